@@ -1,0 +1,70 @@
+// Runs one case of the step benchmark PASSES times over all configurations, for callgrind (count_instructions.py).
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "support/cases.hpp"
+
+#if defined(__GNUC__) && defined(__x86_64__)
+// Valgrind (3.19) does not know the shorter of two encodings of vmovq between registers; this asks for the other.
+asm(".macro vmovq operands:vararg\n {load} vmovq \\operands\n.endm");
+#endif
+
+namespace {
+
+using namespace bench;
+
+template <class Case>
+bool run_ours(int passes) {
+  const auto& solved = Solved<Case::loaded>::instance();
+  auto workspaces = solved.workspaces;
+  ctcr::Solution<3> solution;
+  bool good = solved.all_solved;
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t i = 0; i < solved.configurations.size(); ++i) {
+      const Configuration& c = solved.configurations[i];
+      const auto status = ctcr::step<Case::derivatives>(solved.model, c.joints, c.load, workspaces[i], solution, {});
+      good = good && status == ctcr::Status::ok;
+    }
+  return good;
+}
+
+template <class Case>
+bool run_rival(int passes) {
+  const auto& solved = RivalSolved<Case::loaded>::instance();
+  typename RivalSolved<Case::loaded>::Rival::Solution solution;
+  bool good = solved.agrees();
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t i = 0; i < solved.configurations.size(); ++i) {
+      const Configuration& c = solved.configurations[i];
+      auto unknowns = solved.unknowns[i];
+      solved.rival.template step<Case::rival_outputs>(c.joints, c.load, unknowns, solution);
+      good = good && solution.residual < 1e-9;
+    }
+  return good;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc == 2 && std::strcmp(argv[1], "--about") == 0) {
+#if defined(__AVX2__) && defined(__FMA__)
+    std::puts("g++ " __VERSION__ ", AVX2");
+#else
+    std::puts("g++ " __VERSION__ ", no AVX2");
+#endif
+    return 0;
+  }
+  if (argc != 3) return std::fputs("usage: count_driver --about | CASE PASSES\n", stderr), 2;
+  const int passes = std::atoi(argv[2]);
+  bool found = false, good = false;
+  for_each_case([&](auto row) {
+    using Case = decltype(row);
+    if (argv[1] == std::string(Case::name)) found = true, good = run_ours<Case>(passes);
+    if (argv[1] == "rival/" + std::string(Case::name)) found = true, good = run_rival<Case>(passes);
+  });
+  if (!found) return std::fputs("no such case\n", stderr), 2;
+  if (!good) return std::fputs("a step went wrong\n", stderr), 1;
+  return 0;
+}

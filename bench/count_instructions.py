@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""Instructions of one Newton step, counted by callgrind: a speed that load does not change.
+
+The driver runs all 1000 configurations once and three times over; the difference is two passes of `step()`,
+everything in it counted, set-up cancelled. Compares with instructions.json; exit code 1 when a case grew by
+more than GROWTH, or when nothing could be counted.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+GROWTH = 0.03
+BASELINE = Path(__file__).with_name("instructions.json")
+REQUIRED = {  # instructions per step that must not be exceeded (3 tubes, AVX2)
+    "unloaded": 2000,
+    "unloaded_jacobian": 4500,
+    "loaded": 7000,
+    "loaded_jacobian": 12500,
+    "loaded_jacobian_compliance": 15000,
+}
+CONFIGURATIONS = 1000
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--driver", type=Path, required=True, help="the built count_driver")
+    parser.add_argument("--update", action="store_true", help="write the counts to instructions.json")
+    parser.add_argument("--rival", action="store_true", help="also count the rival's steps (slower)")
+    arguments = parser.parse_args()
+    try:
+        compiler = run([str(arguments.driver), "--about"]).strip()
+        counts = {case: per_step(arguments.driver, case) for case in REQUIRED}
+        rivals = {case: per_step(arguments.driver, f"rival/{case}") for case in REQUIRED if arguments.rival}
+    except (OSError, RuntimeError) as error:
+        print(f"count_instructions: {error}", file=sys.stderr)
+        return 1
+
+    if arguments.update:
+        record = {"compiler": compiler, "instructions_per_step": counts}
+        BASELINE.write_text(json.dumps(record, indent=2) + "\n")
+    baseline = json.loads(BASELINE.read_text()) if BASELINE.exists() else {}
+    comparable = baseline.get("compiler") == compiler
+    recorded = baseline["instructions_per_step"] if comparable else {}
+    print_table(counts, recorded, rivals)
+    if not comparable:
+        print(
+            f"not compared: recorded with {baseline.get('compiler')}, this is {compiler}; --update records it"
+        )
+    grown = [case for case, count in counts.items() if count > (1 + GROWTH) * recorded.get(case, count)]
+    for case in grown:
+        print(f"{case}: {counts[case]} instructions, {recorded[case]} recorded, grew by over {GROWTH:.0%}")
+    return 1 if grown else 0
+
+
+def per_step(driver: Path, case: str) -> int:
+    """Instructions per step [1], mean over the configurations."""
+    once, thrice = (collected(driver, case, passes) for passes in (1, 3))
+    return round((thrice - once) / (2 * CONFIGURATIONS))
+
+
+def collected(driver: Path, case: str, passes: int) -> int:
+    callgrind = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+    found = re.search(r"Collected\s*:\s*(\d+)", run([*callgrind, str(driver), case, str(passes)]))
+    if not found:
+        raise RuntimeError(f"callgrind printed no count for {case}")
+    return int(found.group(1))
+
+
+def run(command: list[str]) -> str:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stderr.strip()}")
+    return done.stdout + done.stderr
+
+
+def print_table(counts: dict[str, int], recorded: dict[str, int], rivals: dict[str, int]) -> None:
+    print("instructions per Newton step, 3 tubes, 1000 random configurations of the Table II robot")
+    header = f"{'':28}{'now':>9}{'recorded':>10}{'change':>9}{'limit':>9}"
+    print(header + (f"{'rival':>9}{'ratio':>8}" if rivals else ""))
+    for case, count in counts.items():
+        old = recorded.get(case)
+        change = f"{count / old - 1:+9.1%}" if old else f"{'-':>9}"
+        row = f"{case:28}{count:9d}{old if old else '-':>10}{change}{REQUIRED[case]:9d}"
+        row += "  over" if count > REQUIRED[case] else ""
+        print(row + (f"{rivals[case]:9d}{rivals[case] / count:8.1f}" if rivals else ""))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

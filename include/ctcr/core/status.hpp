@@ -1,0 +1,29 @@
+#pragma once
+// What a real-time function can answer. Outputs are defined whatever the status.
+#include <cstdint>
+
+namespace ctcr {
+
+enum class [[nodiscard]] Status : std::uint8_t {
+  ok,                   ///< the outputs solve the model to the asked tolerance
+  joints_out_of_order,  ///< an outer tube is grasped behind, or reaches beyond, an inner one; or beta > 0
+  tip_behind_plate,     ///< a tube's tip is behind the front plate
+  not_converged,        ///< iteration limit reached; the outputs are the best iterate
+  singular,             ///< near a bifurcation: the equilibrium is about to snap, derivatives are unbounded
+  not_finite,           ///< an input or a result is NaN or infinite
+};
+
+/// Plain-words name of a status. Real time: yes.
+constexpr const char* to_string(Status status) noexcept {
+  switch (status) {
+    case Status::ok: return "ok";
+    case Status::joints_out_of_order: return "joints out of order";
+    case Status::tip_behind_plate: return "tip behind the plate";
+    case Status::not_converged: return "not converged";
+    case Status::singular: return "singular: near a bifurcation";
+    case Status::not_finite: return "not finite";
+  }
+  return "unknown";
+}
+
+}  // namespace ctcr

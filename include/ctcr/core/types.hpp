@@ -1,0 +1,28 @@
+#pragma once
+// Fixed-size linear algebra shared by all layers. SI units everywhere: m, rad, N, N m, s.
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace ctcr {
+
+template <int N>
+using VecN = Eigen::Matrix<double, N, 1>;
+using Vec3 = Eigen::Vector3d;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat3 = Eigen::Matrix3d;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+
+/// Rigid transform T_a_b: maps coordinates in frame b to frame a, x_a = rotation * x_b + position.
+struct Pose {
+  Mat3 rotation = Mat3::Identity();
+  Vec3 position = Vec3::Zero();
+
+  friend Pose operator*(const Pose& T_a_b, const Pose& T_b_c) noexcept {
+    return {T_a_b.rotation * T_b_c.rotation, T_a_b.rotation * T_b_c.position + T_a_b.position};
+  }
+  [[nodiscard]] Pose inverse() const noexcept {
+    return {rotation.transpose(), -(rotation.transpose() * position)};
+  }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,17 @@
+#pragma once
+// Everything that runs in real time. Needs Eigen alone.
+#include "ctcr/actuation/transmission.hpp"
+#include "ctcr/core/derivatives.hpp"
+#include "ctcr/core/status.hpp"
+#include "ctcr/core/types.hpp"
+#include "ctcr/derivatives/parameters.hpp"
+#include "ctcr/mechanics/model.hpp"
+#include "ctcr/mechanics/solve.hpp"
+#include "ctcr/pipeline/predict.hpp"
+#include "ctcr/pipeline/system.hpp"
+#include "ctcr/robot/joints.hpp"
+#include "ctcr/robot/parameters.hpp"
+#include "ctcr/robot/robot.hpp"
+#include "ctcr/robot/tip_load.hpp"
+#include "ctcr/sensing/pose_sensor.hpp"
+#include "ctcr/sensing/residual.hpp"

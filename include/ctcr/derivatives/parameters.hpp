@@ -1,0 +1,136 @@
+#pragma once
+// Derivatives of a tube tip's pose by everything that the mechanics depends on, by the implicit function theorem:
+// residual b(u, p) = 0 and pose x(u, p) are differentiated along the unknowns u and all p in one set of passes, and
+// eliminating u leaves dx/dp.
+#include <numbers>
+
+#include "ctcr/derivatives/tip_pass.hpp"
+#include "ctcr/robot/parameters.hpp"
+
+namespace ctcr {
+
+/// Derivatives of the pose of one tube's tip. Rows: position [m], rotation [rad], both in base axes, as J.
+template <int N>
+struct TipDerivatives {
+  /// Columns beta_1..N [m], alpha_1..N [rad].
+  Eigen::Matrix<double, 6, 2 * N> by_joints = Eigen::Matrix<double, 6, 2 * N>::Zero();
+  /// Columns as ParameterVector<N>, up to gravity.
+  Eigen::Matrix<double, 6, ParameterVector<N>::robot_count> by_parameters =
+      Eigen::Matrix<double, 6, ParameterVector<N>::robot_count>::Zero();
+};
+
+namespace detail {
+
+/// All derivatives of a tube's tip by the first `variables` variables, the unknowns eliminated.
+template <int N, bool Loaded, bool Gravity, class Stepper>
+class TipSystem {
+ public:
+  using V = TipVariables<N, Loaded, Gravity>;
+
+  TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int variables = V::count) noexcept {
+    for (int pass = 0; pass < V::passes(variables); ++pass)
+      rotation_ = TipPass<N, Loaded, Gravity, Stepper>(robot, at, tube, steps, pass * V::pass_lanes).write(row_);
+    constexpr auto lane = [](int j) constexpr { return j; };
+    det_ = eliminate<V::unknowns>(row_, lane);
+    if constexpr (Loaded) det_ = -det_;  // three rows carry the opposite sign
+  }
+
+  [[nodiscard]] double det() const noexcept { return det_; }
+  /// R_base_tip as integrated.
+  [[nodiscard]] const Mat3& rotation() const noexcept { return rotation_; }
+  [[nodiscard]] Vec6 by(int variable) const noexcept {
+    Vec6 column;
+    for (int k = 0; k < 6; ++k) column[k] = row_[V::unknowns + k][variable];
+    return column;
+  }
+
+ private:
+  typename V::Row row_[V::rows] = {};
+  Mat3 rotation_;
+  double det_;
+};
+
+/// From what the mechanics uses of tube i to what its data sheet says.
+template <int N, class System>
+void put_tube(const System& system, const Tube& t, int i, TipDerivatives<N>& out) noexcept {
+  using V = typename System::V;
+  constexpr double pi = std::numbers::pi;
+  const auto column = [&](Parameter kind) { return out.by_parameters.col(ParameterVector<N>::index(kind, i)); };
+  const double stretch = 1.0 / (1.0 + t.poisson_ratio), outer = t.outer_diameter, inner = t.inner_diameter;
+  const Vec6 by_GJ = system.by(V::kz + i), by_EI = system.by(V::k + i) + by_GJ * stretch;
+  column(Parameter::poisson_ratio) = by_GJ * (-t.GJ() * stretch);
+  column(Parameter::length) = system.by(V::length + i);
+  column(Parameter::curved_length) = system.by(V::curved_length + i);
+  column(Parameter::curvature) = system.by(V::kappa + i);
+  if (t.bending_stiffness > 0) {
+    column(Parameter::bending_stiffness) = by_EI;
+  } else {
+    column(Parameter::youngs_modulus) = by_EI * t.second_moment();
+    column(Parameter::outer_diameter) = by_EI * (t.youngs_modulus * pi / 16 * outer * outer * outer);
+    column(Parameter::inner_diameter) = by_EI * (-t.youngs_modulus * pi / 16 * inner * inner * inner);
+  }
+  if constexpr (V::alpha > V::mass) {
+    const Vec6 by_mass = system.by(V::mass + i);
+    column(Parameter::density) = by_mass * (pi / 4 * (outer * outer - inner * inner));
+    column(Parameter::outer_diameter) += by_mass * (t.density * pi / 2 * outer);
+    column(Parameter::inner_diameter) -= by_mass * (t.density * pi / 2 * inner);
+  }
+}
+
+template <bool Loaded, bool Gravity, class Stepper, int N>
+Status differentiate_tip(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps,
+                         TipDerivatives<N>& out) noexcept {
+  constexpr int gravity = ParameterVector<N>::index(Parameter::gravity);
+  const TipSystem<N, Loaded, Gravity, Stepper> system(robot, at, tube, steps);
+  using V = typename decltype(system)::V;
+  for (int i = 0; i < N; ++i) {
+    out.by_joints.col(i) = system.by(V::beta + i);
+    out.by_joints.col(N + i) = system.by(V::alpha + i);
+    put_tube(system, robot.tubes[std::size_t(i)], i, out);
+  }
+  if constexpr (Gravity) {
+    for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = system.by(V::gravity + j);
+  } else {
+    using General = TipVariables<N, true, true>;
+    Workspace<N> found = at;
+    found.guess.rotation = system.rotation();  // a guess may leave turns open that only weight makes felt
+    const TipSystem<N, true, true, Stepper> weighed(robot, found, tube, steps, General::beta);
+    for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = weighed.by(General::gravity + j);
+  }
+  return system.det() < singular_det ? Status::singular : Status::ok;
+}
+
+}  // namespace detail
+
+/// Exact derivatives, of the discretised model, of the pose of a tube's tip by the joints and by all tube parameters
+/// and gravity, at the configuration that `ws` was last solved for.
+///
+/// bending_stiffness replaces Young's modulus and the diameters where it is given: those of the two that have no effect
+/// get zero columns. Where two breakpoints coincide the derivatives are one-sided. Those by gravity at zero gravity are
+/// of the model with weight, integrated in as many steps.
+/// @param ws        as solve() or step() left it for this model
+/// @param tube      whose tip, 0 is the innermost   @param settings  as given to solve(); its steps are used
+/// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
+///         last two leave zeros. Real time: yes, about N + 1 integrations with eight columns each.
+template <class Stepper = MagnusRk4, int N>
+Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
+                         const Settings& settings = {}) noexcept {
+  const auto run = [&](auto loaded, auto gravity) noexcept {
+    return detail::differentiate_tip<loaded, gravity, Stepper>(model.robot(), ws, tube, settings.steps, out);
+  };
+  Status status = Status::not_converged;
+  if (!ws.warm) {
+    out = {};
+  } else if (!model.robot().gravity.isZero(0.0)) {
+    status = run(std::true_type{}, std::true_type{});
+  } else if (!ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0)) {
+    status = run(std::true_type{}, std::false_type{});
+  } else {
+    status = run(std::false_type{}, std::false_type{});
+  }
+  if (out.by_joints.allFinite() && out.by_parameters.allFinite()) return status;
+  out = {};
+  return Status::not_finite;
+}
+
+}  // namespace ctcr

@@ -1,0 +1,48 @@
+#pragma once
+// Four doubles that are computed together. With GCC or Clang they are one vector (AVX2: one register, SSE2 and NEON:
+// two); any other compiler gets the array below, which computes the same.
+#include <cstddef>
+
+namespace ctcr {
+
+inline constexpr int lane_count = 4;
+
+#if defined(__GNUC__) && !defined(CTCR_SCALAR_LANES)
+#if !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wpsabi"  // lanes never cross a compiled interface
+#endif
+typedef double Lanes __attribute__((vector_size(32)));
+#define CTCR_INLINE inline __attribute__((always_inline))
+#define CTCR_NOINLINE __attribute__((noinline))
+#else
+struct alignas(32) Lanes {
+  double x[lane_count];
+  double& operator[](std::size_t i) { return x[i]; }
+  double operator[](std::size_t i) const { return x[i]; }
+};
+#define CTCR_INLINE inline
+#define CTCR_NOINLINE
+#define CTCR_LANE_OPERATOR(op)                                                                          \
+  CTCR_INLINE Lanes operator op(const Lanes& a, const Lanes& b) noexcept {                              \
+    return {{a.x[0] op b.x[0], a.x[1] op b.x[1], a.x[2] op b.x[2], a.x[3] op b.x[3]}};                  \
+  }                                                                                                     \
+  CTCR_INLINE Lanes operator op(double a, const Lanes& b) noexcept { return Lanes{{a, a, a, a}} op b; } \
+  CTCR_INLINE Lanes operator op(const Lanes& a, double b) noexcept { return a op Lanes{{b, b, b, b}}; } \
+  CTCR_INLINE Lanes& operator op##=(Lanes& a, const Lanes& b) noexcept { return a = a op b; }
+CTCR_LANE_OPERATOR(+)
+CTCR_LANE_OPERATOR(-)
+CTCR_LANE_OPERATOR(*)
+#undef CTCR_LANE_OPERATOR
+CTCR_INLINE Lanes operator-(const Lanes& a) noexcept { return {{-a.x[0], -a.x[1], -a.x[2], -a.x[3]}}; }
+#endif
+
+/// 1 in lane i, 0 elsewhere. Adding x * unit_lane(i) keeps vectors in registers where writing a lane would not.
+CTCR_INLINE Lanes unit_lane(int i) noexcept {
+  constexpr Lanes units[lane_count] = {Lanes{1, 0, 0, 0}, Lanes{0, 1, 0, 0}, Lanes{0, 0, 1, 0}, Lanes{0, 0, 0, 1}};
+  return units[i];
+}
+
+/// Number of lane groups that hold `n` values.
+constexpr int lane_groups(int n) noexcept { return (n + lane_count - 1) / lane_count; }
+
+}  // namespace ctcr

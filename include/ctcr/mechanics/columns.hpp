@@ -1,0 +1,58 @@
+#pragma once
+#include "ctcr/core/derivatives.hpp"
+#include "ctcr/math/lanes.hpp"
+
+namespace ctcr {
+
+/// What loads the robot: each kind has its own, cheapest, equations.
+enum class Loading {
+  none,    ///< moments inside the tubes only
+  force,   ///< tip force: turning the tip about it changes nothing, two unknown turns are left
+  wrench,  ///< tip force and moment: three unknown turns of the tip
+  weight,  ///< the tubes' own weight besides
+};
+
+/// Where each direction of differentiation stands in the lanes of a pass and of the linear system behind it.
+///
+/// A pass integrates: turns of the tip or, for compliance, tip force and moment (6); the angles psi of tubes 2..N at
+/// their tips; and for the Jacobian the positions beta of tubes 2..N. Everything else follows without integration:
+/// alpha, a common shift of all beta, and turns of the tip from forces and moments.
+template <int N, Loading L, Derivatives D>
+struct Columns {
+  static constexpr bool jacobian = D != Derivatives::none;
+  static constexpr bool compliance = D == Derivatives::compliance;
+  static constexpr bool loaded = L != Loading::none;
+  static constexpr bool weight = L == Loading::weight;
+  static_assert(loaded || !compliance, "compliance needs the loaded equations");
+
+  static constexpr int turns = L == Loading::none ? 0 : L == Loading::force ? 2 : 3;
+  static constexpr bool integrates_turns = loaded && (weight || !compliance);
+  static constexpr int force = integrates_turns ? turns : 0;  ///< only with compliance
+  static constexpr int moment = force + 3;
+  static constexpr int psi = force + (compliance ? 6 : 0);      ///< of tube 2
+  static constexpr int beta = psi + N - 1;                      ///< of tube 2
+  static constexpr int newton = beta + (jacobian ? N - 1 : 0);  ///< the residual, solved along with the others
+  static constexpr int groups = lane_groups(newton + 1);
+  static constexpr int first_beta_group = jacobian && N > 1 ? beta / lane_count : groups;
+
+  // The linear system has further lane groups behind those of the pass.
+  static constexpr int alpha = groups * lane_count;  ///< of tube 1; only with the Jacobian
+  static constexpr int common = alpha + N;           ///< all beta together
+  static constexpr int joint_groups = jacobian ? lane_groups(N + 1) : 0;
+  static constexpr int turn = integrates_turns ? 0 : (groups + joint_groups) * lane_count;
+  static constexpr int system_groups = groups + joint_groups + (loaded && !integrates_turns ? 1 : 0);
+
+  static constexpr int unknowns = turns + N - 1;
+  /// Lane of unknown j: turns of the tip, then psi_2..N.
+  static constexpr int unknown(int j) noexcept { return j < turns ? turn + j : psi + j - turns; }
+
+  /// Number of tubes that must be near for lane group g to differ from zero: 1 from the robot tip on, N + 1 never.
+  static constexpr int starts_with(int g) noexcept {
+    if (g * lane_count < psi) return 1;
+    for (int tube = 1; tube < N; ++tube)
+      if ((psi + tube - 1) / lane_count == g || (jacobian && (beta + tube - 1) / lane_count == g)) return tube + 1;
+    return N + 1;
+  }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,368 @@
+#pragma once
+// One integration of the rod from its tip to the front plate.
+//
+// Shooting starts at the tip because every guess is then an exact equilibrium: of the same robot with other base angles
+// and a turned load. Newton's method walks through equilibria only, and derivatives by base angles cost nothing.
+#include "ctcr/mechanics/events.hpp"
+#include "ctcr/mechanics/replay.hpp"
+#include "ctcr/mechanics/steppers.hpp"
+
+namespace ctcr {
+
+/// Everything carried along the rod: given at the tip, found at the front plate. Body vectors in the Bishop frame,
+/// which at the tip is tube 1's material frame.
+template <class S, int N>
+struct RobotState {
+  std::array<S, N> psi, w;  ///< angle [rad] and twist rate [rad/m] of each tube; before its tip: what they are there
+  std::array<S, 2> m;       ///< bending moment, x and y [N m]
+  std::array<S, 3> n;       ///< force [N]
+  std::array<S, 3> g;       ///< gravity [m/s^2]
+};
+
+/// Rates at the front plate.
+template <class S, int N>
+struct BaseRates {
+  std::array<S, N> F;  ///< w' [rad/m^2]
+  std::array<S, 2> u;  ///< curvature of the centreline [1/m]
+};
+
+/// The tips of tubes 2..N, as seen from the robot tip: a Bishop frame and the tube's angle in it.
+template <int N>
+struct TubeTips {
+  std::array<Frame<double>, N - 1> frame;
+  std::array<double, N - 1> psi;
+};
+
+/// Observer that records nothing.
+struct NoRecord {
+  template <class... A>
+  void operator()(const A&...) const noexcept {}
+};
+
+/// Tubes of the current segment.
+template <int N>
+struct SegmentTubes {
+  int present = 0;   ///< tubes 1..present
+  int near = 0;      ///< tubes present or beginning at the far end of the segment
+  int curved_count = 0, straight_count = 0;
+  std::array<int, N> curved{}, straight{};
+
+  CTCR_INLINE void add(int tube, bool is_curved) noexcept {
+    present = tube + 1;
+    if (is_curved)
+      curved[std::size_t(curved_count++)] = tube;
+    else
+      straight[std::size_t(straight_count++)] = tube;
+  }
+  CTCR_INLINE void straighten(int tube) noexcept {
+    int kept = 0;
+    for (int i = 0; i < curved_count; ++i) {
+      curved[std::size_t(kept)] = curved[std::size_t(i)];
+      kept += curved[std::size_t(i)] != tube;
+    }
+    curved_count = kept;
+    straight[std::size_t(straight_count++)] = tube;
+  }
+};
+
+/// Integrates the rod for scalars S (state), P (robot parameters) and H (segment lengths).
+/// @tparam Col  the columns that S differentiates along (columns.hpp)
+template <int N, class S, class P, class H, bool Loaded, bool Gravity, class Stepper, class Col>
+class Shooting {
+ public:
+  using State = RobotState<S, N>;
+
+  /// Integrates from the tip to s = 0.
+  /// @param place   H place(event, s): arc length of an event with its derivatives [m]
+  /// @param steps   integration steps per segment, >= 1
+  /// @param y       in: state at the tip; out: at the front plate
+  /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
+  /// @param record  record(s, tubes, state, frame, u) at both ends of every step
+  /// @return tubes of the last segment
+  /// Real time: yes (2N segments, `steps` steps each).
+  template <class Place, class Record = NoRecord>
+  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const Place& place,
+                                         int steps, State& y, Frame<S>& frame, TubeTips<N>& tips,
+                                         const Record& record = {}) noexcept {
+    SegmentTubes<N> tubes;
+    set_identity(frame);
+    H here = place(events.id[0], events.s[0]);
+    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || tubes.present < N); ++e) {
+      const int id = events.id[e];
+      if (id < N) {
+        tubes.add(id, c.curved[std::size_t(id)]);
+        if (id > 0) {
+          tips.frame[std::size_t(id - 1)] = frame;
+          tips.psi[std::size_t(id - 1)] = value(y.psi[std::size_t(id)]);
+        }
+      } else {
+        tubes.straighten(id - N);
+      }
+      const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
+      const H next = last ? H{} : place(events.id[e + 1], events.s[e + 1]);
+      tubes.near = tubes.present + (!last && events.id[e + 1] < N);
+      advance(c, tubes, next - here, events.s[e], steps, y, frame, record);
+      here = next;
+    }
+    return tubes;
+  }
+
+  /// Integrates over `h` from `s`, inside the segment of `tubes`, in `steps` steps. Real time: yes.
+  template <class Record, int NC = 0>
+  static CTCR_INLINE void advance(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s,
+                                  int steps, State& y, Frame<S>& frame, const Record& record) noexcept {
+    if constexpr (NC < N) {
+      if (tubes.curved_count != NC) return advance<Record, NC + 1>(c, tubes, h, s, steps, y, frame, record);
+    }
+    advance_curved<NC>(c, tubes, h, s, steps, y, frame, record);
+  }
+
+  /// Rates of the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
+  template <int NC = 0>
+  static CTCR_INLINE BaseRates<double, N> rates(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
+                                                const State& y) noexcept {
+    if constexpr (NC < N) {
+      if (tubes.curved_count != NC) return rates<NC + 1>(c, tubes, y);
+    }
+    BaseRates<double, N> base{};
+    if constexpr (NC > 0 || Loaded) {
+      RodSection<double, double, NC> r;
+      RodRates<double, NC> k;
+      std::array<double, NC> psi;
+      std::array<double, 2> m{};
+      r.compliance = value(c.compliance[std::size_t(tubes.present - 1)]);
+      for (std::size_t i = 0; i < NC; ++i) {
+        const auto t = std::size_t(tubes.curved[i]);
+        r.a[i] = value(c.a[t]), r.rho[i] = value(c.rho[t]), psi[i] = value(y.psi[t]);
+      }
+      if constexpr (Loaded) m = {value(y.m[0]), value(y.m[1])};
+      curvature<Loaded>(r, psi, m, k);
+      base.u = k.u;
+      if constexpr (Loaded || NC > 1)
+        for (std::size_t i = 0; i < NC; ++i) base.F[std::size_t(tubes.curved[i])] = k.F[i];
+    }
+    return base;
+  }
+
+ private:
+  static constexpr bool replayed = is_dual<S> && !is_dual<P> && Stepper::replayed;
+  static constexpr TangentOf of =
+      Col::jacobian ? TangentOf::frame : (Loaded ? TangentOf::rotation : TangentOf::nothing);
+
+  static CTCR_INLINE void set_identity(Frame<S>& frame) noexcept {
+    static_cast<Frame<double>&>(frame) = Frame<double>{};
+    if constexpr (is_dual<S>)
+      for (int i = 0; i < 3; ++i)
+        for (std::size_t g = 0; g < std::size_t(groups_of<S>); ++g) {
+          if constexpr (of != TangentOf::nothing) frame.rotation_twist[i][g] = Lanes{};
+          if constexpr (of == TangentOf::frame) frame.translation_twist[i][g] = Lanes{};
+        }
+  }
+
+  template <int NC>
+  static CTCR_INLINE RodSection<S, P, NC> section(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
+                                                  const State& y) noexcept {
+    RodSection<S, P, NC> r;
+    const auto last = std::size_t(tubes.present - 1);
+    r.compliance = c.compliance[last];
+    if constexpr (Gravity) r.weight = c.weight[last];
+    for (std::size_t i = 0; i < NC; ++i) {
+      const auto t = std::size_t(tubes.curved[i]);
+      r.a[i] = c.a[t];
+      r.rho[i] = c.rho[t];
+      r.kz[i] = c.kz[t];
+    }
+    if constexpr (Loaded) {
+      r.straight_mz = 0.0;
+      for (int i = 0; i < tubes.straight_count; ++i) {
+        const auto t = std::size_t(tubes.straight[std::size_t(i)]);
+        r.straight_mz = r.straight_mz + c.kz[t] * y.w[t];
+      }
+    }
+    return r;
+  }
+
+  template <int NC>
+  static CTCR_INLINE RodState<S, NC> gather(const SegmentTubes<N>& tubes, const State& y) noexcept {
+    RodState<S, NC> z;
+    for (std::size_t i = 0; i < NC; ++i) {
+      z.psi[i] = y.psi[std::size_t(tubes.curved[i])];
+      z.w[i] = y.w[std::size_t(tubes.curved[i])];
+    }
+    if constexpr (Loaded) z.m = y.m, z.n = y.n;
+    if constexpr (Gravity) z.g = y.g;
+    return z;
+  }
+
+  template <int NC, class Record>
+  static void advance_curved(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s, int steps,
+                             State& y, Frame<S>& frame, const Record& record) noexcept {
+    const H k = steps == 1 ? h : (1.0 / steps) * h;
+    if constexpr (replayed && (Loaded || NC > 0)) {
+      for (int i = 0; i < steps; ++i) replay_step<NC>(c, tubes, k, y, frame);
+    } else {
+      const auto observe = [&] {
+        if constexpr (!std::is_same_v<Record, NoRecord>) record(s, tubes, y, frame, rates<NC>(c, tubes, y).u);
+      };
+      for (int i = 0; i < steps; ++i) {
+        observe();
+        direct_step<NC>(c, tubes, k, y, frame);
+        s += value(k);
+      }
+      observe();
+    }
+  }
+
+  /// A step of values and tangents together.
+  template <int NC>
+  static CTCR_INLINE void direct_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& k, State& y,
+                                      Frame<S>& frame) noexcept {
+    RodState<S, NC> z = gather<NC>(tubes, y);
+    if constexpr (Loaded)
+      Stepper::template loaded<Gravity>(section<NC>(c, tubes, y), z, frame, k);
+    else if constexpr (NC > 0)
+      Stepper::unloaded(section<NC>(c, tubes, y), z, frame, k);
+    else
+      move_straight(frame, k);
+    for (int j = 0; j < tubes.straight_count; ++j) {
+      const auto t = std::size_t(tubes.straight[std::size_t(j)]);
+      y.psi[t] = y.psi[t] + k * y.w[t];
+    }
+    for (std::size_t j = 0; j < NC; ++j) {
+      y.psi[std::size_t(tubes.curved[j])] = z.psi[j];
+      y.w[std::size_t(tubes.curved[j])] = z.w[j];
+    }
+    if constexpr (Loaded) y.m = z.m, y.n = z.n;
+    if constexpr (Gravity) y.g = z.g;
+  }
+
+  /// The taped form of a step: values first, then four columns at a time.
+  template <int NC>
+  static CTCR_INLINE void replay_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, State& y,
+                                      Frame<S>& frame) noexcept {
+    RodSection<double, double, NC> r;
+    const auto last = std::size_t(tubes.present - 1);
+    r.compliance = c.compliance[last];
+    if constexpr (Gravity) r.weight = c.weight[last];
+    RodState<double, NC> z;
+    for (std::size_t i = 0; i < NC; ++i) {
+      const auto t = std::size_t(tubes.curved[i]);
+      r.a[i] = c.a[t], r.rho[i] = c.rho[t], r.kz[i] = c.kz[t];
+      z.psi[i] = y.psi[t].v, z.w[i] = y.w[t].v;
+    }
+    const double k = value(h);
+    r.straight_mz = 0.0;
+    for (int i = 0; i < tubes.straight_count; ++i) {
+      const auto t = std::size_t(tubes.straight[std::size_t(i)]);
+      r.straight_mz += c.kz[t] * y.w[t].v;
+    }
+    Stage<Loaded, Gravity, NC> stages[Loaded ? 4 : 3];
+    Exponential step;
+    TapedFrame<of> taped{frame, step};
+    const auto tape = [&](int i, const RodState<double, NC>& state, const RodRates<double, NC>& rates) {
+      stages[i].keep(state, rates);
+    };
+    std::array<double, 2> u_mid, u_end;
+    if constexpr (Loaded) {
+      for (std::size_t i = 0; i < 2; ++i) z.m[i] = y.m[i].v;
+      for (std::size_t i = 0; i < 3; ++i) z.n[i] = y.n[i].v;
+      if constexpr (Gravity)
+        for (std::size_t i = 0; i < 3; ++i) z.g[i] = y.g[i].v;
+      Stepper::template loaded<Gravity>(r, z, taped, k, tape);
+      for (std::size_t i = 0; i < 2; ++i) u_mid[i] = 0.5 * (stages[1].u[i] + stages[2].u[i]);
+      u_end = stages[3].u;
+      for (std::size_t i = 0; i < 2; ++i) y.m[i].v = z.m[i];
+      for (std::size_t i = 0; i < 3; ++i) y.n[i].v = z.n[i];
+      if constexpr (Gravity)
+        for (std::size_t i = 0; i < 3; ++i) y.g[i].v = z.g[i];
+    } else {
+      Stepper::unloaded(r, z, taped, k, tape);
+      u_mid = stages[1].u;
+      u_end = stages[2].u;
+    }
+    [&]<std::size_t... I>(std::index_sequence<I...>) {
+      (replay_if_started<int(I)>(c, r, tubes, stages, step, u_mid, u_end, h, y, frame), ...);
+    }(std::make_index_sequence<std::size_t(groups_of<S>)>{});
+    for (int i = 0; i < tubes.straight_count; ++i) {
+      const auto t = std::size_t(tubes.straight[std::size_t(i)]);
+      y.psi[t].v += k * y.w[t].v;
+    }
+    for (std::size_t i = 0; i < NC; ++i) {
+      y.psi[std::size_t(tubes.curved[i])].v = z.psi[i];
+      y.w[std::size_t(tubes.curved[i])].v = z.w[i];
+    }
+  }
+
+  template <int g, class... A>
+  static CTCR_INLINE void replay_if_started(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
+                                            A&... rest) noexcept {
+    constexpr int first = Col::starts_with(g);
+    if constexpr (first <= N)
+      if (first == 1 || tubes.near >= first) replay_group<g>(c, r, tubes, rest...);
+  }
+
+  template <int g, int NC>
+  static CTCR_INLINE void replay_group(const Coefficients<N, P>& c, const RodSection<double, double, NC>& r,
+                                       const SegmentTubes<N>& tubes, const Stage<Loaded, Gravity, NC> (&stages)[Loaded ? 4 : 3],
+                                       const Exponential& step, const std::array<double, 2>& u_mid,
+                                       const std::array<double, 2>& u_end, const H& h, State& y,
+                                       Frame<S>& frame) noexcept {
+    constexpr int G = groups_of<S>;
+    constexpr bool Dk = has_length_tangent<H, g>;
+    using R = Replay<Loaded, Gravity, Dk, NC>;
+    const double k = value(h);
+    const Lanes dk = length_tangent<G>(h, g);
+    GroupState<NC> z;
+    Lanes mz{};
+    for (int i = 0; i < tubes.straight_count; ++i) {
+      const auto t = std::size_t(tubes.straight[std::size_t(i)]);
+      const Lanes w = y.w[t].d[g];
+      if constexpr (Loaded) mz += c.kz[t] * w;
+      y.psi[t].d[g] += k * w;
+      if constexpr (Dk) y.psi[t].d[g] += y.w[t].v * dk;
+    }
+    for (std::size_t j = 0; j < NC; ++j) {
+      z.psi[j] = y.psi[std::size_t(tubes.curved[j])].d[g];
+      z.w[j] = y.w[std::size_t(tubes.curved[j])].d[g];
+    }
+    typename R::Curvature u[3];
+    if constexpr (Loaded) {
+      for (std::size_t i = 0; i < 2; ++i) z.m[i] = y.m[i].d[g];
+      for (std::size_t i = 0; i < 3; ++i) z.n[i] = y.n[i].d[g];
+      if constexpr (Gravity)
+        for (std::size_t i = 0; i < 3; ++i) z.g[i] = y.g[i].d[g];
+      R::loaded(r, stages, k, dk, mz, z, u);
+      for (std::size_t i = 0; i < 2; ++i) y.m[i].d[g] = z.m[i];
+      for (std::size_t i = 0; i < 3; ++i) y.n[i].d[g] = z.n[i];
+      if constexpr (Gravity)
+        for (std::size_t i = 0; i < 3; ++i) y.g[i].d[g] = z.g[i];
+    } else {
+      R::unloaded(r, stages, k, dk, z, u);
+    }
+    for (std::size_t j = 0; j < NC; ++j) {
+      y.psi[std::size_t(tubes.curved[j])].d[g] = z.psi[j];
+      y.w[std::size_t(tubes.curved[j])].d[g] = z.w[j];
+    }
+    if constexpr (of != TangentOf::nothing)
+      R::template frame<of>(step, stages[0].u, u_mid, u_end, k, dk, u, &frame.rotation_twist[0][g],
+                                               &frame.translation_twist[0][g], std::size_t(G));
+  }
+
+  static CTCR_INLINE void move_straight(Frame<S>& g, const H& k) noexcept {
+    g.p += g.z * value(k);
+    if constexpr (is_dual<S>) {
+      constexpr int G = int(sizeof(g.rotation_twist[0]) / sizeof(Lanes));
+      for (int i = 0; i < G; ++i) {
+        if constexpr (!Col::jacobian) break;
+        g.translation_twist[0][i] += g.rotation_twist[1][i] * value(k);
+        g.translation_twist[1][i] = g.translation_twist[1][i] - g.rotation_twist[0][i] * value(k);
+        if constexpr (!std::is_same_v<H, double>) {
+          constexpr int first = G - int(sizeof(k.d) / sizeof(Lanes));
+          if (i >= first) g.translation_twist[2][i] += k.d[i - first];
+        }
+      }
+    }
+  }
+};
+
+}  // namespace ctcr

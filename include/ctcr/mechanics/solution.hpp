@@ -1,0 +1,52 @@
+#pragma once
+#include <array>
+#include <limits>
+
+#include "ctcr/core/status.hpp"
+#include "ctcr/core/types.hpp"
+#include "ctcr/mechanics/evaluation.hpp"
+
+namespace ctcr {
+
+struct Settings {
+  int max_iterations = 50;   ///< evaluations allowed to each attempt of a solve
+  double tolerance = 1e-10;  ///< on ||b|| [rad]
+  int steps = 1;             ///< integration steps per segment, >= 1
+};
+
+/// The answer of a solve or a step. Every field is defined whatever the status.
+template <int N>
+struct Solution {
+  Status status = Status::not_converged;
+  int iterations = 0;                                          ///< evaluations used
+  double residual = std::numeric_limits<double>::infinity();  ///< ||b|| [rad]
+  double stability = 0;  ///< det B_u: 1 without interaction between tubes or load, 0 where the robot snaps or buckles
+
+  Vec3 position = Vec3::Zero();      ///< tip, base frame [m]
+  Mat3 rotation = Mat3::Identity();  ///< R_base_tip: material frame of tube 1 at its tip
+  std::array<Pose, N> tube_tips{};   ///< T_base_tip of each tube, material frame
+
+  /// J: rows tip velocity [m], angular velocity [rad], base frame; columns beta_1..N [m], alpha_1..N [rad].
+  Eigen::Matrix<double, 6, 2 * N> jacobian = Eigen::Matrix<double, 6, 2 * N>::Zero();
+  /// C: rows as J; columns tip force [N], tip moment [N m], base frame.
+  Mat6 compliance = Mat6::Zero();
+
+  [[nodiscard]] Pose pose() const noexcept { return {rotation, position}; }
+};
+
+/// Scratch and warm start of one thread. Reused from call to call; nothing is allocated.
+template <int N>
+struct Workspace {
+  TipGuess<N> guess;
+  Joints<N> q;   ///< joints and load that the guess belongs to
+  TipLoad load;
+  bool warm = false;           ///< whether the guess may be used
+  bool knows_joints = false;   ///< whether the change of the guess with the joints is known
+  bool knows_load = false;     ///< and with the load
+  /// Change of the unknowns (turn of the tip in base axes, psi_2..N) by beta, alpha, force, moment.
+  Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
+
+  void reset() noexcept { warm = knows_joints = knows_load = false; }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,67 @@
+// Random robots from no knowledge at all: converged or said so, and never farther out than the robot is long.
+#include <gtest/gtest.h>
+
+#include "support/laws.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::Random;
+
+template <int N>
+struct Outcome {
+  int ok = 0, singular = 0, others = 0;
+
+  void add(const Robot<N>& robot, const Joints<N>& q, const TipLoad& load) {
+    Workspace<N> ws;
+    Solution<N> s;
+    const Status status = solve<Derivatives::none>(Model<N>(robot), q, load, ws, s);
+    EXPECT_EQ(s.status, status);
+    ok += status == Status::ok;
+    singular += status == Status::singular;
+    others += status != Status::ok && status != Status::singular;
+    if (status == Status::ok) {
+      EXPECT_LT(s.residual, 1e-10);
+      EXPECT_GT(s.stability, 0) << "an unstable equilibrium is no answer";
+    }
+    const double deployed = robot.tubes[0].length + q.beta[0];
+    EXPECT_LE(s.position.norm(), deployed + 1e-12);
+    for (std::size_t i = 0; i < N; ++i) {
+      EXPECT_LE(s.tube_tips[i].position.norm(), robot.tubes[i].length + q.beta[Eigen::Index(i)] + 1e-12);
+      EXPECT_LT((s.tube_tips[i].rotation.transpose() * s.tube_tips[i].rotation - Mat3::Identity()).norm(), 1e-12);
+    }
+    EXPECT_LT((s.rotation.transpose() * s.rotation - Mat3::Identity()).norm(), 1e-12);
+    EXPECT_LT((s.tube_tips[0].position - s.position).norm(), 1e-12);
+  }
+};
+
+TEST(ColdStart, PaperRobotUnderTipForce) {
+  Random random(51);
+  const Robot<3> robot = test::paper_robot();
+  Outcome<3> outcome;
+  const int cases = test::cases(2000);
+  for (int n = 0; n < cases; ++n)
+    outcome.add(robot, test::random_joints(robot, random), test::random_load(random, 0.3));
+  EXPECT_LE(outcome.singular + outcome.others, 2 + cases / 1000);
+}
+
+template <class T>
+struct ColdStarts : testing::Test {};
+TYPED_TEST_SUITE(ColdStarts, test::TubeCounts);
+
+TYPED_TEST(ColdStarts, RandomRobots) {
+  constexpr int N = TypeParam::N;
+  Random random(52);
+  Outcome<N> outcome;
+  const int cases = test::cases(300);
+  for (int n = 0; n < cases; ++n) {
+    Robot<N> robot = test::random_robot<N>(random);
+    if (n % 3 == 1) robot.gravity = test::tilted_gravity;
+    const Joints<N> q = test::random_joints(robot, random, 0.1);
+    outcome.add(robot, q, n % 3 == 0 ? TipLoad{} : test::random_load(random, 0.2, 0.005));
+  }
+  EXPECT_LE(outcome.others, 1 + cases / 100) << outcome.singular << " singular";
+}
+
+}  // namespace
+}  // namespace ctcr

@@ -1,0 +1,126 @@
+// J and C are derivatives of the pose that solve() returns: held against differences of that pose.
+#include <gtest/gtest.h>
+
+#include "support/laws.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::Random;
+constexpr int fine = 16;
+
+template <class T>
+struct TipDerivative : testing::Test {};
+TYPED_TEST_SUITE(TipDerivative, test::TubeCounts);
+
+/// Solves near a solution, from its warm start, more tightly than any difference can feel.
+template <int N>
+class Nearby {
+ public:
+  explicit Nearby(const test::Case<N>& c) : model_(c.robot), c_(c) { pose(c.q, c.load); }
+
+  Pose pose(const Joints<N>& q, const TipLoad& load) {
+    Workspace<N> ws = ws_;
+    Solution<N> solution;
+    (void)solve<Derivatives::none>(model_, q, load, ws, solution, {.tolerance = 1e-13, .steps = fine});
+    EXPECT_LT(solution.residual, 1e-11);
+    if (!ws_.warm) ws_ = ws;
+    return solution.pose();
+  }
+  /// d pose / d joint `column`, columns as in J.
+  Vec6 by_joint(int column) {
+    return test::slope(
+        [&](double t) {
+          Joints<N> q = c_.q;
+          (column < N ? q.beta[column] : q.alpha[column - N]) += t;
+          return pose(q, c_.load);
+        },
+        column < N ? 1e-4 : 1e-3);
+  }
+  /// d pose / d load `column`, columns as in C.
+  Vec6 by_load(int column) {
+    return test::slope(
+        [&](double t) {
+          TipLoad load = c_.load;
+          (column < 3 ? load.force[column] : load.moment[column - 3]) += t;
+          return pose(c_.q, load);
+        },
+        column < 3 ? 1e-3 : 1e-4);
+  }
+
+ private:
+  Model<N> model_;
+  test::Case<N> c_;
+  Workspace<N> ws_;
+};
+
+template <int N>
+void expect_jacobian(const test::Case<N>& c, const Solution<N>& solution) {
+  Nearby<N> near(c);
+  Eigen::Matrix<double, 6, 2 * N> J;
+  for (int j = 0; j < 2 * N; ++j) J.col(j) = near.by_joint(j);
+  EXPECT_LT((solution.jacobian - J).cwiseAbs().maxCoeff(), 1e-6 * J.cwiseAbs().maxCoeff());
+}
+
+template <int N>
+void expect_compliance(const test::Case<N>& c, const Solution<N>& solution) {
+  Nearby<N> near(c);
+  Mat6 C;
+  for (int j = 0; j < 6; ++j) C.col(j) = near.by_load(j);
+  // Moments move the tip far more per unit than forces: each column against its own size.
+  for (int j = 0; j < 6; ++j)
+    EXPECT_LT((solution.compliance - C).col(j).cwiseAbs().maxCoeff(), 1e-6 * C.col(j).cwiseAbs().maxCoeff());
+}
+
+template <int N>
+void expect_derivatives(double max_force, double max_moment, const Vec3& gravity, unsigned seed) {
+  Random random(seed);
+  for (int n = 0; n < test::cases(8); ++n) {
+    const test::Case<N> c = test::smooth_case<N>(random, max_force, max_moment, gravity);
+    const Solution<N> with_J = test::solved<Derivatives::jacobian>(c.robot, c.q, c.load, fine);
+    const Solution<N> with_C = test::solved<Derivatives::compliance>(c.robot, c.q, c.load, fine);
+    expect_jacobian(c, with_J);
+    EXPECT_LT((with_J.jacobian - with_C.jacobian).norm(), 1e-7 * with_J.jacobian.norm());
+    if (max_force > 0 || !gravity.isZero()) expect_compliance(c, with_C);
+  }
+}
+
+TYPED_TEST(TipDerivative, Unloaded) { expect_derivatives<TypeParam::N>(0, 0, Vec3::Zero(), 21); }
+TYPED_TEST(TipDerivative, UnderForce) { expect_derivatives<TypeParam::N>(0.3, 0, Vec3::Zero(), 22); }
+TYPED_TEST(TipDerivative, UnderForceAndMoment) { expect_derivatives<TypeParam::N>(0.3, 0.01, Vec3::Zero(), 23); }
+TYPED_TEST(TipDerivative, UnderWeight) { expect_derivatives<TypeParam::N>(0, 0, test::tilted_gravity, 24); }
+TYPED_TEST(TipDerivative, UnderWeightForceAndMoment) {
+  expect_derivatives<TypeParam::N>(0.3, 0.01, test::tilted_gravity, 25);
+}
+
+TYPED_TEST(TipDerivative, ComplianceOfAnUnloadedRobot) {
+  constexpr int N = TypeParam::N;
+  Random random(26);
+  for (int n = 0; n < test::cases(8); ++n) {
+    const test::Case<N> c = test::smooth_case<N>(random, 0, 0, Vec3::Zero());
+    Nearby<N> near(c);
+    const Solution<N> solution = test::solved<Derivatives::compliance>(c.robot, c.q, {}, fine);
+    // Differences cross from force to force through the unloaded path, which integrates more exactly.
+    for (int j = 0; j < 6; ++j) {
+      const Vec6 slope = near.by_load(j);
+      EXPECT_LT((solution.compliance.col(j) - slope).norm(), 1e-4 * slope.norm());
+    }
+  }
+}
+
+TYPED_TEST(TipDerivative, ComplianceIsSymmetricWhereTheLoadsHaveAPotential) {
+  constexpr int N = TypeParam::N;
+  Random random(27);
+  for (int n = 0; n < test::cases(20); ++n) {
+    const bool weight = n % 2 == 1;
+    const test::Case<N> c = test::smooth_case<N>(random, 0.3, 0, weight ? test::tilted_gravity : Vec3(0, 0, 0));
+    const Mat6 C = test::solved<Derivatives::compliance>(c.robot, c.q, c.load, 64).compliance;
+    const auto asymmetry = [](const auto& M) { return (M - M.transpose()).norm() / M.norm(); };
+    EXPECT_LT(asymmetry(C.topLeftCorner<3, 3>()), 1e-6);
+    // A moment of constant direction has no potential, but at zero moment its work is symmetric, too.
+    EXPECT_LT(asymmetry(C), 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace ctcr

@@ -1,0 +1,107 @@
+// Every input gets a Status, and whatever the status all outputs are defined.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "support/laws.hpp"
+
+namespace ctcr {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+constexpr Derivatives all = Derivatives::compliance;
+
+const Robot<3> robot = test::paper_robot();
+const Joints<3> good{{-0.3, -0.2, -0.1}, {0.1, 1.2, -2.3}};
+const TipLoad weight{{0, -0.1, 0}, {}};
+
+bool finite(const Solution<3>& s) {
+  bool tips = true;
+  for (const Pose& tip : s.tube_tips) tips = tips && tip.position.allFinite() && tip.rotation.allFinite();
+  return tips && s.position.allFinite() && s.rotation.allFinite() && s.jacobian.allFinite() && s.compliance.allFinite() &&
+         std::isfinite(s.stability);
+}
+
+/// Refused by solve() and step(), cold and warm, and the next good call is not disturbed.
+void expect_refused(const Joints<3>& q, const TipLoad& load, Status expected) {
+  const Model<3> model(robot);
+  for (const bool warm : {false, true}) {
+    Workspace<3> ws;
+    Solution<3> s;
+    const Solution<3> before = test::solved<all>(robot, good, weight);
+    if (warm) (void)solve<all>(model, good, weight, ws, s);
+    EXPECT_EQ(solve<all>(model, q, load, ws, s), expected);
+    EXPECT_EQ(s.status, expected);
+    EXPECT_TRUE(finite(s));
+    EXPECT_TRUE(s.position.isZero(0) && s.rotation.isIdentity(0) && s.jacobian.isZero(0) && s.compliance.isZero(0));
+    EXPECT_EQ(s.iterations, 0);
+    EXPECT_EQ(step<all>(model, q, load, ws, s), expected);
+    EXPECT_EQ(solve<all>(model, good, weight, ws, s), Status::ok);
+    EXPECT_LT((s.position - before.position).norm(), 1e-10);
+  }
+}
+
+TEST(InvalidInput, JointsAndLoads) {
+  for (const double bad : {nan, infinity, -infinity}) {
+    Joints<3> q = good;
+    q.alpha[1] = bad;
+    expect_refused(q, weight, Status::not_finite);
+    q = good;
+    q.beta[0] = bad;
+    expect_refused(q, weight, Status::not_finite);
+    expect_refused(good, {{0, bad, 0}, {}}, Status::not_finite);
+    expect_refused(good, {{}, {bad, 0, 0}}, Status::not_finite);
+  }
+  expect_refused({{-0.19, -0.2, -0.1}, {}}, weight, Status::joints_out_of_order);
+  expect_refused({{-0.34, -0.2, -0.1}, {}}, weight, Status::joints_out_of_order);
+  expect_refused({{-0.3, -0.2, -0.1995}, {}}, weight, Status::tip_behind_plate);
+}
+
+TEST(InvalidInput, RobotOfNonsense) {
+  const auto expect_not_ok = [](const Robot<3>& nonsense) {
+    Workspace<3> ws;
+    Solution<3> s;
+    const Status status = solve<all>(Model<3>(nonsense), good, weight, ws, s);
+    EXPECT_NE(status, Status::ok);
+    EXPECT_EQ(s.status, status);
+    EXPECT_TRUE(finite(s)) << to_string(status);
+  };
+  Robot<3> nonsense = robot;
+  nonsense.tubes[1].curvature = nan;
+  expect_not_ok(nonsense);
+  nonsense = robot;
+  nonsense.tubes[0].youngs_modulus = nan;
+  expect_not_ok(nonsense);
+  nonsense = robot;
+  nonsense.gravity = Vec3(0, nan, 0);
+  expect_not_ok(nonsense);
+  nonsense = robot;
+  nonsense.tubes[2].length = nan;
+  expect_not_ok(nonsense);
+}
+
+TEST(InvalidInput, LoadsBeyondAllReason) {
+  test::Random random(1);
+  for (int n = 0; n < test::cases(30); ++n) {
+    Workspace<3> ws;
+    Solution<3> s;
+    const Joints<3> q = test::random_joints(robot, random);
+    const TipLoad load = test::random_load(random, n % 2 == 0 ? 1e3 : 1e200, 1);
+    const Status status = solve<all>(Model<3>(robot), q, load, ws, s);
+    EXPECT_EQ(s.status, status);
+    EXPECT_TRUE(finite(s)) << to_string(status);
+    EXPECT_TRUE(status != Status::ok || s.residual < 1e-10);
+  }
+}
+
+TEST(InvalidInput, TooFewIterationsAreReported) {
+  Workspace<3> ws;
+  Solution<3> s;
+  const Status status = solve<all>(Model<3>(robot), good, {{0, -0.3, 0}, {}}, ws, s, {.max_iterations = 1});
+  EXPECT_EQ(status, Status::not_converged);
+  EXPECT_GT(s.residual, 1e-10);
+  EXPECT_TRUE(finite(s));
+}
+
+}  // namespace
+}  // namespace ctcr

@@ -1,0 +1,162 @@
+// Where a solve starts from must not show in its answer, and one evaluation from a near start is enough.
+#include <gtest/gtest.h>
+
+#include "support/laws.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::Random, test::uniform;
+
+template <int N>
+struct Move {
+  Joints<N> q;
+  TipLoad load;
+};
+
+template <int N>
+Move<N> nearby(const test::Case<N>& c, Random& random, double translation, double rotation, double force) {
+  Move<N> move{c.q, c.load};
+  for (int i = 0; i < N; ++i) {
+    move.q.beta[i] += uniform(random, -translation, translation);
+    move.q.alpha[i] += uniform(random, -rotation, rotation);
+  }
+  move.load.force += test::random_vector(random, force);
+  return move;
+}
+
+template <class T>
+struct WarmStart : testing::Test {};
+TYPED_TEST_SUITE(WarmStart, test::TubeCounts);
+
+template <Derivatives D, int N>
+void expect_warm_equals_cold(double max_force, const Vec3& gravity) {
+  Random random(61);
+  for (int n = 0; n < test::cases(30); ++n) {
+    const test::Case<N> c = test::smooth_case<N>(random, max_force, 0, gravity);
+    const Move<N> move = nearby(c, random, 5e-4, 0.05, max_force * 0.1);
+    const Model<N> model(c.robot);
+    Workspace<N> ws;
+    Solution<N> warm;
+    ASSERT_EQ(solve<D>(model, c.q, c.load, ws, warm), Status::ok);
+    const int cold_evaluations = warm.iterations;
+    ASSERT_EQ(solve<D>(model, move.q, move.load, ws, warm), Status::ok);
+    const Solution<N> cold = test::solved<D>(c.robot, move.q, move.load);
+    EXPECT_LT(test::difference(cold.pose(), warm.pose()).norm(), 1e-9);
+    EXPECT_LT((cold.jacobian - warm.jacobian).norm(), 1e-7 * (1 + cold.jacobian.norm()));
+    EXPECT_LT((cold.compliance - warm.compliance).norm(), 1e-7 * (1 + cold.compliance.norm()));
+    EXPECT_LE(warm.iterations, cold_evaluations + 1);
+    for (std::size_t i = 0; i < N; ++i)
+      EXPECT_LT(test::difference(cold.tube_tips[i], warm.tube_tips[i]).norm(), 1e-9);
+  }
+}
+
+TYPED_TEST(WarmStart, EqualsColdStart) {
+  constexpr int N = TypeParam::N;
+  expect_warm_equals_cold<Derivatives::none, N>(0, Vec3::Zero());
+  expect_warm_equals_cold<Derivatives::jacobian, N>(0, Vec3::Zero());
+  expect_warm_equals_cold<Derivatives::jacobian, N>(0.3, Vec3::Zero());
+  expect_warm_equals_cold<Derivatives::compliance, N>(0.3, Vec3::Zero());
+  expect_warm_equals_cold<Derivatives::compliance, N>(0.3, test::tilted_gravity);
+}
+
+TYPED_TEST(WarmStart, SolvingAgainTakesOneEvaluation) {
+  constexpr int N = TypeParam::N;
+  Random random(62);
+  for (int n = 0; n < test::cases(20); ++n) {
+    const test::Case<N> c = test::smooth_case<N>(random, 0.3, 0.005, Vec3::Zero());
+    const Model<N> model(c.robot);
+    Workspace<N> ws;
+    Solution<N> s;
+    ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s), Status::ok);
+    const Vec3 position = s.position;
+    ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s), Status::ok);
+    EXPECT_EQ(s.iterations, 1);
+    EXPECT_LT((s.position - position).norm(), 1e-12);
+  }
+}
+
+/// Tip error after one evaluation at the end of a control period [m], mean over random moves.
+template <Derivatives D, int N>
+double mean_error_of_step(const Robot<N>& robot, double max_force, unsigned seed) {
+  Random random(seed);
+  double sum = 0;
+  const int cases = test::cases(300);
+  int counted = 0;
+  while (counted < cases) {
+    const test::Case<N> c{robot, test::random_joints(robot, random), test::random_load(random, max_force)};
+    const Move<N> move = nearby(c, random, 1e-3, 0.0175, 0);
+    const Model<N> model(robot);
+    Workspace<N> ws;
+    Solution<N> s, exact;
+    if (solve<D>(model, c.q, c.load, ws, s) != Status::ok || check_joints(robot, move.q) != Status::ok) continue;
+    Workspace<N> same = ws;
+    if (solve<D>(model, move.q, move.load, same, exact) != Status::ok) continue;
+    EXPECT_EQ(step<D>(model, move.q, move.load, ws, s), Status::ok);
+    sum += (s.position - exact.position).norm();
+    ++counted;
+  }
+  return sum / cases;
+}
+
+TEST(Step, IsGoodToATenthOfAMicrometreAfterOneMillimetreAndOneDegree) {
+  EXPECT_LT((mean_error_of_step<Derivatives::jacobian, 3>(test::paper_robot(), 0.3, 63)), 1e-7);
+  EXPECT_LT((mean_error_of_step<Derivatives::compliance, 3>(test::paper_robot(), 0.3, 64)), 1e-7);
+  EXPECT_LT((mean_error_of_step<Derivatives::jacobian, 3>(test::paper_robot(), 0, 65)), 1e-7);
+}
+
+TYPED_TEST(WarmStart, StepTakesOneEvaluationAndItsResidualTellsItsError) {
+  constexpr int N = TypeParam::N;
+  Random random(66);
+  for (int n = 0; n < test::cases(50); ++n) {
+    const test::Case<N> c = test::smooth_case<N>(random, 0.3, 0, Vec3::Zero());
+    const Move<N> move = nearby(c, random, 5e-4, 0.02, 0.01);
+    const Model<N> model(c.robot);
+    Workspace<N> ws;
+    Solution<N> s;
+    ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s), Status::ok);
+    ASSERT_EQ(step<Derivatives::compliance>(model, move.q, move.load, ws, s), Status::ok);
+    EXPECT_EQ(s.iterations, 1);
+    const Vec6 error =
+        test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
+    EXPECT_LT(error.norm(), 10 * s.residual * s.residual + 1e-9);
+  }
+}
+
+TYPED_TEST(WarmStart, StepsAlongAPathStayOnIt) {
+  constexpr int N = TypeParam::N;
+  Random random(67);
+  const test::Case<N> c = test::smooth_case<N>(random, 0.2, 0, Vec3::Zero());
+  const Model<N> model(c.robot);
+  Workspace<N> ws;
+  Solution<N> s;
+  Joints<N> q = c.q;
+  ASSERT_EQ(solve<Derivatives::jacobian>(model, q, c.load, ws, s), Status::ok);
+  for (int k = 0; k < 200; ++k) {
+    q.alpha[0] += 0.005;
+    ASSERT_EQ(step<Derivatives::jacobian>(model, q, c.load, ws, s), Status::ok);
+    Workspace<N> same = ws;
+    Solution<N> exact;
+    ASSERT_EQ(solve<Derivatives::none>(model, q, c.load, same, exact), Status::ok);
+    ASSERT_LT((s.position - exact.position).norm(), 1e-6) << "step " << k;
+  }
+}
+
+TEST(Step, SolvesWhereThereIsNoStartOrItIsTooFar) {
+  Random random(68);
+  const test::Case<3> c = test::smooth_case<3>(random, 0.2, 0, Vec3::Zero());
+  const Model<3> model(c.robot);
+  Workspace<3> ws;
+  Solution<3> s;
+  ASSERT_EQ(step<Derivatives::jacobian>(model, c.q, c.load, ws, s), Status::ok);
+  EXPECT_LT(s.residual, 1e-10);
+  Joints<3> far = c.q;
+  far.alpha += Eigen::Vector3d(1.5, -1.0, 0.7);
+  const Solution<3> cold = test::solved<Derivatives::jacobian>(c.robot, far, c.load);
+  if (cold.status != Status::ok) GTEST_SKIP();
+  ASSERT_EQ(step<Derivatives::jacobian>(model, far, c.load, ws, s), Status::ok);
+  EXPECT_LT(s.residual, 1e-10);
+}
+
+}  // namespace
+}  // namespace ctcr

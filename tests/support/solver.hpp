@@ -1,0 +1,56 @@
+#pragma once
+// The solver, compiled once for all tests: its instantiations are long, the tests of its laws are short.
+// Link ctcr_test_solver (solver.cmake), which holds what is declared here.
+#include "ctcr/ctcr.hpp"
+
+namespace ctcr::test {
+
+/// evaluate() behind a call.
+template <Derivatives D, Loading L, class Stepper, int N>
+void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess, int steps,
+                Evaluation<N, L, D>& out) {
+  evaluate<D, L, Stepper>(c, q, load, guess, steps, out);
+}
+
+}  // namespace ctcr::test
+
+#define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                       \
+  kind void test::evaluation<Derivatives::D, Loading::L, Stepper, N>(                                      \
+      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, int,                   \
+      Evaluation<N, Loading::L, Derivatives::D>&);
+#define CTCR_TEST_LOADED_EVALUATIONS(kind, D, Stepper, N) \
+  CTCR_TEST_EVALUATION(kind, D, force, Stepper, N)        \
+  CTCR_TEST_EVALUATION(kind, D, wrench, Stepper, N)       \
+  CTCR_TEST_EVALUATION(kind, D, weight, Stepper, N)
+#define CTCR_TEST_EVALUATIONS_none(kind, Stepper, N)    \
+  CTCR_TEST_EVALUATION(kind, none, none, Stepper, N)    \
+  CTCR_TEST_LOADED_EVALUATIONS(kind, none, Stepper, N)
+#define CTCR_TEST_EVALUATIONS_jacobian(kind, Stepper, N)  \
+  CTCR_TEST_EVALUATION(kind, jacobian, none, Stepper, N)  \
+  CTCR_TEST_LOADED_EVALUATIONS(kind, jacobian, Stepper, N)
+#define CTCR_TEST_EVALUATIONS_compliance(kind, Stepper, N) CTCR_TEST_LOADED_EVALUATIONS(kind, compliance, Stepper, N)
+
+#define CTCR_TEST_SOLVER(kind, D, N)                                                                          \
+  kind Status solve<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&,          \
+                                                  Workspace<N>&, Solution<N>&, const Settings&) noexcept;     \
+  kind Status step<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&,           \
+                                                 Workspace<N>&, Solution<N>&, const Settings&) noexcept;      \
+  CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
+#define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
+
+#define CTCR_TEST_DECLARE(N)                     \
+  CTCR_TEST_SOLVER(extern template, none, N)       \
+  CTCR_TEST_SOLVER(extern template, jacobian, N)   \
+  CTCR_TEST_SOLVER(extern template, compliance, N) \
+  CTCR_TEST_DIRECT(extern template, none, N)       \
+  CTCR_TEST_DIRECT(extern template, jacobian, N)   \
+  CTCR_TEST_DIRECT(extern template, compliance, N)
+
+#ifndef CTCR_TEST_INSTANTIATE
+namespace ctcr {
+CTCR_TEST_DECLARE(1)
+CTCR_TEST_DECLARE(2)
+CTCR_TEST_DECLARE(3)
+CTCR_TEST_DECLARE(4)
+}  // namespace ctcr
+#endif

@@ -1,0 +1,3 @@
+#include "model_of.hpp"
+
+template std::unique_ptr<ctcr::python::AnyModel> ctcr::python::make_model<3>(std::span<const Tube>, const Vec3&);

@@ -1,0 +1,83 @@
+"""The `ctcr` command. Each subcommand is a module of `ctcr.commands`, loaded when it is called."""
+
+import os
+import pkgutil
+import sys
+from importlib import import_module
+
+import click
+
+from ctcr import commands
+
+
+class LazyGroup(click.Group):
+    """Finds its subcommands in `ctcr.commands`: a new file there is a new command."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        return import_module(f"ctcr.commands.{cmd_name}").command
+
+
+def _version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
+    if asked:
+        import ctcr
+
+        click.echo(f"ctcr {ctcr.__version__}")
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Print the version."
+)
+def cli() -> None:
+    """Concentric tube continuum robots: what the model predicts, and how wrong it is."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Runs the command line and exits: 0 when it did what was asked, 1 with what was wrong on standard error."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """The exit code of a command line. Set CTCR_DEBUG to see the traceback of an unexpected error."""
+    try:
+        code = cli.main(arguments, prog_name="ctcr", standalone_mode=False)
+        sys.stdout.flush()
+        return code if isinstance(code, int) else 0
+    except click.ClickException as error:
+        error.show()
+    except click.Abort:
+        _say("stopped")
+    except BrokenPipeError:  # the reader, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except Exception as error:
+        _report(error)
+    return 1
+
+
+def _report(error: Exception) -> None:
+    from ctcr.errors import InputError
+
+    if isinstance(error, InputError):
+        lines = str(error).splitlines()
+        _say(lines[0] if len(lines) == 1 else "\n  ".join(["the input cannot be used:", *lines]))
+    elif isinstance(error, ModuleNotFoundError) and error.name == "ctcr._core":
+        _say(
+            "the compiled part of ctcr is missing: install the package with `pip install .` or `tools/dev setup`"
+        )
+    elif isinstance(error, MemoryError):
+        _say("not enough memory for this input: split the table")
+    elif "CTCR_DEBUG" in os.environ:
+        raise error
+    else:
+        reason = " ".join(str(error).split())
+        _say(f"{reason} ({type(error).__name__}; this should not happen: CTCR_DEBUG=1 shows where)")
+
+
+def _say(text: str) -> None:
+    click.echo(f"{click.style('Error:', fg='red')} {text}", err=True)

@@ -1,0 +1,114 @@
+"""`ctcr bench`: how fast the model is on this machine."""
+
+import os
+import time
+
+import click
+
+ROWS = 20_000
+REPEATS = 5
+
+
+@click.command(name="bench")
+@click.argument("robot", required=False)
+@click.option("--json", "json_target", metavar="FILE", help="Write the table as JSON; - for standard output.")
+def command(robot: str | None, json_target: str | None) -> None:
+    """Time the model on random joints of ROBOT (default: the robot of the paper's Table II).
+
+    The times hold for this machine at this moment: absolute times mean nothing across machines. The benchmark of
+    the library itself, with instruction counts and the rival, is `tools/dev bench`.
+    """
+    from ctcr import output, robot_file
+    from ctcr.model import Model
+
+    loaded = robot_file.load(robot) if robot else table_ii()
+    model = Model(loaded)
+    results = [
+        _timed(model, loaded, loads, derivatives, threads)
+        for loads in ("none", "tip force")
+        for derivatives in (False, True)
+        for threads in dict.fromkeys((1, os.cpu_count() or 1))
+    ]
+    if json_target:
+        output.write_json({"robot": loaded.name, "rows": ROWS, "results": results}, json_target)
+    rows = [
+        [
+            result["load"],
+            "pose, J, C" if result["derivatives"] else "pose",
+            str(result["threads"]),
+            f"{result['per_second']:,.0f}",
+            f"{result['per_second_and_thread']:,.0f}",
+            f"{result['solved_percent']:.1f}",
+        ]
+        for result in results
+    ]
+    columns = ["load", "result", "threads", "configurations/s", "per thread", "solved %"]
+    console = output.console(json_target)
+    console.print(
+        output.table(f"{loaded.name}: {ROWS} random configurations from a cold start", columns, rows, 2)
+    )
+    console.print("Best of 5. Absolute times mean nothing across machines.")
+
+
+def table_ii():
+    """The robot of the paper's Table II."""
+    from ctcr.robot import Actuation, Robot, Tracker, Tube, Uncertainty
+
+    def tube(inner: float, outer: float, length: float, curvature: float) -> Tube:
+        return Tube(
+            youngs_modulus_GPa=58.0,
+            poisson_ratio=0.3,
+            density_kg_m3=6450.0,
+            inner_diameter_mm=inner,
+            outer_diameter_mm=outer,
+            length_mm=length,
+            curved_length_mm=50.0,
+            curvature_per_m=curvature,
+        )
+
+    return Robot(
+        name="Table II",
+        gravity=None,
+        tubes=[tube(1.3, 1.52, 463.0, 10.0), tube(1.62, 1.8, 330.5, 5.0), tube(2.03, 2.35, 199.0, 7.0)],
+        actuation=Actuation.model_construct(),
+        tracker=Tracker.model_construct(sensor_on_tube=1),
+        uncertainty=Uncertainty.model_construct(),
+    )
+
+
+def _timed(model, robot, load: str, derivatives: bool, threads: int) -> dict:
+    import numpy as np
+
+    random = np.random.default_rng(1)
+    beta, alpha = random_joints(robot, ROWS, random)
+    force = random.uniform(-0.1, 0.1, (ROWS, 3)) if load == "tip force" else np.zeros((ROWS, 3))
+    seconds = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        answer = model.predict(beta, alpha, force, derivatives=derivatives, threads=threads)
+        seconds.append(time.perf_counter() - start)
+    rate = ROWS / min(seconds)
+    return {
+        "load": load,
+        "derivatives": derivatives,
+        "threads": threads,
+        "per_second": rate,
+        "per_second_and_thread": rate / threads,
+        "solved_percent": 100 * float(np.mean(np.asarray(answer.status) == 0)),
+    }
+
+
+def random_joints(robot, rows: int, random):
+    """Joints (rows, N), (rows, N) that the robot can reach, uniform in what the neighbours leave free [m], [rad]."""
+    import numpy as np
+
+    lengths = np.array([tube.length for tube in robot.tubes])
+    ends = np.empty((rows, robot.n_tubes))  # arc lengths of the tips; beta = end - length
+    inner_end = np.zeros(rows)
+    for i in reversed(range(robot.n_tubes)):
+        least = inner_end
+        outer_beta = ends[:, i + 1] - lengths[i + 1] if i + 1 < robot.n_tubes else 0.0
+        most = lengths[i] + outer_beta
+        ends[:, i] = random.uniform(least, np.minimum(most, least + 0.1))
+        inner_end = ends[:, i]
+    return ends - lengths, random.uniform(-np.pi, np.pi, (rows, robot.n_tubes))

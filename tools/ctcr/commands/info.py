@@ -1,0 +1,99 @@
+"""`ctcr info`: what a robot file says, and what looks wrong in it."""
+
+import click
+
+
+@click.command(name="info")
+@click.argument("robot")
+@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
+def command(robot: str, json_target: str | None) -> None:
+    """Show what the file ROBOT says, the stiffnesses that follow, and what looks wrong."""
+    from ctcr import output, robot_file
+
+    loaded = robot_file.load(robot)
+    doubts = robot_file.warnings(loaded)
+    if json_target:
+        output.write_json(_as_data(loaded, doubts), json_target)
+    if json_target == "-":
+        return
+    console = output.console()
+    console.print(f"[bold]{loaded.name}[/bold]: {loaded.n_tubes} tubes, innermost first")
+    console.print(output.table("Tubes", *_tube_rows(loaded), text_columns=2))
+    console.print(output.table("Sensor and frame", ["", "value", "unit"], _bench_rows(loaded)))
+    _print_doubts(console, doubts)
+
+
+def _tube_rows(robot) -> tuple[list[str], list[list[str]]]:
+    columns = ["", "unit", *(f"tube {i}" for i in range(1, robot.n_tubes + 1))]
+
+    def row(name: str, unit: str, values: list[float | None], form: str = "{:g}") -> list[str]:
+        return [name, unit, *("-" if value is None else form.format(value) for value in values)]
+
+    def of(field: str) -> list[float | None]:
+        return [getattr(tube, field) for tube in robot.tubes]
+
+    rows = [
+        row("inner diameter", "mm", of("inner_diameter_mm")),
+        row("outer diameter", "mm", of("outer_diameter_mm")),
+        row("length", "mm", of("length_mm")),
+        row("curved length", "mm", of("curved_length_mm")),
+        row("curvature", "1/m", of("curvature_per_m")),
+        row("radius of curvature", "mm", [1e3 / abs(k) if k else None for k in of("curvature")], "{:.1f}"),
+        row("Young's modulus", "GPa", of("youngs_modulus_GPa")),
+        row("Poisson's ratio", "", of("poisson_ratio")),
+        row("density", "kg/m^3", of("density_kg_m3")),
+        row("bending stiffness EI", "N m^2", of("bending_stiffness"), "{:.4g}"),
+        row("torsional stiffness GJ", "N m^2", of("torsional_stiffness"), "{:.4g}"),
+        row("mass per length", "g/m", [1e3 * m or None for m in of("mass_per_length")], "{:.3g}"),
+        row("strain when straightened", "%", [100 * e or None for e in of("straightened_strain")], "{:.2f}"),
+    ]
+    return columns, rows
+
+
+def _bench_rows(robot) -> list[list[str]]:
+    def text(value) -> str:
+        if value is None:
+            return "not known"
+        return ", ".join(f"{v:g}" for v in value) if isinstance(value, list) else f"{value:g}"
+
+    tracker, actuation = robot.tracker, robot.actuation
+    return [
+        ["gravity in the base frame", text(robot.gravity), "m/s^2"],
+        ["sensor on tube", text(tracker.sensor_on_tube), ""],
+        ["base frame in the tracker frame", text(tracker.position_mm), "mm"],
+        ["its rotation vector", text(tracker.rotation_vector_rad), "rad"],
+        ["readings", text(tracker.rate_Hz), "Hz"],
+        ["jitter of one reading", f"{text(tracker.jitter_mm)}; {text(tracker.jitter_deg)}", "mm; deg"],
+        ["accuracy (95 %)", f"{text(tracker.accuracy_95_mm)}; {text(tracker.accuracy_95_deg)}", "mm; deg"],
+        ["translation of a motor turn", text(actuation.translation_mm_per_rev), "mm"],
+        ["rotation of a motor turn", text(actuation.rotation_rev_per_rev), "turns"],
+        ["home of the translations", text(actuation.home_translation_mm), "mm"],
+        ["home of the rotations", text(actuation.home_rotation_deg), "deg"],
+    ]
+
+
+def _print_doubts(console, doubts) -> None:
+    if not doubts:
+        console.print("Nothing looks wrong.")
+        return
+    console.print("[bold yellow]What looks wrong[/bold yellow]")
+    for doubt in doubts:
+        console.print(f"  {doubt}", markup=False)
+
+
+def _as_data(robot, doubts) -> dict:
+    derived = ("bending_stiffness", "torsional_stiffness", "mass_per_length", "straightened_strain")
+    units = ("N_m2", "N_m2", "kg_per_m", "1")
+    return {
+        "robot": robot.model_dump(exclude_unset=True),
+        "derived": [
+            {
+                f"{name}_{unit}".removesuffix("_1"): getattr(tube, name) or None
+                for name, unit in zip(derived, units, strict=True)
+            }
+            for tube in robot.tubes
+        ],
+        "looks_wrong": [
+            {"field": doubt.field, "line": doubt.line, "message": doubt.message} for doubt in doubts
+        ],
+    }

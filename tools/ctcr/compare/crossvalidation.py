@@ -1,0 +1,91 @@
+"""How much of the error a linear form predicts on data it has not seen, and how much chance would give.
+
+Everything is computed from each block's normal equations, so the cost does not grow with the number of trials.
+The chance level flips the sign of whole blocks (runs or places): that keeps every structure inside a block and
+destroys only what repeats from block to block, which is exactly what predicting a new block needs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+RIDGES = (0.01, 0.3)  # relative to the mean square of a column; the better one counts, for chance as well
+
+
+@dataclass(frozen=True)
+class Folds:
+    """Assignment of rows to G blocks which are left out in turn, and T random sign patterns for them."""
+
+    label: NDArray[np.int64]  # (K,) 0..G-1, ascending: a block is a slice of the rows
+    signs: Array  # (1 + T, G), first row all ones: the data as they are
+
+    @property
+    def count(self) -> int:
+        """Number of blocks G."""
+        return self.signs.shape[1]
+
+
+def make_folds(label: NDArray, trials: int, seed: int = 0) -> Folds:
+    """Folds for ascending labels 0..G-1 with a fixed seed, so that a report can be repeated."""
+    count = int(label.max()) + 1
+    random = np.random.default_rng(seed)
+    flips = random.choice([-1.0, 1.0], size=(trials, count))
+    return Folds(label, np.vstack([np.ones((1, count)), flips]))
+
+
+def unexplained(design: Array, target: Array, folds: Folds) -> Array:
+    """Held-out sum of squares (1 + T,) of target (K, C) predicted linearly from design (K, P).
+
+    The first value belongs to the data, the others to the sign patterns of chance.
+    """
+    gram, cross = block_products(design, target, folds)
+    energy = float(np.sum(target**2))
+    forms = [_quadratic_form(gram, cross, ridge) for ridge in RIDGES]
+    return energy + np.min([np.sum((folds.signs @ form) * folds.signs, axis=1) for form in forms], axis=0)
+
+
+def block_products(design: Array, target: Array, folds: Folds) -> tuple[Array, Array]:
+    """Normal equations of every block: X'X (G, P, P) and X'y (G, P, C)."""
+    bounds = np.searchsorted(folds.label, np.arange(folds.count + 1))
+    parts = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    # einsum, not BLAS: its threads make these thousands of small products far slower when another core is busy
+    gram = np.stack([np.einsum("kp,kq->pq", design[part], design[part]) for part in parts])
+    cross = np.stack([np.einsum("kp,kc->pc", design[part], target[part]) for part in parts])
+    return gram, cross
+
+
+def _quadratic_form(gram: Array, cross: Array, ridge: float) -> Array:
+    """Matrix Q (G, G) so that signs s of the blocks change the held-out sum of squares by s' Q s.
+
+    The coefficients without block g are linear in the signs of the others, c_g = H_g sum_h s_h X_h'y_h, so what
+    they leave in block g, c_g' X_g'X_g c_g - 2 s_g c_g' X_g'y_g, is quadratic in the signs.
+    """
+    groups = len(gram)
+    parts = np.einsum("gpq,hqc->ghpc", _inverses(gram, ridge), cross)
+    parts[np.arange(groups), np.arange(groups)] = 0.0
+    fitted = np.einsum("gpq,ghqc->ghpc", gram, parts)
+    by_source = parts.transpose(1, 0, 2, 3).reshape(groups, -1)
+    square = by_source @ fitted.transpose(1, 0, 2, 3).reshape(groups, -1).T
+    return square - 2 * np.einsum("ghpc,gpc->hg", parts, cross)
+
+
+def _inverses(gram: Array, ridge: float) -> Array:
+    """Inverse normal matrices (G, P, P) without each block in turn; the ridge is relative to the column's square."""
+    diagonal = np.diagonal(gram.sum(axis=0))
+    penalty = np.diag(ridge * diagonal + 1e-12 * max(diagonal.max(), 1e-300))
+    return np.linalg.inv(gram.sum(axis=0) - gram + penalty)
+
+
+def held_out_prediction(design: Array, target: Array, folds: Folds) -> Array:
+    """Prediction (K, C) of every row from the blocks it does not belong to."""
+    gram, cross = block_products(design, target, folds)
+    ridge = RIDGES[int(np.argmin([_quadratic_form(gram, cross, ridge).sum() for ridge in RIDGES]))]
+    coefficients = _inverses(gram, ridge) @ (cross.sum(axis=0) - cross)
+    return np.einsum("kp,kpc->kc", design, coefficients[folds.label])
+
+
+def chance(observed: float, trials: Array) -> float:
+    """Share of chance results at least as large as the observed one, which itself counts as one of them."""
+    return float((1 + np.sum(trials >= observed)) / (1 + len(trials)))

@@ -1,0 +1,245 @@
+"""The pictures of the report, as SVG text. One colour means one thing in all of them."""
+
+import io
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
+from scipy import stats
+
+from ctcr.compare.analysis import Comparison
+from ctcr.compare.dependence import Dependence
+from ctcr.compare.forms import FRAME_NAMES
+from ctcr.compare.visits import OPPOSITE, SAME
+
+Array = NDArray[np.float64]
+
+ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
+AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
+INK = "#1c2733"
+MOST_POINTS = 4000
+BARS = 12
+PANELS = 6
+BINS = 18
+
+STYLE = {
+    "font.family": "sans-serif", "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"], "font.size": 10,
+    "axes.edgecolor": "#8794a0", "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK,
+    "ytick.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10.5,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "legend.frameon": False, "savefig.dpi": 150,
+    "axes.grid": True, "grid.color": "#e7ebef", "axes.axisbelow": True, "svg.hashsalt": "ctcr",
+}  # fmt: skip
+
+
+def draw(plot, c: Comparison, width: float, height: float) -> str | None:
+    """SVG text of a picture, or None when there is nothing to draw."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        if plot(figure, c) is False:
+            return None
+        target = io.StringIO()
+        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+    text = target.getvalue()
+    return text[text.index("<svg") :]
+
+
+def histogram(figure: Figure, c: Comparison) -> None:
+    """Error sizes against what noise alone would give."""
+    axes = figure.subplots()
+    size = np.linalg.norm(c.headline.error, axis=1) * 1e3
+    noise = c.noise.axis_mm if c.noise.axis_mm > 0 else np.nan
+    low = np.nanmin([np.percentile(size, 0.5), noise * 0.4, size.max() / 3])
+    edges = np.geomspace(max(low, 1e-4), size.max() * 1.05, 45)
+    axes.hist(
+        size, edges, weights=np.full(len(size), 100 / len(size)), color=ERROR, alpha=0.85, label="error"
+    )
+    if np.isfinite(noise):
+        share = 100 * np.diff(stats.maxwell.cdf(edges, scale=noise))
+        axes.stairs(share, edges, fill=True, color=NOISE, alpha=0.55, label="noise alone")
+        label = f"noise {c.noise.rms_mm:.2g} mm RMS"
+        axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=label)
+    axes.axvline(
+        c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS"
+    )
+    axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
+    _log_ticks(axes)
+    axes.legend(loc="best", fontsize=9)
+
+
+def _log_ticks(axes) -> None:
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def course(figure: Figure, c: Comparison) -> None:
+    """Error size in the order measured, runs set apart."""
+    axes = figure.subplots()
+    size = np.linalg.norm(c.headline.error, axis=1) * 1e3
+    timed = len(c.runs) == 1 and c.has_time
+    x = c.headline.t if timed else np.arange(len(size))
+    run = c.headline.run
+    starts = np.flatnonzero(np.concatenate([[True], run[1:] != run[:-1]]))
+    stops = np.append(starts[1:], len(run))
+    sparse = max(1, int(np.ceil(len(starts) / 16)))
+    for number, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+        rows = np.arange(start, stop)[:: max(1, len(run) // MOST_POINTS)]
+        if number % 2:
+            axes.axvspan(x[start], x[stop - 1], color="#f2f4f7", lw=0)
+        axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
+        if len(starts) > 1 and number % sparse == 0:
+            axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), transform=axes.get_xaxis_transform(),
+                      ha="center", fontsize=8, color=NOISE)  # fmt: skip
+    if len(starts) > 1:
+        axes.text(-0.01, 1.01, "run", transform=axes.transAxes, ha="right", fontsize=8, color=NOISE)
+    if np.isfinite(c.noise.rms_mm):
+        axes.axhline(c.noise.rms_mm, color=NOISE, lw=1, ls="--", label="noise, RMS")
+        axes.legend(loc="upper right", fontsize=9)
+    axes.set(xlabel="time, s" if timed else "reading", ylabel="error, mm", ylim=(0, 1.15 * size.max()))
+    axes.margins(x=0.01)
+
+
+def out_and_return(figure: Figure, c: Comparison) -> bool | None:
+    """Left: how far apart visits of the same joints are. Right: the error out and on return along the path."""
+    inside = c.revisits.select(~c.revisits.between_runs)
+    opposite, same = inside.select(inside.kind == OPPOSITE), inside.select(inside.kind == SAME)
+    if len(opposite) == 0:
+        return False
+    left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
+    apart = [np.linalg.norm(pairs.difference, axis=1) * 1e3 for pairs in (opposite, same)]
+    everything = np.concatenate(apart)
+    quiet = c.noise.axis_mm * 0.6 if c.noise.axis_mm > 0 else np.inf
+    low, high = max(min(np.percentile(everything, 1), quiet), 1e-3), max(everything.max() * 1.05, 2e-3)
+    edges = np.geomspace(low, high, 32)
+    for values, colour, label in zip(apart, (BACK, OUT), ("opposite", "same"), strict=True):
+        if len(values):
+            left.hist(values, edges, weights=np.full(len(values), 100 / len(values)), color=colour, alpha=0.7,
+                      label=f"{label} direction ({len(values)})")  # fmt: skip
+    if c.noise.axis_mm > 0:
+        share = 100 * np.diff(stats.maxwell.cdf(edges, scale=c.noise.axis_mm * np.sqrt(2)))
+        left.stairs(share, edges, color=NOISE, lw=1.4, label="noise alone")
+    left.set(xscale="log", xlabel="distance between two visits, mm", ylabel="% of pairs",
+             title="Same joints, visited twice")  # fmt: skip
+    _log_ticks(left)
+    left.legend(fontsize=8, loc="best")
+    left.margins(y=0.3)
+    _both_ways(right, c, opposite)
+    return None
+
+
+def _both_ways(axes, c: Comparison, pairs) -> None:
+    """The error component that differs most, for the run with the largest difference."""
+    runs = c.stops.run[pairs.later]
+    size = {run: np.median(np.sum(pairs.difference[runs == run] ** 2, axis=1)) for run in np.unique(runs)}
+    counts = {run: int(np.sum(runs == run)) for run in size}
+    run = max(size, key=lambda name: size[name] * (counts[name] >= 0.5 * max(counts.values())))
+    mine = np.flatnonzero(runs == run)
+    component = int(np.argmax(np.median(pairs.difference[mine] ** 2, axis=0)))
+    place = pairs.earlier[mine] + pairs.weight[mine]
+    order = np.argsort(place)
+    later = c.stops.error[pairs.later[mine], component] * 1e3
+    earlier = later - pairs.difference[mine, component] * 1e3
+    path = np.arange(len(order))
+    axes.fill_between(path, earlier[order], later[order], color=FAINT, alpha=0.6, lw=0)
+    axes.plot(path, earlier[order], color=OUT, lw=1.3, marker=".", ms=3, label="first pass")
+    axes.plot(path, later[order], color=BACK, lw=1.3, marker=".", ms=3, label="opposite pass")
+    axes.set(xlabel=f"place along the path of run {run}", ylabel=f"error along {'xyz'[component]} (tracker), mm",
+             title="The error out and on return")  # fmt: skip
+    axes.legend(fontsize=8)
+
+
+def ranking(figure: Figure, c: Comparison) -> bool | None:
+    """Shares of the squared error predicted on data left out."""
+    items = c.ranking.distinct()[:BARS][::-1]
+    if not items:
+        return False
+    axes = figure.subplots()
+    found = {item.name for item in c.ranking.chosen}
+    colours = [ERROR if item.name in found else FAINT for item in items]
+    shares = [100 * max(item.share, 0) for item in items]
+    axes.barh(range(len(items)), shares, color=colours, height=0.72)
+    for place, (item, share) in enumerate(zip(items, shares, strict=True)):
+        axes.text(
+            share + 0.4,
+            place,
+            f"{100 * item.share:.0f} %  ({item.size_mm:.2g} mm)",
+            va="center",
+            fontsize=8.5,
+        )
+    axes.set_yticks(range(len(items)), [item.label for item in items], fontsize=9)
+    level = 100 * c.ranking.chance_share
+    if level > 0:
+        axes.axvline(level, color=NOISE, ls="--", lw=1.2)
+        axes.text(
+            level,
+            len(items) - 0.4,
+            " chance rarely gets beyond this line",
+            fontsize=8,
+            color=NOISE,
+            va="bottom",
+        )
+    axes.set(xlabel="share of the squared error predicted on data left out, %", ylim=(-0.6, len(items) + 0.1),
+             xlim=(0, max([*shares, level]) * 1.25 + 1))  # fmt: skip
+    axes.grid(axis="y", visible=False)
+    return None
+
+
+def strongest(figure: Figure, c: Comparison) -> bool | None:
+    """The error components against the strongest quantities."""
+    chosen = {item.name for item in c.ranking.chosen}
+    items = [item for item in c.ranking.distinct() if _abscissa(item, c) is not None]
+    items = sorted(items, key=lambda item: item.name not in chosen)[:PANELS]
+    if not items:
+        return False
+    columns = 3 if len(items) > 1 else 1
+    grid = figure.subplots(int(np.ceil(len(items) / columns)), columns, squeeze=False).ravel()
+    for axes in grid[len(items) :]:
+        axes.set_visible(False)
+    for axes, item in zip(grid[: len(items)], items, strict=True):
+        _against(axes, item, c, item.name in chosen)
+    return None
+
+
+def _abscissa(item: Dependence, c: Comparison) -> tuple[Array, str, str] | None:
+    """Values, axis label and frame to draw a dependence with; None when it is no function of one number."""
+    if item.name == "lag":
+        speed = np.linalg.norm(c.sample.tip_velocity[c.ranking.rows], axis=1) * 1e3
+        return speed, "speed of the tip, mm/s", "motion"
+    quantity = item.form.covariate
+    if quantity is None:
+        return None
+    value = quantity.value[c.ranking.rows]
+    if quantity.kind == "angle":
+        value = np.angle(np.exp(1j * value))
+    unit = f", {quantity.unit}" if quantity.unit else ""
+    return value * quantity.scale, quantity.symbol + unit, item.form.frame
+
+
+def _against(axes, item: Dependence, c: Comparison, found: bool) -> None:
+    x, label, frame = _abscissa(item, c)
+    local = np.einsum("kji,kj->ki", c.ranking.frames[frame], c.ranking.error) * 1e3
+    known = np.isfinite(x)
+    x, local = x[known], local[known]
+    shown = np.linspace(0, len(x) - 1, min(len(x), 1500)).astype(int)
+    label_of = FRAME_NAMES[frame]
+    levels = np.unique(x)
+    bins = levels if len(levels) <= 6 else np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
+    cell = (
+        np.searchsorted(levels, x)
+        if len(levels) <= 6
+        else np.clip(np.searchsorted(bins, x) - 1, 0, len(bins) - 2)
+    )
+    for axis in range(3):
+        axes.scatter(x[shown], local[shown, axis], s=3, color=AXES[axis], alpha=0.15, lw=0, rasterized=True)
+        used = np.unique(cell)
+        centre = [x[cell == k].mean() for k in used]
+        mean = [local[cell == k, axis].mean() for k in used]
+        axes.plot(centre, mean, color=AXES[axis], lw=1.8, marker="o", ms=3, label=label_of[axis])
+    axes.axhline(0, color="#8794a0", lw=0.7)
+    limit = np.percentile(np.abs(local), 99) * 1.15
+    axes.set(xlabel=label, ylabel="error, mm", ylim=(-limit, limit))
+    axes.set_title(f"{100 * item.share:.0f} % of the squared error{' *' if found else ''}")
+    axes.legend(fontsize=7, handlelength=1, labelspacing=0.25, frameon=True, framealpha=0.8, edgecolor="none")

@@ -1,0 +1,172 @@
+"""Revisits: places of the joint path that were passed more than once, from which direction, and how far apart
+the errors are there. Works for stops repeated exactly and for streams, where a pass never hits the same joints.
+
+A reading is matched with the nearest point of an earlier pass over the (piecewise straight) joint path, and the
+earlier error is interpolated along that path. Comparing errors instead of tip positions removes, to first order
+in the model, what the small joint difference itself does to the tip.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from ctcr.compare.sample import Sample
+
+Array = NDArray[np.float64]
+SAME, OPPOSITE, MIXED = 1, -1, 0
+
+REST = 20e-6  # rows within this scaled joint distance [m] of one another are one stop
+STEP_SHARE = 0.25  # the two passes may miss each other by this share of the usual joint step ...
+TOLERANCE = (0.1e-3, 0.5e-3)  # ... inside these bounds [m]
+LONGEST_LINK = 3.0  # errors are interpolated over steps of at most this many usual steps ...
+LONGEST_LINK_SHARE = 0.2  # ... and this share of the lever arm (about 0.2 rad of rotation)
+MOST_CANDIDATES = 4_000_000
+
+
+@dataclass(frozen=True)
+class Stops:
+    """S visits: rows at rest are averaged into one visit, a moving row is a visit of its own."""
+
+    first: NDArray[np.int64]  # (S,) index of the first row
+    size: NDArray[np.int64]  # (S,) rows averaged
+    run: NDArray[np.int64]  # (S,)
+    scaled: Array  # (S, 2N) [m]
+    direction: NDArray[np.int8]  # (S, 2N)
+    error: Array  # (S, 3) tracker frame [m]
+    dwell_variance: Array  # (S,) variance per axis inside the visit [m^2], NaN below 3 rows
+
+
+@dataclass(frozen=True)
+class Revisits:
+    """P pairs of a later visit with an earlier pass through the same joints."""
+
+    later: NDArray[np.int64]  # (P,) visit index
+    earlier: NDArray[np.int64]  # (P,) visit index at the start of the earlier step
+    weight: Array  # (P,) position on the earlier step, 0 at its start, 1 at its end
+    kind: NDArray[np.int8]  # (P,) SAME, OPPOSITE or MIXED directions of the joints
+    between_runs: NDArray[np.bool_]  # (P,)
+    difference: Array  # (P, 3) later error minus earlier error, tracker frame [m]
+    miss: Array  # (P,) scaled joint distance between the two [m]
+    noise_factor: Array  # (P,) variance of the difference in units of one reading's variance
+    tolerance: float  # [m] largest miss accepted
+    complete: bool  # False when only every so many visits were looked up
+
+    def select(self, mask: NDArray) -> "Revisits":
+        """Some of the pairs."""
+        arrays = (self.later, self.earlier, self.weight, self.kind, self.between_runs, self.difference,
+                  self.miss, self.noise_factor)  # fmt: skip
+        return Revisits(*(array[mask] for array in arrays), self.tolerance, self.complete)
+
+    def __len__(self) -> int:
+        return len(self.later)
+
+
+def find_stops(sample: Sample) -> Stops:
+    """Join the rows of one run that stay within REST of the first of them."""
+    scaled, run = sample.motion.scaled, sample.run
+    moved = np.concatenate([[True], np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * REST])
+    first, anchor, anchor_run = [], None, None
+    for index in range(len(run)):
+        here = scaled[index]
+        if anchor is not None and run[index] == anchor_run:
+            if not moved[index] or np.abs(here - anchor).max() <= REST:
+                continue
+        first.append(index)
+        anchor, anchor_run = here, run[index]
+    start = np.array(first, dtype=np.int64)
+    size = np.diff(np.append(start, len(run)))
+    mean = _segment_mean(sample.error, start, size)
+    square = _segment_mean(sample.error**2, start, size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = (square - mean**2).mean(axis=1) * size / (size - 1)
+    variance[size < 3] = np.nan
+    last = start + size - 1
+    return Stops(start, size, run[start], _segment_mean(scaled, start, size), sample.motion.direction[last],
+                 mean, variance)  # fmt: skip
+
+
+def _segment_mean(values: Array, start: NDArray, size: NDArray) -> Array:
+    return np.add.reduceat(values, start, axis=0) / size[:, None] if len(start) else values[:0]
+
+
+def find_revisits(stops: Stops, lever: float) -> Revisits:
+    """All pairs of visits to the same joints, each later visit with each earlier pass once.
+
+    lever [m]: the length that one radian of base rotation counts for in the scaled joints.
+    """
+    linked = np.append(stops.run[1:] == stops.run[:-1], False)
+    link = np.where(linked[:, None], np.roll(stops.scaled, -1, axis=0) - stops.scaled, 0.0)
+    length = np.linalg.norm(link, axis=1)
+    usual = float(np.median(length[linked])) if linked.any() else 0.0
+    tolerance = float(np.clip(STEP_SHARE * usual, *TOLERANCE))
+    usable = linked & (length <= min(LONGEST_LINK * usual, LONGEST_LINK_SHARE * lever))
+    reach = float(np.hypot(tolerance, 0.5 * length[usable].max(initial=0.0)))
+
+    later, vertex, complete = _neighbours(stops.scaled, reach)
+    order = np.lexsort((vertex, later))
+    later, vertex = later[order], vertex[order]
+    opens = np.ones(len(later), bool)
+    opens[1:] = (
+        (np.diff(later) != 0) | (np.diff(vertex) > 1) | (stops.run[vertex[1:]] != stops.run[vertex[:-1]])
+    )
+    which_pass = np.cumsum(opens) - 1
+    own = np.zeros(len(opens) and which_pass[-1] + 1, bool)
+    own[which_pass[vertex == later]] = True
+    use = ~own[which_pass] & (vertex < later) if len(later) else np.zeros(0, bool)
+    later, vertex, which_pass = later[use], vertex[use], which_pass[use]
+
+    miss, start, weight = _nearest_point(stops.scaled, link, length, usable, later, vertex)
+    best = np.lexsort((miss, which_pass))
+    best = best[np.unique(which_pass[best], return_index=True)[1]]
+    best = best[miss[best] <= tolerance]
+    later, start, weight, miss = later[best], start[best], weight[best], miss[best]
+    order = np.argsort(later, kind="stable")
+    return _pairs(stops, later[order], start[order], weight[order], miss[order], tolerance, complete)
+
+
+def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray, bool]:
+    """Index pairs (visit, neighbour) within reach, the visit itself included; thinned when there are too many."""
+    tree = cKDTree(scaled)
+    probe = np.linspace(0, len(scaled) - 1, min(len(scaled), 500)).astype(int)
+    typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
+    stride = int(np.ceil(typical * len(scaled) / MOST_CANDIDATES))
+    queries = np.arange(0, len(scaled), stride)
+    found = tree.query_ball_point(scaled[queries], reach)
+    sizes = np.fromiter(map(len, found), np.int64, len(found))
+    flat = np.concatenate([np.asarray(item, np.int64) for item in found])
+    return np.repeat(queries, sizes), flat, stride == 1
+
+
+def _nearest_point(
+    scaled: Array, link: Array, length: Array, usable: NDArray, later: NDArray, vertex: NDArray
+):
+    """Nearest point to each later visit on the steps that meet in the neighbouring vertex: miss, start, weight."""
+    best_miss = np.linalg.norm(scaled[later] - scaled[vertex], axis=1)
+    best_start, best_weight = vertex.copy(), np.zeros(len(vertex))
+    for start in (vertex, vertex - 1):
+        start = np.maximum(start, 0)
+        offset = scaled[later] - scaled[start]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            weight = np.clip(np.sum(offset * link[start], axis=1) / length[start] ** 2, 0.0, 1.0)
+        miss = np.linalg.norm(offset - weight[:, None] * link[start], axis=1)
+        better = usable[start] & (length[start] > 0) & (miss < best_miss - 1e-12)
+        best_miss = np.where(better, miss, best_miss)
+        best_start = np.where(better, start, best_start)
+        best_weight = np.where(better, weight, best_weight)
+    return best_miss, best_start, best_weight
+
+
+def _pairs(stops: Stops, later, start, weight, miss, tolerance: float, complete: bool) -> Revisits:
+    end = np.minimum(start + (weight > 0), len(stops.run) - 1)
+    agree = stops.direction[later].astype(int) * stops.direction[end]
+    some = (agree != 0).any(axis=1)
+    kind = np.full(len(later), MIXED, np.int8)
+    kind[some & (agree >= 0).all(axis=1)] = SAME
+    kind[some & (agree <= 0).all(axis=1)] = OPPOSITE
+    w = weight[:, None]
+    difference = stops.error[later] - (1 - w) * stops.error[start] - w * stops.error[end]
+    factor = 1 / stops.size[later] + (1 - weight) ** 2 / stops.size[start] + weight**2 / stops.size[end]
+    return Revisits(later, start, weight, kind, stops.run[later] != stops.run[start], difference, miss,
+                    factor, tolerance, complete)  # fmt: skip

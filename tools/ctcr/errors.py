@@ -1,0 +1,54 @@
+"""What is wrong with an input, told so that its author can mend it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault: what is wrong, and where. `line` counts from 1; in a table it is the row a spreadsheet shows."""
+
+    message: str
+    file: str | None = None
+    line: int | None = None
+    field: str | None = None
+    line_name: str = "line"
+
+    def __str__(self) -> str:
+        where = [self.file, f"{self.line_name} {self.line}" if self.line else None, self.field]
+        return ": ".join([", ".join(part for part in where if part), self.message]).removeprefix(": ")
+
+
+class InputError(Exception):
+    """An input cannot be used. `problems` holds every fault found (at most a screenful; `omitted` counts the rest)."""
+
+    def __init__(self, problems: Problem | Iterable[Problem], omitted: int = 0):
+        self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
+        self.omitted = omitted
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        lines = [str(problem) for problem in self.problems]
+        if self.omitted:
+            lines.append(f"and {self.omitted} more")
+        return "\n".join(lines)
+
+
+def did_you_mean(name: str, choices: Iterable[str]) -> str | None:
+    """The choice nearest in spelling to `name`, if any is near."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), [choice.lower() for choice in choices], n=1, cutoff=0.6)
+    return next((choice for choice in choices if near and choice.lower() == near[0]), None)
+
+
+def shown(value: object) -> str:
+    """A value as an error shows it: short, on one line."""
+    text = repr(value)
+    return text if len(text) <= 40 else text[:36] + " ..."
+
+
+def file_fault(error: OSError, path: object, doing: str) -> InputError:
+    """The operating system's refusal as one sentence: `doing` is read or write."""
+    reason = (error.strerror or str(error)).lower()
+    return InputError(Problem(f"cannot {doing} it: {reason}", file=str(path)))

@@ -1,0 +1,65 @@
+"""Rotations as quaternions (w, x, y, z) and rotation vectors, and the tracker frame. Arrays of any leading shape."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def quaternion_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Unit quaternion (..., 4) of a rotation vector (..., 3) [rad]; w >= 0 up to half a turn."""
+    vector = np.asarray(rotation_vector, dtype=float)
+    half = np.linalg.norm(vector, axis=-1, keepdims=True) / 2
+    # np.sinc(x) = sin(pi x) / (pi x) is smooth through zero
+    return np.concatenate([np.cos(half), vector * np.sinc(half / np.pi) / 2], axis=-1)
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Rotation matrix (..., 3, 3) of a unit quaternion (..., 4)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrix_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Rotation matrix (..., 3, 3) of a rotation vector (..., 3) [rad]."""
+    return matrix_from_quaternion(quaternion_from_rotation_vector(rotation_vector))
+
+
+def conjugate(quaternion: ArrayLike) -> Array:
+    """The inverse rotation of a unit quaternion (..., 4)."""
+    return np.asarray(quaternion, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def product(first: ArrayLike, second: ArrayLike) -> Array:
+    """Quaternion of the matrix product first * second, each (..., 4)."""
+    a, b = np.broadcast_arrays(np.asarray(first, dtype=float), np.asarray(second, dtype=float))
+    scalar = a[..., 0] * b[..., 0] - np.sum(a[..., 1:] * b[..., 1:], axis=-1)
+    vector = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])
+    return np.concatenate([scalar[..., None], vector], axis=-1)
+
+
+def angle_between(first: ArrayLike, second: ArrayLike) -> Array:
+    """Angle [rad], 0 to pi, of the rotation between unit quaternions (..., 4); q and -q are the same rotation."""
+    difference = product(conjugate(first), second)
+    return 2 * np.arctan2(np.linalg.norm(difference[..., 1:], axis=-1), np.abs(difference[..., 0]))
+
+
+def base_to_tracker(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
+    """Poses (..., 3), (..., 4) of the base frame seen in the tracker frame: x_tracker = T_ref x_base.
+
+    `tracker` is the robot file's section, which holds T_ref.
+    """
+    turned = np.asarray(position, dtype=float) @ tracker.rotation.T + tracker.position
+    return turned, product(quaternion_from_rotation_vector(tracker.rotation_vector_rad), quaternion)
+
+
+def tracker_to_base(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
+    """The inverse of `base_to_tracker`."""
+    turned = (np.asarray(position, dtype=float) - tracker.position) @ tracker.rotation
+    inverse = conjugate(quaternion_from_rotation_vector(tracker.rotation_vector_rad))
+    return turned, product(inverse, quaternion)

@@ -1,0 +1,66 @@
+"""A physical quantity of an input file: its unit, what is possible, what is usual, and which unit was meant."""
+
+from dataclasses import dataclass
+from math import pi
+
+LARGEST = 1e15  # no quantity of ours, in no unit that people write, goes beyond
+
+# unit -> (unit that people write instead, what one of those is in our unit)
+_OTHER_UNITS = {
+    "m": (("mm", 1e-3), ("um", 1e-6)),
+    "mm": (("m", 1e3), ("um", 1e-3)),
+    "1/m": (("1/mm", 1e3),),
+    "GPa": (("Pa", 1e-9), ("MPa", 1e-3)),
+    "kg/m^3": (("g/cm^3", 1e3),),
+    "N": (("mN", 1e-3),),
+    "N m^2": (("N mm^2", 1e-6),),
+    "deg": (("rad", 180 / pi),),
+    "rad": (("deg", pi / 180),),
+    "m/s^2": (("mm/s^2", 1e-3), ("g", 9.80665)),
+    "Hz": (("kHz", 1e3),),
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Values are possible above `above` (exclusive), from `least` to `most`; `usual` bounds their size, zero aside.
+
+    `count` says in words how many values there are.
+    """
+
+    unit: str
+    usual: tuple[float, float] | None = None
+    count: str = "a number"
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+
+    @property
+    def expected(self) -> str:
+        """What a value must be, in words."""
+        bounds = [
+            f"{sign} {bound:g}"
+            for sign, bound in ((">", self.above), (">=", self.least), ("<=", self.most))
+            if bound is not None
+        ]
+        unit = f"in {self.unit}" if self.unit else "without unit"
+        return f"{self.count} {unit}" + (f", {' and '.join(bounds)}" if bounds else "")
+
+    def is_possible(self, value: float) -> bool:
+        return abs(value) <= LARGEST and not (
+            (self.above is not None and not value > self.above)
+            or (self.least is not None and not value >= self.least)
+            or (self.most is not None and not value <= self.most)
+        )
+
+    def is_usual(self, value: float) -> bool:
+        return self.usual is None or value == 0 or self.usual[0] <= abs(value) <= self.usual[1]
+
+    def doubt(self, value: float) -> str:
+        """Why an unusual value looks wrong, with the unit that was probably meant."""
+        text = f"{value:g} {self.unit}".rstrip()
+        for unit, factor in _OTHER_UNITS.get(self.unit, ()):
+            if self.is_usual(value * factor) and self.is_possible(value * factor):
+                return f"{text}: is this {unit}?"
+        low, high = self.usual or (0, 0)
+        return f"{text} is unusual (usual: {low:g} to {high:g} {self.unit})".replace(" )", ")")

@@ -1,0 +1,54 @@
+"""YAML 1.2 read safely, with the line of every field."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
+
+from ctcr.errors import InputError, Problem
+
+FieldPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class YamlDocument:
+    """`data` holds plain dictionaries, lists and scalars; `root` the nodes they came from."""
+
+    data: Any
+    root: Node | None
+
+    def line(self, path: FieldPath) -> int | None:
+        """Line (from 1) of the field at `path`, or of the nearest enclosing part that exists."""
+        node, line = self.root, None
+        for step in path:
+            key, node = _child(node, step)
+            if node is None:
+                break
+            line = (key or node).start_mark.line + 1
+        return line
+
+
+def parse(text: str, file: str) -> YamlDocument:
+    """Parses one document. Raises InputError that names the line."""
+    yaml = YAML(typ="safe", pure=True)
+    try:
+        root = yaml.compose(text)
+        return YamlDocument(None if root is None else yaml.constructor.construct_document(root), root)
+    except MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else None
+        raise InputError(Problem(f"not valid YAML: {error.problem or error.context}", file, line)) from None
+    except RecursionError:
+        raise InputError(Problem("not valid YAML: nested too deeply", file)) from None
+    except Exception as error:  # the YAML library leaks all kinds of exceptions on garbage
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(Problem(f"not valid YAML: {reason}", file)) from None
+
+
+def _child(node: Node | None, step: str | int) -> tuple[Node | None, Node | None]:
+    if isinstance(node, MappingNode):
+        return next(((key, value) for key, value in node.value if key.value == step), (None, None))
+    if isinstance(node, SequenceNode) and isinstance(step, int) and step < len(node.value):
+        return None, node.value[step]
+    return None, None
