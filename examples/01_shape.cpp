@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <vector>
 
-#include "ctcr/ctcr.hpp"
-#include "ctcr/mechanics/shape.hpp"
+#include <ctcr/ctcr.hpp>
+#include <ctcr/mechanics/shape.hpp>
 
 int main() {
   // Three nitinol tubes, innermost first. Lengths in m, curvature in 1/m. Ref: Boyer et al., Table II.
@@ -18,11 +18,12 @@ int main() {
     robot.tubes[i].length = length[i];
     robot.tubes[i].curvature = curvature[i];
   }
+  robot.gravity = {0, -9.80665, 0};  // the robot points horizontally, its y axis up
   const ctcr::Model<3> model(robot);
 
   // Where the tubes are grasped (behind the front plate) and how far they are turned; a weight of 10 g at the tip.
   const ctcr::Joints<3> q{{-0.30, -0.22, -0.13}, {0.0, 1.0, 2.0}};
-  const ctcr::TipLoad load{.force = {0, -0.0981, 0}, .moment = {0, 0, 0}};
+  const ctcr::TipLoad load{.force = {0, -0.0981, 0}};
 
   ctcr::Workspace<3> workspace;  // remembers the last solution: the next, nearby one is found faster
   ctcr::Solution<3> solution;
@@ -45,3 +46,14 @@ int main() {
   }
   return status == ctcr::Status::ok ? 0 : 1;
 }
+
+// Prints:
+//   ok after 8 evaluations
+//   tip position [mm]    33.37   -9.98  155.80
+//   tip quaternion      0.9526  0.2546  0.1592 -0.0483
+//
+//    s [mm]    x [mm]    y [mm]    z [mm]  curvature of tube 1 [1/m]
+//      40.0      0.98      0.21     39.97       4.75
+//      80.0      8.19      2.47     79.19       3.23
+//     120.0     20.17      2.83    117.32      10.57
+//     160.0     32.53     -8.52    153.32      10.04

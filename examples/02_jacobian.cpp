@@ -1,7 +1,7 @@
 // How the tip moves with the joints (J) and with a load (C), and how good it is to trust them for small changes.
 #include <cstdio>
 
-#include "ctcr/ctcr.hpp"
+#include <ctcr/ctcr.hpp>
 
 namespace {
 
@@ -24,6 +24,7 @@ int main() {
   };
   ctcr::Robot<3> robot;
   robot.tubes = {tube(1.30e-3, 1.52e-3, 0.463, 10), tube(1.62e-3, 1.80e-3, 0.3305, 5), tube(2.03e-3, 2.35e-3, 0.199, 7)};
+  robot.gravity = {0, -9.80665, 0};  // the robot points horizontally, its y axis up
   const ctcr::Model<3> model(robot);
   const ctcr::Joints<3> q{{-0.30, -0.22, -0.13}, {0.0, 1.0, 2.0}};
 
@@ -43,10 +44,16 @@ int main() {
   print("small move: predicted by J", (here.jacobian * change).head<3>());
   print("small move: solved", moved.position - here.position);
 
-  // Hang 10 g on the tip; y points up.
-  const ctcr::TipLoad weight{.force = {0, -0.010 * 9.81, 0}, .moment = {0, 0, 0}};
+  // Hang 10 g on the tip.
+  const ctcr::TipLoad weight{.force = {0, -0.010 * 9.81, 0}};
   if (ctcr::solve(model, q, weight, workspace, loaded) != ctcr::Status::ok) return 1;
   print("10 g at the tip: predicted by C", here.compliance.topLeftCorner<3, 3>() * weight.force);
   print("10 g at the tip: solved", loaded.position - here.position);
   return 0;
 }
+
+// Prints:
+//   small move: predicted by J           0.2429   0.1557   0.4648 mm
+//   small move: solved                   0.2423   0.1573   0.4649 mm
+//   10 g at the tip: predicted by C     -0.0689  -4.3366  -0.4647 mm
+//   10 g at the tip: solved             -0.1013  -4.2872  -0.5354 mm

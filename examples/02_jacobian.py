@@ -25,7 +25,7 @@ moved = model.predict([(q + change)[:3]], [(q + change)[3:]])
 print_millimetres("small move: predicted by J", (J @ change)[:3])
 print_millimetres("small move: solved", moved.position[0] - here.position[0])
 
-# Hang 10 g on the tip; y points up.
+# Hang 10 g on the tip: in this robot's file y points up.
 weight = np.array([0, -0.010 * 9.81, 0])
 loaded = model.predict([q[:3]], [q[3:]], weight)
 print_millimetres("10 g at the tip: predicted by C", C[:3, :3] @ weight)

@@ -3,9 +3,9 @@
 #include <array>
 #include <vector>
 
-#include "support/configurations.hpp"
-#include "support/fine_model.hpp"
-#include "support/rival.hpp"
+#include "configurations.hpp"
+#include "fine_model.hpp"
+#include "rival.hpp"
 
 namespace bench {
 

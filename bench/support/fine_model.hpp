@@ -5,7 +5,7 @@
 #include <array>
 #include <ctcr/ctcr.hpp>
 
-#include "support/configurations.hpp"
+#include "configurations.hpp"
 
 namespace bench {
 

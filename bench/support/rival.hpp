@@ -10,7 +10,7 @@
 
 #include "ctcr/robot/joints.hpp"
 #include "ctcr/robot/tip_load.hpp"
-#include "support/rival_equations.hpp"
+#include "rival_equations.hpp"
 
 namespace rival {
 

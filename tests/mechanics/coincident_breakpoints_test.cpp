@@ -94,7 +94,7 @@ TYPED_TEST(Coincident, WhatIsCurvedBehindThePlateDoesNotMatter) {
 TEST(Retracted, EndsAtThePlate) {
   const Robot<3> robot = test::paper_robot();
   const Joints<3> q{{-0.463, -0.3305, -0.199}, {0.5, 1.0, -2.0}};
-  const Solution<3> s = test::solved<Derivatives::compliance>(robot, q, {{0, -0.1, 0}, {}});
+  const Solution<3> s = test::solved<Derivatives::compliance>(robot, q, {.force = {0, -0.1, 0}});
   EXPECT_EQ(s.status, Status::ok);
   EXPECT_LT(test::difference({rotation_z(0.5), Vec3::Zero()}, s.pose()).norm(), 1e-12);
   EXPECT_TRUE(s.jacobian.allFinite() && s.compliance.allFinite());

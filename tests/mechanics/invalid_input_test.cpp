@@ -13,7 +13,7 @@ constexpr Derivatives all = Derivatives::compliance;
 
 const Robot<3> robot = test::paper_robot();
 const Joints<3> good{{-0.3, -0.2, -0.1}, {0.1, 1.2, -2.3}};
-const TipLoad weight{{0, -0.1, 0}, {}};
+const TipLoad weight{.force = {0, -0.1, 0}};
 
 bool finite(const Solution<3>& s) {
   bool tips = true;
@@ -49,12 +49,12 @@ TEST(InvalidInput, JointsAndLoads) {
     q = good;
     q.beta[0] = bad;
     expect_refused(q, weight, Status::not_finite);
-    expect_refused(good, {{0, bad, 0}, {}}, Status::not_finite);
-    expect_refused(good, {{}, {bad, 0, 0}}, Status::not_finite);
+    expect_refused(good, {.force = {0, bad, 0}}, Status::not_finite);
+    expect_refused(good, {.moment = {bad, 0, 0}}, Status::not_finite);
   }
-  expect_refused({{-0.19, -0.2, -0.1}, {}}, weight, Status::joints_out_of_order);
-  expect_refused({{-0.34, -0.2, -0.1}, {}}, weight, Status::joints_out_of_order);
-  expect_refused({{-0.3, -0.2, -0.1995}, {}}, weight, Status::tip_behind_plate);
+  expect_refused({.beta = {-0.19, -0.2, -0.1}}, weight, Status::joints_out_of_order);
+  expect_refused({.beta = {-0.34, -0.2, -0.1}}, weight, Status::joints_out_of_order);
+  expect_refused({.beta = {-0.3, -0.2, -0.1995}}, weight, Status::tip_behind_plate);
 }
 
 TEST(InvalidInput, RobotOfNonsense) {
@@ -97,7 +97,7 @@ TEST(InvalidInput, LoadsBeyondAllReason) {
 TEST(InvalidInput, TooFewIterationsAreReported) {
   Workspace<3> ws;
   Solution<3> s;
-  const Status status = solve<all>(Model<3>(robot), good, {{0, -0.3, 0}, {}}, ws, s, {.max_iterations = 1});
+  const Status status = solve<all>(Model<3>(robot), good, {.force = {0, -0.3, 0}}, ws, s, {.max_iterations = 1});
   EXPECT_EQ(status, Status::not_converged);
   EXPECT_GT(s.residual, 1e-10);
   EXPECT_TRUE(finite(s));

@@ -62,13 +62,13 @@ class Shots {
     test::evaluation<K::D, K::L, MagnusRk4>(coefficients_, c_.q, c_.load, guess, 1, ev);
     return ev;
   }
-  static Vector residual(const Ev& ev) {
+  static CTCR_INLINE Vector residual(const Ev& ev) {
     Vector b;
     for (int j = 0; j < turns; ++j) b[j] = ev.axis[j].dot(ev.turn);
     for (int i = 1; i < N; ++i) b[turns + i - 1] = ev.angle_error[i];
     return b;
   }
-  static Vector step(const Ev& ev) {
+  static CTCR_INLINE Vector step(const Ev& ev) {
     Vector dx;
     for (int j = 0; j < unknowns; ++j) dx[j] = ev.unknown(j, Ev::Col::newton);
     return dx;

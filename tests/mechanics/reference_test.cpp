@@ -24,7 +24,7 @@ Errors errors_of(const Robot<N>& robot, const std::vector<test::Row>& rows, int 
       q.beta[i] = row.at("beta" + std::to_string(i + 1) + "_m");
       q.alpha[i] = row.at("alpha" + std::to_string(i + 1) + "_rad");
     }
-    TipLoad load{{row.at("fx_N"), row.at("fy_N"), row.at("fz_N")}, {}};
+    TipLoad load{.force = {row.at("fx_N"), row.at("fy_N"), row.at("fz_N")}};
     if (row.contains("mx_Nm")) load.moment = {row.at("mx_Nm"), row.at("my_Nm"), row.at("mz_Nm")};
     const Eigen::Quaterniond rotation(row.at("qw"), row.at("qx"), row.at("qy"), row.at("qz"));
     const Pose expected{rotation.normalized().toRotationMatrix(), {row.at("x_m"), row.at("y_m"), row.at("z_m")}};

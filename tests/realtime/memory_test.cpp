@@ -24,7 +24,7 @@ void* solve_hard_cases(void*) {
   const Joints<3> q{{-0.35, -0.2, -0.1}, {0.1, 2.2, -2.3}};
   (void)solve<Derivatives::compliance>(light, q, {{0.1, -0.2, 0}, {0.001, 0, 0}}, ws, s);
   (void)solve<Derivatives::compliance>(light, q, {{50, -20, 0}, {0.1, 0, 0}}, ws, s);
-  (void)step<Derivatives::compliance>(light, q, {{0.1, -0.2, 0}, {}}, ws, s);
+  (void)step<Derivatives::compliance>(light, q, {.force = {0.1, -0.2, 0}}, ws, s);
   (void)solve<Derivatives::jacobian>(light, q, {}, ws, s);
   Robot<3> robot = test::paper_robot();
   robot.gravity = test::tilted_gravity;

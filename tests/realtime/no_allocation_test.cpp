@@ -54,7 +54,7 @@ TEST(Guard, CatchesAPlantedAllocationInTheStep) {
   Workspace<3> ws;
   Solution<3> s;
   const HeapGuard guard;
-  (void)step<Derivatives::jacobian>(model, Joints<3>{{-0.3, -0.2, -0.1}, {}}, {}, ws, s);
+  (void)step<Derivatives::jacobian>(model, Joints<3>{.beta = {-0.3, -0.2, -0.1}}, {}, ws, s);
   EXPECT_EQ(guard.uses(), 0);
   const auto planted = std::make_unique<Solution<3>>(s);
   asm volatile("" : : "g"(planted.get()) : "memory");

@@ -24,14 +24,14 @@ TEST(CheckJoints, AcceptsOrderedJoints) { EXPECT_EQ(check_joints(robot, good), S
 TEST(CheckJoints, AcceptsFlushTipsGraspsAndPlate) {
   EXPECT_EQ(check_joints(robot, with_beta(0, good.beta[1])), Status::ok);
   EXPECT_EQ(check_joints(robot, with_beta(0, 0.3305 - 0.2 - 0.463)), Status::ok);
-  EXPECT_EQ(check_joints(robot, Joints<3>{{-0.463, -0.3305, -0.199}, {}}), Status::ok);
+  EXPECT_EQ(check_joints(robot, Joints<3>{.beta = {-0.463, -0.3305, -0.199}}), Status::ok);
   EXPECT_EQ(check_joints(robot, Joints<3>{}), Status::ok);
 }
 
 TEST(CheckJoints, RefusesWrongOrder) {
   EXPECT_EQ(check_joints(robot, with_beta(0, -0.19)), Status::joints_out_of_order) << "grasped before the next tube";
   EXPECT_EQ(check_joints(robot, with_beta(0, -0.34)), Status::joints_out_of_order) << "tip behind the next tube's";
-  EXPECT_EQ(check_joints(robot, Joints<3>{{0, 0, 0.001}, {}}), Status::joints_out_of_order) << "grasped before the plate";
+  EXPECT_EQ(check_joints(robot, Joints<3>{.beta = {0, 0, 0.001}}), Status::joints_out_of_order) << "before the plate";
 }
 
 TEST(CheckJoints, RefusesATipBehindThePlate) {
@@ -50,7 +50,7 @@ TEST(CheckJoints, RefusesWhatIsNotFinite) {
 }
 
 TEST(CheckJoints, SlackForgivesRounding) {
-  const Joints<3> q{{0, 0, 1e-6}, {}};
+  const Joints<3> q{.beta = {0, 0, 1e-6}};
   EXPECT_EQ(check_joints(robot, q), Status::joints_out_of_order);
   EXPECT_EQ(check_joints(robot, q, 2e-6), Status::ok);
 }

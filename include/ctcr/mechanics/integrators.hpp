@@ -10,6 +10,7 @@ namespace ctcr {
 template <class Tableau>
 struct RungeKutta {
   static constexpr bool replayed = false;
+  static constexpr bool general_equations = true;  ///< those with load and weight, whatever acts: compiled once
 
   template <bool Gravity, class S, class P, int NC, class F, class H>
   static void loaded(const RodSection<S, P, NC>& r, RodState<S, NC>& y, F& frame, const H& k) noexcept {

@@ -266,7 +266,9 @@ inline Status dispatch(const Model<N>& model, const Joints<N>& q, const TipLoad&
       return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   };
   using enum Loading;
-  if (!model.coefficients().gravity.isZero(0.0))
+  if constexpr (requires { Stepper::general_equations; })
+    out.status = run(std::integral_constant<Loading, weight>{});
+  else if (!model.coefficients().gravity.isZero(0.0))
     out.status = run(std::integral_constant<Loading, weight>{});
   else if (!load.moment.isZero(0.0) || (D == Derivatives::compliance && load.force.isZero(0.0)))
     out.status = run(std::integral_constant<Loading, wrench>{});
