@@ -1,9 +1,8 @@
 // A robot in code, where its tip is, and what shape it takes.
 #include <cstdio>
-#include <vector>
-
 #include <ctcr/ctcr.hpp>
 #include <ctcr/mechanics/shape.hpp>
+#include <vector>
 
 int main() {
   // Three nitinol tubes, innermost first. Lengths in m, curvature in 1/m. Ref: Boyer et al., Table II.

@@ -1,6 +1,5 @@
 // How the tip moves with the joints (J) and with a load (C), and how good it is to trust them for small changes.
 #include <cstdio>
-
 #include <ctcr/ctcr.hpp>
 
 namespace {
@@ -23,7 +22,8 @@ int main() {
                       .curvature = curvature};
   };
   ctcr::Robot<3> robot;
-  robot.tubes = {tube(1.30e-3, 1.52e-3, 0.463, 10), tube(1.62e-3, 1.80e-3, 0.3305, 5), tube(2.03e-3, 2.35e-3, 0.199, 7)};
+  robot.tubes = {tube(1.30e-3, 1.52e-3, 0.463, 10), tube(1.62e-3, 1.80e-3, 0.3305, 5),
+                 tube(2.03e-3, 2.35e-3, 0.199, 7)};
   robot.gravity = {0, -9.80665, 0};  // the robot points horizontally, its y axis up
   const ctcr::Model<3> model(robot);
   const ctcr::Joints<3> q{{-0.30, -0.22, -0.13}, {0.0, 1.0, 2.0}};

@@ -68,7 +68,8 @@ TEST(Exponential, EqualsTheMatrixExponential) {
   Uniform uniform{std::mt19937_64(1)};
   for (int n = 0; n < test::cases(500); ++n) {
     const double size = n % 5 == 0 ? 1.0 + uniform(-1e-6, 1e-6) : n % 5 == 1 ? uniform(0, 1e-7) : uniform(0, 4);
-    const Vec3 o1 = uniform.vector(size), v1 = uniform.vector(1), o2 = uniform.vector(uniform(0, 4)), v2 = uniform.vector(1);
+    const Vec3 o1 = uniform.vector(size), v1 = uniform.vector(1), o2 = uniform.vector(uniform(0, 4)),
+               v2 = uniform.vector(1);
     EXPECT_LT((matrix(moved(o1, v1, o2, v2)) - reference(o1, v1) * reference(o2, v2)).cwiseAbs().maxCoeff(), 2e-13);
   }
 }
@@ -81,7 +82,8 @@ TEST(Exponential, TangentEqualsDifferences) {
     Eigen::Matrix<double, 12, 1> x;
     x << uniform.vector(size), uniform.vector(1), uniform.vector(uniform(0, 3)), uniform.vector(1);
     const auto at = [](const auto& a) {
-      return moved(a.template segment<3>(0), a.template segment<3>(3), a.template segment<3>(6), a.template segment<3>(9));
+      return moved(a.template segment<3>(0), a.template segment<3>(3), a.template segment<3>(6),
+                   a.template segment<3>(9));
     };
     Dual<3> d[12];
     for (int i = 0; i < 12; ++i) {

@@ -16,7 +16,7 @@ TYPED_TEST_SUITE(TipDerivative, test::TubeCounts);
 /// Solves near a solution, from its warm start, more tightly than any difference can feel.
 template <int N>
 class Nearby {
- public:
+public:
   explicit Nearby(const test::Case<N>& c) : model_(c.robot), c_(c) { pose(c.q, c.load); }
 
   Pose pose(const Joints<N>& q, const TipLoad& load) {
@@ -48,7 +48,7 @@ class Nearby {
         column < 3 ? 1e-3 : 1e-4);
   }
 
- private:
+private:
   Model<N> model_;
   test::Case<N> c_;
   Workspace<N> ws_;

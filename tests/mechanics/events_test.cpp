@@ -57,8 +57,7 @@ TEST(Events, AStraightTubeHasNoCurvedStart) {
   robot.tubes[1].curvature = 0;
   robot.tubes[2].curved_length = 0;
   const Events<3> events = sort_events(make_coefficients(robot), VecN<3>(-0.3, -0.2, -0.1));
-  for (std::size_t e = 0; e < 6; ++e)
-    EXPECT_EQ(events.s[e] < 0, events.id[e] == 4 || events.id[e] == 5);
+  for (std::size_t e = 0; e < 6; ++e) EXPECT_EQ(events.s[e] < 0, events.id[e] == 4 || events.id[e] == 5);
 }
 
 }  // namespace

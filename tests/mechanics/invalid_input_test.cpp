@@ -18,8 +18,8 @@ const TipLoad weight{.force = {0, -0.1, 0}};
 bool finite(const Solution<3>& s) {
   bool tips = true;
   for (const Pose& tip : s.tube_tips) tips = tips && tip.position.allFinite() && tip.rotation.allFinite();
-  return tips && s.position.allFinite() && s.rotation.allFinite() && s.jacobian.allFinite() && s.compliance.allFinite() &&
-         std::isfinite(s.stability);
+  return tips && s.position.allFinite() && s.rotation.allFinite() && s.jacobian.allFinite() &&
+         s.compliance.allFinite() && std::isfinite(s.stability);
 }
 
 /// Refused by solve() and step(), cold and warm, and the next good call is not disturbed.

@@ -34,7 +34,7 @@ TYPED_TEST_SUITE(Newton, Kinds);
 
 template <class K>
 class Shots {
- public:
+public:
   static constexpr int N = K::N;
   using Ev = Evaluation<N, K::L, K::D>;
   static constexpr int unknowns = Ev::Col::unknowns, turns = Ev::Col::turns;
@@ -85,7 +85,7 @@ class Shots {
     return A;
   }
 
- private:
+private:
   test::Case<N> c_;
   Coefficients<N> coefficients_;
   TipGuess<N> guess_;

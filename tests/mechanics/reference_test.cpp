@@ -1,9 +1,8 @@
 // Poses that other methods found (energy minimisation without shooting or Runge-Kutta): the model must find them, too.
-#include "support/reference_poses.hpp"
-
 #include <gtest/gtest.h>
 
 #include "support/laws.hpp"
+#include "support/reference_poses.hpp"
 
 namespace ctcr {
 namespace {

@@ -80,10 +80,10 @@ TYPED_TEST(Symmetry, LengthsAndForcesScale) {
     const Solution<N> b = test::solved<all>(scaled.robot, scaled.q, scaled.load);
     EXPECT_LT((b.position - length * a.position).norm(), 1e-10);
     EXPECT_LT((b.rotation - a.rotation).norm(), 1e-9);
-    EXPECT_LT((b.compliance.template topLeftCorner<3, 3>() * (force / length) -
-               a.compliance.template topLeftCorner<3, 3>())
-                  .norm(),
-              1e-8 * a.compliance.norm());
+    EXPECT_LT(
+        (b.compliance.template topLeftCorner<3, 3>() * (force / length) - a.compliance.template topLeftCorner<3, 3>())
+            .norm(),
+        1e-8 * a.compliance.norm());
     EXPECT_NEAR(b.stability, a.stability, 1e-8);
   }
 }

@@ -46,8 +46,7 @@ void expect_warm_equals_cold(double max_force, const Vec3& gravity) {
     EXPECT_LT((cold.jacobian - warm.jacobian).norm(), 1e-7 * (1 + cold.jacobian.norm()));
     EXPECT_LT((cold.compliance - warm.compliance).norm(), 1e-7 * (1 + cold.compliance.norm()));
     EXPECT_LE(warm.iterations, cold_evaluations + 1);
-    for (std::size_t i = 0; i < N; ++i)
-      EXPECT_LT(test::difference(cold.tube_tips[i], warm.tube_tips[i]).norm(), 1e-9);
+    for (std::size_t i = 0; i < N; ++i) EXPECT_LT(test::difference(cold.tube_tips[i], warm.tube_tips[i]).norm(), 1e-9);
   }
 }
 
@@ -117,8 +116,7 @@ TYPED_TEST(WarmStart, StepTakesOneEvaluationAndItsResidualTellsItsError) {
     ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s), Status::ok);
     ASSERT_EQ(step<Derivatives::compliance>(model, move.q, move.load, ws, s), Status::ok);
     EXPECT_EQ(s.iterations, 1);
-    const Vec6 error =
-        test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
+    const Vec6 error = test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
     EXPECT_LT(error.norm(), 10 * s.residual * s.residual + 1e-9);
   }
 }

@@ -11,8 +11,9 @@ namespace ctcr {
 #include "model_to_numbers.hpp"
 }  // namespace ctcr
 
-void ctcr_scalar_build::solve_paper_robot(const double (&joints)[6], const double (&load)[6], const double (&gravity)[3],
-                                          bool with_compliance, double (&result)[result_size]) {
+void ctcr_scalar_build::solve_paper_robot(const double (&joints)[6], const double (&load)[6],
+                                          const double (&gravity)[3], bool with_compliance,
+                                          double (&result)[result_size]) {
   static_assert(!__is_same(ctcr::Lanes, double __attribute__((vector_size(32)))));
   ctcr::solve_to_numbers(joints, load, gravity, with_compliance, result);
 }

@@ -1,10 +1,9 @@
 // Compilers without vectors compute the same robot.
-#include "scalar.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "scalar.hpp"
 #include "support/cases.hpp"
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"

@@ -14,31 +14,31 @@ void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& loa
 
 }  // namespace ctcr::test
 
-#define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                       \
-  kind void test::evaluation<Derivatives::D, Loading::L, Stepper, N>(                                      \
-      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, int,                   \
-      Evaluation<N, Loading::L, Derivatives::D>&);
+#define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                           \
+  kind void test::evaluation<Derivatives::D, Loading::L, Stepper, N>(const Coefficients<N>&, const Joints<N>&, \
+                                                                     const TipLoad&, const TipGuess<N>&, int,  \
+                                                                     Evaluation<N, Loading::L, Derivatives::D>&);
 #define CTCR_TEST_LOADED_EVALUATIONS(kind, D, Stepper, N) \
   CTCR_TEST_EVALUATION(kind, D, force, Stepper, N)        \
   CTCR_TEST_EVALUATION(kind, D, wrench, Stepper, N)       \
   CTCR_TEST_EVALUATION(kind, D, weight, Stepper, N)
-#define CTCR_TEST_EVALUATIONS_none(kind, Stepper, N)    \
-  CTCR_TEST_EVALUATION(kind, none, none, Stepper, N)    \
+#define CTCR_TEST_EVALUATIONS_none(kind, Stepper, N) \
+  CTCR_TEST_EVALUATION(kind, none, none, Stepper, N) \
   CTCR_TEST_LOADED_EVALUATIONS(kind, none, Stepper, N)
-#define CTCR_TEST_EVALUATIONS_jacobian(kind, Stepper, N)  \
-  CTCR_TEST_EVALUATION(kind, jacobian, none, Stepper, N)  \
+#define CTCR_TEST_EVALUATIONS_jacobian(kind, Stepper, N) \
+  CTCR_TEST_EVALUATION(kind, jacobian, none, Stepper, N) \
   CTCR_TEST_LOADED_EVALUATIONS(kind, jacobian, Stepper, N)
 #define CTCR_TEST_EVALUATIONS_compliance(kind, Stepper, N) CTCR_TEST_LOADED_EVALUATIONS(kind, compliance, Stepper, N)
 
-#define CTCR_TEST_SOLVER(kind, D, N)                                                                          \
-  kind Status solve<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&,          \
-                                                  Workspace<N>&, Solution<N>&, const Settings&) noexcept;     \
-  kind Status step<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&,           \
-                                                 Workspace<N>&, Solution<N>&, const Settings&) noexcept;      \
+#define CTCR_TEST_SOLVER(kind, D, N)                                                                                \
+  kind Status solve<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
+                                                  Solution<N>&, const Settings&) noexcept;                          \
+  kind Status step<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&,  \
+                                                 Solution<N>&, const Settings&) noexcept;                           \
   CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
 #define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
 
-#define CTCR_TEST_DECLARE(N)                     \
+#define CTCR_TEST_DECLARE(N)                       \
   CTCR_TEST_SOLVER(extern template, none, N)       \
   CTCR_TEST_SOLVER(extern template, jacobian, N)   \
   CTCR_TEST_SOLVER(extern template, compliance, N) \

@@ -109,9 +109,10 @@ inline int ramped_guess(const Coefficients<N>& c, const Joints<N>& q, const TipL
 }
 
 /// Copies an evaluation into the solution and the warm start.
+/// @param previous  the guess that was evaluated   @param guess  the guess to go on from
 template <class Ev, int N>
-inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess, Workspace<N>& ws,
-                    Solution<N>& out) noexcept {
+inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& previous,
+                    const TipGuess<N>& guess, Workspace<N>& ws, Solution<N>& out) noexcept {
   using Col = typename Ev::Col;
   out.residual = ev.residual;
   out.stability = ev.det;
@@ -158,6 +159,16 @@ inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const
     if constexpr (Col::compliance)
       for (int k = 0; k < 6; ++k)
         for (int j = 0; j < 6; ++j) out.compliance(k, j) = ev.pose(k, Col::force + j);
+    if constexpr (Col::compliance && Col::turns == 2) {
+      // Loads were varied along the base axes as the guessed tip frame sees them; it may be turned about the force.
+      const Mat3 found_axes = (ev.rotation * previous.rotation.transpose()).transpose();
+      for (const int first : {0, 3}) {
+        auto block = out.compliance.template middleCols<3>(first);
+        block = (block * found_axes).eval();
+        auto change = ws.sensitivity.template middleCols<3>(2 * N + first);
+        change = (change * found_axes).eval();
+      }
+    }
   }
 }
 
@@ -202,7 +213,7 @@ inline Status solve_as(const Model<N>& model, const Joints<N>& q, const TipLoad&
     out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, ramp_curvature, guess);
     attempt();
   }
-  publish(ev, q, load, guess, ws, out);
+  publish(ev, q, load, guess, guess, ws, out);
   if (!std::isfinite(ev.residual) || !ev.position.allFinite()) {
     out.position.setZero();
     out.rotation.setIdentity();
@@ -230,7 +241,7 @@ inline Status step_as(const Model<N>& model, const Joints<N>& q, const TipLoad& 
     return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   TipGuess<N> next = moved<N>(guess, dx, 1.0);
   if constexpr (L == Loading::none) next.rotation = ev.rotation;
-  publish(ev, q, load, next, ws, out);
+  publish(ev, q, load, guess, next, ws, out);
   // The pose at the end of the Newton step: the tangent is known, so it costs nothing.
   if constexpr (Ev::Col::turns == 3) {
     out.rotation = next.rotation;
