@@ -15,8 +15,26 @@ namespace {
 
 using namespace bench;
 
+/// The paper's Newton step: residual, B_u, and with them J and C.
 template <class Case>
-bool run_ours(int passes) {
+bool run_newton(int passes) {
+  constexpr auto loading = Case::loaded ? ctcr::Loading::force : ctcr::Loading::none;
+  const auto& solved = Solved<Case::loaded>::instance();
+  ctcr::Evaluation<3, loading, Case::derivatives> evaluation;
+  bool good = solved.all_solved;
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t i = 0; i < solved.configurations.size(); ++i) {
+      const Configuration& c = solved.configurations[i];
+      ctcr::evaluate<Case::derivatives, loading, ctcr::MagnusRk4>(solved.model.coefficients(), c.joints, c.load,
+                                                                  solved.workspaces[i].guess, 1, evaluation);
+      good = good && evaluation.residual < 1e-9;
+    }
+  return good;
+}
+
+/// The whole control step around it: checks, prediction, outputs.
+template <class Case>
+bool run_step(int passes) {
   const auto& solved = Solved<Case::loaded>::instance();
   auto workspaces = solved.workspaces;
   ctcr::Solution<3> solution;
@@ -61,7 +79,8 @@ int main(int argc, char** argv) {
   bool found = false, good = false;
   for_each_case([&](auto row) {
     using Case = decltype(row);
-    if (argv[1] == std::string(Case::name)) found = true, good = run_ours<Case>(passes);
+    if (argv[1] == std::string(Case::name)) found = true, good = run_newton<Case>(passes);
+    if (argv[1] == "step/" + std::string(Case::name)) found = true, good = run_step<Case>(passes);
     if (argv[1] == "rival/" + std::string(Case::name)) found = true, good = run_rival<Case>(passes);
   });
   if (!found) return std::fputs("no such case\n", stderr), 2;

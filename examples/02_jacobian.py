@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-import numpy as np
-
 import ctcr
+import numpy as np
 
 model = ctcr.Model(ctcr.robot_file.load(Path(__file__).parent / "robots" / "table2.yaml"))
 q = np.array([-0.30, -0.22, -0.13, 0.0, 1.0, 2.0])  # beta_1..3 [m], alpha_1..3 [rad]

@@ -393,10 +393,7 @@ def test_every_integrator_converges_to_the_same_answer_at_its_order(integrator, 
         assert answer.solved.all()
         return np.linalg.norm(answer.position - exact, axis=1).mean()
 
-    if order == 8:
-        assert error(2) < 1e-9
-    else:
-        assert 0.7 * 2**order < error(8) / error(16) < 1.5 * 2**order
+    assert error(2) < 1e-9 if order == 8 else 0.7 * 2**order < error(8) / error(16) < 1.5 * 2**order
 
 
 def test_integrators_are_known_by_name_and_give_poses_only():

@@ -44,8 +44,8 @@ inline Mat6 twice(const Mat3& R) {
   return both;
 }
 
-/// Smallest distance between the places where anything changes along the robot, the plate included [m]: how far beta
-/// may move before the model's derivative by it jumps.
+/// Smallest distance between the places where anything changes along the robot, grasps and the plate included [m]: how
+/// far beta may move before the model's derivative by it jumps, or the joints are refused.
 template <int N>
 double smallest_gap(const Robot<N>& robot, const Joints<N>& q) {
   std::array<double, 2 * N + 1> s{};
@@ -56,6 +56,7 @@ double smallest_gap(const Robot<N>& robot, const Joints<N>& q) {
   std::sort(s.begin(), s.end());
   double gap = 1;
   for (std::size_t i = 0; i + 1 < s.size(); ++i) gap = std::min(gap, s[i + 1] - s[i]);
+  for (int i = 0; i < N; ++i) gap = std::min(gap, (i + 1 < N ? q.beta[i + 1] : 0.0) - q.beta[i]);
   return gap;
 }
 
