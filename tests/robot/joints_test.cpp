@@ -50,9 +50,9 @@ TEST(CheckJoints, RefusesWhatIsNotFinite) {
 }
 
 TEST(CheckJoints, SlackForgivesRounding) {
-  const Joints<3> q{.beta = {0, 0, 1e-6}};
+  const Joints<3> q{.beta = {0, 0, 2e-6}};
   EXPECT_EQ(check_joints(robot, q), Status::joints_out_of_order);
-  EXPECT_EQ(check_joints(robot, q, 2e-6), Status::ok);
+  EXPECT_EQ(check_joints(robot, q, 3e-6), Status::ok);
 }
 
 }  // namespace

@@ -214,9 +214,12 @@ inline Status solve_as(const Model<N>& model, const Joints<N>& q, const TipLoad&
     attempt();
   }
   publish(ev, q, load, guess, guess, ws, out);
-  if (!std::isfinite(ev.residual) || !ev.position.allFinite()) {
-    out.position.setZero();
-    out.rotation.setIdentity();
+  const bool finite = std::isfinite(ev.residual) && std::isfinite(ev.det) && ev.position.allFinite() &&
+                      out.jacobian.allFinite() && out.compliance.allFinite();
+  if (!finite) {
+    const int iterations = out.iterations;
+    out = Solution<N>{};
+    out.iterations = iterations;
     ws.reset();
     return Status::not_finite;
   }
