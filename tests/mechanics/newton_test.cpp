@@ -50,7 +50,12 @@ public:
     detail::turn_axes<K::L>(c.load, axis_);
   }
 
-  Ev at(const Vector& off) const {
+  /// What one evaluation finds with the guess moved off the solution.
+  struct Shot {
+    Vector residual, step;
+    double det;
+  };
+  Shot at(const Vector& off) const {
     TipGuess<N> guess = guess_;
     if constexpr (turns > 0) {
       Vec3 turn = Vec3::Zero();
@@ -60,26 +65,19 @@ public:
     for (int i = 1; i < N; ++i) guess.psi[i] += off[turns + i - 1];
     Ev ev;
     test::evaluation<K::D, K::L, MagnusRk4>(coefficients_, c_.q, c_.load, guess, 1, ev);
-    return ev;
+    Shot shot;
+    for (int j = 0; j < turns; ++j) shot.residual[j] = axis_[j].dot(ev.turn);
+    for (int i = 1; i < N; ++i) shot.residual[turns + i - 1] = ev.angle_error[i];
+    for (int j = 0; j < unknowns; ++j) shot.step[j] = ev.unknown(j, Ev::Col::newton);
+    shot.det = ev.det;
+    return shot;
   }
-  static CTCR_INLINE Vector residual(const Ev& ev) {
-    Vector b;
-    for (int j = 0; j < turns; ++j) b[j] = ev.axis[j].dot(ev.turn);
-    for (int i = 1; i < N; ++i) b[turns + i - 1] = ev.angle_error[i];
-    return b;
-  }
-  static CTCR_INLINE Vector step(const Ev& ev) {
-    Vector dx;
-    for (int j = 0; j < unknowns; ++j) dx[j] = ev.unknown(j, Ev::Col::newton);
-    return dx;
-  }
-  /// Derivative of f(evaluation) by the unknowns at the solution, by differences of fourth order.
-  template <class F>
-  Matrix derivative(const F& f) const {
+  /// Derivative of a member of Shot by the unknowns at the solution, by differences of fourth order.
+  Matrix derivative(Vector Shot::* member) const {
     constexpr double h = 3e-4;
     Matrix A;
     for (int j = 0; j < unknowns; ++j) {
-      const auto moved = [&](double t) { return f(at(Vector(t * Vector::Unit(j)))); };
+      const auto moved = [&](double t) { return Vector(at(t * Vector::Unit(j)).*member); };
       A.col(j) = (8.0 * (moved(h) - moved(-h)) - (moved(2 * h) - moved(-2 * h))) / (12 * h);
     }
     return A;
@@ -104,7 +102,7 @@ TYPED_TEST(Newton, BuEqualsDifferencesOfTheDiscreteMap) {
   for (int n = 0; n < test::cases(20); ++n) {
     const Shots<TypeParam> shots(random_case<TypeParam>(random));
     using Matrix = typename Shots<TypeParam>::Matrix;
-    const Matrix steps = shots.derivative([](const auto& ev) { return Shots<TypeParam>::step(ev); });
+    const Matrix steps = shots.derivative(&Shots<TypeParam>::Shot::step);
     EXPECT_LT((steps + Matrix::Identity()).cwiseAbs().maxCoeff(), 1e-8);
   }
 }
@@ -114,7 +112,7 @@ TYPED_TEST(Newton, StabilityIsTheDeterminantOfBu) {
   for (int n = 0; n < test::cases(20); ++n) {
     const Shots<TypeParam> shots(random_case<TypeParam>(random));
     const double sign = Shots<TypeParam>::turns % 2 == 0 ? 1 : -1;  // rows of turns carry minus the unknown turn
-    const auto B_u = shots.derivative([](const auto& ev) { return Shots<TypeParam>::residual(ev); });
+    const auto B_u = shots.derivative(&Shots<TypeParam>::Shot::residual);
     const double det = sign * B_u.determinant();
     EXPECT_NEAR(shots.at(Shots<TypeParam>::Vector::Zero()).det, det, 1e-8 * (1 + std::abs(det)));
   }
@@ -127,7 +125,7 @@ TYPED_TEST(Newton, ConvergesQuadratically) {
   for (int n = 0; n < test::cases(20); ++n) {
     const Shots<TypeParam> shots(random_case<TypeParam>(random));
     const Vector direction = Vector::Random().normalized();
-    const auto left_over = [&](double off) { return (shots.step(shots.at(off * direction)) + off * direction).norm(); };
+    const auto left_over = [&](double off) { return (shots.at(off * direction).step + off * direction).norm(); };
     const double far = left_over(1e-2), near = left_over(1e-3);
     EXPECT_LT(far, 0.05 * 1e-2) << "after one step";
     EXPECT_LT(near, 0.013 * far + 1e-12) << "a tenth of the way leaves a hundredth of the error";
