@@ -126,9 +126,9 @@ TYPED_TEST(Newton, ConvergesQuadratically) {
     const Shots<TypeParam> shots(random_case<TypeParam>(random));
     const Vector direction = Vector::Random().normalized();
     const auto left_over = [&](double off) { return (shots.at(off * direction).step + off * direction).norm(); };
-    const double far = left_over(1e-2), near = left_over(1e-3);
-    EXPECT_LT(far, 0.05 * 1e-2) << "after one step";
-    EXPECT_LT(near, 0.013 * far + 1e-12) << "a tenth of the way leaves a hundredth of the error";
+    const double far = left_over(1e-3), near = left_over(1e-4);
+    EXPECT_LT(far, 0.2 * 1e-3) << "after one step";
+    EXPECT_LT(near, 0.015 * far + 1e-11) << "a tenth of the way leaves a hundredth of the error";
   }
 }
 
