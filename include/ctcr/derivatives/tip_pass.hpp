@@ -28,23 +28,6 @@ struct TipVariables {
   static constexpr int rows = unknowns + 6;  ///< equations, then the pose
 };
 
-using Lanes3 = std::array<Lanes, 3>;
-
-CTCR_INLINE Lanes3 operator+(const Lanes3& a, const Lanes3& b) noexcept {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-CTCR_INLINE Lanes3 operator-(const Lanes3& a, const Lanes3& b) noexcept {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-CTCR_INLINE Lanes3 operator*(const Mat3& R, const Lanes3& v) noexcept {
-  Lanes3 r;
-  for (int i = 0; i < 3; ++i) r[std::size_t(i)] = R(i, 0) * v[0] + R(i, 1) * v[1] + R(i, 2) * v[2];
-  return r;
-}
-CTCR_INLINE Lanes3 cross(const Lanes3& a, const Vec3& b) noexcept {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 /// One integration that differentiates along pass_lanes of the variables.
 template <int N, bool Loaded, bool Gravity, class Stepper>
 class TipPass {

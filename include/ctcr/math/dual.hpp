@@ -155,6 +155,16 @@ CTCR_INLINE Dual<G> inverse(const Dual<G>& a) noexcept {
 }
 CTCR_INLINE double inverse(double a) noexcept { return 1.0 / a; }
 
+/// f(x) from its value and its slope at x. Real time: yes.
+CTCR_INLINE double mapped(double, double f, double) noexcept { return f; }
+template <int G>
+CTCR_INLINE Dual<G> mapped(const Dual<G>& x, double f, double slope) noexcept {
+  Dual<G> r;
+  r.v = f;
+  for (int g = 0; g < G; ++g) r.d[g] = x.d[g] * slope;
+  return r;
+}
+
 /// sine and cosine together. Real time: yes.
 template <int G>
 CTCR_INLINE void sincos(const Dual<G>& a, Dual<G>& s, Dual<G>& c) noexcept {

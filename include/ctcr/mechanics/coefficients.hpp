@@ -48,15 +48,21 @@ inline Coefficients<N, P> make_coefficients(const std::array<TubeParameters<P>, 
   return c;
 }
 
-/// Coefficients of a robot. Real time: yes.
+/// What the mechanics uses of each tube. Real time: yes.
 template <int N>
-inline Coefficients<N> make_coefficients(const Robot<N>& robot) noexcept {
+inline std::array<TubeParameters<double>, N> tube_parameters(const Robot<N>& robot) noexcept {
   std::array<TubeParameters<double>, N> tubes{};
   for (std::size_t i = 0; i < N; ++i) {
     const Tube& t = robot.tubes[i];
     tubes[i] = {t.EI(), t.GJ(), t.curvature, t.length, t.curved_length, t.mass_per_length()};
   }
-  return make_coefficients<N, double>(tubes, robot.gravity);
+  return tubes;
+}
+
+/// Coefficients of a robot. Real time: yes.
+template <int N>
+inline Coefficients<N> make_coefficients(const Robot<N>& robot) noexcept {
+  return make_coefficients<N, double>(tube_parameters(robot), robot.gravity);
 }
 
 }  // namespace ctcr

@@ -1,20 +1,49 @@
 #pragma once
+#include <type_traits>
+
+#include "ctcr/effects/hooks.hpp"
 #include "ctcr/mechanics/coefficients.hpp"
 
 namespace ctcr {
 
+/// The numbers that the general path needs of a robot, and its effects.
+template <int N, class Fx>
+struct EffectCoefficients {
+  std::array<TubeParameters<double>, N> tubes;
+  Coefficients<N> plain;  ///< without effects: where tubes end and curve
+  Vec3 gravity;           ///< base frame [m/s^2]
+  typename Fx::template On<N> effects;
+};
+
+/// Whether coefficients C are those of a model with effects.
+template <class C>
+inline constexpr bool has_effects = false;
+template <int N, class Fx>
+inline constexpr bool has_effects<EffectCoefficients<N, Fx>> = true;
+
 /// A robot ready to be solved: its description and the numbers derived from it. Immutable; share it between threads.
-template <int N>
+/// @tparam Fx  EffectList<...> of what it has beyond the standard model
+template <int N, class Fx = Standard>
 class Model {
  public:
-  explicit Model(const Robot<N>& robot) noexcept : robot_(robot), coefficients_(make_coefficients(robot)) {}
+  using Effects = typename Fx::template On<N>;
+  using Numbers = std::conditional_t<Fx::none, Coefficients<N>, EffectCoefficients<N, Fx>>;
+
+  explicit Model(const Robot<N>& robot, const Effects& effects = {}) noexcept : robot_(robot), effects_(effects) {
+    if constexpr (Fx::none)
+      coefficients_ = make_coefficients(robot);
+    else
+      coefficients_ = {tube_parameters(robot), make_coefficients(robot), robot.gravity, effects};
+  }
 
   [[nodiscard]] const Robot<N>& robot() const noexcept { return robot_; }
-  [[nodiscard]] const Coefficients<N>& coefficients() const noexcept { return coefficients_; }
+  [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
+  [[nodiscard]] const Numbers& coefficients() const noexcept { return coefficients_; }
 
  private:
   Robot<N> robot_;
-  Coefficients<N> coefficients_;
+  [[no_unique_address]] Effects effects_;
+  Numbers coefficients_;
 };
 
 }  // namespace ctcr

@@ -2,6 +2,7 @@
 // Newton's method on the shooting problem, and its real-time form: one evaluation per control period.
 #include <algorithm>
 
+#include "ctcr/mechanics/effect_evaluation.hpp"
 #include "ctcr/mechanics/solution.hpp"
 
 namespace ctcr {
@@ -45,8 +46,8 @@ inline VecN<N + 2> newton_step(const Ev& ev) noexcept {
 
 /// Damped Newton iteration from `guess`. On return `ev` belongs to `guess`.
 /// @return evaluations used; ev.residual tells whether it converged
-template <Derivatives D, Loading L, class Stepper, int N>
-inline int newton(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
+template <Derivatives D, Loading L, class Stepper, int N, class C>
+inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
                   TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
   int used = 1;
   evaluate<D, L, Stepper>(c, q, load, guess, settings.steps, ev);
@@ -76,18 +77,36 @@ inline int newton(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& l
   return used;
 }
 
+/// Coefficients of the same robot with a part of its weight and of its precurvature.
+template <int N>
+inline Coefficients<N> scaled(Coefficients<N> c, double weight, double curvature) noexcept {
+  c.gravity *= weight;
+  for (std::size_t i = 0; i < N; ++i) c.a[i] *= curvature, c.rho[i] *= curvature;
+  return c;
+}
+template <int N, class Fx>
+inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weight, double curvature) noexcept {
+  c.gravity *= weight;
+  for (auto& tube : c.tubes) tube.kappa *= curvature;
+  return c;
+}
+
 /// Unloaded equilibrium, from the angles at the base; the tip frame follows without iteration.
-template <class Stepper, int N>
-inline int unloaded_guess(const Coefficients<N>& c, const Joints<N>& q, const Settings& settings,
-                          TipGuess<N>& guess) noexcept {
-  Evaluation<N, Loading::none, Derivatives::none> ev;
+template <class Stepper, int N, class C>
+inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, TipGuess<N>& guess) noexcept {
   guess = straight_guess(q);
-  return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, guess, ev);
+  if constexpr (has_effects<C>) {
+    Evaluation<N, Loading::weight, Derivatives::none> ev;
+    return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, guess, ev);
+  } else {
+    Evaluation<N, Loading::none, Derivatives::none> ev;
+    return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, guess, ev);
+  }
 }
 
 /// Brings the load, or if that fails the precurvature, from nothing to its full size in small steps.
-template <Loading L, class Stepper, int N>
-inline int ramped_guess(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
+template <Loading L, class Stepper, int N, class C>
+inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
                         bool ramp_curvature, TipGuess<N>& guess) noexcept {
   constexpr int ramp_steps = 16;
   Evaluation<N, L, Derivatives::none> ev;
@@ -98,12 +117,8 @@ inline int ramped_guess(const Coefficients<N>& c, const Joints<N>& q, const TipL
     used += unloaded_guess<Stepper>(c, q, settings, guess);
   for (int k = 1; k <= ramp_steps; ++k) {
     const double part = double(k) / ramp_steps;
-    Coefficients<N> partial = c;
-    partial.gravity = c.gravity * part;
-    if (ramp_curvature)
-      for (std::size_t i = 0; i < N; ++i) partial.a[i] *= part, partial.rho[i] *= part;
     used += newton<Derivatives::none, L, Stepper>(
-        partial, q, TipLoad{load.force * part, load.moment * part}, settings, guess, ev);
+        scaled(c, part, ramp_curvature ? part : 1), q, TipLoad{load.force * part, load.moment * part}, settings, guess, ev);
   }
   return used;
 }
@@ -190,10 +205,10 @@ inline TipGuess<N> predicted_guess(const Workspace<N>& ws, const Joints<N>& q, c
   return size < step_limit ? moved<N>(ws.guess, dx, 1.0) : ws.guess;
 }
 
-template <Derivatives D, Loading L, class Stepper, int N>
-inline Status solve_as(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
+template <Derivatives D, Loading L, class Stepper, int N, class Fx>
+inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
                        const Settings& settings) noexcept {
-  const Coefficients<N>& c = model.coefficients();
+  const auto& c = model.coefficients();
   Evaluation<N, L, D> ev;
   TipGuess<N> guess;
   const auto converged = [&] { return ev.residual < settings.tolerance && ev.det > 0; };
@@ -230,8 +245,8 @@ inline Status solve_as(const Model<N>& model, const Joints<N>& q, const TipLoad&
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
-template <Derivatives D, Loading L, class Stepper, int N>
-inline Status step_as(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
+template <Derivatives D, Loading L, class Stepper, int N, class Fx>
+inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
                       const Settings& settings) noexcept {
   if (!ws.warm) return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   using Ev = Evaluation<N, L, D>;
@@ -258,8 +273,8 @@ inline Status step_as(const Model<N>& model, const Joints<N>& q, const TipLoad& 
 }
 
 /// Chooses the cheapest equations that hold, and answers invalid input.
-template <Derivatives D, class Stepper, bool OneStep, int N>
-inline Status dispatch(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+template <Derivatives D, class Stepper, bool OneStep, int N, class Fx>
+inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                        Solution<N>& out, const Settings& settings) noexcept {
   out.iterations = 0;
   out.status = check_joints(model.robot(), q);
@@ -280,7 +295,7 @@ inline Status dispatch(const Model<N>& model, const Joints<N>& q, const TipLoad&
       return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   };
   using enum Loading;
-  if constexpr (requires { Stepper::general_equations; })
+  if constexpr (!Fx::none || requires { Stepper::general_equations; })
     out.status = run(std::integral_constant<Loading, weight>{});
   else if (!model.coefficients().gravity.isZero(0.0))
     out.status = run(std::integral_constant<Loading, weight>{});
@@ -304,8 +319,8 @@ inline Status dispatch(const Model<N>& model, const Joints<N>& q, const TipLoad&
 ///         iterate; singular: solved, but at a bifurcation or an unstable equilibrium
 /// Real time: yes; at most about 70 * max_iterations evaluations, 1 to 3 from a warm start.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
-template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N>
-Status solve(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
+template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
+Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
              const Settings& settings = {}) noexcept {
   return detail::dispatch<D, Stepper, false>(model, q, load, ws, out, settings);
 }
@@ -314,8 +329,8 @@ Status solve(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Wor
 /// no warm start or the joints moved too far (||b|| > 0.05 rad). out.residual is that before the final correction, whose
 /// square bounds the error. Ask for the Jacobian to have the prediction and the corrected pose.
 /// Real time: yes, one evaluation.
-template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N>
-Status step(const Model<N>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
+template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
+Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
             const Settings& settings = {}) noexcept {
   return detail::dispatch<D, Stepper, true>(model, q, load, ws, out, settings);
 }

@@ -7,10 +7,11 @@
 namespace ctcr {
 
 /// A robot with its motors and its tracker, as it is calibrated and controlled. Immutable; share it between threads.
-template <int N>
+/// @tparam Fx  EffectList<...> of what it has beyond the standard model
+template <int N, class Fx = Standard>
 struct System {
   Transmission<N> transmission;
-  Model<N> model;
+  Model<N, Fx> model;
   PoseSensor sensor;
   Settings settings{};
 };

@@ -1,0 +1,49 @@
+#pragma once
+// Weights that let a reading which nothing explains count for little.
+#include <algorithm>
+#include <cmath>
+
+#include "ctcr/calibration/whitening.hpp"
+
+namespace ctcr {
+
+/// Weight of three residuals whose squared length in sd is `square`: 1 within the bulk of a normal distribution, beyond
+/// it that of Student's t with five degrees of freedom. Normal data keep their weight, so that their chi-square and
+/// their standard deviations stay what they are.
+inline double tail_weight(double square) noexcept {
+  constexpr double freedom = 5, bulk = 9.348;  // 97.5 % of chi-square of three
+  return square <= bulk ? 1.0 : (freedom + bulk) / (freedom + square);
+}
+
+/// Weights for the next fit of residuals (6 rows) that were fitted with `whitening`.
+///
+/// A row is judged by how far it lies from what the field error at the other rows predicts for it, in units of the
+/// usual distance of these rows: where the model itself is wrong everywhere, that is no row's fault.
+/// @param use  rows of weight 0 here keep 0
+inline RowWeights outlier_weights(const Noise& noise, const Whitening& whitening, const Eigen::VectorXd& residual,
+                                  const RowWeights& use) {
+  constexpr double median_of_chi_square = 2.366;  // of three
+  RowWeights weights = use;
+  const Eigen::VectorXd left = residual - whitening.field(residual);
+  for (int kind = 0; kind < 2; ++kind) {
+    const double jitter = kind == 0 ? noise.position_jitter : noise.rotation_jitter;
+    const Eigen::ArrayXd variance = whitening.axes(kind).field_variance();
+    // Leaving the row out: both its residual and the field's variance grow by 1 / (1 - leverage).
+    const Eigen::ArrayXd leverage = variance * whitening.axes(kind).scale().array().square();
+    const Eigen::ArrayXd apart = (1 - leverage).max(1e-6);
+    const Eigen::ArrayXd square = Whitening::gathered(left, kind).rowwise().squaredNorm().array() /
+                                  (apart.square() * (jitter * jitter + variance / apart));
+    std::vector<double> used;
+    for (Eigen::Index i = 0; i < square.size(); ++i)
+      if (use(i, kind) > 0) used.push_back(square[i]);
+    if (used.empty()) continue;
+    const auto middle = used.begin() + std::ptrdiff_t(used.size() / 2);
+    std::nth_element(used.begin(), middle, used.end());
+    const double usual = std::max(1.0, *middle / median_of_chi_square);
+    for (Eigen::Index i = 0; i < square.size(); ++i)
+      if (use(i, kind) > 0) weights(i, kind) = tail_weight(square[i] / usual);
+  }
+  return weights;
+}
+
+}  // namespace ctcr

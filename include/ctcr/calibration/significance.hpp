@@ -1,0 +1,21 @@
+#pragma once
+// How surprising a sum of squares is, as a normal score: 3 is exceeded once in 740 by chance.
+#include <algorithm>
+#include <cmath>
+
+namespace ctcr {
+
+/// Score of a chi-square value. Ref: Wilson, Hilferty, "The distribution of chi-square", 1931.
+inline double chi_square_score(double chi_square, double degrees) noexcept {
+  const double v = 2.0 / (9.0 * degrees);
+  return (std::cbrt(std::max(0.0, chi_square) / degrees) - (1 - v)) / std::sqrt(v);
+}
+
+/// Score of the ratio of two mean squares with these degrees of freedom, good from three degrees below on.
+/// Ref: Paulson, "An approximate normalization of the analysis of variance distribution", 1942.
+inline double variance_ratio_score(double ratio, double degrees_above, double degrees_below) noexcept {
+  const double a = 2.0 / (9.0 * degrees_above), b = 2.0 / (9.0 * degrees_below), f = std::cbrt(std::max(0.0, ratio));
+  return ((1 - b) * f - (1 - a)) / std::sqrt(b * f * f + a);
+}
+
+}  // namespace ctcr

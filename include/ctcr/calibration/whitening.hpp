@@ -1,0 +1,134 @@
+#pragma once
+// Residuals with the covariance of Noise made independent and of unit variance, in time linear in the rows.
+//
+// The covariance is the same for the three axes of a position (of a rotation): with the precision W^2 = diag(weight / jitter^2)
+// and A = W Phi it is W^-1 (I + A A^T) W^-1. The eigenvectors V and eigenvalues t of the small matrix A^T A give
+// (I + A A^T)^(-1/2) = I - A V diag(1 / (1 + t + sqrt(1 + t))) V^T A^T.
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <type_traits>
+
+#include "ctcr/calibration/noise.hpp"
+
+namespace ctcr {
+
+/// Six numbers a row: position x, y, z [m], rotation vector x, y, z [rad], tracker axes.
+using Rows6 = Eigen::Matrix<double, Eigen::Dynamic, 6>;
+/// Weight of each row's position and rotation: 1 as the noise says, less for outliers, 0 where not measured or not used.
+using RowWeights = Eigen::MatrixX2d;
+
+namespace detail {
+
+/// Every sixth of the numbers that start at `first`.
+template <class Scalar>
+auto every_sixth(Scalar* first, Eigen::Index rows) {
+  using Vector = std::conditional_t<std::is_const_v<Scalar>, const Eigen::VectorXd, Eigen::VectorXd>;
+  return Eigen::Map<Vector, 0, Eigen::InnerStride<6>>(first, rows);
+}
+
+/// The three axes of a position or of a rotation, which share one covariance.
+class ThreeAxes {
+ public:
+  ThreeAxes() = default;
+  ThreeAxes(double jitter, double field_sd, const SmoothField& field, const Eigen::VectorXd& weight)
+    : field_(field_sd * field.factor), variance_(jitter * jitter + field_sd * field_sd) {
+    const Eigen::ArrayXd variance = jitter * jitter + field_sd * field_sd * field.rest.array();
+    scale_ = (weight.array() / variance).sqrt();
+    const Eigen::MatrixXd A = scale_.asDiagonal() * field_;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(A.transpose() * A);
+    const Eigen::ArrayXd t = eigen.eigenvalues().array().max(0.0);
+    field_ *= (eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal()).eval();
+    shrink_ = (1 + t).sqrt() / (1 + (1 + t).sqrt());
+    used_ = (weight.array() > 0).count();
+    log_determinant_ = (1 + t).log().sum() - 2 * (scale_.array() > 0).select(scale_.array().log(), 0.0).sum();
+  }
+
+  /// @param y  (rows, any)
+  void whiten(Eigen::MatrixXd& y) const {
+    y = scale_.asDiagonal() * y;
+    if (field_.cols() == 0) return;
+    const Eigen::MatrixXd small = shrink_.matrix().asDiagonal() * (field_.transpose() * (scale_.asDiagonal() * y));
+    y.noalias() -= scale_.asDiagonal() * (field_ * small);
+  }
+  /// Posterior mean of the field error at every row, given residuals (rows, any).
+  [[nodiscard]] Eigen::MatrixXd field_mean(const Eigen::MatrixXd& residual) const {
+    return field_ * (field_.transpose() * (scale_.cwiseAbs2().asDiagonal() * residual));
+  }
+  /// Its variance, per axis.
+  [[nodiscard]] Eigen::VectorXd field_variance() const { return field_.rowwise().squaredNorm(); }
+  [[nodiscard]] const Eigen::VectorXd& scale() const { return scale_; }  ///< sqrt(weight) / sd of the jitter
+  [[nodiscard]] double variance() const { return variance_; }            ///< of one reading, jitter and field, per axis
+  [[nodiscard]] double log_determinant() const { return 3 * log_determinant_; }
+  [[nodiscard]] Eigen::Index used() const { return used_; }  ///< rows of weight above 0
+
+ private:
+  Eigen::MatrixXd field_;  ///< its posterior covariance is field_ field_^T
+  Eigen::VectorXd scale_;
+  Eigen::ArrayXd shrink_;
+  double variance_ = 0, log_determinant_ = 0;
+  Eigen::Index used_ = 0;
+};
+
+}  // namespace detail
+
+/// The noise of a table of readings at given weights, ready to be applied to any number of columns.
+///
+/// Columns have six entries a row, interleaved: entry 6 i + a is axis a of row i. Rows of weight 0 become 0.
+/// Real time: no.
+class Whitening {
+ public:
+  Whitening() = default;
+  /// @param field  smooth_field() at the rows' places; its factor may have no columns
+  Whitening(const Noise& noise, const SmoothField& field, const RowWeights& weights)
+    : axes_{detail::ThreeAxes(noise.position_jitter, noise.position_field, field, weights.col(0)),
+            detail::ThreeAxes(noise.rotation_jitter, noise.rotation_field, field, weights.col(1))} {}
+
+  /// Columns (6 rows, any) in place.
+  void apply(Eigen::Ref<Eigen::MatrixXd> columns) const {
+    constexpr Eigen::Index panel = 16;  // columns at a time: bounds the memory
+    for (Eigen::Index first = 0; first < columns.cols(); first += panel) {
+      auto some = columns.middleCols(first, std::min(panel, columns.cols() - first));
+      for (int kind = 0; kind < 2; ++kind) {
+        Eigen::MatrixXd y = gathered(some, kind);
+        axes_[std::size_t(kind)].whiten(y);
+        scatter(y, kind, some);
+      }
+    }
+  }
+  /// log |Sigma| of the rows of weight above 0.
+  [[nodiscard]] double log_determinant() const { return axes_[0].log_determinant() + axes_[1].log_determinant(); }
+  /// Numbers of weight above 0.
+  [[nodiscard]] Eigen::Index observations() const { return 3 * (axes_[0].used() + axes_[1].used()); }
+  /// Posterior mean of the field error given a residual (6 rows): what of it the tracker's field explains. Defined at
+  /// rows of weight 0 too, from the others.
+  [[nodiscard]] Eigen::VectorXd field(const Eigen::VectorXd& residual) const {
+    Eigen::VectorXd out(residual.size());
+    for (int kind = 0; kind < 2; ++kind)
+      scatter(axes_[std::size_t(kind)].field_mean(gathered(residual, kind)), kind, out);
+    return out;
+  }
+  /// 0: position, 1: rotation.
+  [[nodiscard]] const detail::ThreeAxes& axes(int kind) const { return axes_[std::size_t(kind)]; }
+
+  /// Three columns for each of `columns`: the axes of a kind, row by row. Whatever is not finite counts as 0.
+  static Eigen::MatrixXd gathered(const Eigen::Ref<const Eigen::MatrixXd>& columns, int kind) {
+    const Eigen::Index rows = columns.rows() / 6;
+    Eigen::MatrixXd y(rows, 3 * columns.cols());
+    for (Eigen::Index k = 0; k < columns.cols(); ++k)
+      for (int a = 0; a < 3; ++a) {
+        const auto axis = detail::every_sixth(columns.col(k).data() + 3 * kind + a, rows);
+        y.col(3 * k + a) = axis.array().isFinite().select(axis, 0.0);
+      }
+    return y;
+  }
+
+ private:
+  static void scatter(const Eigen::MatrixXd& y, int kind, Eigen::Ref<Eigen::MatrixXd> columns) {
+    for (Eigen::Index k = 0; k < columns.cols(); ++k)
+      for (int a = 0; a < 3; ++a) detail::every_sixth(columns.col(k).data() + 3 * kind + a, y.rows()) = y.col(3 * k + a);
+  }
+
+  std::array<detail::ThreeAxes, 2> axes_;
+};
+
+}  // namespace ctcr

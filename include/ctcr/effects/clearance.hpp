@@ -1,0 +1,53 @@
+#pragma once
+#include "ctcr/effects/hooks.hpp"
+#include "ctcr/math/functions.hpp"
+
+namespace ctcr {
+namespace clearance {
+inline constexpr EffectInfo info{
+    .id = "clearance",
+    .title = "Clearance between the tubes",
+    .physics = "Tubes fit loosely: where an outer tube ends, the inner ones lean to one side.",
+    .signature =
+        "A kink of constant size whose direction follows the bending moment: it does not grow with the moment.",
+    .measure = "Load with different weights: a kink stays, a compliance grows.",
+    .look_alikes = "entry_clearance softening sensor_offset",
+    .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709",
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "tilt",
+                    .unit = "rad",
+                    .neutral = 0,
+                    .sigma = 0.0087,
+                    .soft_low = -0.03,
+                    .soft_high = 0.03,
+                    .hard_low = -0.2,
+                    .hard_high = 0.2,
+                    .per_tube = true,
+                    .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
+    EffectParameter{.name = "moment",
+                    .unit = "N m",
+                    .neutral = 0.01,
+                    .sigma = 0.005,
+                    .soft_low = 0.002,
+                    .soft_high = 0.05,
+                    .hard_low = 0.0005,
+                    .hard_high = 0.5,
+                    .role = Role::shape,
+                    .meaning = "at which 76 % of the tilt is reached"},
+};
+}  // namespace clearance
+
+/// Where a tube ends, the bundle inside it tilts within its clearance, towards the moment that it carries.
+template <int N, class P = double>
+struct Clearance : EffectValues<clearance::parameters, N, P> {
+  static constexpr const EffectInfo& info = clearance::info;
+
+  void station(Station<P, N>& s) const noexcept {
+    if (s.kind != Station<P, N>::Kind::tube_tip) return;
+    const std::array<P, 2> direction = saturated(s.moment, this->template get<1>());
+    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + this->template get<0>(s.tube) * direction[i];
+  }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,63 @@
+#pragma once
+#include "ctcr/effects/hooks.hpp"
+
+namespace ctcr {
+namespace delay {
+inline constexpr EffectInfo info{
+    .id = "delay",
+    .title = "Time delay between joints and tracker",
+    .physics = "The tracker filters and transmits: a pose belongs to joints of a while ago.",
+    .signature =
+        "The error is the velocity of the tip times the delay: it grows with speed, reverses with direction and "
+        "vanishes at rest.",
+    .measure = "Move along the same path at two speeds, or stop before each reading.",
+    .look_alikes = "backlash_rotation friction",
+    .reference = "kalibr (time offset estimation); any streamed data",
+    .needs = {.order = true, .time = true},
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "delay",
+                    .unit = "s",
+                    .neutral = 0,
+                    .sigma = 0.05,
+                    .soft_low = 0,
+                    .soft_high = 0.3,
+                    .hard_low = -0.05,
+                    .hard_high = 1,
+                    .meaning = "by which poses are late"},
+};
+}  // namespace delay
+
+/// Poses are logged later than joints: the joints that count are those of a time ago.
+template <int N, class P = double>
+struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
+  static constexpr const EffectInfo& info = delay::info;
+
+  /// state: joints then minus joints now, beta and alpha of each tube.
+  void remember(const Path<N>& path, std::size_t row) noexcept {
+    auto& state = this->past.state;
+    for (auto& x : state) x = 0.0;
+    if (path.time.empty() || row == 0) return;
+    const P& delay = this->template get<0>();
+    const double now = path.time[row], then = now - value(delay);
+    std::size_t k = row;  // then lies between rows k - 1 and k
+    while (k > 1 && path.time[k - 1] > then) --k;
+    const double span = path.time[k] - path.time[k - 1];
+    if (!(span > 0)) return;
+    const P part = (path.time[k] - now + delay) * (1 / span);
+    for (int i = 0; i < N; ++i) {
+      const Joints<N>&a = path.q[k], &b = path.q[k - 1];
+      state[std::size_t(i)] = (a.beta[i] - path.q[row].beta[i]) + part * (b.beta[i] - a.beta[i]);
+      state[std::size_t(N + i)] = (a.alpha[i] - path.q[row].alpha[i]) + part * (b.alpha[i] - a.alpha[i]);
+    }
+  }
+
+  void actuate(const Occasion&, std::array<P, N>& beta, std::array<P, N>& alpha) const noexcept {
+    for (std::size_t i = 0; i < N; ++i) {
+      beta[i] = beta[i] + this->past.state[i];
+      alpha[i] = alpha[i] + this->past.state[N + i];
+    }
+  }
+};
+
+}  // namespace ctcr

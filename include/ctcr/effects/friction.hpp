@@ -1,0 +1,92 @@
+#pragma once
+#include "ctcr/effects/hooks.hpp"
+#include "ctcr/math/functions.hpp"
+
+namespace ctcr {
+namespace friction {
+inline constexpr EffectInfo info{
+    .id = "friction",
+    .title = "Friction between the tubes",
+    .physics =
+        "Tubes that turn inside one another rub where they press on each other: at their ends, where they start to "
+        "curve and in the front plate. The inner tube lags behind its base.",
+    .signature =
+        "The same joints give another pose when they are reached from the other side; the difference grows with the "
+        "bending moments and lasts until the motion reverses.",
+    .measure = "Visit the same joints from both directions, each time after turning by at least 40 degrees.",
+    .look_alikes = "backlash_rotation delay",
+    .reference = "Lock & Dupont 2011; Ha, Fagogenis & Dupont 2019; bristle: Dahl 1968",
+    .needs = {.order = true},
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "coefficient",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.02,
+                    .soft_low = 0,
+                    .soft_high = 0.1,
+                    .hard_low = 0,
+                    .hard_high = 0.3,
+                    .per_tube = true,
+                    .meaning = "friction torque per jump of the bending moment, of a tube in the next outer one (of "
+                               "the outermost: in the front plate)"},
+    EffectParameter{.name = "slip_angle",
+                    .unit = "rad",
+                    .neutral = 20 * 0.017453292519943295,
+                    .sigma = 0.17,
+                    .soft_low = 0.08,
+                    .soft_high = 0.9,
+                    .hard_low = 0.02,
+                    .hard_high = 3,
+                    .role = Role::shape,
+                    .meaning = "rotation after which friction has turned round to 63 %"},
+    EffectParameter{.name = "insertion",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.5,
+                    .soft_low = 0,
+                    .soft_high = 1.5,
+                    .hard_low = 0,
+                    .hard_high = 4,
+                    .role = Role::shape,
+                    .meaning = "share of the sliding by insertion that takes friction off rotation: 0 none, 1 all, on "
+                               "a contact radius of 0.8 mm"},
+};
+}  // namespace friction
+
+/// Torque exchanged where a tube's bending moment jumps: C |jump| h. h in [-1, 1] follows the tube's rotation against the
+/// next outer one (the guide, for the outermost) as a bristle does, so that the tube lags its base.
+template <int N, class P = double>
+struct Friction : EffectValues<friction::parameters, N, P, N> {
+  static constexpr const EffectInfo& info = friction::info;
+
+  void station(Station<P, N>& s) const noexcept {
+    for (int j = 0; j < s.near; ++j) {
+      const auto i = std::size_t(j);
+      // Both tubes must be there; the outermost rubs on the front plate alone.
+      if (j + 1 < N ? j + 1 >= s.near : s.kind != Station<P, N>::Kind::plate) continue;
+      const P dx = s.far_moment[i][0] - s.near_moment[i][0], dy = s.far_moment[i][1] - s.near_moment[i][1];
+      constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
+      const P torque = this->template get<0>(j) * this->past.state[i] * square_root(dx * dx + dy * dy + smooth);
+      s.torque[i] = s.torque[i] - torque;
+      if (j + 1 < s.near) s.torque[i + 1] = s.torque[i + 1] + torque;
+    }
+  }
+
+  void remember(const Path<N>& path, std::size_t row) noexcept {
+    if (row == 0) return;
+    const Joints<N>&from = path.q[row - 1], &to = path.q[row];
+    constexpr double radius = 0.8e-3;
+    for (int i = 0; i < N; ++i) {
+      const auto against_next = [&](const VecN<N>& v) { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
+      const double turn = against_next(to.alpha) - against_next(from.alpha);
+      const double slide = (against_next(to.beta) - against_next(from.beta)) / radius;
+      const P travel = square_root(this->template get<2>() * (slide * slide) + (turn * turn + 1e-16));
+      P& h = this->past.state[std::size_t(i)];
+      const P target = turn * inverse(travel);
+      h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<1>())));
+    }
+  }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,42 @@
+#pragma once
+#include "ctcr/effects/hooks.hpp"
+
+namespace ctcr {
+namespace softening {
+inline constexpr EffectInfo info{
+    .id = "softening",
+    .title = "Superelastic softening",
+    .physics =
+        "Nitinol gives way where it is bent far from its free shape: the tube is softer than its Young modulus says.",
+    .signature =
+        "Tubes bend further towards one another when their curves oppose than predicted, growing with the third power "
+        "of the change of curvature.",
+    .measure = "Oppose strongly curved tubes; compare with aligned ones under the same loads.",
+    .look_alikes = "torsional_compliance precurvature_profile anisotropy",
+    .reference = "Jang et al. 2016",
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "gamma",
+                    .unit = "m^2",
+                    .neutral = 0,
+                    .sigma = 0.004,
+                    .soft_low = 0,
+                    .soft_high = 0.016,
+                    .hard_low = -0.002,
+                    .hard_high = 0.08,
+                    .per_tube = true,
+                    .meaning = "half of the stiffness is lost where the change of curvature reaches 1/sqrt(gamma)"},
+};
+}  // namespace softening
+
+/// Superelastic softening: m = EI d / (1 + gamma |d|^2), d the change of curvature.
+template <int N, class P = double>
+struct Softening : EffectValues<softening::parameters, N, P> {
+  static constexpr const EffectInfo& info = softening::info;
+
+  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+    m.softening = m.softening + this->template get<0>(place.tube);
+  }
+};
+
+}  // namespace ctcr

@@ -1,0 +1,380 @@
+#pragma once
+// The general path: the rod with effects, for any scalar S, from the robot tip to the front plate. Every tube may bend
+// anywhere and by any law of hooks.hpp; tubes may exchange torque and the frame may kink where tubes end or start to
+// curve. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
+#include "ctcr/effects/hooks.hpp"
+#include "ctcr/mechanics/events.hpp"
+#include "ctcr/mechanics/steppers.hpp"
+
+namespace ctcr {
+
+/// All that the mechanics depends on.
+template <int N, class S, class Fx>
+struct RodInputs {
+  std::array<TubeParameters<S>, N> tubes;
+  std::array<S, N> beta, alpha;             ///< [m], [rad]
+  std::array<S, 3> force, moment, gravity;  ///< base frame [N], [N m], [m/s^2]
+  typename Fx::template On<N, S> effects;
+};
+
+/// Carried along the rod; body vectors in the Bishop frame.
+template <int N, class S>
+struct EffectState {
+  static constexpr int size = 2 * N + 8;
+  std::array<S, std::size_t(size)> y;
+  S& psi(int i) noexcept { return y[std::size_t(i)]; }                ///< angle of a tube [rad]
+  S& torque(int i) noexcept { return y[std::size_t(N + i)]; }         ///< its torsional moment [N m]
+  S& m(int i) noexcept { return y[std::size_t(2 * N + i)]; }          ///< bending moment of all tubes [N m]
+  S& n(int i) noexcept { return y[std::size_t(2 * N + 2 + i)]; }      ///< force [N]
+  S& g(int i) noexcept { return y[std::size_t(2 * N + 5 + i)]; }      ///< gravity [m/s^2]
+  const S& psi(int i) const noexcept { return y[std::size_t(i)]; }
+  const S& torque(int i) const noexcept { return y[std::size_t(N + i)]; }
+  const S& m(int i) const noexcept { return y[std::size_t(2 * N + i)]; }
+  const S& n(int i) const noexcept { return y[std::size_t(2 * N + 2 + i)]; }
+  const S& g(int i) const noexcept { return y[std::size_t(2 * N + 5 + i)]; }
+};
+
+template <int N, class S, class Fx>
+class EffectRod {
+ public:
+  using State = EffectState<N, S>;
+  using Inputs = RodInputs<N, S, Fx>;
+
+  /// How the tubes bend at a place.
+  struct Bend {
+    std::array<S, 2> u;                               ///< curvature of the centreline, Bishop axes [1/m]
+    std::array<S, N> sine, cosine;                    ///< of psi
+    std::array<std::array<S, 2>, N> curvature;        ///< of each tube, its own axes [1/m]
+    std::array<std::array<S, 2>, N> moment;           ///< of each tube, its own axes [N m]
+    std::array<S, N> twist;                           ///< rate of psi [rad/m]
+  };
+
+  /// Tubes of the current segment, and where on them it stands.
+  struct Place {
+    int present = 0;                 ///< tubes 1..present
+    std::array<bool, N> curved{};
+    std::array<S, N> along;          ///< arc length of each present tube here [m]
+  };
+
+  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {}
+
+  /// Integrates from the state at the tip to the grasped side of the front plate.
+  /// @param frame  out: Bishop frame there as seen from the tip frame
+  /// @param tip    called as tip(tube, frame, psi) at the tip of each tube but the innermost
+  /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
+  /// Real time: yes (2N segments, `steps` steps each).
+  template <class Tip, class Node>
+  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Tip& tip, const Node& node) const noexcept {
+    Place place;
+    frame = Frame<S>{};
+    clear_twist(frame);
+    S here = event_place(events.id[0]);
+    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || place.present < N); ++e) {
+      const int id = events.id[e];
+      Place near = place;
+      if (id < N) {
+        near.present = id + 1;
+        near.curved[std::size_t(id)] = has_curve(id);
+        near.along[std::size_t(id)] = in_.tubes[std::size_t(id)].length;
+      } else {
+        near.curved[std::size_t(id - N)] = false;
+      }
+      if (place.present > 0) {
+        using Kind = typename Station<S, N>::Kind;
+        stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
+      }
+      if (id < N) tip(id, frame, y.psi(id));
+      place = near;
+      const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
+      const S next = last ? S(0.0) : event_place(events.id[e + 1]);
+      const S h = (1.0 / steps) * (next - here);
+      for (int i = 0; i < steps; ++i) {
+        if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, place, y, frame, *this);
+        step(place, h, y, frame);
+      }
+      if constexpr (!std::is_same_v<Node, NoNode>) node(next, place, y, frame, *this);
+      here = next;
+    }
+    stop(Station<S, N>::Kind::plate, -1, place, place, y, frame);
+  }
+
+  struct NoNode {};
+
+  /// How the tubes bend under the moment of a state.
+  [[nodiscard]] Bend bend(const Place& place, const State& y) const noexcept {
+    Bend b;
+    std::array<Material<S>, N> material;
+    Slope slope{};
+    std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
+    bool linear = true;
+    for (int j = 0; j < place.present; ++j) {
+      const auto i = std::size_t(j);
+      Material<S>& m = material[i] = material_of(place, j);
+      sincos(y.psi(j), b.sine[i], b.cosine[i]);
+      b.twist[i] = m.twist + y.torque(j) * inverse(in_.tubes[i].kz);
+      add_stiffness(m, b, i, 1.0, slope);
+      const auto straightening = stiffness(m, value(m.curvature[0]), value(m.curvature[1]));
+      moment[0] += value(b.cosine[i]) * straightening[0] - value(b.sine[i]) * straightening[1];
+      moment[1] += value(b.sine[i]) * straightening[0] + value(b.cosine[i]) * straightening[1];
+      linear = linear && value(m.softening) == 0;
+    }
+    // The value by Newton's method; one more step of it with derivatives then makes them exact.
+    slope = inverted(slope);
+    std::array<double, 2> u = slope * moment;
+    if (!linear) {
+      for (int k = 0; k < softening_iterations; ++k) {
+        slope = inverted(tangent(place, material, b, u));
+        const auto change = slope * unbalanced<double>(place, y, material, b, u, nullptr);
+        u = {u[0] + change[0], u[1] + change[1]};
+      }
+      slope = inverted(tangent(place, material, b, u));
+    }
+    const auto change = slope * unbalanced<S>(place, y, material, b, {S(u[0]), S(u[1])}, nullptr);
+    b.u = {u[0] + change[0], u[1] + change[1]};
+    (void)unbalanced<S>(place, y, material, b, b.u, &b);
+    return b;
+  }
+
+ private:
+  static constexpr int softening_iterations = 4;  ///< quadratic; softening is a small part of the stiffness
+
+  /// A 2 x 2 matrix.
+  struct Slope {
+    double xx = 0, xy = 0, yx = 0, yy = 0;
+    template <class T>
+    std::array<T, 2> operator*(const std::array<T, 2>& v) const noexcept {
+      return {xx * v[0] + xy * v[1], yx * v[0] + yy * v[1]};
+    }
+  };
+  static Slope inverted(const Slope& a) noexcept {
+    const double det = 1.0 / (a.xx * a.yy - a.xy * a.yx);
+    return {a.yy * det, -a.xy * det, -a.yx * det, a.xx * det};
+  }
+
+  [[nodiscard]] bool has_curve(int i) const noexcept { return value(in_.tubes[std::size_t(i)].curved_length) > 0; }
+
+  [[nodiscard]] S event_place(int id) const noexcept {
+    const auto i = std::size_t(id < N ? id : id - N);
+    const S tip = in_.tubes[i].length + in_.beta[i];
+    return id < N ? tip : tip - in_.tubes[i].curved_length;
+  }
+
+  static void clear_twist(Frame<S>& frame) noexcept {
+    if constexpr (is_dual<S>)
+      for (int i = 0; i < 3; ++i)
+        for (std::size_t g = 0; g < std::size_t(groups_of<S>); ++g)
+          frame.rotation_twist[i][g] = frame.translation_twist[i][g] = Lanes{};
+  }
+
+  [[nodiscard]] Material<S> material_of(const Place& place, int j) const noexcept {
+    const auto i = std::size_t(j);
+    const TubeParameters<S>& t = in_.tubes[i];
+    Material<S> m{.bending_stiffness = t.k, .curvature = {place.curved[i] ? t.kappa : S(0.0), S(0.0)}};
+    if constexpr (!Fx::none) {
+      const S straight = t.length - t.curved_length;
+      const S part = place.curved[i] ? (place.along[i] - straight) * inverse(t.curved_length)
+                                     : place.along[i] * inverse(straight);
+      in_.effects.material(TubePlace<S>{j, place.curved[i], place.along[i], part}, m);
+    }
+    return m;
+  }
+
+  template <class A, class B>
+  static auto stiffness(const Material<S>& m, const A& x, const B& y) noexcept {
+    if constexpr (std::is_same_v<A, double>) {
+      const double k = value(m.bending_stiffness), a = value(m.anisotropy[0]), c = value(m.anisotropy[1]);
+      return std::array<double, 2>{k * ((1 + a) * x + c * y), k * (c * x + (1 - a) * y)};
+    } else {
+      const S& k = m.bending_stiffness;
+      const S &a = m.anisotropy[0], &c = m.anisotropy[1];
+      return std::array<S, 2>{k * ((1.0 + a) * x + c * y), k * (c * x + (1.0 - a) * y)};
+    }
+  }
+
+  /// Adds f R K R^T.
+  static void add_stiffness(const Material<S>& m, const Bend& b, std::size_t i, double f, Slope& slope) noexcept {
+    const double s = value(b.sine[i]), c = value(b.cosine[i]), k = f * value(m.bending_stiffness);
+    const double a = value(m.anisotropy[0]), o = value(m.anisotropy[1]);
+    const double xx = k * (1 + a), yy = k * (1 - a), xy = k * o;
+    const double across = s * c * (xx - yy) + (c * c - s * s) * xy;
+    slope.xx += c * c * xx - 2 * s * c * xy + s * s * yy;
+    slope.yy += s * s * xx + 2 * s * c * xy + c * c * yy;
+    slope.xy += across;
+    slope.yx += across;
+  }
+
+  /// Slope of the tubes' moment by u, softening included.
+  static Slope tangent(const Place& place, const std::array<Material<S>, N>& material, const Bend& b,
+                       const std::array<double, 2>& u) noexcept {
+    Slope slope;
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
+      const Material<S>& m = material[i];
+      const double s = value(b.sine[i]), c = value(b.cosine[i]);
+      const double dx = c * u[0] + s * u[1] - value(m.curvature[0]), dy = c * u[1] - s * u[0] - value(m.curvature[1]);
+      const double gamma = value(m.softening), f = 1 / (1 + gamma * (dx * dx + dy * dy));
+      add_stiffness(m, b, i, f, slope);
+      const auto q = stiffness(m, dx, dy);
+      const double factor = -2 * gamma * f * f;
+      const double qx = factor * (c * q[0] - s * q[1]), qy = factor * (s * q[0] + c * q[1]);
+      const double ex = c * dx - s * dy, ey = s * dx + c * dy;
+      slope.xx += qx * ex;
+      slope.xy += qx * ey;
+      slope.yx += qy * ex;
+      slope.yy += qy * ey;
+    }
+    return slope;
+  }
+
+  /// The moment that is not balanced by the tubes bent with u; keeps each tube's curvature and moment in `keep`.
+  template <class T>
+  static std::array<T, 2> unbalanced(const Place& place, const State& y, const std::array<Material<S>, N>& material,
+                                     const Bend& b, const std::array<T, 2>& u, Bend* keep) noexcept {
+    const auto as = [](const S& x) -> decltype(auto) {
+      if constexpr (std::is_same_v<T, S>)
+        return (x);
+      else
+        return value(x);
+    };
+    T rx = as(y.m(0)), ry = as(y.m(1));
+    for (int j = 0; j < place.present; ++j) {
+      const auto i = std::size_t(j);
+      const Material<S>& m = material[i];
+      const T s = as(b.sine[i]), c = as(b.cosine[i]);
+      const T ux = c * u[0] + s * u[1], uy = c * u[1] - s * u[0];
+      const T dx = ux - as(m.curvature[0]), dy = uy - as(m.curvature[1]);
+      auto q = stiffness(m, dx, dy);
+      const T f = inverse(1.0 + as(m.softening) * (dx * dx + dy * dy));
+      const T qx = f * q[0], qy = f * q[1];
+      rx = rx - (c * qx - s * qy);
+      ry = ry - (s * qx + c * qy);
+      if constexpr (std::is_same_v<T, S>)
+        if (keep != nullptr) {
+          keep->curvature[i] = {ux, uy};
+          keep->moment[i] = {qx, qy};
+        }
+    }
+    return {rx, ry};
+  }
+
+  State rates(const Place& place, const State& y, std::array<S, 2>& u) const noexcept {
+    const Bend b = bend(place, y);
+    u = b.u;
+    State d;
+    S mz = 0.0, mass = 0.0;
+    for (int j = 0; j < N; ++j) {
+      const auto i = std::size_t(j);
+      if (j < place.present) {
+        d.psi(j) = b.twist[i];
+        d.torque(j) = b.curvature[i][1] * b.moment[i][0] - b.curvature[i][0] * b.moment[i][1];
+        mz = mz + y.torque(j);
+        mass = mass + in_.tubes[i].mass;
+      } else {
+        d.psi(j) = d.torque(j) = 0.0;
+      }
+    }
+    const S &ux = u[0], &uy = u[1];
+    d.m(0) = y.n(1) - uy * mz;
+    d.m(1) = ux * mz - y.n(0);
+    d.n(0) = -(uy * y.n(2)) - mass * y.g(0);
+    d.n(1) = ux * y.n(2) - mass * y.g(1);
+    d.n(2) = uy * y.n(0) - ux * y.n(1) - mass * y.g(2);
+    d.g(0) = -(uy * y.g(2));
+    d.g(1) = ux * y.g(2);
+    d.g(2) = uy * y.g(0) - ux * y.g(1);
+    return d;
+  }
+
+  /// The scheme of MagnusRk4.
+  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
+    const S half = 0.5 * h;
+    const auto moved = [](const State& y0, const S& k, const State& d) {
+      State r;
+      for (std::size_t i = 0; i < State::size; ++i) r.y[i] = y0.y[i] + k * d.y[i];
+      return r;
+    };
+    const auto advance = [&] {
+      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
+    };
+    std::array<S, 2> u1, u2, u3, u4;
+    const State k1 = rates(place, y, u1);
+    advance();
+    const State k2 = rates(place, moved(y, half, k1), u2);
+    const State k3 = rates(place, moved(y, half, k2), u3);
+    advance();
+    const State k4 = rates(place, moved(y, h, k3), u4);
+    const S sixth = (1.0 / 6.0) * h;
+    for (std::size_t i = 0; i < State::size; ++i)
+      y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
+    move_frame(frame, u1, std::array<S, 2>{0.5 * (u2[0] + u3[0]), 0.5 * (u2[1] + u3[1])}, u4, h);
+  }
+
+  /// Lets the effects act where tubes end or start to curve.
+  void stop(typename Station<S, N>::Kind kind, int tube, const Place& far, const Place& near, State& y,
+            Frame<S>& frame) const noexcept {
+    if constexpr (!Fx::none) {
+      Station<S, N> s{.kind = kind, .tube = tube, .far = far.present, .near = near.present,
+                      .moment = {y.m(0), y.m(1)}, .far_moment = moments(far, y),
+                      .near_moment = kind == Station<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
+      for (std::size_t i = 0; i < N; ++i) s.torque[i] = 0.0;
+      s.kink = {0.0, 0.0};
+      in_.effects.station(s);
+      for (int i = 0; i < near.present; ++i) y.torque(i) = y.torque(i) + s.torque[std::size_t(i)];
+      kink(s.kink, near.present, y, frame);
+    }
+  }
+
+  std::array<std::array<S, 2>, N> moments(const Place& place, const State& y) const noexcept {
+    const Bend b = bend(place, y);
+    std::array<std::array<S, 2>, N> m;
+    for (int j = 0; j < N; ++j) {
+      const auto i = std::size_t(j);
+      if (j < place.present) {
+        m[i] = {b.cosine[i] * b.moment[i][0] - b.sine[i] * b.moment[i][1],
+                b.sine[i] * b.moment[i][0] + b.cosine[i] * b.moment[i][1]};
+      } else {
+        m[i] = {0.0, 0.0};
+      }
+    }
+    return m;
+  }
+
+  /// The guide behind the plate keeps the tubes straight: each carries what straightens it.
+  std::array<std::array<S, 2>, N> moments_behind_plate(const Place& place, const State& y) const noexcept {
+    std::array<std::array<S, 2>, N> m;
+    for (int j = 0; j < N; ++j) {
+      const auto i = std::size_t(j);
+      const Material<S> mat = material_of(place, j);
+      const auto q = stiffness(mat, mat.curvature[0], mat.curvature[1]);
+      S s, c;
+      sincos(y.psi(j), s, c);
+      m[i] = {s * q[1] - c * q[0], -(s * q[0]) - c * q[1]};
+    }
+    return m;
+  }
+
+  /// Passes a kink towards the base: the near frame is the far one turned back by it. The torque of all tubes, which
+  /// turns with it, changes by its cosine only.
+  void kink(const std::array<S, 2>& turn, int present, State& y, Frame<S>& frame) const noexcept {
+    S mz = 0.0;
+    for (int i = 0; i < present; ++i) mz = mz + y.torque(i);
+    const S z = turn[0] * turn[0] + turn[1] * turn[1];
+    const S A = 1.0 - z * ((1.0 / 6.0) - (1.0 / 120.0) * z), B = 0.5 - z * ((1.0 / 24.0) - (1.0 / 720.0) * z);
+    const auto turned = [&](S& x, S& y_, S& z_) {  // v + A t x v + B t x (t x v)
+      const S &a = turn[0], &b = turn[1];
+      const S cx = b * z_, cy = -(a * z_), cz = a * y_ - b * x;
+      const S dx = b * cz, dy = -(a * cz), dz = a * cy - b * cx;
+      x = x + A * cx + B * dx;
+      y_ = y_ + A * cy + B * dy;
+      z_ = z_ + A * cz + B * dz;
+    };
+    turned(y.m(0), y.m(1), mz);
+    turned(y.n(0), y.n(1), y.n(2));
+    turned(y.g(0), y.g(1), y.g(2));
+    const S back[3] = {-turn[0], -turn[1], S(0.0)};
+    move_by_exponential(frame, back, S(0.0), S(0.0), S(0.0));
+  }
+
+  const Inputs& in_;
+};
+
+}  // namespace ctcr
