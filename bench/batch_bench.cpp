@@ -34,10 +34,9 @@ void batch(benchmark::State& state, bool loaded, int threads) {
         pool);
   }
   const auto failed = std::count_if(status.begin(), status.end(), [](auto s) { return s != ctcr::Status::ok; });
-  if (failed > 8) return state.SkipWithError("more than 2 in 1000 configurations did not converge");
+  if (failed > 0) return state.SkipWithError("a configuration was not solved");
   const double done = double(state.iterations()) * double(configurations.size());
   state.counters["configurations/s"] = benchmark::Counter(done, benchmark::Counter::kIsRate);
-  state.counters["failed"] = double(failed);
 }
 
 const bool registered = [] {

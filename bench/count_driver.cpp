@@ -4,6 +4,7 @@
 #include <cstring>
 #include <string>
 
+#include "ctcr/effects/catalogue.hpp"
 #include "support/cases.hpp"
 
 #if defined(__GNUC__) && defined(__x86_64__)
@@ -30,6 +31,39 @@ bool run_newton(int passes) {
       good = good && evaluation.residual < 1e-9;
     }
   return good;
+}
+
+/// Every effect of the catalogue at work: each parameter one standard deviation from neutral, history included.
+ctcr::Catalogue::On<3> all_effects() {
+  ctcr::Catalogue::On<3> effects;
+  effects.for_each([](auto& effect, int) {
+    for (int k = 0; k < int(effect.parameters.size()); ++k)
+      for (int i = 0; i < effect.size(k); ++i)
+        effect.values[std::size_t(effect.place(k, i))] += effect.parameters[std::size_t(k)].sigma;
+  });
+  std::get<ctcr::Friction<3>>(effects.list).past.state = {0.8, -0.6, 0.4};
+  return effects;
+}
+
+/// The Newton step of the robot with all of them.
+bool run_effects(int passes) {
+  constexpr auto all = ctcr::Derivatives::compliance;
+  const auto configurations = random_configurations(table_ii(), true, n_configurations);
+  const ctcr::Model<3, ctcr::Catalogue> model(table_ii(), all_effects());
+  std::vector<ctcr::Workspace<3>> workspaces(n_configurations);
+  ctcr::Solution<3> solution;
+  for (std::size_t i = 0; i < n_configurations; ++i)
+    (void)ctcr::solve(model, configurations[i].joints, configurations[i].load, workspaces[i], solution, {});
+  ctcr::Evaluation<3, ctcr::Loading::weight, all> evaluation;
+  int converged = 0;
+  for (int pass = 0; pass < passes; ++pass)
+    for (std::size_t i = 0; i < n_configurations; ++i) {
+      const Configuration& c = configurations[i];
+      ctcr::evaluate<all, ctcr::Loading::weight, ctcr::MagnusRk4>(model.coefficients(), c.joints, c.load,
+                                                                  workspaces[i].guess, 1, evaluation);
+      converged += evaluation.residual < 1e-9;
+    }
+  return converged >= passes * n_configurations * 97 / 100;
 }
 
 /// The whole control step around it: checks, prediction, outputs.
@@ -83,6 +117,7 @@ int main(int argc, char** argv) {
     if (argv[1] == "step/" + std::string(Case::name)) found = true, good = run_step<Case>(passes);
     if (argv[1] == "rival/" + std::string(Case::name)) found = true, good = run_rival<Case>(passes);
   });
+  if (argv[1] == std::string("effects")) found = true, good = run_effects(passes);
   if (!found) return std::fputs("no such case\n", stderr), 2;
   if (!good) return std::fputs("a step went wrong\n", stderr), 1;
   return 0;

@@ -3,7 +3,8 @@
 
 The driver runs all 1000 configurations once and three times over; the difference is two passes, everything in
 them counted, set-up cancelled. A Newton step is what the paper times (residual, B_u, and with them J and C);
-rows step/.. are the whole control step() around it: checks, prediction, corrected pose, outputs. Compares with
+rows step/.. are the whole control step() around it: checks, prediction, corrected pose, outputs; row effects is the
+Newton step with J and C of a robot with every effect of the catalogue at work. Compares with
 instructions.json; exit code 1 when a case grew by more than GROWTH, or when nothing could be counted.
 """
 
@@ -23,7 +24,8 @@ REQUIRED = {  # instructions per step that must not be exceeded (3 tubes, AVX2)
     "loaded_jacobian": 12500,
     "loaded_jacobian_compliance": 15000,
 }
-CASES = [*REQUIRED, *(f"step/{case}" for case in REQUIRED)]
+CASES = [*REQUIRED, *(f"step/{case}" for case in REQUIRED), "effects"]
+RIVALS = {case: f"rival/{case}" for case in REQUIRED} | {"effects": "rival/loaded_jacobian_compliance"}
 CONFIGURATIONS = 1000
 
 
@@ -36,7 +38,7 @@ def main() -> int:
     try:
         compiler = run([str(arguments.driver), "--about"]).strip()
         counts = {case: per_step(arguments.driver, case) for case in CASES}
-        rivals = {case: per_step(arguments.driver, f"rival/{case}") for case in REQUIRED if arguments.rival}
+        rivals = {case: per_step(arguments.driver, rival) for case, rival in RIVALS.items() if arguments.rival}
     except (OSError, RuntimeError) as error:
         print(f"count_instructions: {error}", file=sys.stderr)
         return 1

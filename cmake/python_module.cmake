@@ -10,7 +10,7 @@ execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARI
 find_package(nanobind CONFIG REQUIRED)
 
 nanobind_add_module(_core NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
-target_link_libraries(_core PRIVATE ctcr::ctcr ctcr_flags)
+target_link_libraries(_core PRIVATE ctcr::calibration ctcr_flags)
 target_compile_definitions(_core PRIVATE CTCR_VERSION="${PROJECT_VERSION}")
 nanobind_add_stub(core_stub MODULE _core OUTPUT _core.pyi MARKER_FILE py.typed
                   PYTHON_PATH $<TARGET_FILE_DIR:_core> DEPENDS _core)

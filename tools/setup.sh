@@ -38,7 +38,7 @@ missing_packages() {
   command -v ninja >/dev/null || echo ninja-build
   find_python >/dev/null || printf '%s\n' python3 python3-venv python3-dev
   local package
-  for package in libeigen3-dev libgtest-dev libbenchmark-dev; do
+  for package in libeigen3-dev libceres-dev libgtest-dev libbenchmark-dev; do
     is_installed "$package" || echo "$package"
   done
 }

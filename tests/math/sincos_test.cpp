@@ -47,6 +47,27 @@ TEST(Sincos, IsExactAtZeroAndOdd) {
   EXPECT_EQ(minus_c, c);
 }
 
+TEST(Sincos, OfSeveralAnglesEqualsThatOfEach) {
+  std::mt19937_64 random(2);
+  for (const double range : {1e-8, 1.0, 10.0, 1e5}) {
+    std::uniform_real_distribution<double> angle(-range, range);
+    for (int i = 0; i < test::cases(20000); ++i) {
+      std::array<double, 3> x, s, c;
+      for (double& a : x) a = angle(random);
+      sincos(x, s, c);
+      for (std::size_t j = 0; j < x.size(); ++j) {
+        ASSERT_NEAR(s[j], std::sin(x[j]), rounding) << x[j];
+        ASSERT_NEAR(c[j], std::cos(x[j]), rounding) << x[j];
+      }
+    }
+  }
+  const Lanes quarters = sincos_pair(0.0, std::numbers::pi);
+  EXPECT_EQ(quarters[0], 0.0);
+  EXPECT_EQ(quarters[1], 1.0);
+  EXPECT_NEAR(quarters[2], 0.0, rounding);
+  EXPECT_EQ(quarters[3], -1.0);
+}
+
 TEST(Sincos, PassesOnNaN) {
   double s, c;
   sincos(std::nan(""), s, c);

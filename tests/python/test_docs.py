@@ -16,7 +16,9 @@ ROOT = Path(__file__).parents[2]
 DOCUMENTS = [
     ROOT / "README.md",
     *sorted(
-        path for folder in ("include", "examples", "bench", "tools") for path in (ROOT / folder).rglob("*.md")
+        path
+        for folder in ("docs", "include", "examples", "bench", "tools")
+        for path in (ROOT / folder).rglob("*.md")
     ),
 ]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core
+from ctcr import _core, effect_model
+from ctcr.errors import InputError, Problem
 from ctcr.frames import product
 from ctcr.robot import Robot
 
@@ -26,7 +27,7 @@ class Prediction:
     position: Array  # (M, 3) [m], tip of the tube that carries the sensor
     quaternion: Array  # (M, 4), w first and not negative
     status: NDArray[np.uint8]  # (M,), 0: solved; `status_text` says what the others mean
-    stability: Array  # (M,), 1 without interaction between tubes, 0 where the robot snaps
+    stability: Array  # (M,), 1 without interaction between tubes, 0 where the robot snaps; NaN with effects
     jacobian: Array | None  # (M, 6, 2N), rows: velocity [m], turn [rad]; columns: beta [m], alpha [rad]
     compliance: Array | None  # (M, 6, 6), rows as above; columns: tip force [N], tip moment [N m]
 
@@ -71,7 +72,9 @@ class Model:
     `integrator` is one of INTEGRATORS; those beside the default serve to compare and give poses alone.
     Joints are `beta` [m], <= 0, where each tube is grasped, and `alpha` [rad], the angle of its base; innermost tube
     first. Loads act at the robot tip: `force` [N] and `moment` [N m], base frame. Arrays of other types than float64
-    are converted. Raises ValueError where shapes do not fit.
+    are converted. A robot's effects (see `ctcr.effects`) act on the poses, but for those of the tracker: poses are
+    those of the tube. Raises ValueError where shapes do not fit, and InputError where a robot's effects cannot be used:
+    those that depend on the path, of which single configurations know nothing.
     """
 
     def __init__(self, robot: Robot, *, steps: int = 1, integrator: str = "default"):
@@ -79,6 +82,7 @@ class Model:
             raise ValueError(f"integrator must be one of {', '.join(INTEGRATORS)}, not {integrator!r}")
         self.robot = robot
         self.steps = steps
+        self._effects = effect_model.usable(robot, integrator) if robot.effects else {}
         self.integrator = integrator
         self._core = _core.Model(**robot.core_parameters())
 
@@ -113,6 +117,17 @@ class Model:
             jacobian=np.empty((rows, 6, 2 * n)) if derivatives else None,
             compliance=np.empty((rows, 6, 6)) if derivatives else None,
         )
+        if self._effects:
+            if derivatives or moment is not None:
+                text = (
+                    f"with the effects {', '.join(self._effects)} a model gives poses under forces, neither "
+                    "derivatives nor poses under moments"
+                )
+                raise InputError(Problem(text))
+            loads = _load("force", force, rows)
+            options = {"steps": self.steps, "threads": threads}
+            effect_model.predict(self.robot, self._effects, beta, alpha, loads, answer, **options)
+            return answer
         self._core.predict(
             beta=beta,
             alpha=alpha,
@@ -139,6 +154,12 @@ class Model:
 
         Integrated finely with the default integrator, whatever `steps`. Raises ValueError where there is no solution.
         """
+        if self._effects:
+            text = (
+                "the shape along the robot is known of the standard model alone, and this robot has the effects "
+                f"{', '.join(self._effects)}"
+            )
+            raise InputError(Problem(text))
         n = self.robot.n_tubes
         room = points + 2 * n  # there are two breakpoints a tube
         shape = Shape(

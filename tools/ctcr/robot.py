@@ -121,12 +121,34 @@ class Tube(Section):
 
 
 class Actuation(Section):
-    """Transmission: q = rho * theta_motor + Delta. The homes, Delta, hold one value a tube."""
+    """Transmission: q = rho * theta_motor + Delta. The homes, Delta, hold one value a tube.
+
+    Joints in a table are those of the controller that recorded it. Where a calibration has found other homes since,
+    the homes of that controller are kept as the recorded ones; without them both are the same.
+    """
 
     translation_mm_per_rev: Annotated[float | None, Quantity("mm", usual=(0.01, 100))]
     rotation_rev_per_rev: Annotated[float | None, Quantity("", usual=(1e-4, 10))]
     home_translation_mm: Annotated[list[float], Quantity("mm", usual=(0.1, 2000), count="one number a tube,")]
     home_rotation_deg: Annotated[list[float], Quantity("deg", usual=(0, 360), count="one number a tube,")]
+    recorded_home_translation_mm: Annotated[
+        list[float] | None, Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
+    ] = None
+    recorded_home_rotation_deg: Annotated[
+        list[float] | None, Quantity("deg", usual=(0, 360), count="one number a tube,")
+    ] = None
+
+    @property
+    def translation_correction(self) -> Array:
+        """What the joints beta of a table lack (N,) [m]."""
+        recorded = self.recorded_home_translation_mm or self.home_translation_mm
+        return 1e-3 * (np.array(self.home_translation_mm) - np.array(recorded))
+
+    @property
+    def rotation_correction(self) -> Array:
+        """What the joints alpha of a table lack (N,) [rad]."""
+        recorded = self.recorded_home_rotation_deg or self.home_rotation_deg
+        return np.deg2rad(np.array(self.home_rotation_deg) - np.array(recorded))
 
 
 class Tracker(Section):
@@ -167,7 +189,11 @@ class Uncertainty(Section):
 
 
 class Robot(Section):
-    """The whole file. `gravity` [m/s^2] in the base frame; null where its direction is not known."""
+    """The whole file. `gravity` [m/s^2] in the base frame; null where its direction is not known.
+
+    `effects` are the physical effects beyond the standard model, by id; `history` is the ledger of calibrations, see
+    `ctcr.robot_update`.
+    """
 
     name: str = Field(description="text")
     gravity: Annotated[Three | None, Quantity("m/s^2", usual=(0, 9.9), count="three numbers")]
@@ -175,6 +201,12 @@ class Robot(Section):
     actuation: Actuation = Field(description="its fields, indented below it")
     tracker: Tracker = Field(description="its fields, indented below it")
     uncertainty: Uncertainty = Field(description="its fields, indented below it")
+    effects: dict[str, dict[str, float | list[float]]] = Field(
+        default_factory=dict, description="the name of each effect with its parameters, indented below it"
+    )
+    history: list[dict[str, Any]] = Field(
+        default_factory=list, description="a list of what was changed, oldest first"
+    )
 
     _source: Any = PrivateAttr(None)  # what robot_file loaded it from: lines for warnings, layout for saving
 
@@ -186,6 +218,10 @@ class Robot(Section):
     def gravity_vector(self) -> Array:
         """Gravity (3,) [m/s^2], base frame; zero where the file does not know it."""
         return np.array(self.gravity or (0.0, 0.0, 0.0))
+
+    def joints_of_table(self, beta: Array, alpha: Array) -> tuple[Array, Array]:
+        """The joints beta [m], alpha [rad] (M, N) of this robot where a table holds those of its controller."""
+        return beta + self.actuation.translation_correction, alpha + self.actuation.rotation_correction
 
     def core_parameters(self) -> dict[str, Array]:
         """What the compiled model needs, in SI units: one array (N,) a tube property, and gravity (3,).

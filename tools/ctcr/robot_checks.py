@@ -14,6 +14,12 @@ from ctcr.yaml_document import FieldPath
 Fault = tuple[FieldPath, str]
 
 _SECTIONS = {"tubes": Tube, "actuation": Actuation, "tracker": Tracker, "uncertainty": Uncertainty}
+_PER_TUBE = (
+    "home_translation_mm",
+    "home_rotation_deg",
+    "recorded_home_translation_mm",
+    "recorded_home_rotation_deg",
+)
 _MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
 
 
@@ -83,7 +89,7 @@ def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
         yield from _relations_in_tube(("tubes", i), tube)
     yield from _nesting(tubes)
     actuation, tracker = _mapping(data.get("actuation")), _mapping(data.get("tracker"))
-    for key in ("home_translation_mm", "home_rotation_deg"):
+    for key in _PER_TUBE:
         home = actuation.get(key)
         if tubes and isinstance(home, list) and len(home) != len(tubes):
             yield ("actuation", key), f"has {len(home)} values: needs {len(tubes)}, one a tube"

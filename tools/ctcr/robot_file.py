@@ -5,6 +5,8 @@ the file that the robot came from.
 """
 
 import io
+from collections.abc import Collection
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +14,7 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 from ctcr import robot_checks, yaml_document
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, did_you_mean, file_fault
 from ctcr.output import atomic_writer
 from ctcr.robot import Robot
 from ctcr.yaml_document import YamlDocument
@@ -49,7 +51,7 @@ def parse(content: bytes, file: str = "robot.yaml") -> Robot:
         robot, errors = Robot.model_validate(document.data), []
     except ValidationError as error:
         robot, errors = None, error.errors(include_url=False)
-    faults = robot_checks.faults(document.data, errors)
+    faults = robot_checks.faults(document.data, errors) + _unknown_effects(document.data)
     if robot is None or faults:
         raise InputError(robot_checks.problems(faults, file, document.line))
     robot._source = _Source(file, text, document)
@@ -73,6 +75,28 @@ def save(robot: Robot, path: str | Path) -> None:
     yaml.dump(document, text)
     with atomic_writer(path) as file:
         file.write(text.getvalue())
+
+
+def known_effects() -> Collection[str] | None:
+    """Ids of the effects that a file may hold; None where there is no catalogue, and any id passes."""
+    try:
+        return import_module("ctcr.effects").known_effects()
+    except ModuleNotFoundError:
+        return None
+
+
+def _unknown_effects(data: dict[str, Any]) -> list[robot_checks.Fault]:
+    effects = data.get("effects")
+    known = known_effects() if isinstance(effects, dict) and effects else None
+    if known is None:
+        return []
+    found = []
+    for name in effects:
+        if name not in known:
+            meant = did_you_mean(str(name), known)
+            hint = f": did you mean {meant}?" if meant else ": `ctcr effects` lists those there are"
+            found.append((("effects", name), f"unknown effect{hint}"))
+    return found
 
 
 def _text(content: bytes, file: str) -> str:

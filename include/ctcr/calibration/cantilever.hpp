@@ -1,6 +1,9 @@
 #pragma once
 // Young's modulus of a tube from how far it deflects when it is clamped at one end and loaded across.
-#include <Eigen/Dense>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 #include <vector>
@@ -34,6 +37,16 @@ enum class CantileverNotice {
   deflection_small,  ///< figure: relative sd of the modulus from the readings alone
   residuals_large,   ///< figure: sd of the residuals [m], above the one stated
 };
+
+/// The notice's name.
+constexpr const char* to_string(CantileverNotice kind) noexcept {
+  switch (kind) {
+    case CantileverNotice::load_dependent: return "load_dependent";
+    case CantileverNotice::deflection_small: return "deflection_small";
+    case CantileverNotice::residuals_large: return "residuals_large";
+  }
+  return "unknown";
+}
 
 struct Cantilever {
   double youngs_modulus, youngs_modulus_sd;        ///< E [Pa]
@@ -199,8 +212,9 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   const Eigen::VectorXd x = wide.colPivHouseholderQr().solve(error);
   const double remaining = (error - wide * x).squaredNorm(), saved = sum - remaining;
   const double floor = 1e-20 * error.size() * std::pow(rows.front().free_length, 2);
-  const double score = stated > 0 ? chi_square_score(saved / stated, 1)
-                                  : variance_ratio_score(saved / std::max(remaining / (degrees - 1), floor), 1, degrees - 1);
+  const double score = stated > 0
+                           ? chi_square_score(saved / stated, 1)
+                           : variance_ratio_score(saved / std::max(remaining / (degrees - 1), floor), 1, degrees - 1);
   const double change = x[unknowns] * (largest - least);
   if (score > surprising && std::abs(change) > 0.02)
     tell(load_dependent, change, 0.02,

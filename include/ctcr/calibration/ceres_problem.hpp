@@ -1,20 +1,27 @@
 #pragma once
 // The one way in which calibration uses Ceres: small dense problems, solved to rounding, quietly, on one thread.
-#include <ceres/ceres.h>
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/crs_matrix.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
 
 #include <Eigen/Core>
 #include <vector>
 
 namespace ctcr {
 
-/// Minimises the problem from where its parameter blocks stand. Residuals should be of order 1: in units of the noise.
-inline void minimise(ceres::Problem& problem, int iterations = 100) {
+/// Minimises the problem from where its parameter blocks stand, until they are right to `precision` (in units of the
+/// residuals' numerators) or, where `gain` > 0, a step gains less than this part of the cost.
+/// @param scale  what residuals are divided by, so that they are of order 1
+inline void minimise(ceres::Problem& problem, double scale, double precision, double gain = 0) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = iterations;
-  options.function_tolerance = 1e-16;
-  options.gradient_tolerance = 1e-16;
-  options.parameter_tolerance = 1e-15;
+  options.max_num_iterations = 100;
+  options.function_tolerance = gain;
+  // The curvature of the cost is about the number of residuals over scale^2.
+  options.gradient_tolerance = problem.NumResiduals() * precision / (scale * scale);
+  options.parameter_tolerance = 0;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);

@@ -1,6 +1,6 @@
 #pragma once
 // A point that a motor turns on a circle in space, fitted to readings of where it is.
-#include <Eigen/Dense>
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,11 +15,11 @@ namespace ctcr {
 /// centre + radius (cos(angle + offset) x + sin(angle + offset) y), where x is `reference` projected on the plane and y
 /// completes a right-handed frame with the normal. Readings of series 0 and 1 have offsets of their own.
 struct Circle {
-  Vec3 centre = Vec3::Zero();                   ///< [m]
-  double radius = 0;                            ///< [m]
-  Vec3 normal = Vec3::UnitZ();                  ///< unit vector about which angles grow
-  Vec3 reference = Vec3::UnitX();               ///< not parallel to the normal
-  Eigen::Vector2d offset = {0, 0};              ///< [rad]
+  Vec3 centre = Vec3::Zero();       ///< [m]
+  double radius = 0;                ///< [m]
+  Vec3 normal = Vec3::UnitZ();      ///< unit vector about which angles grow
+  Vec3 reference = Vec3::UnitX();   ///< not parallel to the normal
+  Eigen::Vector2d offset = {0, 0};  ///< [rad]
 
   /// Columns x, y, normal.
   [[nodiscard]] Mat3 frame() const {
@@ -43,9 +43,9 @@ struct CircleReading {
 
 /// What is known of the circle and not fitted.
 struct KnownCircle {
-  std::optional<Vec3> centre;    ///< [m]
-  std::optional<double> radius;  ///< [m]
-  std::optional<Vec3> normal;    ///< unit vector
+  std::optional<Vec3> centre{};    ///< [m]
+  std::optional<double> radius{};  ///< [m]
+  std::optional<Vec3> normal{};    ///< unit vector
 };
 
 /// The circle with both offsets equal, from linear least absolute deviations: an ellipse c + A cos + B sin is linear in
@@ -107,7 +107,7 @@ struct CircleFit {
 };
 
 /// Least squares from `start`, whose known parts stay; with `loss` > 0 [m] readings farther off than that count ever
-/// less (Cauchy).
+/// less (Cauchy), which is good for finding them, not for the last digit.
 inline CircleFit refined_circle(const std::vector<CircleReading>& readings, const Circle& start,
                                 const KnownCircle& known, double scale, double loss) {
   CircleFit fit{.circle = start, .J = {}};
@@ -134,7 +134,7 @@ inline CircleFit refined_circle(const std::vector<CircleReading>& readings, cons
       problem.SetParameterBlockConstant(blocks[k]);
     }
   }
-  minimise(problem);
+  minimise(problem, scale, 1e-13, loss > 0 ? 1e-6 : 0);
   fit.J = scale * jacobian(problem, free_blocks);
   const Mat3 R = start.frame();
   circle.normal = (R * Vec3(tilt[0], tilt[1], 1)).normalized();

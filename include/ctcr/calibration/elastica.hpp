@@ -1,5 +1,6 @@
 #pragma once
 // A straight elastic rod, clamped at one end, with a dead load across it: exact, however far it bends.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -49,8 +50,8 @@ inline Elastica elastica_at(double angle) {
   // 1 - sin angle without cancellation.
   const double s = std::sin(angle), half = std::sin(0.5 * (0.5 * std::numbers::pi - angle)), rest = 2 * half * half;
   double length = 0, fall = 0, high = std::atan(std::sqrt(s));
-  for (int panel = 0; panel < 40; ++panel) {
-    const double low = panel == 39 ? 0 : 0.5 * high;
+  while (high > 0) {
+    const double low = high * high > rest ? 0.5 * high : 0;
     for (std::size_t i = 0; i < rule.x.size(); ++i) {
       const double chi = 0.5 * (low + high) + 0.5 * (high - low) * rule.x[i], q = std::sin(chi);
       const double density = 0.5 * (high - low) * rule.w[i] * std::sqrt(2 / (rest + (1 + s) * q * q));
@@ -62,15 +63,30 @@ inline Elastica elastica_at(double angle) {
   return {.load = length * length, .angle = angle, .deflection = fall / length};
 }
 
-/// The rod under F a^2 / EI = `load` > 0: the angle grows with it and stays below both that of small deflections and
-/// pi/2, so bisection cannot fail. Real time: yes.
+/// The rod under F a^2 / EI = `load` > 0, to rounding up to a load of about 400. The angle grows with it and stays below
+/// both that of small deflections and pi/2: false position between bounds (Illinois) cannot fail. Real time: yes.
 inline Elastica elastica_under(double load) {
-  double low = 0, high = std::min(0.5 * load, 0.5 * std::numbers::pi);
+  const double wanted = std::sqrt(load);
+  const auto excess_of = [&](const Elastica& rod) { return std::sqrt(rod.load) - wanted; };
+  double low = 0, at_low = -wanted, high = std::min(0.5 * load, 0.5 * std::numbers::pi - 1e-8);
   Elastica rod = elastica_at(high);
-  for (int k = 0; k < 200 && high - low > 4e-16 * high; ++k) {
-    const double middle = 0.5 * (low + high);
-    rod = elastica_at(middle);
-    (rod.load < load ? low : high) = middle;
+  double at_high = excess_of(rod);
+  int kept = 0;  // which end stayed: -1 low, 1 high
+  for (int k = 0; k < 200 && std::abs(excess_of(rod)) > 4e-16 * wanted && high - low > 4e-16 * high; ++k) {
+    const double angle = (low * at_high - high * at_low) / (at_high - at_low);
+    rod = elastica_at(angle);
+    const double excess = excess_of(rod);
+    if (excess < 0) {
+      low = angle;
+      at_low = excess;
+      if (kept == 1) at_high *= 0.5;
+      kept = 1;
+    } else {
+      high = angle;
+      at_high = excess;
+      if (kept == -1) at_low *= 0.5;
+      kept = -1;
+    }
   }
   return rod;
 }

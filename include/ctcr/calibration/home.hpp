@@ -1,6 +1,7 @@
 #pragma once
 // Translational offsets and effective lengths: what a ruler, the motors and tips flush with the front plate tell.
-#include <Eigen/Dense>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <string>
@@ -13,10 +14,10 @@ namespace ctcr {
 
 /// What was measured of one tube; any two of the three lists are enough.
 struct TubeHome {
-  double home_angle = 0;             ///< of its translation motor in the home position [rad]
-  std::vector<double> distances;     ///< from the front plate back to where it is grasped, at home, by hand [m], > 0
-  std::vector<double> flush_angles;  ///< of the motor when the tip is flush with the front plate [rad]
-  std::vector<double> lengths;       ///< from the grasp to the tip, by hand or from the data sheet [m]
+  double home_angle = 0;               ///< of its translation motor in the home position [rad]
+  std::vector<double> distances{};     ///< from the front plate back to where it is grasped, at home, by hand [m], > 0
+  std::vector<double> flush_angles{};  ///< of the motor when the tip is flush with the front plate [rad]
+  std::vector<double> lengths{};       ///< from the grasp to the tip, by hand or from the data sheet [m]
 };
 
 struct HomeOptions {
@@ -30,6 +31,15 @@ enum class HomeNotice {
   inconsistent,  ///< figure: distance + travel to flush - length [m]
   out_of_order,  ///< figure: by how much a tube is grasped, or ends, beyond the one inside it [m]
 };
+
+/// The notice's name.
+constexpr const char* to_string(HomeNotice kind) noexcept {
+  switch (kind) {
+    case HomeNotice::inconsistent: return "inconsistent";
+    case HomeNotice::out_of_order: return "out_of_order";
+  }
+  return "unknown";
+}
 
 /// Of one tube. Offset and length share the error of the ruler: their sum, and so the tip, is known to that of the flush
 /// reading alone, which is what the correlation near -1 says.
@@ -61,8 +71,8 @@ inline Mean mean_of(const std::vector<double>& values, double sd) {
 
 inline void check(const TubeHome& tube, std::size_t number) {
   const int kinds = !tube.distances.empty() + !tube.flush_angles.empty() + !tube.lengths.empty();
-  require(kinds >= 2, sentence("tube %zu: two of home distance, flush reading and length are needed, here is %s", number,
-                               kinds == 1 ? "one" : "none"));
+  require(kinds >= 2, sentence("tube %zu: two of home distance, flush reading and length are needed, here is %s",
+                               number, kinds == 1 ? "one" : "none"));
   bool is_finite = std::isfinite(tube.home_angle);
   for (const auto* list : {&tube.distances, &tube.flush_angles, &tube.lengths})
     for (const double value : *list) is_finite = is_finite && std::isfinite(value);
@@ -70,8 +80,8 @@ inline void check(const TubeHome& tube, std::size_t number) {
   for (const auto* list : {&tube.distances, &tube.lengths})
     for (const double value : *list)
       require(value > 0 && value < 10,
-              sentence("tube %zu: %g m is no distance from plate to grasp and no tube length: give metres, positive", number,
-                       value));
+              sentence("tube %zu: %g m is no distance from plate to grasp and no tube length: give metres, positive",
+                       number, value));
 }
 
 }  // namespace home
@@ -113,18 +123,24 @@ inline void check(const TubeHome& tube, std::size_t number) {
     const Eigen::Matrix2d covariance = (A.transpose() * A).inverse();
     const Eigen::Vector2d x = covariance * (A.transpose() * b), sd = covariance.diagonal().cwiseSqrt();
     const double tip_sd = std::sqrt(std::max(0.0, covariance.sum()));
-    result.tubes.push_back({.offset = x[0], .offset_sd = sd[0], .length = x[1], .length_sd = sd[1],
+    result.tubes.push_back({.offset = x[0],
+                            .offset_sd = sd[0],
+                            .length = x[1],
+                            .length_sd = sd[1],
                             .correlation = covariance(0, 1) / (sd[0] * sd[1]),
-                            .deployed = rho * tube.home_angle + x[0] + x[1], .deployed_sd = tip_sd});
-    require(x[1] > 0, sentence("tube %zu: its length comes out as %.1f mm: the sign of the translation ratio or a flush "
-                               "reading is wrong", i + 1, x[1] / mm));
+                            .deployed = rho * tube.home_angle + x[0] + x[1],
+                            .deployed_sd = tip_sd});
+    require(x[1] > 0,
+            sentence("tube %zu: its length comes out as %.1f mm: the sign of the translation ratio or a flush "
+                     "reading is wrong",
+                     i + 1, x[1] / mm));
     const double misfit = (A * x - b).norm();
     if (!tube.distances.empty() && !tube.flush_angles.empty() && !tube.lengths.empty() && misfit > surprising) {
-      const double gap = mean_of(tube.distances, 1).value + rho * (tube.home_angle - mean_of(tube.flush_angles, 1).value) -
-                         mean_of(tube.lengths, 1).value;
-      result.notices.push_back({HomeNotice::inconsistent, gap, gap * surprising / misfit,
-                                sentence("tube %zu: distance and travel make it %.2f mm longer than it was measured", i + 1,
-                                         gap / mm)});
+      const double gap = mean_of(tube.distances, 1).value +
+                         rho * (tube.home_angle - mean_of(tube.flush_angles, 1).value) - mean_of(tube.lengths, 1).value;
+      result.notices.push_back(
+          {HomeNotice::inconsistent, gap, gap * surprising / misfit,
+           sentence("tube %zu: distance and travel make it %.2f mm longer than it was measured", i + 1, gap / mm)});
     }
     if (i == 0) continue;
     const HomeOffset &inner = result.tubes[i - 1], &outer = result.tubes[i];

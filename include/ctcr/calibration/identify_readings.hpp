@@ -1,5 +1,7 @@
 #pragma once
 // The fit of a table some of whose rows the model may be unable to solve.
+#include <algorithm>
+#include <iterator>
 #include <vector>
 
 #include "ctcr/calibration/identify.hpp"
@@ -9,7 +11,7 @@ namespace ctcr {
 /// Fits the active rows of a table such as Readings<N>: a Predictor with unsolved(), active() and activate().
 ///
 /// Rows that cannot be solved at the start are left out of the whole fit. So are, once a descent gets stuck for their
-/// sake, those that cannot be solved where it wants to go; it then goes on without them.
+/// sake, those that cannot be solved where it wants to go, if they are few; it then goes on without them.
 /// @param excluded  receives the rows left out
 /// @return and throws as identify(); on return the table's active rows are those that were fitted
 template <class Table>
@@ -23,7 +25,8 @@ Identification identify_readings(Table& table, const std::vector<FreeParameter>&
     excluded.insert(excluded.end(), rows.begin(), rows.end());
   };
   Eigen::VectorXd x(Eigen::Index(parameters.size())), residual;
-  for (Eigen::Index k = 0; k < x.size(); ++k) x[k] = options.start ? (*options.start)[k] : parameters[std::size_t(k)].mean;
+  for (Eigen::Index k = 0; k < x.size(); ++k)
+    x[k] = options.start ? (*options.start)[k] : parameters[std::size_t(k)].mean;
   if (!table(x, residual, nullptr)) exclude(table.unsolved());
 
   for (int round = 1;; ++round) {
@@ -34,7 +37,11 @@ Identification identify_readings(Table& table, const std::vector<FreeParameter>&
       return solved;
     };
     Identification fit = identify(predict, parameters, noise, places, options);
-    if (fit.converged || blocked.empty() || round == rounds) {
+    const auto active = std::count(table.active().begin(), table.active().end(), true);
+    const bool few = 10 * std::ssize(blocked) <= active;
+    if (fit.converged || blocked.empty() || !few || round == rounds) {
+      if (!fit.converged && !blocked.empty())
+        fit.status += "; " + std::to_string(blocked.size()) + " readings cannot be solved where it leads";
       std::sort(excluded.begin(), excluded.end());
       return fit;
     }

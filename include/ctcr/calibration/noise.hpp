@@ -11,11 +11,11 @@ namespace ctcr {
 
 /// Standard deviations per axis. A field of 0: jitter alone.
 struct Noise {
-  double position_jitter = 0;        ///< [m]
-  double rotation_jitter = 0;        ///< [rad]
-  double position_field = 0;         ///< [m]
-  double rotation_field = 0;         ///< [rad]
-  double correlation_length = 0.1;   ///< over which the field error changes [m]
+  double position_jitter = 0;       ///< [m]
+  double rotation_jitter = 0;       ///< [rad]
+  double position_field = 0;        ///< [m]
+  double rotation_field = 0;        ///< [rad]
+  double correlation_length = 0.1;  ///< over which the field error changes [m]
 };
 
 /// 95 % of the lengths of a vector with three independent normal components lie below this many of their sd.
@@ -43,6 +43,7 @@ struct SmoothField {
 inline SmoothField smooth_field(const Eigen::MatrixX3d& places, double length, double tolerance, int max_rank = 400) {
   const Eigen::Index count = places.rows();
   const Eigen::ArrayX<bool> known = places.array().isFinite().rowwise().all();
+  tolerance = std::max(tolerance, 1e-12);  // less is rounding
   Eigen::VectorXd left = known.cast<double>().matrix();
   Eigen::MatrixXd factor(count, 0);
   Eigen::Index rank = 0;

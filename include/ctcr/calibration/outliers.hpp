@@ -2,16 +2,17 @@
 // Weights that let a reading which nothing explains count for little.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "ctcr/calibration/whitening.hpp"
 
 namespace ctcr {
 
-/// Weight of three residuals whose squared length in sd is `square`: 1 within the bulk of a normal distribution, beyond
-/// it that of Student's t with five degrees of freedom. Normal data keep their weight, so that their chi-square and
-/// their standard deviations stay what they are.
-inline double tail_weight(double square) noexcept {
-  constexpr double freedom = 5, bulk = 9.348;  // 97.5 % of chi-square of three
+/// Share of a row with three residuals of squared length `square`, in sd, that belongs to the bulk of a normal
+/// distribution: 1 within its 97.5 %, falling with the square beyond. Its square is the weight, so that far rows add next
+/// to nothing to chi-square, while normal data keep theirs, and with it honest standard deviations.
+inline double bulk_share(double square) noexcept {
+  constexpr double freedom = 5, bulk = 9.348;  // 97.5 % of chi-square of three; the tail is that of Student's t
   return square <= bulk ? 1.0 : (freedom + bulk) / (freedom + square);
 }
 
@@ -19,14 +20,15 @@ inline double tail_weight(double square) noexcept {
 ///
 /// A row is judged by how far it lies from what the field error at the other rows predicts for it, in units of the
 /// usual distance of these rows: where the model itself is wrong everywhere, that is no row's fault.
-/// @param use  rows of weight 0 here keep 0
-inline RowWeights outlier_weights(const Noise& noise, const Whitening& whitening, const Eigen::VectorXd& residual,
-                                  const RowWeights& use) {
+/// @param inflation  factor on the jitter of positions and of rotations that `whitening` has in it
+/// @param use  weights before outliers are thought of; 0 stays 0
+inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& inflation, const Whitening& whitening,
+                                  const Eigen::VectorXd& residual, const RowWeights& use) {
   constexpr double median_of_chi_square = 2.366;  // of three
   RowWeights weights = use;
   const Eigen::VectorXd left = residual - whitening.field(residual);
   for (int kind = 0; kind < 2; ++kind) {
-    const double jitter = kind == 0 ? noise.position_jitter : noise.rotation_jitter;
+    const double jitter = inflation[kind] * (kind == 0 ? noise.position_jitter : noise.rotation_jitter);
     const Eigen::ArrayXd variance = whitening.axes(kind).field_variance();
     // Leaving the row out: both its residual and the field's variance grow by 1 / (1 - leverage).
     const Eigen::ArrayXd leverage = variance * whitening.axes(kind).scale().array().square();
@@ -41,7 +43,7 @@ inline RowWeights outlier_weights(const Noise& noise, const Whitening& whitening
     std::nth_element(used.begin(), middle, used.end());
     const double usual = std::max(1.0, *middle / median_of_chi_square);
     for (Eigen::Index i = 0; i < square.size(); ++i)
-      if (use(i, kind) > 0) weights(i, kind) = tail_weight(square[i] / usual);
+      if (use(i, kind) > 0) weights(i, kind) = use(i, kind) * std::pow(bulk_share(square[i] / usual), 2);
   }
   return weights;
 }

@@ -38,7 +38,7 @@ struct Direction {
 
 /// Gaussian approximation of the posterior in scaled parameters.
 class Posterior {
- public:
+public:
   /// @param information  J^T Sigma^-1 J   @param prior  precision of the prior, 1 or 0, for each parameter
   Posterior(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior) {
     Eigen::MatrixXd H = information;
@@ -67,7 +67,7 @@ class Posterior {
   [[nodiscard]] double log_determinant() const { return log_determinant_; }  ///< of the posterior's precision
   [[nodiscard]] double effective_parameters() const { return effective_; }   ///< trace of the hat matrix
 
- private:
+private:
   Eigen::MatrixXd covariance_;
   Eigen::VectorXd sd_;
   bool singular_ = false;
@@ -84,8 +84,8 @@ inline void make_simple(Eigen::MatrixXd& V) {
       for (Eigen::Index b = a + 1; b < V.cols(); ++b) {
         const Eigen::ArrayXd x = V.col(a), y = V.col(b), u = x * x - y * y, v = 2 * x * y;
         const double count = double(V.rows()), U = u.sum(), W = v.sum();
-        const double angle = 0.25 * std::atan2(2 * ((u * v).sum() - U * W / count),
-                                               (u * u - v * v).sum() - (U * U - W * W) / count);
+        const double angle =
+            0.25 * std::atan2(2 * ((u * v).sum() - U * W / count), (u * u - v * v).sum() - (U * U - W * W) / count);
         V.col(a) = std::cos(angle) * x + std::sin(angle) * y;
         V.col(b) = std::cos(angle) * y - std::sin(angle) * x;
         turned = std::max(turned, std::abs(angle));
@@ -160,7 +160,8 @@ inline std::vector<Direction> undetermined_directions(const Posterior& posterior
     if (v[largest] < 0) v = -v;
     add(v, detail::combination(v, parameters));
   }
-  std::stable_sort(found.begin(), found.end(), [](const Direction& a, const Direction& b) { return a.ratio > b.ratio; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Direction& a, const Direction& b) { return a.ratio > b.ratio; });
   rest.insert(rest.end(), found.begin(), found.end());
   return rest;
 }

@@ -18,8 +18,8 @@ inline Eigen::MatrixXd gain(const Eigen::MatrixXd& J) {
   if (qr.rank() < J.cols()) return {};
   // (J^T J)^-1 from R alone; the inverse of J itself would be a square of the number of residuals.
   const Eigen::Index n = J.cols();
-  Eigen::MatrixXd root = qr.matrixQR().topRows(n).template triangularView<Eigen::Upper>().solve(
-      Eigen::MatrixXd::Identity(n, n));
+  Eigen::MatrixXd root =
+      qr.matrixQR().topRows(n).template triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
   root = scale.cwiseInverse().asDiagonal() * (qr.colsPermutation() * root);
   return root * (root.transpose() * J.transpose());
 }

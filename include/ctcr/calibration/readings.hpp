@@ -27,12 +27,18 @@ struct Reading {
 /// Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
 template <int N>
 class Readings {
- public:
+public:
   /// @param parameters  places of x in ParameterVector<N>
   /// @param pool        must outlive this
   Readings(const System<N>& nominal, std::vector<Reading<N>> rows, std::vector<int> parameters, ThreadPool& pool)
-    : nominal_(nominal), rows_(std::move(rows)), parameters_(std::move(parameters)), pool_(&pool),
-      theta_(rows_.size()), memory_(rows_.size()), active_(rows_.size(), true), workers_(std::size_t(pool.size())) {
+    : nominal_(nominal),
+      rows_(std::move(rows)),
+      parameters_(std::move(parameters)),
+      pool_(&pool),
+      theta_(rows_.size()),
+      memory_(rows_.size()),
+      active_(rows_.size(), true),
+      workers_(std::size_t(pool.size())) {
     for (std::size_t i = 0; i < rows_.size(); ++i) theta_[i] = motor_angles(nominal.transmission, rows_[i].q);
   }
 
@@ -74,7 +80,8 @@ class Readings {
     const auto chunks = (size() + batch_chunk - 1) / batch_chunk;
     pool_->parallel_for(int(chunks), [&](int chunk, int worker) noexcept {
       Worker& w = workers_[std::size_t(worker)];
-      const auto first = std::size_t(chunk * batch_chunk), end = std::min(first + std::size_t(batch_chunk), rows_.size());
+      const auto first = std::size_t(chunk * batch_chunk),
+                 end = std::min(first + std::size_t(batch_chunk), rows_.size());
       w.workspace.reset();
       for (std::size_t i = first; i < end; ++i) {
         const auto at = Eigen::Index(6 * i);
@@ -105,7 +112,7 @@ class Readings {
   void activate(const std::vector<bool>& rows) { active_ = rows; }
   [[nodiscard]] const std::vector<bool>& active() const { return active_; }
 
- private:
+private:
   struct Memory {
     TipGuess<N> guess;
     bool known = false;

@@ -2,7 +2,10 @@
 // Where the tracker sees the robot's base frame: from points whose place on the robot is known, touched with a probe.
 #include <ceres/manifold.h>
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <span>
 
@@ -16,12 +19,12 @@ namespace ctcr {
 /// A point of the robot and the readings of a probe held there.
 struct Fiducial {
   std::string name;
-  Vec3 position;               ///< from the CAD [m], base frame
-  std::vector<Vec3> readings;  ///< [m], tracker frame; none: the point is left out
+  Vec3 position = Vec3::Zero();  ///< from the CAD [m], base frame
+  std::vector<Vec3> readings{};  ///< [m], tracker frame; none: the point is left out
 };
 
 struct RegistrationOptions {
-  Noise noise;              ///< of a reading's position
+  Noise noise{};            ///< of a reading's position
   double placement_sd = 0;  ///< how far, per axis, the probe sits from the CAD's point however often it is read [m]; 0:
                             ///< from the residuals, which need more than 3 points to be told well
   double loss_scale = 0;    ///< beyond which points count ever less (Cauchy) [m]; 0: least squares
@@ -32,20 +35,32 @@ enum class RegistrationNotice {
   few_points,       ///< figure: points used; three check nothing
   without_reading,  ///< figure: number of points never read
   large_residuals,  ///< figure: fiducial registration error [m]
-  scale,            ///< figure: size of what the tracker sees over that in the CAD
+  wrong_scale,      ///< figure: size of what the tracker sees over that in the CAD
 };
+
+/// The notice's name.
+constexpr const char* to_string(RegistrationNotice kind) noexcept {
+  switch (kind) {
+    case RegistrationNotice::outliers: return "outliers";
+    case RegistrationNotice::few_points: return "few_points";
+    case RegistrationNotice::without_reading: return "without_reading";
+    case RegistrationNotice::large_residuals: return "large_residuals";
+    case RegistrationNotice::wrong_scale: return "wrong_scale";
+  }
+  return "unknown";
+}
 
 /// T_ref and how well it is known. Changes of T_ref are those of moved_frame(): displacement of the base frame's origin
 /// [m], then rotation about it [rad], tracker axes.
 struct Registration {
-  Pose T_tracker_base;                                ///< T_ref
-  Mat6 covariance;                                    ///< of such a change
-  double fre;                                         ///< fiducial registration error: RMS residual of points used [m]
-  double fle;                                         ///< sd of a point per axis, placement and reading, used [m]
-  int degrees_of_freedom;                             ///< of the residuals
-  double repeatability_sd;                            ///< of readings of one point, per axis [m]; NaN without repeats
-  std::vector<Vec3> residuals;                        ///< mean reading - T_ref point [m], tracker axes; NaN: not read
-  std::vector<std::string> outliers;                  ///< names of the points left out
+  Pose T_tracker_base;                ///< T_ref
+  Mat6 covariance;                    ///< of such a change
+  double fre;                         ///< fiducial registration error: RMS residual of points used [m]
+  double fle;                         ///< sd of a point per axis, placement and reading, used [m]
+  int degrees_of_freedom;             ///< of the residuals
+  double repeatability_sd;            ///< of readings of one point, per axis [m]; NaN without repeats
+  std::vector<Vec3> residuals;        ///< mean reading - T_ref point [m], tracker axes; NaN: not read
+  std::vector<std::string> outliers;  ///< names of the points left out
   std::vector<Notice<RegistrationNotice>> notices;
 
   /// Expected target registration error: RMS distance [m] between where T_ref takes `target` [m], base frame, and where
@@ -76,23 +91,37 @@ struct Pairs {
   }
 };
 
-inline Eigen::Matrix3Xd mapped(const Pose& T, const Eigen::Matrix3Xd& points) {
-  return (T.rotation * points).colwise() + T.position;
+/// Where points miss those they are mapped to [m].
+inline Eigen::Matrix3Xd errors(const Pose& T, const Pairs& pairs) {
+  Eigen::Matrix3Xd error = pairs.tracker;
+  for (Eigen::Index i = 0; i < error.cols(); ++i) error.col(i) -= T.rotation * pairs.base.col(i) + T.position;
+  return error;
 }
 
-/// The rigid transform of least squares, in closed form.
+/// The rigid transform of least squares, in closed form from a singular value decomposition.
+/// Ref: Arun, Huang, Blostein, "Least-squares fitting of two 3-D point sets", 1987, with the determinant of Umeyama, 1991.
 inline Pose closed_form(const Pairs& pairs) {
-  const Eigen::Matrix4d T = Eigen::umeyama(pairs.base, pairs.tracker, false);
-  return {T.topLeftCorner<3, 3>(), T.topRightCorner<3, 1>()};
+  const Vec3 base = pairs.base.rowwise().mean(), tracker = pairs.tracker.rowwise().mean();
+  Mat3 moments = Mat3::Zero();
+  for (Eigen::Index i = 0; i < pairs.count(); ++i)
+    moments += (pairs.tracker.col(i) - tracker) * (pairs.base.col(i) - base).transpose();
+  const Eigen::JacobiSVD<Mat3> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Vec3 sign(1, 1, (svd.matrixU() * svd.matrixV()).determinant() < 0 ? -1 : 1);
+  const Mat3 R = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  return {R, tracker - R * base};
 }
-inline double squares(const Pairs& pairs) {
-  return (pairs.tracker - mapped(closed_form(pairs), pairs.base)).squaredNorm();
-}
+inline double squares(const Pairs& pairs) { return errors(closed_form(pairs), pairs).squaredNorm(); }
 
 /// Standard deviations of points along their principal axes, largest first [m].
 inline Vec3 extents(const Eigen::Matrix3Xd& points) {
-  const Eigen::Matrix3Xd centred = points.colwise() - points.rowwise().mean();
-  return centred.jacobiSvd().singularValues() / std::sqrt(double(points.cols()));
+  const Vec3 mean = points.rowwise().mean();
+  Mat3 moments = Mat3::Zero();
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Vec3 d = points.col(i) - mean;
+    moments += d * d.transpose() / double(points.cols());
+  }
+  const Eigen::SelfAdjointEigenSolver<Mat3> axes(moments, Eigen::EigenvaluesOnly);
+  return axes.eigenvalues().reverse().cwiseMax(0.0).cwiseSqrt();
 }
 
 inline Pairs check(std::span<const Fiducial> points, std::vector<int>& read) {
@@ -118,7 +147,7 @@ inline Pairs check(std::span<const Fiducial> points, std::vector<int>& read) {
   require(read.size() >= 3, sentence("a registration needs readings of at least 3 points, here are %zu", read.size()));
   for (const auto* side : {&pairs.base, &pairs.tracker}) {
     const Vec3 extent = extents(*side);
-    require(extent[1] > 1e-3 * extent[0],
+    require(extent[1] > 3e-3 * extent[0],
             sentence("the %s lie on one line, so that the rotation about it is unknown: add a point beside it",
                      side == &pairs.base ? "points of the CAD" : "readings"));
   }
@@ -137,10 +166,11 @@ inline void check_correspondence(const Pairs& pairs, std::span<const Fiducial> p
   };
   const double mirrored = squares({-pairs.base, pairs.tracker});
   const double count = double(pairs.count());
-  require(!is_far_better(mirrored),
-          sentence("the readings are a mirror image of the CAD's points (residual %.2f mm, mirrored %.2f mm): an axis has "
-                   "the wrong sign, or left and right are exchanged",
-                   std::sqrt(straight / count) / mm, std::sqrt(mirrored / count) / mm));
+  require(
+      !is_far_better(mirrored),
+      sentence("the readings are a mirror image of the CAD's points (residual %.2f mm, mirrored %.2f mm): an axis has "
+               "the wrong sign, or left and right are exchanged",
+               std::sqrt(straight / count) / mm, std::sqrt(mirrored / count) / mm));
   Pairs exchanged = pairs;
   for (Eigen::Index i = 0; i < pairs.count(); ++i)
     for (Eigen::Index j = 0; j < i; ++j) {
@@ -204,7 +234,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
                              loss_scale > 0 ? new ceres::CauchyLoss(loss_scale / sd[i]) : nullptr,
                              rotation.coeffs().data(), position.data());
   }
-  minimise(problem);
+  minimise(problem, sd.minCoeff(), 1e-14);
   return {rotation.normalized().toRotationMatrix(), position};
 }
 
@@ -243,7 +273,8 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
                                                           : 0;
 
   // Outliers, the worst one first.
-  const double stated = options.placement_sd > 0 ? std::hypot(options.placement_sd, jitter, options.noise.position_field) : 0;
+  const double stated =
+      options.placement_sd > 0 ? std::hypot(options.placement_sd, jitter, options.noise.position_field) : 0;
   for (Eigen::Index worst; (worst = worst_outlier(pairs, stated)) >= 0;) {
     result.outliers.push_back(points[std::size_t(read[std::size_t(worst)])].name);
     pairs = pairs.without(worst);
@@ -262,7 +293,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   // Whitened Jacobian by displacement and rotation, and the weights that the loss left.
   Eigen::MatrixXd J(3 * n, 6);
   Eigen::VectorXd weight(n);
-  const Eigen::Matrix3Xd error = pairs.tracker - mapped(T, pairs.base);
+  const Eigen::Matrix3Xd error = errors(T, pairs);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double far = options.loss_scale > 0 ? error.col(i).norm() / options.loss_scale : 0;
     weight[i] = 1 / (std::sqrt(1 + far * far) * sd[i]);
@@ -291,8 +322,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   for (const Fiducial& point : points) {
     Vec3 mean = Vec3::Zero();
     for (const Vec3& reading : point.readings) mean += reading / double(point.readings.size());
-    result.residuals.push_back(point.readings.empty() ? nan
-                                                      : Vec3(mean - T.rotation * point.position - T.position));
+    result.residuals.push_back(point.readings.empty() ? nan : Vec3(mean - T.rotation * point.position - T.position));
     unread += point.readings.empty();
   }
   if (!result.outliers.empty()) {
@@ -311,7 +341,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   const double scale = extents(pairs.tracker).norm() / size;
   const double scale_sd = result.fle / (size * std::sqrt(double(n)));
   if (std::abs(scale - 1) > std::max(0.01, surprising * scale_sd))
-    tell(RegistrationNotice::scale, scale, 0.01,
+    tell(wrong_scale, scale, 0.01,
          sentence("the tracker sees the points %.1f %% farther apart than the CAD says", 100 * (scale - 1)));
   return result;
 }

@@ -12,8 +12,6 @@
 
 namespace ctcr {
 
-/// Six numbers a row: position x, y, z [m], rotation vector x, y, z [rad], tracker axes.
-using Rows6 = Eigen::Matrix<double, Eigen::Dynamic, 6>;
 /// Weight of each row's position and rotation: 1 as the noise says, less for outliers, 0 where not measured or not used.
 using RowWeights = Eigen::MatrixX2d;
 
@@ -28,19 +26,24 @@ auto every_sixth(Scalar* first, Eigen::Index rows) {
 
 /// The three axes of a position or of a rotation, which share one covariance.
 class ThreeAxes {
- public:
+public:
   ThreeAxes() = default;
   ThreeAxes(double jitter, double field_sd, const SmoothField& field, const Eigen::VectorXd& weight)
-    : field_(field_sd * field.factor), variance_(jitter * jitter + field_sd * field_sd) {
+    : field_(field_sd * field.factor),
+      jitter_variance_(jitter * jitter),
+      variance_(jitter_variance_ + field_sd * field_sd) {
     const Eigen::ArrayXd variance = jitter * jitter + field_sd * field_sd * field.rest.array();
     scale_ = (weight.array() / variance).sqrt();
+    used_ = (weight.array() > 0).count();
+    log_determinant_ = -2 * (scale_.array() > 0).select(scale_.array().log(), 0.0).sum();
+    if (field_.cols() == 0) return;
     const Eigen::MatrixXd A = scale_.asDiagonal() * field_;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(A.transpose() * A);
     const Eigen::ArrayXd t = eigen.eigenvalues().array().max(0.0);
     field_ *= (eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal()).eval();
     shrink_ = (1 + t).sqrt() / (1 + (1 + t).sqrt());
-    used_ = (weight.array() > 0).count();
-    log_determinant_ = (1 + t).log().sum() - 2 * (scale_.array() > 0).select(scale_.array().log(), 0.0).sum();
+    strength_ = t;
+    log_determinant_ += (1 + t).log().sum();
   }
 
   /// @param y  (rows, any)
@@ -54,18 +57,39 @@ class ThreeAxes {
   [[nodiscard]] Eigen::MatrixXd field_mean(const Eigen::MatrixXd& residual) const {
     return field_ * (field_.transpose() * (scale_.cwiseAbs2().asDiagonal() * residual));
   }
-  /// Its variance, per axis.
+  /// Factor on the jitter's variance with which the chi-square of a residual (rows, 3) is `expected`; 1 where it is not
+  /// significantly above that (four standard deviations).
+  [[nodiscard]] double inflation(const Eigen::MatrixXd& residual, double expected) const {
+    const Eigen::MatrixXd y = scale_.asDiagonal() * residual;
+    const double all = y.squaredNorm();
+    Eigen::ArrayXd smooth;  // what of it the field can explain, by eigenvector of A A^T
+    if (field_.cols() > 0)
+      smooth = (1 + strength_) * (field_.transpose() * (scale_.asDiagonal() * y)).rowwise().squaredNorm().array();
+    const auto chi_square = [&](double s2) {
+      return (all - (smooth.size() > 0 ? (smooth / (s2 + strength_)).sum() : 0.0)) / s2;
+    };
+    double low = 1, high = 1;
+    if (!(expected > 0) || chi_square(1) <= expected + 4 * std::sqrt(2 * expected)) return 1;
+    while (chi_square(high *= 4) > expected) low = high;
+    for (int halving = 0; halving < 40; ++halving) {
+      const double middle = std::sqrt(low * high);
+      (chi_square(middle) > expected ? low : high) = middle;
+    }
+    return high;
+  }
+  /// Variance of the field error given the rows that count, per axis.
   [[nodiscard]] Eigen::VectorXd field_variance() const { return field_.rowwise().squaredNorm(); }
   [[nodiscard]] const Eigen::VectorXd& scale() const { return scale_; }  ///< sqrt(weight) / sd of the jitter
   [[nodiscard]] double variance() const { return variance_; }            ///< of one reading, jitter and field, per axis
+  [[nodiscard]] double jitter_variance() const { return jitter_variance_; }
   [[nodiscard]] double log_determinant() const { return 3 * log_determinant_; }
   [[nodiscard]] Eigen::Index used() const { return used_; }  ///< rows of weight above 0
 
- private:
+private:
   Eigen::MatrixXd field_;  ///< its posterior covariance is field_ field_^T
   Eigen::VectorXd scale_;
-  Eigen::ArrayXd shrink_;
-  double variance_ = 0, log_determinant_ = 0;
+  Eigen::ArrayXd shrink_, strength_;
+  double jitter_variance_ = 0, variance_ = 0, log_determinant_ = 0;
   Eigen::Index used_ = 0;
 };
 
@@ -76,7 +100,7 @@ class ThreeAxes {
 /// Columns have six entries a row, interleaved: entry 6 i + a is axis a of row i. Rows of weight 0 become 0.
 /// Real time: no.
 class Whitening {
- public:
+public:
   Whitening() = default;
   /// @param field  smooth_field() at the rows' places; its factor may have no columns
   Whitening(const Noise& noise, const SmoothField& field, const RowWeights& weights)
@@ -122,10 +146,11 @@ class Whitening {
     return y;
   }
 
- private:
+private:
   static void scatter(const Eigen::MatrixXd& y, int kind, Eigen::Ref<Eigen::MatrixXd> columns) {
     for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      for (int a = 0; a < 3; ++a) detail::every_sixth(columns.col(k).data() + 3 * kind + a, y.rows()) = y.col(3 * k + a);
+      for (int a = 0; a < 3; ++a)
+        detail::every_sixth(columns.col(k).data() + 3 * kind + a, y.rows()) = y.col(3 * k + a);
   }
 
   std::array<detail::ThreeAxes, 2> axes_;

@@ -35,19 +35,18 @@ template <int N, class P = double>
 struct BacklashRotation : EffectValues<backlash_rotation::parameters, N, P, N> {
   static constexpr const EffectInfo& info = backlash_rotation::info;
 
-  void remember(const Path<N>& path, std::size_t row) noexcept {
+  void remember(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
-    for (int i = 0; i < N; ++i) {
-      P& lag = this->past.state[std::size_t(i)];
-      const P& b = this->template get<0>(i);
-      const double moved = path.q[row].alpha[i] - path.q[row - 1].alpha[i];
-      if (moved != 0) lag = clamped(P(lag - moved), P(-b), b);
+    for (std::size_t i = 0; i < N; ++i) {
+      P& lag = this->past.state[i];
+      const P& b = this->template get<0>(int(i));
+      const P moved = path.q[row].alpha[i] - path.q[row - 1].alpha[i];
+      if (value(moved) != 0) lag = clamped(P(lag - moved), P(-b), b);
     }
   }
 
-  void actuate(const Occasion&, std::array<P, N>& beta, std::array<P, N>& alpha) const noexcept {
+  void actuate(const Occasion&, std::array<P, N>&, std::array<P, N>& alpha) const noexcept {
     for (std::size_t i = 0; i < N; ++i) alpha[i] = alpha[i] + this->past.state[i];
-    (void)beta;
   }
 };
 

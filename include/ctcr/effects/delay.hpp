@@ -34,21 +34,19 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = delay::info;
 
   /// state: joints then minus joints now, beta and alpha of each tube.
-  void remember(const Path<N>& path, std::size_t row) noexcept {
+  void remember(const Path<N, P>& path, std::size_t row) noexcept {
     auto& state = this->past.state;
     for (auto& x : state) x = 0.0;
-    if (path.time.empty() || row == 0) return;
+    if (path.time.empty() || row == 0 || !(path.time[row - 1] < path.time[row])) return;
     const P& delay = this->template get<0>();
     const double now = path.time[row], then = now - value(delay);
-    std::size_t k = row;  // then lies between rows k - 1 and k
-    while (k > 1 && path.time[k - 1] > then) --k;
-    const double span = path.time[k] - path.time[k - 1];
-    if (!(span > 0)) return;
-    const P part = (path.time[k] - now + delay) * (1 / span);
-    for (int i = 0; i < N; ++i) {
-      const Joints<N>&a = path.q[k], &b = path.q[k - 1];
-      state[std::size_t(i)] = (a.beta[i] - path.q[row].beta[i]) + part * (b.beta[i] - a.beta[i]);
-      state[std::size_t(N + i)] = (a.alpha[i] - path.q[row].alpha[i]) + part * (b.alpha[i] - a.alpha[i]);
+    std::size_t k = row;  // then lies between rows k - 1 and k, or before the first of a clock that started anew
+    while (k > 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
+    const P part = (path.time[k] - now + delay) * (1 / (path.time[k] - path.time[k - 1]));
+    const auto &a = path.q[k], &b = path.q[k - 1], &here = path.q[row];
+    for (std::size_t i = 0; i < N; ++i) {
+      state[i] = (a.beta[i] - here.beta[i]) + part * (b.beta[i] - a.beta[i]);
+      state[N + i] = (a.alpha[i] - here.alpha[i]) + part * (b.alpha[i] - a.alpha[i]);
     }
   }
 

@@ -50,15 +50,16 @@ struct EffectInfo {
   Needs needs{};
 };
 
-/// What the joints' past left behind in an effect: numbers, and for P = double their slopes by the effect's parameters.
-template <int States, int Count, class P>
+/// What the joints' past left behind in an effect: numbers, and for P = double their slopes by what they depend on: the
+/// effect's parameters, then those of the transmission (both ratios, home of beta, home of alpha).
+template <int States, int Slopes, class P>
 struct EffectPast {
   std::array<P, std::size_t(States)> state{};
 };
-template <int States, int Count>
-struct EffectPast<States, Count, double> {
+template <int States, int Slopes>
+struct EffectPast<States, Slopes, double> {
   std::array<double, std::size_t(States)> state{};
-  std::array<std::array<double, std::size_t(Count)>, std::size_t(States)> slope{};
+  std::array<std::array<double, std::size_t(Slopes)>, std::size_t(States)> slope{};
 };
 
 /// The values of an effect's parameters: parameter after parameter, and within one tube after tube.
@@ -76,10 +77,12 @@ struct EffectValues {
   }
   static constexpr int count = place(int(List.size()));
 
-  using Past = EffectPast<States, count, P>;
+  static constexpr int transmission_count = 2 + 2 * N;
+  using Past = EffectPast<States, count + transmission_count, P>;
 
   std::array<P, std::size_t(count)> values = neutral();
   Past past{};
+  bool active = true;  ///< false: changes nothing, nor has derivatives, so that its hooks need not be called
 
   /// Parameter K; that of a tube, from 0, if it is per tube.
   template <int K>

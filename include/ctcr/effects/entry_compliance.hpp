@@ -22,7 +22,7 @@ inline constexpr std::array parameters{
                     .soft_high = 3,
                     .hard_low = -5,
                     .hard_high = 50,
-                    .meaning = ""},
+                    .meaning = "of the entry against bending"},
 };
 }  // namespace entry_compliance
 

@@ -49,8 +49,8 @@ inline constexpr std::array parameters{
                     .hard_low = 0,
                     .hard_high = 4,
                     .role = Role::shape,
-                    .meaning = "share of the sliding by insertion that takes friction off rotation: 0 none, 1 all, on "
-                               "a contact radius of 0.8 mm"},
+                    .meaning = "share of the sliding by insertion that turns friction away from rotation: 0 none, 1 "
+                               "as much as sliding by rotation on a contact radius of 0.8 mm"},
 };
 }  // namespace friction
 
@@ -73,16 +73,17 @@ struct Friction : EffectValues<friction::parameters, N, P, N> {
     }
   }
 
-  void remember(const Path<N>& path, std::size_t row) noexcept {
+  /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip, exactly along each straight move.
+  void remember(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
-    const Joints<N>&from = path.q[row - 1], &to = path.q[row];
-    constexpr double radius = 0.8e-3;
-    for (int i = 0; i < N; ++i) {
-      const auto against_next = [&](const VecN<N>& v) { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
-      const double turn = against_next(to.alpha) - against_next(from.alpha);
-      const double slide = (against_next(to.beta) - against_next(from.beta)) / radius;
-      const P travel = square_root(this->template get<2>() * (slide * slide) + (turn * turn + 1e-16));
-      P& h = this->past.state[std::size_t(i)];
+    const auto &from = path.q[row - 1], &to = path.q[row];
+    constexpr double per_radius = 1 / 0.8e-3, rest = 1e-12;  // rest [rad]: no division by 0 where nothing moves
+    for (std::size_t i = 0; i < N; ++i) {
+      const auto against_next = [&](const std::array<P, N>& v) -> P { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
+      const P turn = against_next(to.alpha) - against_next(from.alpha);
+      const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
+      const P travel = magnitude(turn) + this->template get<2>() * magnitude(slide) + rest;
+      P& h = this->past.state[i];
       const P target = turn * inverse(travel);
       h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<1>())));
     }

@@ -22,17 +22,21 @@ inline constexpr std::array parameters{
                     .hard_low = -30,
                     .hard_high = 30,
                     .per_tube = true,
-                    .meaning = "of the free tube along its curved part"},
+                    .meaning = "by which the plane of precurvature turns along the curved part"},
 };
 }  // namespace helical_precurvature
 
-/// The plane of precurvature turns along the curved part.
+/// The plane of precurvature turns along the curved part, from where it starts.
 template <int N, class P = double>
 struct HelicalPrecurvature : EffectValues<helical_precurvature::parameters, N, P> {
   static constexpr const EffectInfo& info = helical_precurvature::info;
 
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
-    if (place.curved) m.twist = m.twist + this->template get<0>(place.tube);
+    if (!place.curved) return;
+    P s, c;
+    sincos(this->template get<0>(place.tube) * place.within, s, c);
+    const auto [x, y] = m.curvature;
+    m.curvature = {c * x - s * y, s * x + c * y};
   }
 };
 

@@ -9,10 +9,12 @@
 //   environment(position, force&)                the same, depending on where the tip is
 //   actuate(Occasion, beta&, alpha&)            joints that the tubes really have
 //   sense(Occasion, Frame<P>& reading)          what the tracker makes of the sensor's pose, tracker frame
-//   remember(Path<N>, row)                       makes past.state, left by the rows before, that of this row
+//   remember(Path<N, P>, row)                    makes past.state, left by the rows before, that of this row
 #include <array>
+#include <cmath>
 #include <span>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "ctcr/effects/effect.hpp"
@@ -27,18 +29,21 @@ struct TubePlace {
   int tube;     ///< from 0, innermost first
   bool curved;  ///< in the part that the data sheet calls curved
   P along;      ///< arc length of the tube from its grasped point [m]
-  P part;       ///< position within the curved or the straight part, 0 at its start, 1 at its end
+  P within;     ///< arc length from the start of the curved or the straight part [m]
+  P part;       ///< the same as a fraction of that part, 0 at its start, 1 at its end
 };
 
 /// What a tube is made of at a place; on entry as its data sheet says. Its bending moment, tube frame x and y, is
-/// EI d / (1 + softening |d|^2), d = u - curvature, with a stiffness that may differ by direction.
+/// f EI A d, d = u - curvature, A = 1 + [a0 a1; a1 -a0], f = r + (1 - r) / sqrt(1 + 2 c d A d / (1 - r)), c the
+/// softening: f = 1 - c d A d at first, r in the end. That has a convex potential: every moment has one curvature.
 template <class P>
 struct Material {
   P bending_stiffness;                      ///< EI, mean of all directions [N m^2]
-  std::array<P, 2> anisotropy{{0.0, 0.0}};  ///< EI_x = EI (1 + a0), EI_y = EI (1 - a0), EI_xy = EI a1
+  std::array<P, 2> anisotropy{{0.0, 0.0}};  ///< a0, a1
   std::array<P, 2> curvature;               ///< of the free tube about its x and y axes [1/m]
-  P twist = 0.0;                            ///< of the free tube [rad/m]
-  P softening = 0.0;                        ///< [m^2]
+  P softening = 0.0;                        ///< c [m^2]
+
+  static constexpr double stiffness_left = 0.25;  ///< r
 };
 
 /// A place where a tube ends or starts to be curved, or the front plate. Vectors in the Bishop frame on its far side.
@@ -50,7 +55,7 @@ struct Station {
   std::array<P, 2> moment;  ///< bending moment of all tubes on the far side [N m]
   std::array<std::array<P, 2>, N> far_moment, near_moment;  ///< bending moment of each tube on both sides [N m]
   std::array<P, N> torque{};  ///< out: added to the torque of each tube towards the base [N m]
-  std::array<P, 2> kink{};    ///< out: turn of the far side against the near one [rad]
+  std::array<P, 2> kink{};    ///< out: turn of the far side against the near one, along `moment` [rad]
 };
 
 /// When a row was measured, and how.
@@ -61,10 +66,13 @@ struct Occasion {
   Vec3 centre = Vec3::Zero();  ///< of all measured positions, tracker frame [m]
 };
 
-/// The recorded path: joints move in a straight line from row to row.
-template <int N>
+/// The recorded path: joints move in a straight line from row to row. They have derivatives by the transmission.
+template <int N, class P>
 struct Path {
-  std::span<const Joints<N>> q;
+  struct Row {
+    std::array<P, N> beta, alpha;  ///< [m], [rad]
+  };
+  std::span<const Row> q;
   std::span<const double> time;  ///< [s]; empty: unknown
 };
 
@@ -74,6 +82,13 @@ concept HasEnvironment = requires(const Effect& effect, const std::array<P, 3>& 
   effect.environment(position, force);
 };
 
+/// An effect at stations.
+template <class Effect, class P, int N>
+concept HasStation = requires(const Effect& effect, Station<P, N>& station) { effect.station(station); };
+
+/// Numbers without derivatives.
+struct Constant {};
+
 /// Effects that act together, in their order.
 template <template <int, class> class... E>
 struct EffectList {
@@ -81,9 +96,13 @@ struct EffectList {
 
   template <int N, class P = double>
   struct On {
-    std::tuple<E<N, P>...> list{};
+    [[no_unique_address]] std::tuple<E<N, P>...> list{};
 
     static constexpr int count = (0 + ... + E<N, P>::count);  ///< values of all parameters
+    /// Whether anything happens where tubes end or start to curve.
+    static constexpr bool has_station = (false || ... || HasStation<E<N, P>, P, N>);
+    /// Whether the tip's surroundings act on it.
+    static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 
     /// What the past left behind in each effect.
     using Memory = std::tuple<typename E<N, P>::Past...>;
@@ -95,14 +114,35 @@ struct EffectList {
 
     /// The same effects with the scalar S; value(x, place) gives a parameter's value its derivatives, and those of what
     /// the past left behind follow.
-    template <class S, class Value>
-    [[nodiscard]] On<N, S> seeded(const Value& value) const noexcept {
+    /// @param transmission  transmission(k): 0, with the derivatives of the transmission's parameter k
+    template <class S, class Value, class Transmission = Constant>
+    [[nodiscard]] On<N, S> seeded(const Value& value, const Transmission& transmission = {}) const noexcept {
       On<N, S> r;
       int first = 0;
       [&]<std::size_t... I>(std::index_sequence<I...>) {
-        (seed(std::get<I>(list), std::get<I>(r.list), std::exchange(first, first + E<N, P>::count), value), ...);
+        (seed(std::get<I>(list), std::get<I>(r.list), std::exchange(first, first + E<N, P>::count), value,
+              transmission),
+         ...);
       }(std::index_sequence_for<E<N, P>...>{});
       return r;
+    }
+
+    /// Whether every parameter has a value.
+    [[nodiscard]] bool finite() const noexcept {
+      bool all = true;
+      for_each([&](const auto& e, int) {
+        for (const P& x : e.values) all = all && std::isfinite(value(x));
+      });
+      return all;
+    }
+
+    /// Whether an effect that is active has something to do where tubes end or start to curve.
+    [[nodiscard]] bool acts_at_stations() const noexcept {
+      bool any = false;
+      for_each([&](const auto& e, int) {
+        if constexpr (HasStation<std::remove_cvref_t<decltype(e)>, P, N>) any = any || e.active;
+      });
+      return any;
     }
 
     /// Calls f(effect, place of its first value) for each.
@@ -119,50 +159,81 @@ struct EffectList {
 
     void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.material(place, m); }) e.material(place, m);
+        if constexpr (requires { e.material(place, m); })
+          if (e.active) e.material(place, m);
       });
     }
     void station(Station<P, N>& s) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.station(s); }) e.station(s);
+        if constexpr (requires { e.station(s); })
+          if (e.active) e.station(s);
       });
     }
     void grip(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.grip(torque, angle); }) e.grip(torque, angle);
+        if constexpr (requires { e.grip(torque, angle); })
+          if (e.active) e.grip(torque, angle);
       });
     }
     void tip_force(const std::array<P, 3>& gravity, std::array<P, 3>& force) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.tip_force(gravity, force); }) e.tip_force(gravity, force);
+        if constexpr (requires { e.tip_force(gravity, force); })
+          if (e.active) e.tip_force(gravity, force);
       });
     }
-    /// Whether the tip's surroundings act on it.
-    static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
     void environment(const std::array<P, 3>& position, std::array<P, 3>& force) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.environment(position, force); }) e.environment(position, force);
+        if constexpr (requires { e.environment(position, force); })
+          if (e.active) e.environment(position, force);
       });
     }
     void actuate(const Occasion& at, std::array<P, N>& beta, std::array<P, N>& alpha) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.actuate(at, beta, alpha); }) e.actuate(at, beta, alpha);
+        if constexpr (requires { e.actuate(at, beta, alpha); })
+          if (e.active) e.actuate(at, beta, alpha);
       });
     }
     void sense(const Occasion& at, Frame<P>& reading) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.sense(at, reading); }) e.sense(at, reading);
+        if constexpr (requires { e.sense(at, reading); })
+          if (e.active) e.sense(at, reading);
       });
     }
 
   private:
-    template <class From, class To, class Value>
-    static void seed(const From& from, To& to, int first, const Value& value) noexcept {
-      for (std::size_t k = 0; k < from.values.size(); ++k) to.values[k] = value(from.values[k], first + int(k));
+    /// Whether an amplitude differs from its neutral value or has derivatives.
+    template <class Effect>
+    static bool acts(const Effect& effect) noexcept {
+      if constexpr (requires { effect.profiles; }) return true;
+      for (int k = 0; k < int(effect.parameters.size()); ++k) {
+        const EffectParameter& parameter = effect.parameters[std::size_t(k)];
+        if (parameter.role != Role::amplitude) continue;
+        for (int i = 0; i < effect.size(k); ++i) {
+          const auto& x = effect.values[std::size_t(effect.place(k, i))];
+          if (value(x) != parameter.neutral) return true;
+          if constexpr (is_dual<std::remove_cvref_t<decltype(x)>>)
+            for (const Lanes& d : x.d)
+              for (std::size_t lane = 0; lane < lane_count; ++lane)
+                if (d[lane] != 0) return true;
+        }
+      }
+      return false;
+    }
+
+    template <class From, class To, class Value, class Transmission>
+    static void seed(const From& from, To& to, int first, const Value& value,
+                     const Transmission& transmission) noexcept {
+      constexpr auto count_ = std::size_t(From::count);
+      for (std::size_t k = 0; k < count_; ++k) to.values[k] = value(from.values[k], first + int(k));
+      to.active = acts(to);
+      if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
       for (std::size_t i = 0; i < from.past.state.size(); ++i) {
         auto& state = to.past.state[i] = from.past.state[i];
-        for (std::size_t k = 0; k < from.values.size(); ++k)
-          state = state + from.past.slope[i][k] * (to.values[k] - from.values[k]);
+        const auto& slope = from.past.slope[i];
+        for (std::size_t k = 0; k < count_; ++k) state = state + slope[k] * (to.values[k] - from.values[k]);
+        if constexpr (!std::is_same_v<Transmission, Constant>)
+          for (std::size_t k = 0; k < std::size_t(From::transmission_count); ++k)
+            state = state + slope[count_ + k] * transmission(int(k));
       }
     }
   };

@@ -43,7 +43,7 @@ inline constexpr std::array parameters{
                     .hard_low = -1.5,
                     .hard_high = 1.5,
                     .per_tube = true,
-                    .meaning = ""},
+                    .meaning = "of third order"},
 };
 }  // namespace precurvature_profile
 

@@ -12,7 +12,6 @@ inline constexpr EffectInfo info{
     .measure = "Turn the innermost tube alone; record the orientation too.",
     .look_alikes = "precurvature_profile helical_precurvature field_distortion",
     .reference = "Hummel et al. 2005",
-    .needs = {.orientation = false},
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "x",

@@ -22,14 +22,16 @@ inline constexpr std::array parameters{
                     .sigma = 0.004,
                     .soft_low = 0,
                     .soft_high = 0.016,
-                    .hard_low = -0.002,
+                    .hard_low = -0.001,
                     .hard_high = 0.08,
                     .per_tube = true,
-                    .meaning = "half of the stiffness is lost where the change of curvature reaches 1/sqrt(gamma)"},
+                    .meaning = "part of the stiffness that is lost per square of the change of curvature, as long as "
+                               "that is small; three quarters at most"},
 };
 }  // namespace softening
 
-/// Superelastic softening: m = EI d / (1 + gamma |d|^2), d the change of curvature.
+/// Superelastic softening: m = EI d (1 - gamma |d|^2) for a small change d of curvature, towards a plateau for a large one
+/// (Material).
 template <int N, class P = double>
 struct Softening : EffectValues<softening::parameters, N, P> {
   static constexpr const EffectInfo& info = softening::info;

@@ -1,6 +1,7 @@
 #pragma once
 // Forward-mode dual numbers: a value and its derivatives along 4*G directions, four to a Lanes.
 // A function written for a scalar S computes the value alone with S = double and exact derivatives with S = Dual<G>.
+#include <array>
 #include <cmath>
 #include <type_traits>
 
@@ -173,6 +174,11 @@ CTCR_INLINE void sincos(const Dual<G>& a, Dual<G>& s, Dual<G>& c) noexcept {
     s.d[g] = a.d[g] * c.v;
     c.d[g] = a.d[g] * -s.v;
   }
+}
+template <int G, std::size_t M>
+CTCR_INLINE void sincos(const std::array<Dual<G>, M>& a, std::array<Dual<G>, M>& s,
+                        std::array<Dual<G>, M>& c) noexcept {
+  for (std::size_t i = 0; i < M; ++i) sincos(a[i], s[i], c[i]);
 }
 
 }  // namespace ctcr

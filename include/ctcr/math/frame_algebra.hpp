@@ -53,8 +53,7 @@ Frame<S> composed(const Frame<S>& a, const Frame<S>& b) noexcept {
       const Lanes moved[3] = {v[0][g] + w[1][g] * p[2] - w[2][g] * p[1], v[1][g] + w[2][g] * p[0] - w[0][g] * p[2],
                               v[2][g] + w[0][g] * p[1] - w[1][g] * p[0]};
       for (int i = 0; i < 3; ++i) {
-        f.rotation_twist[i][g] =
-            b.rotation_twist[i][g] + Rb(0, i) * w[0][g] + Rb(1, i) * w[1][g] + Rb(2, i) * w[2][g];
+        f.rotation_twist[i][g] = b.rotation_twist[i][g] + Rb(0, i) * w[0][g] + Rb(1, i) * w[1][g] + Rb(2, i) * w[2][g];
         f.translation_twist[i][g] =
             b.translation_twist[i][g] + Rb(0, i) * moved[0] + Rb(1, i) * moved[1] + Rb(2, i) * moved[2];
       }

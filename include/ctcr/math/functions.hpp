@@ -20,6 +20,12 @@ S exponential_of(const S& x) noexcept {
   return mapped(x, e, e);
 }
 
+/// |x|.
+template <class S>
+S magnitude(const S& x) noexcept {
+  return value(x) < 0 ? S(-x) : x;
+}
+
 /// tanh(|v|/size) v/|v|: along v, of length 1 where |v| is much larger than `size`; smooth at 0.
 template <class S>
 std::array<S, 2> saturated(const std::array<S, 2>& v, const S& size) noexcept {

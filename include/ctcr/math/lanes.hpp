@@ -11,6 +11,7 @@ inline constexpr int lane_count = 4;
 #if !defined(__clang__)
 #pragma GCC diagnostic ignored "-Wpsabi"  // lanes never cross a compiled interface
 #endif
+#define CTCR_VECTOR_LANES
 typedef double Lanes __attribute__((vector_size(32)));
 #define CTCR_INLINE inline __attribute__((always_inline))
 #define CTCR_NOINLINE __attribute__((noinline))

@@ -64,8 +64,7 @@ struct Exponential {
 /// @param o  Omega [rad]   @param v  displacement [m]; both in body axes
 /// @tparam Of  D is filled for the rotation's tangent, D and T for the frame's   Real time: yes.
 template <TangentOf Of>
-CTCR_INLINE Exponential exponential(const double (&o)[3], const double (&v)[3]) noexcept {
-  Exponential x;
+CTCR_INLINE void exponential(const double (&o)[3], const double (&v)[3], Exponential& x) noexcept {
   const double z = o[0] * o[0] + o[1] * o[1] + o[2] * o[2];
   const ExpCoefficients q = exp_coefficients(z);
   const double A = 1.0 - z * q.C, dot = o[0] * v[0] + o[1] * v[1] + o[2] * v[2];
@@ -110,7 +109,6 @@ CTCR_INLINE Exponential exponential(const double (&o)[3], const double (&v)[3]) 
       x.T[j][k] += b;
     }
   }
-  return x;
 }
 
 /// g <- g exp: the values.
@@ -149,7 +147,9 @@ CTCR_INLINE void move_twist(Lanes& f0, Lanes& f1, Lanes& f2, Lanes& t0, Lanes& t
 /// g <- g exp(Omega, (vx, vy, vz)) for any scalar. Real time: yes.
 template <class S, class H>
 CTCR_INLINE void move_by_exponential(Frame<S>& g, const S (&o)[3], const S& vx, const S& vy, const H& vz) noexcept {
-  const Exponential x = exponential<is_dual<S> ? TangentOf::frame : TangentOf::nothing>({value(o[0]), value(o[1]), value(o[2])}, {value(vx), value(vy), value(vz)});
+  Exponential x;
+  exponential<is_dual<S> ? TangentOf::frame : TangentOf::nothing>({value(o[0]), value(o[1]), value(o[2])},
+                                                                  {value(vx), value(vy), value(vz)}, x);
   move(g, x);
   if constexpr (is_dual<S>) {
     constexpr int G = groups_of<S>;

@@ -10,12 +10,8 @@ namespace detail {
 
 using Lanes3 = std::array<Lanes, 3>;
 
-CTCR_INLINE Lanes3 operator+(const Lanes3& a, const Lanes3& b) noexcept {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-CTCR_INLINE Lanes3 operator-(const Lanes3& a, const Lanes3& b) noexcept {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
+CTCR_INLINE Lanes3 operator+(const Lanes3& a, const Lanes3& b) noexcept { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+CTCR_INLINE Lanes3 operator-(const Lanes3& a, const Lanes3& b) noexcept { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 CTCR_INLINE Lanes3 operator*(const Mat3& R, const Lanes3& v) noexcept {
   Lanes3 r;
   for (int i = 0; i < 3; ++i) r[std::size_t(i)] = R(i, 0) * v[0] + R(i, 1) * v[1] + R(i, 2) * v[2];
@@ -47,7 +43,7 @@ struct Window {
 /// turns of the tip about the base axes, psi_2..N at the tubes' tips.
 template <int N, class Fx>
 class EffectPass {
- public:
+public:
   static constexpr int turn = 0, psi = 3, unknowns = N + 2, rows = unknowns + 6;
   using S = Window::S;
   using Inputs = RodInputs<N, S, Fx>;
@@ -55,7 +51,7 @@ class EffectPass {
   /// @param in  with derivatives along the window's variables other than the unknowns
   EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, int steps,
              const Window& window) noexcept
-      : alpha_(in.alpha), tip_psi_(0.0) {
+    : alpha_(in.alpha), tip_psi_(0.0) {
     using Rod = EffectRod<N, S, Fx>;
     for (int k = 0; k < 3; ++k) turn_[std::size_t(k)] = window(0, turn + k);
     typename Rod::State y = state_at_tip(in, guess, window);
@@ -85,7 +81,9 @@ class EffectPass {
   TubeTips<N> tips;  ///< tips of tubes 2..N as seen from the robot tip
   VecN<N> twist;     ///< of each tube behind the front plate [rad/m]
 
-  [[nodiscard]] double angle(int i) const noexcept { return angle_[std::size_t(i)].v; }  ///< base angle, up to a common turn
+  [[nodiscard]] double angle(int i) const noexcept {
+    return angle_[std::size_t(i)].v;
+  }  ///< base angle, up to a common turn
   /// T_base_tip of tube 1: its base stands at alpha_1.
   [[nodiscard]] Pose tip_of_robot() const noexcept {
     const Mat3 R = rotation_z(alpha_[0].v - angle_[0].v) * frame_.rotation().transpose();
@@ -94,8 +92,10 @@ class EffectPass {
 
   /// Writes the tangents of the equations and of the pose of the asked tube's tip (base axes) into the rows, from lane
   /// group `at` on. The equations: the tip turns as its unknowns say, and angle_i - angle_1 = alpha_i - alpha_1.
-  template <int G>
-  void write(LaneRow<G> (&row)[rows], int at) const noexcept {
+  /// Three rows more are for the position of the robot tip.
+  template <int G, int R>
+  void write(LaneRow<G> (&row)[R], int at) const noexcept {
+    static_assert(R == rows || R == rows + 3);
     const S gamma = alpha_[0] - angle_[0];
     const Mat3 Rz = rotation_z(gamma.v);
     const Mat3 R_base_tip = Rz * frame_.rotation().transpose();
@@ -111,12 +111,17 @@ class EffectPass {
         row[unknowns + int(i)].x[at + g] = velocity[i];
         row[unknowns + 3 + int(i)].x[at + g] = rotation[i];
       }
+      if constexpr (R > rows) {
+        const Vec3 arm = R_base_tip * -frame_.position();
+        const Lanes3 robot_tip = cross(turned, arm) - Rz * group(frame_.translation_twist, g);
+        for (std::size_t i = 0; i < 3; ++i) row[rows + int(i)].x[at + g] = robot_tip[i];
+      }
       for (std::size_t i = 1; i < N; ++i)
         row[psi + int(i) - 1].x[at + g] = (angle_[i] - angle_[0] - alpha_[i] + alpha_[0]).d[g];
     }
   }
 
- private:
+private:
   using Twist = Lanes[3][Window::groups];
   static CTCR_INLINE Lanes3 group(const Twist& twist, int g) noexcept { return {twist[0][g], twist[1][g], twist[2][g]}; }
   static CTCR_INLINE Lanes3 about_z(const S& angle, int g) noexcept { return {Lanes{}, Lanes{}, angle.d[g]}; }

@@ -3,6 +3,7 @@
 // anywhere and by any law of hooks.hpp; tubes may exchange torque and the frame may kink where tubes end or start to
 // curve. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
 #include "ctcr/effects/hooks.hpp"
+#include "ctcr/math/functions.hpp"
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
 
@@ -22,11 +23,11 @@ template <int N, class S>
 struct EffectState {
   static constexpr int size = 2 * N + 8;
   std::array<S, std::size_t(size)> y;
-  S& psi(int i) noexcept { return y[std::size_t(i)]; }                ///< angle of a tube [rad]
-  S& torque(int i) noexcept { return y[std::size_t(N + i)]; }         ///< its torsional moment [N m]
-  S& m(int i) noexcept { return y[std::size_t(2 * N + i)]; }          ///< bending moment of all tubes [N m]
-  S& n(int i) noexcept { return y[std::size_t(2 * N + 2 + i)]; }      ///< force [N]
-  S& g(int i) noexcept { return y[std::size_t(2 * N + 5 + i)]; }      ///< gravity [m/s^2]
+  S& psi(int i) noexcept { return y[std::size_t(i)]; }            ///< angle of a tube [rad]
+  S& torque(int i) noexcept { return y[std::size_t(N + i)]; }     ///< its torsional moment [N m]
+  S& m(int i) noexcept { return y[std::size_t(2 * N + i)]; }      ///< bending moment of all tubes [N m]
+  S& n(int i) noexcept { return y[std::size_t(2 * N + 2 + i)]; }  ///< force [N]
+  S& g(int i) noexcept { return y[std::size_t(2 * N + 5 + i)]; }  ///< gravity [m/s^2]
   const S& psi(int i) const noexcept { return y[std::size_t(i)]; }
   const S& torque(int i) const noexcept { return y[std::size_t(N + i)]; }
   const S& m(int i) const noexcept { return y[std::size_t(2 * N + i)]; }
@@ -36,24 +37,24 @@ struct EffectState {
 
 template <int N, class S, class Fx>
 class EffectRod {
- public:
+public:
   using State = EffectState<N, S>;
   using Inputs = RodInputs<N, S, Fx>;
 
   /// How the tubes bend at a place.
   struct Bend {
-    std::array<S, 2> u;                               ///< curvature of the centreline, Bishop axes [1/m]
-    std::array<S, N> sine, cosine;                    ///< of psi
-    std::array<std::array<S, 2>, N> curvature;        ///< of each tube, its own axes [1/m]
-    std::array<std::array<S, 2>, N> moment;           ///< of each tube, its own axes [N m]
-    std::array<S, N> twist;                           ///< rate of psi [rad/m]
+    std::array<S, 2> u;                         ///< curvature of the centreline, Bishop axes [1/m]
+    std::array<S, N> sine, cosine;              ///< of psi
+    std::array<std::array<S, 2>, N> curvature;  ///< of each tube, its own axes [1/m]
+    std::array<std::array<S, 2>, N> moment;     ///< of each tube, its own axes [N m]
+    std::array<S, N> twist;                     ///< rate of psi [rad/m]
   };
 
   /// Tubes of the current segment, and where on them it stands.
   struct Place {
-    int present = 0;                 ///< tubes 1..present
+    int present = 0;  ///< tubes 1..present
     std::array<bool, N> curved{};
-    std::array<S, N> along;          ///< arc length of each present tube here [m]
+    std::array<S, N> along;  ///< arc length of each present tube here [m]
   };
 
   explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {}
@@ -64,7 +65,8 @@ class EffectRod {
   /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
   template <class Tip, class Node>
-  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Tip& tip, const Node& node) const noexcept {
+  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Tip& tip,
+           const Node& node) const noexcept {
     Place place;
     frame = Frame<S>{};
     clear_twist(frame);
@@ -101,7 +103,7 @@ class EffectRod {
   struct NoNode {};
 
   /// How the tubes bend under the moment of a state.
-  [[nodiscard]] Bend bend(const Place& place, const State& y) const noexcept {
+  [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
     Bend b;
     std::array<Material<S>, N> material;
     Slope slope{};
@@ -111,21 +113,24 @@ class EffectRod {
       const auto i = std::size_t(j);
       Material<S>& m = material[i] = material_of(place, j);
       sincos(y.psi(j), b.sine[i], b.cosine[i]);
-      b.twist[i] = m.twist + y.torque(j) * inverse(in_.tubes[i].kz);
+      b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
       add_stiffness(m, b, i, 1.0, slope);
-      const auto straightening = stiffness(m, value(m.curvature[0]), value(m.curvature[1]));
-      moment[0] += value(b.cosine[i]) * straightening[0] - value(b.sine[i]) * straightening[1];
-      moment[1] += value(b.sine[i]) * straightening[0] + value(b.cosine[i]) * straightening[1];
+      const auto e = weighed(m, value(m.curvature[0]), value(m.curvature[1]));
+      const double k = value(m.bending_stiffness);
+      moment[0] += k * (value(b.cosine[i]) * e[0] - value(b.sine[i]) * e[1]);
+      moment[1] += k * (value(b.sine[i]) * e[0] + value(b.cosine[i]) * e[1]);
       linear = linear && value(m.softening) == 0;
     }
     // The value by Newton's method; one more step of it with derivatives then makes them exact.
     slope = inverted(slope);
     std::array<double, 2> u = slope * moment;
     if (!linear) {
-      for (int k = 0; k < softening_iterations; ++k) {
+      double left = 1;  // (relative change)^2
+      for (int k = 0; k < softening_iterations && left > 1e-16; ++k) {
         slope = inverted(tangent(place, material, b, u));
         const auto change = slope * unbalanced<double>(place, y, material, b, u, nullptr);
         u = {u[0] + change[0], u[1] + change[1]};
+        left = (change[0] * change[0] + change[1] * change[1]) / (1 + u[0] * u[0] + u[1] * u[1]);
       }
       slope = inverted(tangent(place, material, b, u));
     }
@@ -135,20 +140,44 @@ class EffectRod {
     return b;
   }
 
- private:
-  static constexpr int softening_iterations = 4;  ///< quadratic; softening is a small part of the stiffness
+  /// One integration step of length h inside a segment: the scheme of MagnusRk4.
+  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
+    const S half = 0.5 * h;
+    const auto moved = [](const State& y0, const S& k, const State& d) {
+      State r;
+      for (std::size_t i = 0; i < State::size; ++i) r.y[i] = y0.y[i] + k * d.y[i];
+      return r;
+    };
+    const auto advance = [&] {
+      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
+    };
+    std::array<S, 2> u1, u2, u3, u4;
+    const State k1 = rates(place, y, u1);
+    advance();
+    const State k2 = rates(place, moved(y, half, k1), u2);
+    const State k3 = rates(place, moved(y, half, k2), u3);
+    advance();
+    const State k4 = rates(place, moved(y, h, k3), u4);
+    const S sixth = (1.0 / 6.0) * h;
+    for (std::size_t i = 0; i < State::size; ++i)
+      y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
+    move_frame(frame, u1, std::array<S, 2>{0.5 * (u2[0] + u3[0]), 0.5 * (u2[1] + u3[1])}, u4, h);
+  }
 
-  /// A 2 x 2 matrix.
+private:
+  static constexpr int softening_iterations = 8;  ///< convex and quadratic: 3 are usual, 6 at the strongest softening
+
+  /// A symmetric 2 x 2 matrix.
   struct Slope {
-    double xx = 0, xy = 0, yx = 0, yy = 0;
+    double xx = 0, xy = 0, yy = 0;
     template <class T>
     std::array<T, 2> operator*(const std::array<T, 2>& v) const noexcept {
-      return {xx * v[0] + xy * v[1], yx * v[0] + yy * v[1]};
+      return {xx * v[0] + xy * v[1], xy * v[0] + yy * v[1]};
     }
   };
   static Slope inverted(const Slope& a) noexcept {
-    const double det = 1.0 / (a.xx * a.yy - a.xy * a.yx);
-    return {a.yy * det, -a.xy * det, -a.yx * det, a.xx * det};
+    const double det = 1.0 / (a.xx * a.yy - a.xy * a.xy);
+    return {a.yy * det, -a.xy * det, a.xx * det};
   }
 
   [[nodiscard]] bool has_curve(int i) const noexcept { return value(in_.tubes[std::size_t(i)].curved_length) > 0; }
@@ -172,23 +201,26 @@ class EffectRod {
     Material<S> m{.bending_stiffness = t.k, .curvature = {place.curved[i] ? t.kappa : S(0.0), S(0.0)}};
     if constexpr (!Fx::none) {
       const S straight = t.length - t.curved_length;
-      const S part = place.curved[i] ? (place.along[i] - straight) * inverse(t.curved_length)
-                                     : place.along[i] * inverse(straight);
-      in_.effects.material(TubePlace<S>{j, place.curved[i], place.along[i], part}, m);
+      const S within = place.curved[i] ? S(place.along[i] - straight) : place.along[i];
+      const S part = within * inverse(place.curved[i] ? t.curved_length : straight);
+      in_.effects.material(TubePlace<S>{j, place.curved[i], place.along[i], within, part}, m);
     }
     return m;
   }
 
-  template <class A, class B>
-  static auto stiffness(const Material<S>& m, const A& x, const B& y) noexcept {
-    if constexpr (std::is_same_v<A, double>) {
-      const double k = value(m.bending_stiffness), a = value(m.anisotropy[0]), c = value(m.anisotropy[1]);
-      return std::array<double, 2>{k * ((1 + a) * x + c * y), k * (c * x + (1 - a) * y)};
-    } else {
-      const S& k = m.bending_stiffness;
-      const S &a = m.anisotropy[0], &c = m.anisotropy[1];
-      return std::array<S, 2>{k * ((1.0 + a) * x + c * y), k * (c * x + (1.0 - a) * y)};
-    }
+  /// (x, y) as the directions of bending weigh it: the bending moment is EI times that of d.
+  template <class T>
+  static std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept {
+    const T a = as<T>(m.anisotropy[0]), c = as<T>(m.anisotropy[1]);
+    return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
+  }
+  /// A number, or its value alone.
+  template <class T>
+  static T as(const S& x) noexcept {
+    if constexpr (std::is_same_v<T, S>)
+      return x;
+    else
+      return value(x);
   }
 
   /// Adds f R K R^T.
@@ -196,11 +228,30 @@ class EffectRod {
     const double s = value(b.sine[i]), c = value(b.cosine[i]), k = f * value(m.bending_stiffness);
     const double a = value(m.anisotropy[0]), o = value(m.anisotropy[1]);
     const double xx = k * (1 + a), yy = k * (1 - a), xy = k * o;
-    const double across = s * c * (xx - yy) + (c * c - s * s) * xy;
     slope.xx += c * c * xx - 2 * s * c * xy + s * s * yy;
+    slope.xy += s * c * (xx - yy) + (c * c - s * s) * xy;
     slope.yy += s * s * xx + 2 * s * c * xy + c * c * yy;
-    slope.xy += across;
-    slope.yx += across;
+  }
+
+  /// Bending moment of a tube whose curvature differs from that of the free one by (dx, dy), its own axes.
+  template <class T>
+  static std::array<T, 2> moment_of(const Material<S>& m, const T& dx, const T& dy) noexcept {
+    const std::array<T, 2> e = weighed(m, dx, dy);
+    const T k = as<T>(m.bending_stiffness) * stiffness_left(as<T>(m.softening), T(dx * e[0] + dy * e[1]));
+    return {k * e[0], k * e[1]};
+  }
+  /// What softening c leaves of a stiffness, f of Material.
+  template <class T>
+  static T stiffness_left(const T& c, const T& z) noexcept {
+    constexpr double r = Material<S>::stiffness_left;
+    if (value(c) == 0) return 1.0 - c * z;
+    return r + (1 - r) * inverse(square_root(1.0 + (2 / (1 - r)) * (c * z)));
+  }
+  /// df/dz.
+  static double loss_slope(double c, double z) noexcept {
+    constexpr double r = Material<S>::stiffness_left;
+    const double q = 1 / std::sqrt(1 + 2 / (1 - r) * c * z);
+    return -c * q * q * q;
   }
 
   /// Slope of the tubes' moment by u, softening included.
@@ -211,16 +262,14 @@ class EffectRod {
       const Material<S>& m = material[i];
       const double s = value(b.sine[i]), c = value(b.cosine[i]);
       const double dx = c * u[0] + s * u[1] - value(m.curvature[0]), dy = c * u[1] - s * u[0] - value(m.curvature[1]);
-      const double gamma = value(m.softening), f = 1 / (1 + gamma * (dx * dx + dy * dy));
-      add_stiffness(m, b, i, f, slope);
-      const auto q = stiffness(m, dx, dy);
-      const double factor = -2 * gamma * f * f;
-      const double qx = factor * (c * q[0] - s * q[1]), qy = factor * (s * q[0] + c * q[1]);
-      const double ex = c * dx - s * dy, ey = s * dx + c * dy;
-      slope.xx += qx * ex;
-      slope.xy += qx * ey;
-      slope.yx += qy * ex;
-      slope.yy += qy * ey;
+      const auto e = weighed(m, dx, dy);
+      const double z = dx * e[0] + dy * e[1];
+      add_stiffness(m, b, i, stiffness_left(value(m.softening), z), slope);
+      const double loss = 2 * value(m.bending_stiffness) * loss_slope(value(m.softening), z);
+      const double x = c * e[0] - s * e[1], y = s * e[0] + c * e[1];
+      slope.xx += loss * x * x;
+      slope.xy += loss * x * y;
+      slope.yy += loss * y * y;
     }
     return slope;
   }
@@ -229,28 +278,19 @@ class EffectRod {
   template <class T>
   static std::array<T, 2> unbalanced(const Place& place, const State& y, const std::array<Material<S>, N>& material,
                                      const Bend& b, const std::array<T, 2>& u, Bend* keep) noexcept {
-    const auto as = [](const S& x) -> decltype(auto) {
-      if constexpr (std::is_same_v<T, S>)
-        return (x);
-      else
-        return value(x);
-    };
-    T rx = as(y.m(0)), ry = as(y.m(1));
+    T rx = as<T>(y.m(0)), ry = as<T>(y.m(1));
     for (int j = 0; j < place.present; ++j) {
       const auto i = std::size_t(j);
       const Material<S>& m = material[i];
-      const T s = as(b.sine[i]), c = as(b.cosine[i]);
+      const T s = as<T>(b.sine[i]), c = as<T>(b.cosine[i]);
       const T ux = c * u[0] + s * u[1], uy = c * u[1] - s * u[0];
-      const T dx = ux - as(m.curvature[0]), dy = uy - as(m.curvature[1]);
-      auto q = stiffness(m, dx, dy);
-      const T f = inverse(1.0 + as(m.softening) * (dx * dx + dy * dy));
-      const T qx = f * q[0], qy = f * q[1];
-      rx = rx - (c * qx - s * qy);
-      ry = ry - (s * qx + c * qy);
+      const std::array<T, 2> q = moment_of(m, T(ux - as<T>(m.curvature[0])), T(uy - as<T>(m.curvature[1])));
+      rx = rx - (c * q[0] - s * q[1]);
+      ry = ry - (s * q[0] + c * q[1]);
       if constexpr (std::is_same_v<T, S>)
         if (keep != nullptr) {
           keep->curvature[i] = {ux, uy};
-          keep->moment[i] = {qx, qy};
+          keep->moment[i] = q;
         }
     }
     return {rx, ry};
@@ -284,37 +324,19 @@ class EffectRod {
     return d;
   }
 
-  /// The scheme of MagnusRk4.
-  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
-    const S half = 0.5 * h;
-    const auto moved = [](const State& y0, const S& k, const State& d) {
-      State r;
-      for (std::size_t i = 0; i < State::size; ++i) r.y[i] = y0.y[i] + k * d.y[i];
-      return r;
-    };
-    const auto advance = [&] {
-      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
-    };
-    std::array<S, 2> u1, u2, u3, u4;
-    const State k1 = rates(place, y, u1);
-    advance();
-    const State k2 = rates(place, moved(y, half, k1), u2);
-    const State k3 = rates(place, moved(y, half, k2), u3);
-    advance();
-    const State k4 = rates(place, moved(y, h, k3), u4);
-    const S sixth = (1.0 / 6.0) * h;
-    for (std::size_t i = 0; i < State::size; ++i)
-      y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
-    move_frame(frame, u1, std::array<S, 2>{0.5 * (u2[0] + u3[0]), 0.5 * (u2[1] + u3[1])}, u4, h);
-  }
-
   /// Lets the effects act where tubes end or start to curve.
   void stop(typename Station<S, N>::Kind kind, int tube, const Place& far, const Place& near, State& y,
             Frame<S>& frame) const noexcept {
-    if constexpr (!Fx::none) {
-      Station<S, N> s{.kind = kind, .tube = tube, .far = far.present, .near = near.present,
-                      .moment = {y.m(0), y.m(1)}, .far_moment = moments(far, y),
-                      .near_moment = kind == Station<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
+    if constexpr (Fx::template On<N, S>::has_station) {
+      if (!in_.effects.acts_at_stations()) return;
+      Station<S, N> s{
+          .kind = kind,
+          .tube = tube,
+          .far = far.present,
+          .near = near.present,
+          .moment = {y.m(0), y.m(1)},
+          .far_moment = moments(far, y),
+          .near_moment = kind == Station<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
       for (std::size_t i = 0; i < N; ++i) s.torque[i] = 0.0;
       s.kink = {0.0, 0.0};
       in_.effects.station(s);
@@ -338,27 +360,34 @@ class EffectRod {
     return m;
   }
 
-  /// The guide behind the plate keeps the tubes straight: each carries what straightens it.
+  /// The guide behind the plate keeps the tubes straight: each carries what straightens it, Bishop frame.
   std::array<std::array<S, 2>, N> moments_behind_plate(const Place& place, const State& y) const noexcept {
     std::array<std::array<S, 2>, N> m;
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       const Material<S> mat = material_of(place, j);
-      const auto q = stiffness(mat, mat.curvature[0], mat.curvature[1]);
+      const std::array<S, 2> q = moment_of(mat, mat.curvature[0], mat.curvature[1]);
       S s, c;
       sincos(y.psi(j), s, c);
-      m[i] = {s * q[1] - c * q[0], -(s * q[0]) - c * q[1]};
+      m[i] = {s * q[1] - c * q[0], -(s * q[0] + c * q[1])};
     }
     return m;
   }
 
-  /// Passes a kink towards the base: the near frame is the far one turned back by it. The torque of all tubes, which
-  /// turns with it, changes by its cosine only.
-  void kink(const std::array<S, 2>& turn, int present, State& y, Frame<S>& frame) const noexcept {
+  /// Passes a kink towards the base: the near frame is the far one turned back by it. Tubes keep their torque, as in a
+  /// joint of constant velocity. A kink along the moment then has a potential if that is the moment seen from the frame
+  /// halfway through the kink, which differs from the far one by kink x torque / 2.
+  void kink(std::array<S, 2> turn, int present, State& y, Frame<S>& frame) const noexcept {
     S mz = 0.0;
     for (int i = 0; i < present; ++i) mz = mz + y.torque(i);
+    const S square = y.m(0) * y.m(0) + y.m(1) * y.m(1);
+    if (value(square) > 0) {
+      const S half = 0.5 * mz * (turn[0] * y.m(0) + turn[1] * y.m(1)) * inverse(square);
+      turn = {turn[0] + half * turn[1], turn[1] - half * turn[0]};
+    }
     const S z = turn[0] * turn[0] + turn[1] * turn[1];
-    const S A = 1.0 - z * ((1.0 / 6.0) - (1.0 / 120.0) * z), B = 0.5 - z * ((1.0 / 24.0) - (1.0 / 720.0) * z);
+    const ExpCoefficients q = exp_coefficients(value(z));
+    const S A = mapped(z, 1 - value(z) * q.C, -q.C - value(z) * q.dC), B = mapped(z, q.B, q.dB);
     const auto turned = [&](S& x, S& y_, S& z_) {  // v + A t x v + B t x (t x v)
       const S &a = turn[0], &b = turn[1];
       const S cx = b * z_, cy = -(a * z_), cz = a * y_ - b * x;

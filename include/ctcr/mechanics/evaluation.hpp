@@ -127,7 +127,10 @@ struct EventDirections {
   alignas(32) double d[N][groups * lane_count] = {};
 
   constexpr EventDirections() noexcept {
-    for (int tube = 1; tube < N; ++tube) d[tube][Col::beta + tube - 1 - Col::first_beta_group * lane_count] = 1.0;
+    for (int tube = 1; tube < N; ++tube) {
+      const int lane = Col::beta + tube - 1 - Col::first_beta_group * lane_count;
+      if (lane >= 0 && lane < groups * lane_count) d[tube][lane] = 1.0;
+    }
   }
 };
 template <class Col, int N>
@@ -169,26 +172,31 @@ CTCR_INLINE void turns_from_loads(LaneRow<Col::system_groups>& row, const TipLoa
   }
 }
 
-}  // namespace detail
+/// The integration that differentiates along the columns Col.
+template <int N, class Stepper, class Col>
+using Pass = Shooting<N, Dual<Col::groups>, double,
+                      std::conditional_t<(Col::first_beta_group < Col::groups),
+                                         TailDual<Col::groups, Col::first_beta_group>, double>,
+                      Col::loaded, Col::weight, Stepper, Col>;
 
-/// Integrates once from the guess and eliminates the unknowns.
-/// @param q, load  base frame, must be valid (check_joints)   @param steps  integration steps per segment
-/// Real time: yes. Never inlined: it is large and called from many places.
-template <Derivatives D, Loading L, class Stepper, int N>
-CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
-                     int steps, Evaluation<N, L, D>& out) noexcept {
+/// Integrates from the state at the tip to the front plate.
+/// @return tubes of the last segment
+template <class Stepper, class Col, int N, class S>
+CTCR_INLINE SegmentTubes<N> integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state,
+                                      Frame<S>& frame, TubeTips<N>& tips) noexcept {
+  using H = typename Pass<N, Stepper, Col>::Length;
+  const auto place = [](int event, double s) noexcept { return event_place<Col, N, H>(event, s); };
+  return Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), place, steps, state, frame, tips);
+}
+
+/// What follows from state and frame at the front plate; out.axis and out.tips are there already.
+template <Derivatives D, Loading L, class Stepper, int N, class S>
+CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
+                          const RobotState<S, N>& base, const Frame<S>& f, const SegmentTubes<N>& tubes,
+                          Evaluation<N, L, D>& out) noexcept {
   using Ev = Evaluation<N, L, D>;
   using Col = typename Ev::Col;
   constexpr int G = Col::groups;
-  using S = Dual<G>;
-  using H = std::conditional_t<(Col::first_beta_group < G), TailDual<G, Col::first_beta_group>, double>;
-  using Pass = Shooting<N, S, double, H, Col::loaded, Col::weight, Stepper, Col>;
-
-  detail::turn_axes<L>(load, out.axis);
-  RobotState<S, N> base = detail::tip_state<Col, S>(c, load, guess, out.axis);
-  Frame<S> f;
-  const auto place = [](int event, double s) noexcept { return detail::event_place<Col, N, H>(event, s); };
-  const SegmentTubes<N> tubes = Pass::run(c, sort_events(c, q.beta), place, steps, base, f, out.tips);
 
   for (int i = 0; i < N; ++i) {
     const auto t = std::size_t(i);
@@ -207,7 +215,7 @@ CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q,
   const Vec3 r = out.position = -(out.rotation * f.position());
   double square = 0;
   if constexpr (Col::loaded) {
-    out.turn = detail::felt_turn<L>(out.rotation, guess.rotation, load);
+    out.turn = felt_turn<L>(out.rotation, guess.rotation, load);
     square = out.turn.squaredNorm();
   }
   for (int i = 1; i < N; ++i) square += out.angle_error[i] * out.angle_error[i];
@@ -240,25 +248,25 @@ CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q,
   }
   if constexpr (Col::jacobian) {
     // All beta together: the plate moves back along the rod. alpha_1 turns the whole robot about z.
-    const BaseRates<double, N> rates = Pass::rates(c, tubes, base);
+    const BaseRates<double, N> rates = Pass<N, Stepper, Col>::rates(c, tubes, base);
     const double ux = rates.u[0], uy = rates.u[1];
     const double ox = cg * ux - sg * uy, oy = sg * ux + cg * uy, oz = q.beta[0] * rates.F[0];
     for (int i = 0; i < N; ++i) {
-      detail::joint_lanes<Col, N>(angle[i], 0.0, -q.beta[i] * rates.F[std::size_t(i)]);
+      joint_lanes<Col, N>(angle[i], 0.0, -q.beta[i] * rates.F[std::size_t(i)]);
       if (i > 0) angle[i].add(Col::beta + i - 1, out.w[i]);
     }
-    detail::joint_lanes<Col, N>(rotation[0], 0.0, ox);
-    detail::joint_lanes<Col, N>(rotation[1], 0.0, oy);
-    detail::joint_lanes<Col, N>(rotation[2], 1.0, oz);
-    detail::joint_lanes<Col, N>(position[0], -r[1], oy * r[2] - oz * r[1]);
-    detail::joint_lanes<Col, N>(position[1], r[0], oz * r[0] - ox * r[2]);
-    detail::joint_lanes<Col, N>(position[2], 0.0, 1.0 + ox * r[1] - oy * r[0]);
+    joint_lanes<Col, N>(rotation[0], 0.0, ox);
+    joint_lanes<Col, N>(rotation[1], 0.0, oy);
+    joint_lanes<Col, N>(rotation[2], 1.0, oz);
+    joint_lanes<Col, N>(position[0], -r[1], oy * r[2] - oz * r[1]);
+    joint_lanes<Col, N>(position[1], r[0], oz * r[0] - ox * r[2]);
+    joint_lanes<Col, N>(position[2], 0.0, 1.0 + ox * r[1] - oy * r[0]);
   }
   if constexpr (Col::loaded && !Col::integrates_turns) {
-    for (int i = 0; i < N; ++i) detail::turns_from_loads<L, Col>(angle[i], load, out.axis);
+    for (int i = 0; i < N; ++i) turns_from_loads<L, Col>(angle[i], load, out.axis);
     for (int k = 0; k < 3; ++k) {
-      detail::turns_from_loads<L, Col>(rotation[k], load, out.axis);
-      detail::turns_from_loads<L, Col>(position[k], load, out.axis);
+      turns_from_loads<L, Col>(rotation[k], load, out.axis);
+      turns_from_loads<L, Col>(position[k], load, out.axis);
     }
   }
 
@@ -290,6 +298,23 @@ CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q,
   constexpr auto lane = [](int j) constexpr { return Col::unknown(j); };
   out.det = eliminate<Col::unknowns>(out.row, lane);
   if constexpr (Col::turns == 3) out.det = -out.det;  // three rows carry the opposite sign
+}
+
+}  // namespace detail
+
+/// Integrates once from the guess and eliminates the unknowns.
+/// @param q, load  base frame, must be valid (check_joints)   @param steps  integration steps per segment
+/// Real time: yes. Never inlined: it is large and called from many places.
+template <Derivatives D, Loading L, class Stepper, int N>
+CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load,
+                                   const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {
+  using Col = Columns<N, L, D>;
+  detail::turn_axes<L>(load, out.axis);
+  using S = Dual<Col::groups>;
+  RobotState<S, N> state = detail::tip_state<Col, S>(c, load, guess, out.axis);
+  Frame<S> frame;
+  const SegmentTubes<N> tubes = detail::integrate<Stepper, Col>(c, q, steps, state, frame, out.tips);
+  detail::assemble<D, L, Stepper>(c, q, load, guess, state, frame, tubes, out);
 }
 
 }  // namespace ctcr

@@ -6,6 +6,15 @@
 
 namespace ctcr {
 
+/// Coefficients for the general path, in which effects, and derivatives by the precurvature, bend a curved part even
+/// where its precurvature is 0. Real time: yes.
+template <int N>
+inline Coefficients<N> with_all_curves(const Robot<N>& robot) noexcept {
+  Coefficients<N> c = make_coefficients(robot);
+  for (std::size_t i = 0; i < N; ++i) c.curved[i] = robot.tubes[i].curved_length > 0;
+  return c;
+}
+
 /// The numbers that the general path needs of a robot, and its effects.
 template <int N, class Fx>
 struct EffectCoefficients {
@@ -25,7 +34,7 @@ inline constexpr bool has_effects<EffectCoefficients<N, Fx>> = true;
 /// @tparam Fx  EffectList<...> of what it has beyond the standard model
 template <int N, class Fx = Standard>
 class Model {
- public:
+public:
   using Effects = typename Fx::template On<N>;
   using Numbers = std::conditional_t<Fx::none, Coefficients<N>, EffectCoefficients<N, Fx>>;
 
@@ -33,14 +42,14 @@ class Model {
     if constexpr (Fx::none)
       coefficients_ = make_coefficients(robot);
     else
-      coefficients_ = {tube_parameters(robot), make_coefficients(robot), robot.gravity, effects};
+      coefficients_ = {tube_parameters(robot), with_all_curves(robot), robot.gravity, effects};
   }
 
   [[nodiscard]] const Robot<N>& robot() const noexcept { return robot_; }
   [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
   [[nodiscard]] const Numbers& coefficients() const noexcept { return coefficients_; }
 
- private:
+private:
   Robot<N> robot_;
   [[no_unique_address]] Effects effects_;
   Numbers coefficients_;

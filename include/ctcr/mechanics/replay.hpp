@@ -20,7 +20,7 @@ struct TapedFrame {
 /// Moves the frame and keeps what the tangents need. Real time: yes.
 template <TangentOf Of>
 CTCR_INLINE void move_by_exponential(TapedFrame<Of>& g, const double (&o)[3], double vx, double vy, double vz) noexcept {
-  g.step = exponential<Of>(o, {vx, vy, vz});
+  exponential<Of>(o, {vx, vy, vz}, g.step);
   move(g.frame, g.step);
 }
 

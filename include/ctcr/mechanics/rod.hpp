@@ -39,15 +39,13 @@ struct RodSection {
   S straight_mz;  ///< torsional moment of the straight tubes [N m], constant in the segment
 };
 
-/// Curvature and torsional rate at a place. Real time: yes.
-template <bool Loaded, class S, class P, int NC, class Angles>
-CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const Angles& psi, const std::array<S, 2>& m,
-                           RodRates<S, NC>& k) noexcept {
-  auto &s = k.sin, &c = k.cos;
+/// Curvature and torsional rate where the angles' sines and cosines are in `k`. Real time: yes.
+template <bool Loaded, class S, class P, int NC>
+CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const std::array<S, 2>& m, RodRates<S, NC>& k) noexcept {
+  const auto &s = k.sin, &c = k.cos;
   S ux = 0.0, uy = 0.0;
   if constexpr (Loaded) ux = m[0], uy = m[1];
   for (std::size_t i = 0; i < NC; ++i) {
-    sincos(psi[i], s[i], c[i]);
     if (!Loaded && i == 0) {
       ux = r.a[i] * c[i];
       uy = r.a[i] * s[i];
@@ -61,11 +59,18 @@ CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const Angles& psi, con
     for (std::size_t i = 0; i < NC; ++i) k.F[i] = r.rho[i] * (s[i] * k.u[0] - c[i] * k.u[1]);
 }
 
-/// All rates of a loaded rod. Real time: yes.
+/// Curvature and torsional rate at a place. Real time: yes.
+template <bool Loaded, class S, class P, int NC, class Angles>
+CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const Angles& psi, const std::array<S, 2>& m,
+                           RodRates<S, NC>& k) noexcept {
+  sincos(psi, k.sin, k.cos);
+  curvature<Loaded>(r, m, k);
+}
+
+/// All rates of a loaded rod where the angles' sines and cosines are in `k`. Real time: yes.
 template <bool Gravity, class S, class P, int NC>
-CTCR_INLINE RodRates<S, NC> loaded_rates(const RodSection<S, P, NC>& r, const RodState<S, NC>& y) noexcept {
-  RodRates<S, NC> k;
-  curvature<true>(r, y.psi, y.m, k);
+CTCR_INLINE void loaded_rates(const RodSection<S, P, NC>& r, const RodState<S, NC>& y, RodRates<S, NC>& k) noexcept {
+  curvature<true>(r, y.m, k);
   const S &ux = k.u[0], &uy = k.u[1];
   S mz = r.straight_mz;
   for (std::size_t i = 0; i < NC; ++i) mz = mz + r.kz[i] * y.w[i];
@@ -75,6 +80,14 @@ CTCR_INLINE RodRates<S, NC> loaded_rates(const RodSection<S, P, NC>& r, const Ro
     k.g = {-(uy * y.g[2]), ux * y.g[2], uy * y.g[0] - ux * y.g[1]};
     for (std::size_t i = 0; i < 3; ++i) k.n[i] = k.n[i] - r.weight * y.g[i];
   }
+}
+
+/// All rates of a loaded rod. Real time: yes.
+template <bool Gravity, class S, class P, int NC>
+CTCR_INLINE RodRates<S, NC> loaded_rates(const RodSection<S, P, NC>& r, const RodState<S, NC>& y) noexcept {
+  RodRates<S, NC> k;
+  sincos(y.psi, k.sin, k.cos);
+  loaded_rates<Gravity>(r, y, k);
   return k;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <span>
 
+#include "ctcr/math/frame_algebra.hpp"
 #include "ctcr/mechanics/solve.hpp"
 
 namespace ctcr {
@@ -40,7 +41,8 @@ namespace detail {
 inline constexpr double same_place = 1e-12;
 
 template <bool Loaded, int N>
-inline RobotState<double, N> tip_values(const Coefficients<N>& c, const TipLoad& load, const TipGuess<N>& guess) noexcept {
+inline RobotState<double, N> tip_values(const Coefficients<N>& c, const TipLoad& load,
+                                        const TipGuess<N>& guess) noexcept {
   RobotState<double, N> tip{};
   for (int i = 0; i < N; ++i) tip.psi[std::size_t(i)] = guess.psi[i];
   if constexpr (Loaded) {
@@ -90,19 +92,30 @@ inline void fill_point(const Model<N>& model, const BaseView& base, const Segmen
 }
 
 /// Behind the plate the tubes are straight and transmit torque alone.
+/// @param psi, w  angle and twist rate of each tube there
 template <int N>
-inline void fill_behind_plate(const Model<N>& model, const Joints<N>& q, const BaseView& base,
-                              const RobotState<double, N>& plate, ShapePoint<N>& out) noexcept {
+inline void fill_behind_plate(const Robot<N>& robot, const Joints<N>& q, const BaseView& base,
+                              const std::array<double, std::size_t(N)>& psi,
+                              const std::array<double, std::size_t(N)>& w, ShapePoint<N>& out) noexcept {
   out.bishop.position << 0, 0, out.s;
   for (std::size_t i = 0; i < N; ++i) {
     if (out.s < q.beta[Eigen::Index(i)] - same_place) continue;
     TubeShape& t = out.tube[i];
     t.present = true;
-    t.angle = plate.psi[i] + base.turn + out.s * plate.w[i];
-    t.curvature << 0, 0, plate.w[i];
-    t.moment << 0, 0, model.robot().tubes[i].GJ() * plate.w[i];
+    t.angle = psi[i] + base.turn + out.s * w[i];
+    t.curvature << 0, 0, w[i];
+    t.moment << 0, 0, robot.tubes[i].GJ() * w[i];
     out.moment += t.moment;
   }
+}
+
+/// Fills the points beyond the robot tip. @return how many are left
+template <int N>
+inline std::size_t fill_beyond_tip(double tip, const BaseView& base, std::span<ShapePoint<N>> points) noexcept {
+  std::size_t left = points.size();
+  for (; left > 0 && points[left - 1].s > tip + same_place; --left)
+    points[left - 1].bishop = {base.T_base_tip.rotation * rotation_z(-base.turn), base.T_base_tip.position};
+  return left;
 }
 
 /// Shape of the equilibrium that `guess` describes, at the places already set in `points`.
@@ -132,11 +145,7 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
   base.turn = q.alpha[0] - (plate.psi[0] + q.beta[0] * plate.w[0]);
   base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * Pose{frame.rotation(), frame.position()}.inverse();
 
-  std::size_t left = points.size();
-  for (; left > 0 && points[left - 1].s > events.s[0] + same_place; --left) {
-    ShapePoint<N>& beyond = points[left - 1];
-    beyond.bishop = {base.T_base_tip.rotation * rotation_z(-base.turn), base.T_base_tip.position};
-  }
+  std::size_t left = fill_beyond_tip(events.s[0], base, points);
   Node node{events.s[0], {}, tip, {}};
   const auto fill_down_to = [&](double end) noexcept {
     for (; left > 0 && points[left - 1].s > end + same_place; --left) {
@@ -154,14 +163,101 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
   State y = tip;
   Pass::run(c, events, place, steps, y, frame, tips, record);
   fill_down_to(-2 * same_place);
-  for (; left > 0; --left) fill_behind_plate(model, q, base, plate, points[left - 1]);
+  for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, plate.psi, plate.w, points[left - 1]);
+}
+
+/// The same for a robot with effects.
+template <int N, class Fx>
+inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
+                                    const TipGuess<N>& guess, int steps, std::span<ShapePoint<N>> points) noexcept {
+  using Rod = EffectRod<N, double, Fx>;
+  using State = typename Rod::State;
+  using Place = typename Rod::Place;
+  struct Node {
+    double s;
+    Place place;
+    State y;
+    Frame<double> frame;
+  };
+  const auto& c = model.coefficients();
+  const auto as_array = [](const Vec3& v) noexcept { return std::array{v[0], v[1], v[2]}; };
+  RodInputs<N, double, Fx> in{.tubes = c.tubes,
+                              .beta = {},
+                              .alpha = {},
+                              .force = as_array(load.force),
+                              .moment = as_array(load.moment),
+                              .gravity = as_array(c.gravity),
+                              .effects = c.effects};
+  for (int i = 0; i < N; ++i) in.beta[std::size_t(i)] = q.beta[i], in.alpha[std::size_t(i)] = q.alpha[i];
+  in.effects.tip_force(in.gravity, in.force);
+  const Rod rod(in);
+  const Events<N> events = sort_events(c.plain, q.beta);
+  const auto no_tip = [](int, const Frame<double>&, double) noexcept {};
+
+  State tip;
+  const Mat3 R_tip_base = guess.rotation.transpose();
+  const Vec3 n = R_tip_base * Vec3::Map(in.force.data()), l = R_tip_base * load.moment, g = R_tip_base * c.gravity;
+  for (int i = 0; i < N; ++i) tip.psi(i) = guess.psi[i], tip.torque(i) = i == 0 ? l[2] : 0;
+  for (int i = 0; i < 2; ++i) tip.m(i) = l[i];
+  for (int i = 0; i < 3; ++i) tip.n(i) = n[i], tip.g(i) = g[i];
+
+  State plate = tip;
+  Frame<double> frame;
+  rod.run(events, steps, plate, frame, no_tip, typename Rod::NoNode{});
+  std::array<double, N> psi, w, torque, angle;
+  for (int i = 0; i < N; ++i) {
+    const auto t = std::size_t(i);
+    psi[t] = plate.psi(i);
+    torque[t] = plate.torque(i);
+    w[t] = torque[t] / c.tubes[t].kz;
+    angle[t] = psi[t] + q.beta[i] * w[t];
+  }
+  in.effects.grip(torque, angle);
+  BaseView base;
+  base.turn = q.alpha[0] - angle[0];
+  base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * pose_of(frame).inverse();
+
+  std::size_t left = fill_beyond_tip(events.s[0], base, points);
+  Node node{events.s[0], {}, tip, {}};
+  const auto fill = [&](const Node& here, ShapePoint<N>& out) noexcept {
+    const auto bend = rod.bend(here.place, here.y);
+    const Pose T_base_here = base.T_base_tip * pose_of(here.frame);
+    out.bishop = {T_base_here.rotation * rotation_z(-base.turn), T_base_here.position};
+    out.force = T_base_here.rotation * Vec3(here.y.n(0), here.y.n(1), here.y.n(2));
+    Vec3 moment(here.y.m(0), here.y.m(1), 0);
+    for (int i = 0; i < here.place.present; ++i) {
+      const auto k = std::size_t(i);
+      TubeShape& t = out.tube[k];
+      t.present = true;
+      t.angle = here.y.psi(i) + base.turn;
+      t.curvature << bend.curvature[k][0], bend.curvature[k][1], bend.twist[k];
+      t.moment << bend.moment[k][0], bend.moment[k][1], here.y.torque(i);
+      moment[2] += here.y.torque(i);
+    }
+    out.moment = T_base_here.rotation * moment;
+  };
+  const auto fill_down_to = [&](double end) noexcept {
+    for (; left > 0 && points[left - 1].s > end + same_place; --left) {
+      Node here = node;
+      rod.step(here.place, points[left - 1].s - here.s, here.y, here.frame);
+      fill(here, points[left - 1]);
+    }
+  };
+  const auto record = [&](double s, const Place& place, const State& y, const Frame<double>& f, const Rod&) noexcept {
+    fill_down_to(s);
+    node = {s, place, y, f};
+  };
+  State y = tip;
+  rod.run(events, steps, y, frame, no_tip, record);
+  fill_down_to(-2 * same_place);
+  for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, psi, w, points[left - 1]);
 }
 
 }  // namespace detail
 
 /// Solves the model finely and gives its shape at arc lengths.
 ///
-/// At a breakpoint, where curvatures jump, the values are those of the base side. s < 0 is behind the front plate.
+/// At a breakpoint, where curvatures jump and effects may kink the robot, the values are those of the base side. s < 0 is behind the front plate.
 /// Beyond the robot tip no tube is present and the frame is that of the tip.
 /// @param s       arc lengths from the front plate, ascending [m]
 /// @param points  out: one for each s (at least as many); no tube is present where solve() computes nothing
@@ -169,8 +265,8 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
 /// @param out     the fine solution, without derivatives
 /// @param settings  steps below shape_steps are raised to it
 /// @return as solve()   Real time: yes; solve(), two integrations more, and one step for each point.
-template <int N>
-Status shape(const Model<N>& model, const Joints<N>& q, const TipLoad& load, std::span<const double> s,
+template <int N, class Fx>
+Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, std::span<const double> s,
              std::span<ShapePoint<N>> points, Workspace<N>& ws, Solution<N>& out, Settings settings = {}) noexcept {
   points = points.first(s.size());
   for (std::size_t k = 0; k < s.size(); ++k) {
@@ -180,7 +276,9 @@ Status shape(const Model<N>& model, const Joints<N>& q, const TipLoad& load, std
   settings.steps = std::max(settings.steps, shape_steps);
   const Status status = solve<Derivatives::none>(model, q, load, ws, out, settings);
   if (!(status == Status::ok || status == Status::singular || status == Status::not_converged)) return status;
-  if (!model.coefficients().gravity.isZero(0.0))
+  if constexpr (!Fx::none)
+    detail::fill_shape_with_effects(model, q, load, ws.guess, settings.steps, points);
+  else if (!model.coefficients().gravity.isZero(0.0))
     detail::fill_shape<Loading::weight>(model, q, load, ws.guess, settings.steps, points);
   else if (!load.force.isZero(0.0) || !load.moment.isZero(0.0))
     detail::fill_shape<Loading::wrench>(model, q, load, ws.guess, settings.steps, points);
@@ -193,9 +291,15 @@ Status shape(const Model<N>& model, const Joints<N>& q, const TipLoad& load, std
 /// @param points  how many uniform ones, >= 2
 /// @param s       out: ascending, each once [m]; room for points + 2N
 /// @return how many were written   Real time: yes.
-template <int N>
-std::size_t shape_places(const Model<N>& model, const Joints<N>& q, std::size_t points, std::span<double> s) noexcept {
-  const Events<N> events = sort_events(model.coefficients(), q.beta);
+template <int N, class Fx>
+std::size_t shape_places(const Model<N, Fx>& model, const Joints<N>& q, std::size_t points,
+                         std::span<double> s) noexcept {
+  const auto& c = model.coefficients();
+  Events<N> events;
+  if constexpr (Fx::none)
+    events = sort_events(c, q.beta);
+  else
+    events = sort_events(c.plain, q.beta);
   const double tip = std::max(events.s[0], 0.0);
   std::size_t count = 0;
   for (std::size_t k = 0; k < points; ++k) s[count++] = k + 1 == points ? tip : tip * double(k) / double(points - 1);

@@ -71,6 +71,7 @@ template <int N, class S, class P, class H, bool Loaded, bool Gravity, class Ste
 class Shooting {
  public:
   using State = RobotState<S, N>;
+  using Length = H;
 
   /// Integrates from the tip to s = 0.
   /// @param place   H place(event, s): arc length of an event with its derivatives [m]
@@ -280,9 +281,7 @@ class Shooting {
       u_mid = stages[1].u;
       u_end = stages[2].u;
     }
-    [&]<std::size_t... I>(std::index_sequence<I...>) {
-      (replay_if_started<int(I)>(c, r, tubes, stages, step, u_mid, u_end, h, y, frame), ...);
-    }(std::make_index_sequence<std::size_t(groups_of<S>)>{});
+    replay_groups<0>(c, r, tubes, stages, step, u_mid, u_end, h, y, frame);
     for (int i = 0; i < tubes.straight_count; ++i) {
       const auto t = std::size_t(tubes.straight[std::size_t(i)]);
       y.psi[t].v += k * y.w[t].v;
@@ -293,12 +292,16 @@ class Shooting {
     }
   }
 
+  /// Groups g and later, those that have started.
   template <int g, class... A>
-  static CTCR_INLINE void replay_if_started(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
-                                            A&... rest) noexcept {
-    constexpr int first = Col::starts_with(g);
-    if constexpr (first <= N)
-      if (first == 1 || tubes.near >= first) replay_group<g>(c, r, tubes, rest...);
+  static CTCR_INLINE void replay_groups(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
+                                        A&... rest) noexcept {
+    if constexpr (g < groups_of<S>) {
+      constexpr int first = Col::starts_with(g);
+      if constexpr (first <= N)
+        if (first == 1 || tubes.near >= first) replay_group<g>(c, r, tubes, rest...);
+      replay_groups<g + 1>(c, r, tubes, rest...);
+    }
   }
 
   template <int g, int NC>

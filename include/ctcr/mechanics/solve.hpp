@@ -12,6 +12,8 @@ namespace detail {
 inline constexpr double step_limit = 1.0;
 /// det B_u below which an equilibrium counts as about to snap.
 inline constexpr double singular_det = 1e-2;
+/// Starts from anywhere before a solve is given up.
+inline constexpr int scattered_starts = 16;
 /// ||b|| up to which the pose after one evaluation is good to about ||b||^2 [rad].
 inline constexpr double one_step_residual = 0.05;
 
@@ -20,6 +22,15 @@ inline TipGuess<N> straight_guess(const Joints<N>& q) noexcept {
   TipGuess<N> guess;
   guess.rotation = rotation_z(q.alpha[0]);
   for (int i = 1; i < N; ++i) guess.psi[i] = q.alpha[i] - q.alpha[0];
+  return guess;
+}
+
+/// Start number k >= 1 of a sequence that fills the angles at the tubes' tips evenly.
+template <int N>
+inline TipGuess<N> scattered_guess(const Joints<N>& q, int k) noexcept {
+  constexpr double turn = 6.28318530717958647692;
+  TipGuess<N> guess = straight_guess(q);
+  for (int i = 1; i < N; ++i) guess.psi[i] += turn * std::remainder(k * std::sqrt(i * i + 1.0), 1.0);
   return guess;
 }
 
@@ -91,10 +102,9 @@ inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weig
   return c;
 }
 
-/// Unloaded equilibrium, from the angles at the base; the tip frame follows without iteration.
+/// Unloaded equilibrium from the angles of `guess`; the tip frame follows without iteration.
 template <class Stepper, int N, class C>
 inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, TipGuess<N>& guess) noexcept {
-  guess = straight_guess(q);
   if constexpr (has_effects<C>) {
     Evaluation<N, Loading::weight, Derivatives::none> ev;
     return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, guess, ev);
@@ -111,10 +121,8 @@ inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, con
   constexpr int ramp_steps = 16;
   Evaluation<N, L, Derivatives::none> ev;
   int used = 0;
-  if (ramp_curvature)
-    guess = straight_guess(q);
-  else
-    used += unloaded_guess<Stepper>(c, q, settings, guess);
+  guess = straight_guess(q);
+  if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, guess);
   for (int k = 1; k <= ramp_steps; ++k) {
     const double part = double(k) / ramp_steps;
     used += newton<Derivatives::none, L, Stepper>(
@@ -134,10 +142,11 @@ inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const
   out.position = ev.position;
   out.rotation = ev.rotation;
   out.tube_tips[0] = {ev.rotation, ev.position};
+  std::array<double, N - 1> sines, cosines;
+  sincos(ev.tips.psi, sines, cosines);
   for (std::size_t i = 1; i < N; ++i) {
     const Frame<double>& f = ev.tips.frame[i - 1];
-    double sine, cosine;
-    sincos(ev.tips.psi[i - 1], sine, cosine);
+    const double sine = sines[i - 1], cosine = cosines[i - 1];
     const Vec3 x(f.x[0], f.x[1], f.x[2]), y(f.y[0], f.y[1], f.y[2]), z(f.z[0], f.z[1], f.z[2]);
     Pose& tip = out.tube_tips[i];
     tip.position = ev.rotation * f.position() + ev.position;
@@ -152,28 +161,34 @@ inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const
   ws.knows_joints = Col::jacobian;
   ws.knows_load = Col::compliance;
   if constexpr (Col::jacobian) {
-    const auto by_lanes = [&](auto&& entry, auto&& column) {
-      for (int j = 0; j < N; ++j) column(N + j) = entry(Col::alpha + j);
+    const auto by_joints = [](auto&& entry) {
+      Eigen::Matrix<double, 1, 2 * N> row;
+      for (int j = 0; j < N; ++j) row[N + j] = entry(Col::alpha + j);
       double first = entry(Col::common);
       for (int j = 1; j < N; ++j) {
-        column(j) = entry(Col::beta + j - 1);
-        first -= column(j);
+        row[j] = entry(Col::beta + j - 1);
+        first -= row[j];
       }
-      column(0) = first;
+      row[0] = first;
+      return row;
     };
-    for (int k = 0; k < 6; ++k)
-      by_lanes([&](int lane) { return ev.pose(k, lane); }, [&](int j) -> double& { return out.jacobian(k, j); });
-    for (int i = 0; i < N + 2; ++i) {
-      const auto entry = [&](int lane) {
-        return i < 3 ? ev.pose(3 + i, lane) : ev.unknown(Col::turns + i - 3, lane);
-      };
-      by_lanes(entry, [&](int j) -> double& { return ws.sensitivity(i, j); });
+    for (int k = 0; k < 6; ++k) {
+      const auto entry = [&](int lane) { return ev.pose(k, lane); };
+      const auto row = by_joints(entry);
+      out.jacobian.row(k) = row;
+      if (k >= 3) ws.sensitivity.row(k - 3).template head<2 * N>() = row;
+      if constexpr (Col::compliance)
+        for (int j = 0; j < 6; ++j) {
+          out.compliance(k, j) = entry(Col::force + j);
+          if (k >= 3) ws.sensitivity(k - 3, 2 * N + j) = out.compliance(k, j);
+        }
+    }
+    for (int i = 3; i < N + 2; ++i) {
+      const auto entry = [&](int lane) { return ev.unknown(Col::turns + i - 3, lane); };
+      ws.sensitivity.row(i).template head<2 * N>() = by_joints(entry);
       if constexpr (Col::compliance)
         for (int j = 0; j < 6; ++j) ws.sensitivity(i, 2 * N + j) = entry(Col::force + j);
     }
-    if constexpr (Col::compliance)
-      for (int k = 0; k < 6; ++k)
-        for (int j = 0; j < 6; ++j) out.compliance(k, j) = ev.pose(k, Col::force + j);
     if constexpr (Col::compliance && Col::turns == 2) {
       // Loads were varied along the base axes as the guessed tip frame sees them; it may be turned about the force.
       const Mat3 found_axes = (ev.rotation * previous.rotation.transpose()).transpose();
@@ -191,16 +206,13 @@ inline void publish(const Ev& ev, const Joints<N>& q, const TipLoad& load, const
 template <int N>
 inline TipGuess<N> predicted_guess(const Workspace<N>& ws, const Joints<N>& q, const TipLoad& load) noexcept {
   if (!ws.knows_joints && !ws.knows_load) return ws.guess;
-  VecN<2 * N + 6> change = VecN<2 * N + 6>::Zero();
-  if (ws.knows_joints) {
-    change.template head<N>() = q.beta - ws.q.beta;
-    change.template segment<N>(N) = q.alpha - ws.q.alpha;
-  }
-  if (ws.knows_load) {
-    change.template segment<3>(2 * N) = load.force - ws.load.force;
-    change.template tail<3>() = load.moment - ws.load.moment;
-  }
-  const VecN<N + 2> dx = ws.sensitivity * change;
+  VecN<N + 2> dx = VecN<N + 2>::Zero();
+  if (ws.knows_joints)
+    dx += ws.sensitivity.template leftCols<N>() * (q.beta - ws.q.beta) +
+          ws.sensitivity.template middleCols<N>(N) * (q.alpha - ws.q.alpha);
+  if (ws.knows_load)
+    dx += ws.sensitivity.template middleCols<3>(2 * N) * (load.force - ws.load.force) +
+          ws.sensitivity.template rightCols<3>() * (load.moment - ws.load.moment);
   const double size = dx.norm();
   return size < step_limit ? moved<N>(ws.guess, dx, 1.0) : ws.guess;
 }
@@ -213,20 +225,30 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   TipGuess<N> guess;
   const auto converged = [&] { return ev.residual < settings.tolerance && ev.det > 0; };
   const auto attempt = [&] { out.iterations += newton<D, L, Stepper>(c, q, load, settings, guess, ev); };
+  const auto attempt_from = [&](const TipGuess<N>& start) {
+    guess = start;
+    if constexpr (L != Loading::none) out.iterations += unloaded_guess<Stepper>(c, q, settings, guess);
+    attempt();
+  };
   const bool warm = ws.warm;
   if (warm) {
     guess = predicted_guess(ws, q, load);
     attempt();
   }
-  if (!warm || !converged()) {
-    guess = straight_guess(q);
-    if constexpr (L != Loading::none) out.iterations += unloaded_guess<Stepper>(c, q, settings, guess);
-    attempt();
-  }
+  if (!warm || !converged()) attempt_from(straight_guess(q));
   for (const bool ramp_curvature : {false, true}) {
     if (converged() || (L == Loading::none && !ramp_curvature)) continue;
     out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, ramp_curvature, guess);
     attempt();
+  }
+  if (N > 1 && !converged()) {
+    // A fold, or an unstable equilibrium: those that are stable lie to its sides.
+    const TipGuess<N> found = guess;
+    for (int k = 1; k <= scattered_starts && !converged(); ++k) attempt_from(scattered_guess(q, k));
+    if (!converged()) {
+      guess = found;
+      attempt();
+    }
   }
   publish(ev, q, load, guess, guess, ws, out);
   const bool finite = std::isfinite(ev.residual) && std::isfinite(ev.det) && ev.position.allFinite() &&
@@ -245,14 +267,15 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
-template <Derivatives D, Loading L, class Stepper, int N, class Fx>
+/// @param evaluate_at  evaluate_at(guess, evaluation): evaluate() or an equal of it
+template <Derivatives D, Loading L, class Stepper, int N, class Fx, class Evaluate>
 inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
-                      const Settings& settings) noexcept {
+                      const Settings& settings, const Evaluate& evaluate_at) noexcept {
   if (!ws.warm) return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   using Ev = Evaluation<N, L, D>;
   Ev ev;
   const TipGuess<N> guess = predicted_guess(ws, q, load);
-  evaluate<D, L, Stepper>(model.coefficients(), q, load, guess, settings.steps, ev);
+  evaluate_at(guess, ev);
   out.iterations = 1;
   const VecN<N + 2> dx = newton_step<Ev, N>(ev);
   if (!(ev.residual < one_step_residual) || !dx.allFinite())
@@ -273,9 +296,10 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
 }
 
 /// Chooses the cheapest equations that hold, and answers invalid input.
-template <Derivatives D, class Stepper, bool OneStep, int N, class Fx>
-inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
-                       Solution<N>& out, const Settings& settings) noexcept {
+/// @param run  run(std::integral_constant<Loading, ..>) -> Status
+template <Derivatives D, class Stepper, int N, class Fx, class Run>
+inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Solution<N>& out,
+                       const Run& run) noexcept {
   out.iterations = 0;
   out.status = check_joints(model.robot(), q);
   if (out.status == Status::ok && !(load.force.allFinite() && load.moment.allFinite())) out.status = Status::not_finite;
@@ -287,13 +311,6 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     out.iterations = iterations;
     return status;
   }
-  const auto run = [&](auto loading) {
-    constexpr Loading L = decltype(loading)::value;
-    if constexpr (OneStep)
-      return step_as<D, L, Stepper>(model, q, load, ws, out, settings);
-    else
-      return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
-  };
   using enum Loading;
   if constexpr (!Fx::none || requires { Stepper::general_equations; })
     out.status = run(std::integral_constant<Loading, weight>{});
@@ -322,7 +339,9 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
              const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper, false>(model, q, load, ws, out, settings);
+  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+    return detail::solve_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
+  });
 }
 
 /// One evaluation from the warm start predicted to the new joints: the control step. Falls back to solve() when there is
@@ -332,7 +351,13 @@ Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
             const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper, true>(model, q, load, ws, out, settings);
+  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+    constexpr Loading L = decltype(loading)::value;
+    const auto evaluate_at = [&](const TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
+      evaluate<D, L, Stepper>(model.coefficients(), q, load, guess, settings.steps, ev);
+    };
+    return detail::step_as<D, L, Stepper>(model, q, load, ws, out, settings, evaluate_at);
+  });
 }
 
 }  // namespace ctcr

@@ -36,14 +36,14 @@ class BaseProblem {
   using Pass = Shooting<N, S, double, double, Col::loaded, Col::weight, DirectMagnusRk4, Col>;
   static constexpr int steps_ = 8;
 
- public:
+public:
   static constexpr int turns = Col::turns, unknowns = Col::unknowns;
   static_assert(turns == 0 || turns == 3);
   using Jacobian = Eigen::Matrix<double, unknowns, unknowns>;
   using Unknowns = Eigen::Matrix<double, unknowns, 1>;
 
   BaseProblem(const Model<N>& model, const Joints<N>& q, const TipLoad& load, int steps) noexcept
-      : c_(model.coefficients()), q_(q), load_(load), steps_per_segment_(std::max(steps, steps_)) {}
+    : c_(model.coefficients()), q_(q), load_(load), steps_per_segment_(std::max(steps, steps_)) {}
 
   /// Integrates from `guess`: B_u and residual at the base.
   /// @param watch  watch(s, determinant with the base at s), from the tip to the plate
@@ -79,16 +79,14 @@ class BaseProblem {
   Jacobian B;         ///< by turns of the tip (base axes), psi_2..N
   Unknowns residual;  ///< minus the turn to the found tip frame, angle errors [rad]
 
- private:
+private:
   static Jacobian jacobian(const RobotState<S, N>& y, const Frame<S>& f, const Mat3& R_base_here,
                            const VecN<N>& held) noexcept {
     Jacobian M;
     for (int u = 0; u < unknowns; ++u) {
       const int lane = Col::unknown(u);
       const auto part = [lane](const Lanes* d) { return d[lane / lane_count][lane % lane_count]; };
-      const auto angle = [&](int i) {
-        return part(y.psi[std::size_t(i)].d) + held[i] * part(y.w[std::size_t(i)].d);
-      };
+      const auto angle = [&](int i) { return part(y.psi[std::size_t(i)].d) + held[i] * part(y.w[std::size_t(i)].d); };
       if constexpr (turns > 0) {
         const Vec3 twist(part(f.rotation_twist[0]), part(f.rotation_twist[1]), part(f.rotation_twist[2]) + angle(0));
         M.col(u).template head<turns>() = R_base_here * twist;
@@ -111,7 +109,8 @@ class BaseProblem {
 template <class F, int N>
 inline auto with_base_problem(const Model<N>& model, const Joints<N>& q, const TipLoad& load, const Settings& settings,
                               const F& f) noexcept {
-  if (!model.coefficients().gravity.isZero(0.0)) return f(BaseProblem<Loading::weight, N>(model, q, load, settings.steps));
+  if (!model.coefficients().gravity.isZero(0.0))
+    return f(BaseProblem<Loading::weight, N>(model, q, load, settings.steps));
   if (!load.force.isZero(0.0) || !load.moment.isZero(0.0))
     return f(BaseProblem<Loading::wrench, N>(model, q, load, settings.steps));
   if constexpr (N > 1) return f(BaseProblem<Loading::none, N>(model, q, load, settings.steps));
@@ -125,9 +124,9 @@ class TurnCurve {
   using Point = Eigen::Matrix<double, U + 1, 1>;
   using System = Eigen::Matrix<double, U + 1, U + 1>;
 
- public:
+public:
   TurnCurve(Problem& problem, const TipGuess<N>& guess, int tube, double direction) noexcept
-      : problem_(problem), guess_(guess), row_(Problem::turns + tube - 1) {
+    : problem_(problem), guess_(guess), row_(Problem::turns + tube - 1) {
     tangent_.setZero();
     tangent_[U] = direction;
   }
@@ -152,7 +151,7 @@ class TurnCurve {
     return infinity;
   }
 
- private:
+private:
   TurnCurve& operator=(const TurnCurve& other) noexcept {
     guess_ = other.guess_, turn_ = other.turn_, determinant_ = other.determinant_, tangent_ = other.tangent_;
     return *this;
@@ -226,9 +225,10 @@ class TurnCurve {
 /// although that is positive.
 /// @param ws  from solve() for the same joints and load
 /// Real time: yes, one integration with 8 steps per segment (or settings.steps, if more).
-template <int N>
-[[nodiscard]] WeakestPlace weakest_place(const Model<N>& model, const Joints<N>& q, const TipLoad& load,
+template <int N, class Fx>
+[[nodiscard]] WeakestPlace weakest_place(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
                                          const Workspace<N>& ws, const Settings& settings = {}) noexcept {
+  static_assert(Fx::none, "conjugate points are known for the standard model; with effects, see Solution::stability");
   return detail::with_base_problem(model, q, load, settings, [&](auto problem) noexcept {
     TipGuess<N> guess = ws.guess;
     problem.integrate(guess);
@@ -253,9 +253,10 @@ template <int N>
 /// @param ws  from solve() for the same joints and load
 /// @return infinite angle: no snap within two turns; angle 0: unstable already
 /// Real time: no; bounded, some milliseconds.
-template <int N>
-[[nodiscard]] SnapMargin snap_margin(const Model<N>& model, const Joints<N>& q, const TipLoad& load,
+template <int N, class Fx>
+[[nodiscard]] SnapMargin snap_margin(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
                                      const Workspace<N>& ws, const Settings& settings = {}) noexcept {
+  static_assert(Fx::none, "snaps are followed for the standard model; with effects, see Solution::stability");
   return detail::with_base_problem(model, q, load, settings, [&](auto problem) noexcept {
     TipGuess<N> guess = ws.guess;
     problem.integrate(guess);

@@ -23,6 +23,21 @@ CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::arr
   move_by_exponential(frame, omega, S(kk12 * (u0[1] - u1[1])), S(kk12 * (u1[0] - u0[0])), k);
 }
 
+/// Sines and cosines of the angles at two places at once.
+template <class S, int NC>
+CTCR_INLINE void sincos_of_two(const std::array<S, std::size_t(NC)>& a, const std::array<S, std::size_t(NC)>& b,
+                               RodRates<S, NC>& at_a, RodRates<S, NC>& at_b) noexcept {
+  if constexpr (is_dual<S>) {
+    sincos(a, at_a.sin, at_a.cos);
+    sincos(b, at_b.sin, at_b.cos);
+  } else {
+    for (std::size_t i = 0; i < NC; ++i) {
+      const Lanes r = sincos_pair(a[i], b[i]);
+      at_a.sin[i] = r[0], at_a.cos[i] = r[1], at_b.sin[i] = r[2], at_b.cos[i] = r[3];
+    }
+  }
+}
+
 /// The default scheme. Loaded: classical RK4 for torsion and internal wrench, frame by the Magnus exponential of its
 /// stage curvatures (fourth order, arc length and orthogonality exact). Ref: Hairer, Lubich & Wanner, Geometric
 /// Numerical Integration, IV.7-8.
@@ -35,32 +50,42 @@ struct MagnusRk4 {
                                  const Tape& tape = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
-    const auto stage = [&](const auto& h, const std::array<S, NC>& w, const Rates& q) {
-      RodState<S, NC> z;
-      for (int j = 0; j < NC; ++j) {
-        const auto i = std::size_t(j);
-        z.psi[i] = y.psi[i] + h * w[i];
-        z.w[i] = y.w[i] + h * q.F[i];
-      }
-      for (std::size_t i = 0; i < 2; ++i) z.m[i] = y.m[i] + h * q.m[i];
-      for (std::size_t i = 0; i < 3; ++i) z.n[i] = y.n[i] + h * q.n[i];
-      if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) z.g[i] = y.g[i] + h * q.g[i];
-      return z;
+    const auto along = [](const auto& from, const auto& h, const auto& rate) {
+      auto to = from;
+      for (std::size_t i = 0; i < to.size(); ++i) to[i] = from[i] + h * rate[i];
+      return to;
     };
-    const Rates k1 = loaded_rates<Gravity>(r, y);
+    RodState<S, NC> y2, y3, y4;
+    Rates k1, k2, k3, k4;
+    const auto wrench = [&](const auto& h, const Rates& q, RodState<S, NC>& z) {
+      z.m = along(y.m, h, q.m);
+      z.n = along(y.n, h, q.n);
+      if constexpr (Gravity) z.g = along(y.g, h, q.g);
+    };
+    // An angle depends on the rates of two stages before: two stages share their sines.
+    y2.psi = along(y.psi, half, y.w);
+    sincos_of_two(y.psi, y2.psi, k1, k2);
+    loaded_rates<Gravity>(r, y, k1);
     tape(0, y, k1);
-    const auto y2 = stage(half, y.w, k1);
-    const Rates k2 = loaded_rates<Gravity>(r, y2);
+    y2.w = along(y.w, half, k1.F);
+    wrench(half, k1, y2);
+    loaded_rates<Gravity>(r, y2, k2);
     tape(1, y2, k2);
-    const auto y3 = stage(half, y2.w, k2);
-    const Rates k3 = loaded_rates<Gravity>(r, y3);
+    y3.w = along(y.w, half, k2.F);
+    y3.psi = along(y.psi, half, y2.w);
+    y4.psi = along(y.psi, k, y3.w);
+    sincos_of_two(y3.psi, y4.psi, k3, k4);
+    wrench(half, k2, y3);
+    loaded_rates<Gravity>(r, y3, k3);
     tape(2, y3, k3);
-    const auto y4 = stage(k, y3.w, k3);
-    const Rates k4 = loaded_rates<Gravity>(r, y4);
+    y4.w = along(y.w, k, k3.F);
+    wrench(k, k3, y4);
+    loaded_rates<Gravity>(r, y4, k4);
     tape(3, y4, k4);
     const auto sixth = (1.0 / 6.0) * k;
-    const auto mean = [&](const S& a, const S& b, const S& c, const S& d) { return S(sixth * (a + 2.0 * (b + c) + d)); };
+    const auto mean = [&](const S& a, const S& b, const S& c, const S& d) {
+      return S(sixth * (a + 2.0 * (b + c) + d));
+    };
     for (std::size_t i = 0; i < NC; ++i) {
       y.psi[i] = y.psi[i] + mean(y.w[i], y2.w[i], y3.w[i], y4.w[i]);
       y.w[i] = y.w[i] + mean(k1.F[i], k2.F[i], k3.F[i], k4.F[i]);
@@ -80,17 +105,18 @@ struct MagnusRk4 {
                                    const Tape& tape = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
-    Rates k1, k2, k3;
-    curvature<false>(r, y.psi, y.m, k1);
+    Rates k1, k2, k3, turn;
+    if constexpr (NC == 1)
+      sincos_of_two(y.psi, std::array<S, 1>{half * y.w[0]}, k1, turn);
+    else
+      sincos(y.psi, k1.sin, k1.cos);
+    curvature<false>(r, y.m, k1);
     tape(0, y, k1);
     if constexpr (NC == 1) {
-      S s, c;
-      sincos(half * y.w[0], s, c);
-      const auto size = r.a[0] * r.compliance;
       const auto turned = [&](const Rates& a, Rates& b) {
-        b.sin[0] = a.sin[0] * c + a.cos[0] * s;
-        b.cos[0] = a.cos[0] * c - a.sin[0] * s;
-        b.u = {size * b.cos[0], size * b.sin[0]};
+        b.sin[0] = a.sin[0] * turn.cos[0] + a.cos[0] * turn.sin[0];
+        b.cos[0] = a.cos[0] * turn.cos[0] - a.sin[0] * turn.sin[0];
+        curvature<false>(r, y.m, b);
       };
       turned(k1, k2);
       turned(k2, k3);

@@ -43,7 +43,8 @@ struct SystemParameters {
     put(Parameter::tracker_position, system.sensor.T_tracker_base.position);
     put(Parameter::tracker_rotation, Vec3::Zero());
     system.model.effects().for_each([&](const auto& effect, int first) {
-      for (std::size_t k = 0; k < effect.values.size(); ++k) x[Robot::count + first + Eigen::Index(k)] = effect.values[k];
+      for (std::size_t k = 0; k < effect.values.size(); ++k)
+        x[Robot::count + first + Eigen::Index(k)] = effect.values[k];
     });
     return x;
   }
@@ -74,7 +75,8 @@ struct SystemParameters {
         rotation_matrix(three(Parameter::tracker_rotation)) * nominal.sensor.T_tracker_base.rotation;
     Effects effects = nominal.model.effects();
     effects.for_each([&](auto& effect, int first) {
-      for (std::size_t k = 0; k < effect.values.size(); ++k) effect.values[k] = x[Robot::count + first + Eigen::Index(k)];
+      for (std::size_t k = 0; k < effect.values.size(); ++k)
+        effect.values[k] = x[Robot::count + first + Eigen::Index(k)];
     });
     return {transmission, Model<N, Fx>(robot, effects), sensor, nominal.settings};
   }

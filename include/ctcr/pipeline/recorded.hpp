@@ -21,62 +21,6 @@ struct RecordedRow {
   Occasion at;
 };
 
-/// What the motion before each row left behind in the effects. Rows in the order of recording; between them joints move
-/// in a straight line. Real time: no (allocates).
-template <int N, class Fx>
-std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
-                                                          std::span<const RecordedRow<N>> rows) {
-  using Memory = typename Fx::template On<N>::Memory;
-  std::vector<Memory> memory(rows.size());
-  std::vector<Joints<N>> q;
-  std::vector<double> time;
-  for (const RecordedRow<N>& row : rows) {
-    q.push_back(joints(system.transmission, row.theta));
-    if (std::isfinite(row.at.time)) time.push_back(row.at.time);
-  }
-  if (time.size() < rows.size()) time.clear();
-  const Path<N> path{q, time};
-  const auto& list = system.model.effects().list;
-  [&]<std::size_t... I>(std::index_sequence<I...>) {
-    const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
-      using Effect = std::tuple_element_t<J, std::remove_cvref_t<decltype(list)>>;
-      constexpr int states = int(Effect{}.past.state.size());
-      if constexpr (states > 0) {
-        constexpr int groups = lane_groups(Effect::count);
-        const auto effect = [&]<template <int, class> class E>(const E<N, double>& plain) {
-          E<N, Dual<groups>> dual;
-          for (int k = 0; k < Effect::count; ++k) {
-            dual.values[std::size_t(k)] = plain.values[std::size_t(k)];
-            dual.values[std::size_t(k)].d[k / lane_count] = unit_lane(k % lane_count);
-          }
-          for (std::size_t row = 0; row < rows.size(); ++row) {
-            dual.remember(path, row);
-            auto& past = std::get<J>(memory[row]);
-            for (std::size_t i = 0; i < std::size_t(states); ++i) {
-              past.state[i] = dual.past.state[i].v;
-              for (int k = 0; k < Effect::count; ++k)
-                past.slope[i][std::size_t(k)] = dual.past.state[i].d[k / lane_count][k % lane_count];
-            }
-          }
-        };
-        effect(std::get<J>(list));
-      }
-    };
-    (fill(std::integral_constant<std::size_t, I>{}), ...);
-  }(std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(list)>>>{});
-  return memory;
-}
-
-/// Every station of a row's way.
-template <int N, class Fx>
-struct RecordedPrediction {
-  Joints<N> q;   ///< that the tubes have
-  TipLoad load;  ///< with what the surroundings add
-  Model<N, Fx> model;
-  Solution<N> solution;
-  Pose reading;  ///< T_tracker_sensor
-};
-
 namespace detail {
 
 template <int N, class S>
@@ -86,11 +30,79 @@ void joints_of(const Transmission<N>& t, const MotorAngles<N>& theta, const auto
   const S translation = seed(t.translation_ratio, P::index(Parameter::translation_ratio));
   const S rotation = seed(t.rotation_ratio, P::index(Parameter::rotation_ratio));
   for (int i = 0; i < N; ++i) {
-    beta[std::size_t(i)] = translation * theta.translation[i] +
-                           seed(t.home_translation[i], P::index(Parameter::home_translation, i));
-    alpha[std::size_t(i)] = rotation * theta.rotation[i] + seed(t.home_rotation[i], P::index(Parameter::home_rotation, i));
+    beta[std::size_t(i)] =
+        translation * theta.translation[i] + seed(t.home_translation[i], P::index(Parameter::home_translation, i));
+    alpha[std::size_t(i)] =
+        rotation * theta.rotation[i] + seed(t.home_rotation[i], P::index(Parameter::home_rotation, i));
   }
 }
+
+/// What one effect remembers of each row, by the motion before it.
+template <int N, template <int, class> class E>
+void remember(const E<N, double>& effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
+              std::span<const double> time, const auto& keep) {
+  using V = ParameterVector<N>;
+  constexpr int count = E<N, double>::count, slopes = count + E<N, double>::transmission_count;
+  using P = Dual<lane_groups(slopes)>;
+  const auto seeded = [](double x, int lane) {
+    P p = x;
+    p.d[lane / lane_count] = unit_lane(lane % lane_count);
+    return p;
+  };
+  std::vector<typename Path<N, P>::Row> q(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    joints_of<N, P>(
+        transmission, rows[i].theta,
+        [&](double x, int index) { return seeded(x, count + index - V::index(Parameter::translation_ratio)); },
+        q[i].beta, q[i].alpha);
+  E<N, P> dual;
+  for (int k = 0; k < count; ++k) dual.values[std::size_t(k)] = seeded(effect.values[std::size_t(k)], k);
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    dual.remember(Path<N, P>{q, time}, row);
+    auto& past = keep(row);
+    for (std::size_t i = 0; i < past.state.size(); ++i) {
+      past.state[i] = dual.past.state[i].v;
+      for (int k = 0; k < slopes; ++k)
+        past.slope[i][std::size_t(k)] = dual.past.state[i].d[k / lane_count][k % lane_count];
+    }
+  }
+}
+
+}  // namespace detail
+
+/// What the motion before each row left behind in the effects. Rows in the order of recording; between them joints move
+/// in a straight line. Real time: no (allocates).
+template <int N, class Fx>
+std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
+                                                          std::span<const RecordedRow<N>> rows) {
+  std::vector<typename Fx::template On<N>::Memory> memory(rows.size());
+  std::vector<double> time;
+  for (const RecordedRow<N>& row : rows)
+    if (std::isfinite(row.at.time)) time.push_back(row.at.time);
+  if (time.size() < rows.size()) time.clear();
+  const auto& list = system.model.effects().list;
+  [&]<std::size_t... I>(std::index_sequence<I...>) {
+    const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
+      if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty())
+        detail::remember<N>(std::get<J>(list), system.transmission, rows, time,
+                            [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); });
+    };
+    (fill(std::integral_constant<std::size_t, I>{}), ...);
+  }(std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(list)>>>{});
+  return memory;
+}
+
+/// Every station of a row's way.
+template <int N, class Fx>
+struct RecordedPrediction {
+  Joints<N> q;                     ///< that the tubes have
+  TipLoad load;                    ///< with what the surroundings add
+  Model<N, Fx> model{Robot<N>{}};  ///< with the past of this row
+  Solution<N> solution;
+  Pose reading;  ///< T_tracker_sensor
+};
+
+namespace detail {
 
 template <int N, class S>
 TubeParameters<S> tube_of(const Tube& t, int i, const auto& seed) noexcept {
@@ -99,8 +111,9 @@ TubeParameters<S> tube_of(const Tube& t, int i, const auto& seed) noexcept {
   constexpr double pi = std::numbers::pi;
   const S inner = field(Parameter::inner_diameter), outer = field(Parameter::outer_diameter);
   const S inner2 = inner * inner, outer2 = outer * outer;
-  const S k = t.bending_stiffness > 0 ? field(Parameter::bending_stiffness)
-                                      : field(Parameter::youngs_modulus) * ((pi / 64) * (outer2 * outer2 - inner2 * inner2));
+  const S k = t.bending_stiffness > 0
+                  ? field(Parameter::bending_stiffness)
+                  : field(Parameter::youngs_modulus) * ((pi / 64) * (outer2 * outer2 - inner2 * inner2));
   return {k,
           k * inverse(1.0 + field(Parameter::poisson_ratio)),
           field(Parameter::curvature),
@@ -111,12 +124,62 @@ TubeParameters<S> tube_of(const Tube& t, int i, const auto& seed) noexcept {
 
 }  // namespace detail
 
+namespace detail {
+
+/// Solves with what the tip's surroundings add to the load: Newton's method on that push, whose slope by the tip's
+/// position is known, and so is the tip's compliance.
+template <int N, class Fx>
+Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, const Settings& settings) noexcept {
+  using S = Dual<1>;
+  constexpr int iterations = 30;
+  constexpr double tolerance = 1e-8;  // [N]
+  Status status = solve(out.model, out.q, out.load, ws, out.solution, settings);
+  const Vec3 known = out.load.force;
+  const auto effects = out.model.effects().template seeded<S>([](double x, int) { return S(x); });
+  Vec3 push, added = Vec3::Zero(), change = Vec3::Zero();
+  Mat3 slope;
+  const auto look = [&] {
+    std::array<S, 3> at, f{0.0, 0.0, 0.0};
+    for (int i = 0; i < 3; ++i) {
+      at[std::size_t(i)] = out.solution.position[i];
+      at[std::size_t(i)].d[0] = unit_lane(i);
+    }
+    effects.environment(at, f);
+    for (int i = 0; i < 3; ++i) {
+      push[i] = f[std::size_t(i)].v;
+      for (int j = 0; j < 3; ++j) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
+    }
+  };
+  look();
+  if (push.isZero(0.0)) return status;
+  for (int k = 0; k < iterations && (status == Status::ok || status == Status::singular); ++k) {
+    status = solve<Derivatives::compliance>(out.model, out.q, out.load, ws, out.solution, settings);
+    look();
+    if (push.isZero(0.0)) {  // pushed out: the solution lies between
+      change *= 0.5;
+      added -= change;
+    } else {
+      const Mat3 C = out.solution.compliance.template topLeftCorner<3, 3>();
+      change = (Mat3::Identity() - slope * C).partialPivLu().solve(push - added);
+      if (change.norm() < tolerance) return status;
+      added += change;
+    }
+    out.load.force = known + added;
+  }
+  if (status == Status::ok || status == Status::singular) status = Status::not_converged;
+  return out.solution.status = status;
+}
+
+}  // namespace detail
+
 /// What the tracker will read in a row.
 /// @param memory  of this row, as memories() gives it
-/// @return as solve(). Real time: yes.
+/// @return as solve(), not_finite where a parameter of an effect is not a number, not_converged where the tip and its
+///         surroundings find no balance. Real time: yes.
 template <int N, class Fx>
-Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typename Fx::template On<N>::Memory& memory,
-               Workspace<N>& ws, RecordedPrediction<N, Fx>& out) noexcept {
+Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
+               const typename Fx::template On<N>::Memory& memory, Workspace<N>& ws,
+               RecordedPrediction<N, Fx>& out) noexcept {
   auto effects = system.model.effects();
   effects.remember(memory);
   std::array<double, N> beta, alpha;
@@ -125,43 +188,26 @@ Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typ
   for (int i = 0; i < N; ++i) out.q.beta[i] = beta[std::size_t(i)], out.q.alpha[i] = alpha[std::size_t(i)];
   out.load = row.load;
   out.model = Model<N, Fx>(system.model.robot(), effects);
-  Status status = solve(out.model, out.q, out.load, ws, out.solution, system.settings);
-  if constexpr (Fx::template On<N>::has_environment) {
-    const auto pushed = [&](const Vec3& p, Vec3& force, Mat3* slope) {
-      using S = Dual<1>;
-      std::array<S, 3> position{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
-      for (int i = 0; i < 3; ++i) position[std::size_t(i)].d[0] = unit_lane(i);
-      effects.template seeded<S>([](double x, int) { return S(x); }).environment(position, f);
-      for (int i = 0; i < 3; ++i) {
-        force[i] = f[std::size_t(i)].v;
-        if (slope != nullptr)
-          for (int j = 0; j < 3; ++j) (*slope)(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
-      }
-    };
-    Vec3 force, added = Vec3::Zero();
-    Mat3 slope;
-    constexpr int iterations = 8;
-    pushed(out.solution.position, force, nullptr);
-    if (!force.isZero(0.0))
-      for (int k = 0; k < iterations && (status == Status::ok || status == Status::singular); ++k) {
-        status = solve<Derivatives::compliance>(out.model, out.q, out.load, ws, out.solution, system.settings);
-        pushed(out.solution.position, force, &slope);
-        const Vec3 rest = force - added;
-        if (rest.norm() < 1e-9) break;
-        added += (Mat3::Identity() - slope * out.solution.compliance.template topLeftCorner<3, 3>()).partialPivLu().solve(rest);
-        out.load.force = row.load.force + added;
-      }
-  }
+  if constexpr (Fx::template On<N>::has_environment)
+    (void)detail::solve_in_surroundings(ws, out, system.settings);
+  else
+    (void)solve(out.model, out.q, out.load, ws, out.solution, system.settings);
   Frame<double> reading =
       frame_of<double>(system.sensor.T_tracker_base * out.solution.tube_tips[std::size_t(system.sensor.tube)]);
   effects.sense(row.at, reading);
   out.reading = pose_of(reading);
-  return status;
+  if (!(effects.finite() && out.reading.position.allFinite() && out.reading.rotation.allFinite())) {
+    out.solution = Solution<N>{};
+    out.solution.status = Status::not_finite;
+    out.reading = Pose{};
+    ws.reset();
+  }
+  return out.solution.status;
 }
 
 /// Exact derivatives, of the discretised model, of the reading that predict() just left in `ws` and `prediction`, by
 /// some of the system's parameters. Rows: position [m], rotation [rad], tracker axes.
-/// @param variables  places in SystemParameters<N, Fx>
+/// @param variables  places in SystemParameters<N, Fx>, each once
 /// @param out        6 x variables.size()
 /// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for eight variables.
 template <int N, class Fx>
@@ -186,8 +232,7 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
   slot.fill(-1);
   const int asked = int(variables.size());
   for (int j = 0; j < asked; ++j) slot[std::size_t(variables[std::size_t(j)])] = Pass::unknowns + j;
-  const bool pushed = On::has_environment && prediction.load.force != row.load.force;
-  const int force = Pass::unknowns + asked, count = force + (pushed ? 3 : 0);
+  const int force = Pass::unknowns + asked;
 
   const auto seeding = [&](const detail::Window& window) {
     return [&slot, window](double x, int index) noexcept {
@@ -196,15 +241,31 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
     };
   };
   const auto seeded_effects = [&](const auto& seed) {
-    return effects.template seeded<S>([&](double x, int k) { return seed(x, V::count + k); });
+    return effects.template seeded<S>([&](double x, int k) { return seed(x, V::count + k); },
+                                      [&](int k) { return seed(0, V::index(Parameter::translation_ratio) + k); });
   };
 
-  LaneRow<groups> rows[Pass::rows];
+  // What the surroundings add, and its slopes by the variables: it may be nothing and yet have some.
+  bool pushed = false;
+  std::array<std::array<S, 3>, groups / detail::Window::groups> push;
+  if constexpr (On::has_environment) {
+    const Vec3& p = prediction.solution.position;
+    for (detail::Window window; window.first < force; window.first += window.size) {
+      auto& f = push[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
+      seeded_effects(seeding(window)).environment({p[0], p[1], p[2]}, f);
+      for (const S& x : f) {
+        pushed = pushed || x.v != 0;
+        for (int l = 0; l < window.size; ++l) pushed = pushed || x.d[l / lane_count][l % lane_count] != 0;
+      }
+    }
+  }
+  const int count = force + (pushed ? 3 : 0);
+
+  LaneRow<groups> rows[Pass::rows + (On::has_environment ? 3 : 0)];
   for (auto& r : rows)
     for (auto& x : r.x) x = Lanes{};
-  const Events<N> events = sort_events(make_coefficients(model.robot()), prediction.q.beta);
+  const Events<N> events = sort_events(with_all_curves(model.robot()), prediction.q.beta);
   TipGuess<N> guess = ws.guess;
-  std::array<std::array<S, 3>, (max_lanes + 7) / 8> push;  // slopes of the surroundings' force by the variables
   for (detail::Window window; window.first < count; window.first += window.size) {
     const auto seed = seeding(window);
     RodInputs<N, S, Fx> in;
@@ -219,46 +280,44 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
       in.moment[k] = prediction.load.moment[i];
       in.force[k] = pushed ? window(prediction.load.force[i], force + i) : S(prediction.load.force[i]);
     }
-    if (pushed) {
-      const Vec3& p = prediction.solution.position;
-      auto& f = push[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
-      in.effects.environment({p[0], p[1], p[2]}, f);
-    }
     Pass(in, events, guess, system.sensor.tube, system.settings.steps, window).write(rows, window.first / lane_count);
   }
   constexpr auto lane = [](int j) constexpr { return j; };
   (void)eliminate<Pass::unknowns>(rows, lane);
 
-  if (pushed) {
-    // df = push dv + slope dp and dp = A dv + C df, for tube 1's tip.
-    using Slope = Dual<1>;
-    const Vec3& p = prediction.solution.position;
-    std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
-    for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
-    effects.template seeded<Slope>([](double x, int) { return Slope(x); }).environment(at, f);
-    Mat3 slope, C;
-    Eigen::Matrix<double, 6, 3> by_force;
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 3; ++j) by_force(i, j) = rows[Pass::unknowns + i][force + j];
-    C = by_force.template topRows<3>();
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
-    const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - slope * C);
-    for (int j = Pass::unknowns; j < force; ++j) {
-      Vec3 A, direct;
-      for (int i = 0; i < 3; ++i) {
-        A[i] = rows[Pass::unknowns + i][j];
-        const int l = j % detail::Window::size;
-        direct[i] = push[std::size_t(j / detail::Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
+  if constexpr (On::has_environment) {
+    if (pushed) {
+      // df = push dv + slope dp and dp = A dv + C df, p the robot tip.
+      using Slope = Dual<1>;
+      const Vec3& p = prediction.solution.position;
+      std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
+      for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
+      effects.template seeded<Slope>([](double x, int) { return Slope(x); }).environment(at, f);
+      Mat3 slope, C;
+      Eigen::Matrix<double, 6, 3> by_force;
+      for (int j = 0; j < 3; ++j) {
+        for (int i = 0; i < 6; ++i) by_force(i, j) = rows[Pass::unknowns + i][force + j];
+        for (int i = 0; i < 3; ++i) C(i, j) = rows[Pass::rows + i][force + j];
+        for (int i = 0; i < 3; ++i) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
       }
-      const Vec6 change = by_force * lu.solve(direct + slope * A);
-      for (int i = 0; i < 6; ++i) rows[Pass::unknowns + i].add(j, change[i]);
+      const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - slope * C);
+      for (int j = Pass::unknowns; j < force; ++j) {
+        Vec3 A, direct;
+        for (int i = 0; i < 3; ++i) {
+          A[i] = rows[Pass::rows + i][j];
+          const int l = j % detail::Window::size;
+          direct[i] = push[std::size_t(j / detail::Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
+        }
+        const Vec6 change = by_force * lu.solve(direct + slope * A);
+        for (int i = 0; i < 6; ++i) rows[Pass::unknowns + i].add(j, change[i]);
+      }
     }
   }
 
   using detail::operator*;
   const Pose& T_base_tip = prediction.solution.tube_tips[std::size_t(system.sensor.tube)];
-  const Mat3 R_tip_base = T_base_tip.rotation.transpose(), R_base_tracker = system.sensor.T_tracker_base.rotation.transpose();
+  const Mat3 R_tip_base = T_base_tip.rotation.transpose(),
+             R_base_tracker = system.sensor.T_tracker_base.rotation.transpose();
   for (detail::Window window; window.first < force; window.first += window.size) {
     const auto seed = seeding(window);
     Frame<S> tip = frame_of<S>(T_base_tip), T_ref = frame_of<S>(system.sensor.T_tracker_base);

@@ -126,6 +126,12 @@ class BoundModel {
 }  // namespace
 }  // namespace ctcr::python
 
+namespace ctcr::python {
+void bind_calibration(nb::module_& m);
+void bind_identify(nb::module_& m);
+void bind_effects(nb::module_& m);
+}  // namespace ctcr::python
+
 NB_MODULE(_core, m) {
   using ctcr::Status;
   using ctcr::python::BoundModel;
@@ -168,4 +174,7 @@ NB_MODULE(_core, m) {
            "internal_moment"_a.noconvert(), "tube_angle"_a.noconvert(), "tube_curvature"_a.noconvert(),
            "tube_moment"_a.noconvert(),
            "Writes the shape into the given arrays; returns the status and the number of places written.");
+  ctcr::python::bind_calibration(m);
+  ctcr::python::bind_identify(m);
+  ctcr::python::bind_effects(m);
 }

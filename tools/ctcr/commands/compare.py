@@ -19,7 +19,12 @@ CHUNK_ROWS = 1 << 16
     show_default=True,
     help="Integration steps per segment; more is finer and slower.",
 )
-def command(robot: str, measurements: str, report: str | None, json_target: str | None, steps: int) -> None:
+@click.option(
+    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
+)
+def command(
+    robot: str, measurements: str, report: str | None, json_target: str | None, steps: int, own
+) -> None:
     """Compare the model of ROBOT with the poses in MEASUREMENTS.
 
     Shows the size of the error against noise, the difference between visits of the same joints from opposite
@@ -29,6 +34,10 @@ def command(robot: str, measurements: str, report: str | None, json_target: str 
     from ctcr import output, robot_file
     from ctcr.compare import compare, terminal
 
+    if own:
+        from ctcr import user_effects
+
+        user_effects.load_all(own)
     loaded = robot_file.load(robot)
     readings = table.load(measurements, loaded.n_tubes)
     result = compare(loaded, readings, _predict(loaded, readings, steps))
@@ -50,7 +59,7 @@ def command(robot: str, measurements: str, report: str | None, json_target: str 
 
 
 def _predict(robot, readings, steps: int):
-    """Predicted poses of all readings, in chunks so that a long table shows its progress."""
+    """Predicted poses of all readings, in chunks so that a long table shows its progress; effects need all at once."""
     from types import SimpleNamespace
 
     import numpy as np
@@ -58,11 +67,16 @@ def _predict(robot, readings, steps: int):
     from ctcr.model import Model
     from ctcr.output import Progress
 
+    if robot.effects:
+        from ctcr import effect_model
+
+        return effect_model.readings(robot, readings, steps)
     model, parts = Model(robot, steps=steps), []
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     with Progress("predicting", len(readings)) as progress:
         for start in range(0, len(readings), CHUNK_ROWS):
             rows = slice(start, start + CHUNK_ROWS)
-            parts.append(model.predict(readings.beta[rows], readings.alpha[rows], readings.force[rows]))
+            parts.append(model.predict(beta[rows], alpha[rows], readings.force[rows]))
             progress.advance(len(readings.run[rows]))
     return SimpleNamespace(**{
         name: np.concatenate([getattr(part, name) for part in parts]) for name in ("position", "quaternion", "status")

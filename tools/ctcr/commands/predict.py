@@ -32,19 +32,29 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
 @click.option(
     "--json", "json_target", metavar="FILE", help="Write the summary as JSON; - for standard output."
 )
-def command(robot: str, table: str, target: str, frame: str, steps: int, json_target: str | None) -> None:
+@click.option(
+    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
+)
+def command(
+    robot: str, table: str, target: str, frame: str, steps: int, json_target: str | None, own
+) -> None:
     """Add the pose that the model of ROBOT predicts to each row of TABLE.
 
     The new columns are pred_x_m .. pred_z_m and the quaternion pred_qw .. pred_qz of the tube that carries the
-    sensor. Rows that cannot be solved stay empty and are listed.
+    sensor, with the effects that ROBOT has. Rows that cannot be solved stay empty and are listed.
     """
     from ctcr import measurements, output, robot_file
-    from ctcr.model import Model
 
+    if own:
+        from ctcr import user_effects
+
+        user_effects.load_all(own)
     loaded = robot_file.load(robot)
     readings = measurements.load(table, loaded.n_tubes)
     with output.atomic_writer(target, binary=True) as file:
-        unsolved = _write(file, Path(table), readings, Model(loaded, steps=steps), loaded.tracker, frame)
+        unsolved = _write(
+            file, Path(table), readings, _predictor(loaded, readings, steps), loaded.tracker, frame
+        )
     summary = {
         "rows": len(readings),
         "solved": len(readings) - len(unsolved),
@@ -57,7 +67,23 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, json_ta
     _report(output.console(json_target), summary, target, robot, len(robot_file.warnings(loaded)))
 
 
-def _write(file, table: Path, readings, model, tracker, frame: str) -> list[tuple[int, str]]:
+def _predictor(robot, readings, steps: int):
+    """Predicts a slice of the readings; effects need all of them at once, in their order."""
+    from types import SimpleNamespace
+
+    if robot.effects:
+        from ctcr import effect_model
+
+        found = effect_model.readings(robot, readings, steps)
+        return lambda rows: SimpleNamespace(**{name: values[rows] for name, values in vars(found).items()})
+    from ctcr.model import Model
+
+    model = Model(robot, steps=steps)
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
+    return lambda rows: model.predict(beta[rows], alpha[rows], readings.force[rows])
+
+
+def _write(file, table: Path, readings, predict, tracker, frame: str) -> list[tuple[int, str]]:
     """Copies the table with the predictions beside it; returns (row, why) of those not solved."""
     from ctcr.output import Progress
 
@@ -66,7 +92,7 @@ def _write(file, table: Path, readings, model, tracker, frame: str) -> list[tupl
         file.write(_line(source.readline(), "," + ",".join(POSE_COLUMNS)))
         for start in range(0, len(readings), CHUNK_ROWS):
             rows = slice(start, min(start + CHUNK_ROWS, len(readings)))
-            poses, status = _predict(model, readings, rows, tracker, frame)
+            poses, status = _fields(predict(rows), tracker, frame)
             lines = islice(source, rows.stop - start)
             file.write(b"".join(map(_line, lines, poses)))
             unsolved += [(int(readings.row[start + i]), text) for i, text in enumerate(status) if text]
@@ -74,14 +100,13 @@ def _write(file, table: Path, readings, model, tracker, frame: str) -> list[tupl
     return unsolved
 
 
-def _predict(model, readings, rows: slice, tracker, frame: str) -> tuple[list[str], list[str]]:
+def _fields(answer, tracker, frame: str) -> tuple[list[str], list[str]]:
     """The new fields of each row as text, and why a row has none ("" where it has)."""
     import numpy as np
 
     from ctcr import frames
     from ctcr.model import status_text
 
-    answer = model.predict(readings.beta[rows], readings.alpha[rows], readings.force[rows])
     position, quaternion = answer.position, answer.quaternion
     if frame == "tracker":
         position, quaternion = frames.base_to_tracker(tracker, position, quaternion)

@@ -53,11 +53,13 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_
     beta = _joints("beta", beta, "beta-mm", beta_mm, 1e-3, loaded.n_tubes)
     alpha = _joints("alpha", alpha, "alpha-deg", alpha_deg, np.pi / 180, loaded.n_tubes)
     force = _finite("force", np.array(force), 3)
-    model = Model(loaded, steps=steps)
+    used, left_out = _without_path(loaded) if loaded.effects else (loaded, [])
+    model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
-    shape = model.shape(beta, alpha, force, points=SAMPLES)
+    standard = Model(loaded.model_copy(update={"effects": {}}), steps=steps) if loaded.effects else model
+    shape = standard.shape(beta, alpha, force, points=SAMPLES)
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
     if picture:
         from ctcr.frames import matrix_from_quaternion
@@ -76,7 +78,34 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_
     data = _as_data(loaded, shape, tip, ends)
     if json_target:
         output.write_json(data, json_target)
-    _report(output.console(json_target), loaded, data, picture)
+    console = output.console(json_target)
+    _report(console, loaded, data, picture)
+    if loaded.effects:
+        _tell_effects(console, tip.position[0], used, left_out)
+
+
+def _without_path(robot):
+    """The robot without the effects that depend on how its joints were reached, and their names."""
+    from ctcr import effect_model
+
+    left_out = effect_model.of_the_path(robot)
+    kept = {name: given for name, given in robot.effects.items() if name not in left_out}
+    return robot.model_copy(update={"effects": kept}), left_out
+
+
+def _tell_effects(console, tip, robot, left_out: list[str]) -> None:
+    from ctcr.effect_model import OF_THE_TRACKER
+
+    acting = [name for name in robot.effects if name not in OF_THE_TRACKER]
+    if acting:
+        place = ", ".join(f"{1e3 * x:.3f}" for x in tip)
+        text = (
+            f"With {', '.join(acting)} the sensor is at {place} mm; the shape is that of the standard model."
+        )
+        console.print(text, markup=False)
+    if left_out:
+        text = f"Left out, as it depends on how the joints were reached: {', '.join(left_out)}"
+        console.print(text, markup=False)
 
 
 def _joints(name: str, values, other: str, other_values, factor: float, n_tubes: int):
@@ -157,6 +186,7 @@ def _report(console, robot, data: dict, picture: str | None) -> None:
     console.print(
         "tip quaternion " + ", ".join(f"{x:.5f}" for x in tip["quaternion_wxyz"]) + "  (w, x, y, z)"
     )
-    console.print(f"stability      {data['stability']:.3g}  (0: about to snap)")
+    if data["stability"] == data["stability"]:  # not known with effects
+        console.print(f"stability      {data['stability']:.3g}  (0: about to snap)")
     if picture:
         console.print(f"picture: {picture}", markup=False)

@@ -1,0 +1,85 @@
+#pragma once
+// What a joint identification refuses, and what it has to say beside its numbers.
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "ctcr/calibration/identification.hpp"
+
+namespace ctcr {
+namespace detail {
+
+inline std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// All that makes a fit impossible. @throws std::invalid_argument with one sentence a line
+inline void check(const std::vector<FreeParameter>& parameters, const Noise& noise, const Eigen::MatrixX3d& places,
+                  const IdentifyOptions& options) {
+  std::string faults;
+  const auto require = [&](bool condition, const std::string& text) {
+    if (!condition) faults += (faults.empty() ? "" : "\n") + text;
+  };
+  require(!parameters.empty(), "nothing is free: name at least one parameter");
+  for (const FreeParameter& p : parameters) {
+    require(std::isfinite(p.mean), p.name + ": its prior mean is not finite");
+    require(p.sd > 0, p.name + ": its prior standard deviation is " + number(p.sd) +
+                          ", but must be above 0; leave a parameter that is known exactly out of the fit");
+    require(p.low < p.high && p.low <= p.mean && p.mean <= p.high, p.name + ": its prior mean " + number(p.mean) +
+                                                                       " lies outside its bounds " + number(p.low) +
+                                                                       " and " + number(p.high));
+  }
+  require(noise.position_jitter > 0 && noise.rotation_jitter > 0,
+          "the jitter of the tracker must be above 0, both in position and in rotation");
+  require(noise.position_field >= 0 && noise.rotation_field >= 0 && noise.correlation_length > 0,
+          "the tracker's field error must not be negative, and its correlation length must be above 0");
+  require(!options.weights || (options.weights->rows() == places.rows() && options.weights->allFinite() &&
+                               options.weights->minCoeff() >= 0),
+          "weights must be two numbers, not negative, for each row");
+  require(!options.inflation || (options.inflation->allFinite() && options.inflation->minCoeff() > 0),
+          "the inflation of the jitter must be above 0");
+  require(!options.start || options.start->size() == Eigen::Index(parameters.size()),
+          "the start must hold one value for each parameter");
+  if (!faults.empty()) throw std::invalid_argument(faults);
+}
+
+inline void add_warnings(const std::vector<FreeParameter>& parameters, const Posterior& posterior,
+                         const Eigen::VectorXd& information, const RowWeights& use, Identification& out) {
+  const auto warn = [&](const std::string& text) { out.warnings.push_back(text); };
+  const auto n = Eigen::Index(parameters.size());
+  if (out.observations < n)
+    warn("only " + std::to_string(out.observations) + " numbers were measured for " + std::to_string(n) +
+         " parameters: the prior decides");
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const FreeParameter& p = parameters[std::size_t(k)];
+    if (!(information[k] > 0))
+      warn(p.name + " has no effect on these readings: it stays where it was");
+    else if (!std::isfinite(out.sd[k]))
+      warn(p.name + " is not determined by these readings, and no prior says what it is: give it one or leave it out");
+    if (std::abs(out.shift[k]) > 2)
+      warn(p.name + " moved by " + number(out.shift[k]) +
+           " prior standard deviations: its prior is too narrow, or it stands in for something else");
+    const double margin = 1e-6 * out.sd[k];
+    if (out.values[k] <= p.low + margin || out.values[k] >= p.high - margin)
+      warn(p.name + " stopped at its bound " + number(out.values[k]));
+  }
+  if (posterior.singular() && out.sd.allFinite()) warn("some combination of the parameters is not determined");
+  for (int kind = 0; kind < 2; ++kind)
+    if (out.inflation[kind] > 1)
+      warn("the noise does not explain the " + std::string(kind ? "rotations" : "positions") +
+           ": something is missing in the model, and the fit had to take the jitter for " +
+           number(out.inflation[kind]) + " times as large as stated");
+  for (int kind = 0; kind < 2; ++kind) {
+    const auto used = (use.col(kind).array() > 0).count();
+    const auto low = used - (out.weights.col(kind).array() > 0.5 * use.col(kind).array()).count();
+    if (low > 0.02 * double(used))
+      warn(std::to_string(low) + " of " + std::to_string(used) + (kind ? " rotations" : " positions") +
+           " are outliers and count for little");
+  }
+}
+
+}  // namespace detail
+
+}  // namespace ctcr

@@ -1,0 +1,183 @@
+#pragma once
+// A table of readings beside what a system with effects would have read: as readings.hpp, with the path behind each row.
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "ctcr/parallel/batch.hpp"
+#include "ctcr/pipeline/recorded.hpp"
+
+namespace ctcr {
+
+/// Residuals of a recording, and their exact derivatives, as functions of chosen parameters of the system.
+///
+/// A vector of parameters x holds values of SystemParameters<N, Fx>; tracker.rotation is the turn of T_ref from the
+/// nominal one about the tracker's axes, as one rotation vector [rad]. Rows stand in the order in which they were
+/// recorded. Each row starts from its own last solution. Answers do not depend on the number of threads. Not for several
+/// callers at once. Real time: no.
+template <int N, class Fx>
+class Recording {
+  using P = SystemParameters<N, Fx>;
+  using MemoryOfRow = typename Fx::template On<N>::Memory;
+
+public:
+  /// @param measured    T_tracker_sensor of each row, NaN where not measured
+  /// @param parameters  places of x in SystemParameters<N, Fx>
+  /// @param pool        must outlive this
+  Recording(const System<N, Fx>& nominal, std::vector<RecordedRow<N>> rows, std::vector<Pose> measured,
+            std::vector<int> parameters, ThreadPool& pool)
+    : nominal_(nominal),
+      rows_(std::move(rows)),
+      measured_(std::move(measured)),
+      parameters_(std::move(parameters)),
+      columns_(with_whole_turn(parameters_)),
+      pool_(&pool),
+      start_(rows_.size()),
+      predicted_(rows_.size()),
+      active_(rows_.size(), true),
+      workers_(std::size_t(pool.size())) {}
+
+  [[nodiscard]] Eigen::Index size() const { return Eigen::Index(rows_.size()); }
+
+  /// Values of the nominal system.
+  [[nodiscard]] Eigen::VectorXd nominal() const { return P::values(nominal_)(parameters_); }
+  /// The system with other values.
+  [[nodiscard]] System<N, Fx> system(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd all = P::values(nominal_);
+    all(parameters_) = x;
+    return P::with_values(nominal_, all);
+  }
+
+  /// Residuals at x, six a row: measured - predicted position [m], rotation vector [rad], tracker axes. NaN where not
+  /// measured and in rows left out.
+  /// @param residual  (6 rows)   @param jacobian  its derivatives (6 rows, parameters), or null; both are resized
+  /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
+  bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+    const System<N, Fx> system = this->system(x);
+    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_);
+    const Mat3 turning = left_jacobian(turn_of(x));
+    residual.resize(6 * size());
+    if (jacobian) jacobian->resize(6 * size(), x.size());
+    std::vector<std::uint8_t> failed(rows_.size(), 0);
+    const auto chunks = (size() + batch_chunk - 1) / batch_chunk;
+    pool_->parallel_for(int(chunks), [&](int chunk, int worker) noexcept {
+      Worker& w = workers_[std::size_t(worker)];
+      const auto first = std::size_t(chunk * batch_chunk),
+                 end = std::min(first + std::size_t(batch_chunk), rows_.size());
+      w.workspace.reset();
+      for (std::size_t i = first; i < end; ++i) {
+        const auto at = Eigen::Index(6 * i);
+        bool solved = active_[i] && solve_row(system, memory[i], i, w);
+        if (solved && jacobian) solved = differentiate_row(system, i, turning, w, *jacobian);
+        if (active_[i]) failed[i] = !solved;
+        if (solved) {
+          residual.segment<6>(at) = ctcr::residual(measured_[i], w.prediction.reading);
+          predicted_[i] = w.prediction.reading;
+        } else {
+          residual.segment<6>(at).setConstant(std::numeric_limits<double>::quiet_NaN());
+          if (jacobian) jacobian->middleRows<6>(at).setZero();
+        }
+      }
+    });
+    unsolved_.clear();
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      if (failed[i]) unsolved_.push_back(int(i));
+    return unsolved_.empty();
+  }
+
+  /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
+  [[nodiscard]] const std::vector<Pose>& predicted() const { return predicted_; }
+  /// Rows that could not be solved at the last call.
+  [[nodiscard]] const std::vector<int>& unsolved() const { return unsolved_; }
+  /// Rows to solve from now on; the others are left out.
+  void activate(const std::vector<bool>& rows) { active_ = rows; }
+  [[nodiscard]] const std::vector<bool>& active() const { return active_; }
+
+private:
+  struct Start {
+    TipGuess<N> guess;
+    bool known = false;
+  };
+  struct alignas(64) Worker {
+    Workspace<N> workspace;
+    RecordedPrediction<N, Fx> prediction;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> slopes;
+  };
+
+  bool solve_row(const System<N, Fx>& system, const MemoryOfRow& memory, std::size_t i, Worker& w) noexcept {
+    Workspace<N>& ws = w.workspace;
+    const Joints<N> q = joints(system.transmission, rows_[i].theta);
+    if (start_[i].known) {
+      ws.guess = start_[i].guess;
+      ws.q = q;
+      ws.load = rows_[i].load;
+      ws.knows_joints = ws.knows_load = false;
+      ws.warm = true;
+    } else if (ws.warm && !detail::nearby(ws, Configuration<N>{q, rows_[i].load})) {
+      ws.reset();
+    }
+    const bool solved = predict(system, rows_[i], memory, ws, w.prediction) == Status::ok;
+    if (!solved) ws.reset();
+    start_[i] = {ws.guess, solved};
+    return solved;
+  }
+
+  bool differentiate_row(const System<N, Fx>& system, std::size_t i, const Mat3& turning, Worker& w,
+                         Eigen::MatrixXd& jacobian) noexcept {
+    w.slopes.resize(6, Eigen::Index(columns_.size()));
+    if (differentiate<N, Fx>(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes) != Status::ok)
+      return false;
+    const Mat6 by_reading = residual_by_prediction(ctcr::residual(measured_[i], w.prediction.reading));
+    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
+    Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();
+    for (std::size_t k = 0; k < columns_.size(); ++k)
+      if (const int j = columns_[k] - rotation; j >= 0 && j < 3) turned.col(j) = w.slopes.col(Eigen::Index(k));
+    turned = (turned * turning).eval();
+    for (std::size_t k = 0; k < parameters_.size(); ++k) {
+      const int j = parameters_[k] - rotation;
+      const Vec6 slope = j >= 0 && j < 3 ? Vec6(turned.col(j)) : Vec6(w.slopes.col(Eigen::Index(k)));
+      jacobian.col(Eigen::Index(k)).template segment<6>(Eigen::Index(6 * i)) = by_reading * slope;
+    }
+    return true;
+  }
+
+  /// The parameters, and all turns of T_ref where one is among them: each changes what the others do.
+  static std::vector<int> with_whole_turn(std::vector<int> columns) {
+    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
+    const auto asked = [&](int place) { return std::find(columns.begin(), columns.end(), place) != columns.end(); };
+    if (asked(rotation) || asked(rotation + 1) || asked(rotation + 2))
+      for (int place = rotation; place < rotation + 3; ++place)
+        if (!asked(place)) columns.push_back(place);
+    return columns;
+  }
+
+  Vec3 turn_of(const Eigen::VectorXd& x) const {
+    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
+    Vec3 turn = Vec3::Zero();
+    for (std::size_t k = 0; k < parameters_.size(); ++k)
+      if (const int j = parameters_[k] - rotation; j >= 0 && j < 3) turn[j] = x[Eigen::Index(k)];
+    return turn;
+  }
+  /// exp(turn + d) = exp(left_jacobian(turn) d) exp(turn) to first order.
+  static Mat3 left_jacobian(const Vec3& turn) {
+    const ExpCoefficients c = exp_coefficients(turn.squaredNorm());
+    Mat3 W;
+    W << 0, -turn.z(), turn.y(), turn.z(), 0, -turn.x(), -turn.y(), turn.x(), 0;
+    return Mat3::Identity() + c.B * W + c.C * (W * W);
+  }
+
+  System<N, Fx> nominal_;
+  std::vector<RecordedRow<N>> rows_;
+  std::vector<Pose> measured_;
+  std::vector<int> parameters_, columns_;
+  ThreadPool* pool_;
+  std::vector<Start> start_;
+  std::vector<Pose> predicted_;
+  std::vector<bool> active_;
+  std::vector<Worker> workers_;
+  std::vector<int> unsolved_;
+};
+
+}  // namespace ctcr

@@ -1,0 +1,58 @@
+#pragma once
+// What a tube is made of along itself, as a table that is known at run time only: of effects that are not compiled.
+#include <algorithm>
+#include <vector>
+
+#include "ctcr/effects/hooks.hpp"
+
+namespace ctcr {
+
+/// What is added to the data sheet at a place of a tube.
+struct ProfileNode {
+  std::array<double, 2> curvature{};  ///< of the free tube about its x and y axes, added [1/m]
+  double stiffness = 0;               ///< relative change of EI
+};
+
+/// One table a tube: nodes at equal distances from the grasped point (0) to `length`, linear between them.
+template <int N>
+struct Profiles {
+  std::array<std::vector<ProfileNode>, N> nodes;  ///< empty, or at least two
+  std::array<double, N> length{};                 ///< [m]
+};
+
+namespace profile_table {
+inline constexpr EffectInfo info{
+    .id = "profile_table",
+    .title = "Profiles along the tubes",
+    .physics = "What a tube is made of changes along it.",
+    .signature = "",
+    .measure = "",
+    .look_alikes = "",
+    .reference = "",
+};
+inline constexpr std::array<EffectParameter, 0> parameters{};
+}  // namespace profile_table
+
+/// Profiles of `profiles`, which must outlive it; without any it changes nothing. The table is no parameter.
+template <int N, class P = double>
+struct ProfileTable : EffectValues<profile_table::parameters, N, P> {
+  static constexpr const EffectInfo& info = profile_table::info;
+
+  const Profiles<N>* profiles = nullptr;
+
+  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+    if (profiles == nullptr) return;
+    const auto tube = std::size_t(place.tube);
+    const std::vector<ProfileNode>& nodes = profiles->nodes[tube];
+    if (nodes.size() < 2) return;
+    const P x = place.along * (double(nodes.size() - 1) / profiles->length[tube]);
+    const auto first = std::size_t(std::clamp(value(x), 0.0, double(nodes.size() - 2)));
+    const ProfileNode &a = nodes[first], &b = nodes[first + 1];
+    const P part = x - double(first);
+    for (std::size_t i = 0; i < 2; ++i)
+      m.curvature[i] = m.curvature[i] + part * (b.curvature[i] - a.curvature[i]) + a.curvature[i];
+    m.bending_stiffness = m.bending_stiffness * (part * (b.stiffness - a.stiffness) + (1.0 + a.stiffness));
+  }
+};
+
+}  // namespace ctcr

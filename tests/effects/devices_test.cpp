@@ -1,0 +1,146 @@
+// Effects of the drives, of the tracker and of the tip's surroundings.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "support/catalogue_cases.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::Random;
+
+using JointArray = std::array<double, 2>;
+
+/// What an effect adds to the joints.
+template <class E>
+std::pair<JointArray, JointArray> added(const E& effect, const JointArray& beta, const JointArray& alpha) {
+  JointArray b = beta, a = alpha;
+  effect.actuate({}, b, a);
+  for (std::size_t i = 0; i < 2; ++i) b[i] -= beta[i], a[i] -= alpha[i];
+  return {b, a};
+}
+
+TEST(PeriodicRotation, RepeatsWithEveryTurn) {
+  PeriodicRotation<2> effect;
+  effect.values = {0.01, 0, 0.02, 0.03, 2};  // twice a turn
+  const auto at = [&](double alpha) { return added(effect, {-0.2, -0.1}, {alpha, 0.3}); };
+  EXPECT_NEAR(at(0).second[0], 0.01, 1e-15);
+  EXPECT_NEAR(at(std::numbers::pi / 4).second[0], 0.02, 1e-15);
+  EXPECT_NEAR(at(0.7).second[0], at(0.7 + std::numbers::pi).second[0], 1e-14);
+  EXPECT_NEAR(at(0.7).second[0], -at(0.7 + std::numbers::pi / 2).second[0], 1e-14);
+  EXPECT_NEAR(at(0.7).second[1], 0.03 * std::sin(0.6), 1e-15);
+  EXPECT_EQ(at(0.7).first, JointArray{});
+}
+
+TEST(PeriodicTranslation, RepeatsWithThePitch) {
+  PeriodicTranslation<2> effect;
+  effect.values = {3e-5, 0, 2e-5, 1e-5, 0.002};
+  const auto at = [&](double beta) { return added(effect, {beta, -0.1}, {0.7, 0.3}); };
+  EXPECT_NEAR(at(0).first[0], 3e-5, 1e-18);
+  EXPECT_NEAR(at(-0.1234).first[0], at(-0.1234 + 0.006).first[0], 1e-15);
+  EXPECT_NEAR(at(-0.1234).first[0], -at(-0.1234 + 0.001).first[0], 1e-15);
+  EXPECT_EQ(at(-0.1234).second, JointArray{});
+}
+
+/// What the tracker makes of a pose.
+template <class E>
+Pose sensed(const E& effect, const Occasion& at, const Pose& pose) {
+  Frame<double> reading = frame_of<double>(pose);
+  effect.sense(at, reading);
+  return pose_of(reading);
+}
+
+Pose random_pose(Random& random) {
+  return {rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.3)};
+}
+
+TEST(SensorOffset, IsALeverArm) {
+  Random random(1);
+  SensorOffset<1> effect;
+  effect.values = {1e-3, -2e-3, 0.5e-3, 0.02, 0.03, -0.1};
+  for (int n = 0; n < 10; ++n) {
+    const Pose tip = random_pose(random), read = sensed(effect, {}, tip);
+    EXPECT_LE((read.position - tip.position - tip.rotation * Vec3(1e-3, -2e-3, 0.5e-3)).norm(), 1e-15);
+    EXPECT_LE((read.rotation - tip.rotation * rotation_matrix({0.02, 0.03, -0.1})).norm(), 1e-14);
+  }
+}
+
+TEST(FieldDistortion, DependsOnThePositionAlone) {
+  Random random(2);
+  FieldDistortion<1> effect;
+  for (double& x : effect.values) x = test::uniform(random, -1e-3, 1e-3);
+  const Vec3 centre(0.1, 0.2, -0.1);
+  const auto shift = [&](const Pose& pose) -> Vec3 {
+    const Pose read = sensed(effect, {.centre = centre}, pose);
+    EXPECT_LE((read.rotation - pose.rotation).norm(), 1e-15);
+    return read.position - pose.position;
+  };
+  const Pose pose = random_pose(random), turned{random_pose(random).rotation, pose.position};
+  EXPECT_LE((shift(pose) - shift(turned)).norm(), 1e-15);
+  // Linear and quadratic in the distance from the centre, of the size that its parameters say.
+  const auto along_x = [&](double x) { return shift({Mat3::Identity(), centre + Vec3(x, 0, 0)}); };
+  EXPECT_LE(along_x(0).norm(), 1e-15);
+  const Vec3 even = 0.5 * (along_x(0.05) + along_x(-0.05)), odd = 0.5 * (along_x(0.05) - along_x(-0.05));
+  EXPECT_LE((even - Vec3(effect.values[1], effect.values[7], effect.values[13])).norm(), 1e-15);
+  EXPECT_LE((odd - Vec3(0.05 * effect.values[0], 0, 0)).norm(), 1e-15);
+}
+
+TEST(FrameDrift, IsNothingHalfWay) {
+  Random random(3);
+  FrameDrift<1> effect;
+  effect.values = {1e-3, 2e-3, -1e-3, 0.01, -0.02, 0.03};
+  const Vec3 centre(0.1, 0, 0.3);
+  const Pose pose = random_pose(random);
+  EXPECT_LE((sensed(effect, {.part = 0.5, .centre = centre}, pose).position - pose.position).norm(), 1e-15);
+  const Pose first = sensed(effect, {.part = 0, .centre = centre}, pose);
+  const Pose last = sensed(effect, {.part = 1, .centre = centre}, first);
+  EXPECT_LE((last.rotation - pose.rotation).norm(), 1e-14);  // half the drift back and half forth
+  const Pose middle = sensed(effect, {.part = 1, .centre = centre}, Pose{Mat3::Identity(), centre});
+  EXPECT_LE((middle.position - centre - 0.5 * Vec3(1e-3, 2e-3, -1e-3)).norm(), 1e-15);
+}
+
+TEST(FrameJump, HappensOnce) {
+  Random random(4);
+  FrameJump<1> effect;
+  effect.values = {1e-3, 2e-3, -1e-3, 0.01, -0.02, 0.03, 0.4};
+  const Pose pose = random_pose(random);
+  EXPECT_LE((sensed(effect, {.part = 0.4}, pose).position - pose.position).norm(), 1e-15);
+  const Pose after = sensed(effect, {.part = 0.41}, pose);
+  const Mat3 turn = rotation_matrix({0.01, -0.02, 0.03});
+  EXPECT_LE((after.position - turn * pose.position - Vec3(1e-3, 2e-3, -1e-3)).norm(), 1e-15);
+  EXPECT_LE((after.position - sensed(effect, {.part = 1}, pose).position).norm(), 1e-15);
+}
+
+TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
+  Random random(5);
+  for (int n = 0; n < test::cases(6); ++n) {
+    auto recorded = test::random_recording<2>({}, n % 2, random);
+    const auto predicted = [&](double stiffness, const Vec3& normal, double distance) {
+      Catalogue::On<2> effects;
+      test::effect<Contact, 2>(effects).values = {stiffness, distance, std::atan2(normal.y(), normal.x()),
+                                                  std::asin(normal.z())};
+      recorded.system.model = Model<2, Catalogue>(recorded.system.model.robot(), effects);
+      Workspace<2> ws;
+      RecordedPrediction<2, Catalogue> p;
+      EXPECT_EQ(test::predict_last(recorded.system, recorded.rows, ws, p), Status::ok) << n << ", " << stiffness;
+      return p;
+    };
+    const Vec3 normal = test::random_vector(random, 1).normalized();
+    const auto free = predicted(0, normal, 0);
+    const double reach = normal.dot(free.solution.position);
+    EXPECT_EQ(predicted(1e6, normal, reach + 1e-6).solution.position, free.solution.position);
+    for (const double stiffness : {1.0, 100.0, 1e4, 1e6}) {
+      const auto touching = predicted(stiffness, normal, reach - 1e-3);
+      const double depth = normal.dot(touching.solution.position) - (reach - 1e-3);
+      const Vec3 push = touching.load.force - recorded.rows.back().load.force;
+      EXPECT_GT(depth, 0);
+      EXPECT_LT(depth, 1e-3);
+      EXPECT_LE((push / stiffness + depth * normal).norm(), 1e-8 / stiffness + 1e-9) << stiffness;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace ctcr

@@ -1,0 +1,223 @@
+// Effects that remember: friction, backlash, delay.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "support/catalogue_cases.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::effect, test::Random;
+
+/// A path through joints [rad], [m], at times [s]; motors are joints.
+template <int N>
+struct Walk {
+  System<N, Catalogue> system;
+  std::vector<RecordedRow<N>> rows;
+
+  explicit Walk(const Robot<N>& robot, const Catalogue::On<N>& effects = {})
+    : system{{1, 1, VecN<N>::Zero(), VecN<N>::Zero()}, Model<N, Catalogue>(robot, effects), {}, {.tolerance = 1e-12}} {}
+
+  Walk& to(const Joints<N>& q, double time = 0) {
+    rows.push_back({{q.beta, q.alpha}, {}, {.time = time}});
+    return *this;
+  }
+  /// What E remembers of the last row.
+  template <template <int, class> class E>
+  [[nodiscard]] auto remembered() const {
+    auto effects = system.model.effects();
+    effects.remember(memories<N, Catalogue>(system, rows).back());
+    return effect<E, N>(effects).past.state;
+  }
+  [[nodiscard]] Solution<N> solution() const {
+    Workspace<N> ws;
+    RecordedPrediction<N, Catalogue> p;
+    EXPECT_EQ(test::predict_last(system, rows, ws, p), Status::ok);
+    return p.solution;
+  }
+};
+
+const Robot<2>& two_tubes() {
+  static const Robot<2> robot{{test::paper_robot().tubes[0], test::paper_robot().tubes[1]}, Vec3::Zero()};
+  return robot;
+}
+Joints<2> at(double alpha_1, double alpha_2, double beta_1 = -0.35, double beta_2 = -0.25) {
+  Joints<2> q;
+  q.alpha << alpha_1, alpha_2;
+  q.beta << beta_1, beta_2;
+  return q;
+}
+
+Catalogue::On<2> with_friction(double coefficient, double insertion = 0) {
+  Catalogue::On<2> effects;
+  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0.3, insertion};
+  return effects;
+}
+
+TEST(Friction, FollowsTheDirectionOfTheLastRotation) {
+  const auto h = Walk<2>(two_tubes(), with_friction(0.03)).to(at(0, 0)).to(at(5, 0)).remembered<Friction>();
+  EXPECT_NEAR(h[0], 1, 1e-6);
+  EXPECT_EQ(h[1], 0);
+  const auto back =
+      Walk<2>(two_tubes(), with_friction(0.03)).to(at(0, 0)).to(at(5, 0)).to(at(4.7, 0)).remembered<Friction>();
+  EXPECT_NEAR(back[0], -1 + 2 * std::exp(-1), 1e-6);
+  const auto outer = Walk<2>(two_tubes(), with_friction(0.03)).to(at(0, 0)).to(at(0, 5)).remembered<Friction>();
+  EXPECT_NEAR(outer[0], -1, 1e-6);  // against the turning outer tube the inner one turned backwards
+  EXPECT_NEAR(outer[1], 1, 1e-6);
+}
+
+TEST(Friction, HoldsTheTipBackByTheTorqueThatItTransmits) {
+  // One tube whose curve is half in the plate: behind it the moment EI kappa, in front of it none.
+  Robot<1> robot;
+  robot.tubes[0] = test::paper_robot().tubes[0];
+  const Tube& tube = robot.tubes[0];
+  Joints<1> q;
+  q.beta << 0.02 - tube.length;
+  Catalogue::On<1> effects;
+  effect<Friction, 1>(effects).values = {0.05, 0.3, 0};
+  for (const double direction : {1.0, -1.0}) {
+    Joints<1> end = q;
+    end.alpha << 10 * direction;
+    const Solution<1> s = Walk<1>(robot, effects).to(q).to(end).solution();
+    const double torque = 0.05 * tube.EI() * tube.curvature, lag = torque * -q.beta[0] / tube.GJ();
+    const double stands = std::atan2(-s.position.x(), s.position.y()) + std::numbers::pi;  // it bends towards -y
+    EXPECT_NEAR(std::remainder(stands - (end.alpha[0] - direction * lag), 2 * std::numbers::pi), 0, 1e-6);
+    EXPECT_GT(lag, 0.1);
+  }
+}
+
+TEST(Friction, LagsAndNeverLeads) {
+  Random random(1);
+  for (int n = 0; n < test::cases(10); ++n) {
+    const double start = test::uniform(random, -3, 3), turn = test::uniform(random, 1, 3) * (n % 2 == 0 ? 1 : -1);
+    const auto after = [&](double coefficient) {
+      return Walk<2>(two_tubes(), with_friction(coefficient)).to(at(start - turn, 0)).to(at(start, 0));
+    };
+    const auto shape_behind_plate = [&](const Walk<2>& walk) {
+      Workspace<2> ws;
+      RecordedPrediction<2, Catalogue> p;
+      EXPECT_EQ(test::predict_last(walk.system, walk.rows, ws, p), Status::ok);
+      return p;
+    };
+    const auto rubbing = shape_behind_plate(after(0.01)), smooth = shape_behind_plate(after(0));
+    // Seen from the outer tube, which hardly moves, the tip of the inner one stays behind.
+    const double lead = rotation_vector(rubbing.solution.rotation * smooth.solution.rotation.transpose()).z();
+    EXPECT_LT(lead * turn, 0) << n;
+  }
+}
+
+TEST(Friction, DoesNotDependOnSpeedNorOnHowAMoveIsDivided) {
+  for (const double insertion : {0.0, 0.7}) {
+    Walk<2> once(two_tubes(), with_friction(0.03, insertion)), slowly = once, divided = once;
+    once.to(at(0, 0)).to(at(0.5, -0.1), 1).to(at(0.2, 0.3, -0.34, -0.24), 2);
+    slowly.to(at(0, 0)).to(at(0.5, -0.1), 100).to(at(0.2, 0.3, -0.34, -0.24), 300);
+    divided.to(at(0, 0)).to(at(0.5, -0.1), 1);
+    for (int k = 1; k <= 7; ++k) {
+      const double part = k / 7.0;
+      divided.to(at(0.5 - 0.3 * part, -0.1 + 0.4 * part, -0.35 + 0.01 * part, -0.25 + 0.01 * part), 1 + part);
+    }
+    const auto h = once.remembered<Friction>();
+    for (const auto& walk : {slowly, divided})
+      for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(walk.remembered<Friction>()[i], h[i], 1e-10);
+  }
+}
+
+TEST(Friction, IsTakenOffByInsertion) {
+  const auto h = [](double insertion) {
+    return Walk<2>(two_tubes(), with_friction(0.03, insertion))
+        .to(at(0, 0))
+        .to(at(5, 0))
+        .to(at(5, 0, -0.3499))
+        .remembered<Friction>()[0];
+  };
+  EXPECT_NEAR(h(0), 1, 1e-6);
+  EXPECT_NEAR(h(1), std::exp(-(1e-4 / 0.8e-3) / 0.3), 1e-6);
+}
+
+TEST(Backlash, IsAPlayOperator) {
+  Catalogue::On<2> effects;
+  constexpr double play = 0.02, gap = 1e-4;
+  effect<BacklashRotation, 2>(effects).values = {play, 0};
+  effect<BacklashTranslation, 2>(effects).values = {gap, 0};
+  Walk<2> walk(two_tubes(), effects);
+  const auto lag = [&] { return walk.remembered<BacklashRotation>()[0]; };
+  walk.to(at(0, 0));
+  EXPECT_EQ(lag(), 0);
+  walk.to(at(0.005, 0));
+  EXPECT_NEAR(lag(), -0.005, 1e-15);  // within the play the tube stands still
+  walk.to(at(1, 0.3));
+  EXPECT_NEAR(lag(), -play, 1e-15);
+  EXPECT_EQ(walk.remembered<BacklashRotation>()[1], 0);
+  walk.to(at(1, 1));
+  EXPECT_NEAR(lag(), -play, 1e-15);  // a tube at rest keeps its lag
+  walk.to(at(1 - play, 0));
+  EXPECT_NEAR(lag(), 0, 1e-12);
+  walk.to(at(-1, 0));
+  EXPECT_NEAR(lag(), play, 1e-15);
+  const auto closed = walk.remembered<BacklashRotation>();
+  walk.to(at(0, 0)).to(at(-1.5, 0)).to(at(-1, 0)).to(at(-1.5, 0)).to(at(-1, 0));
+  const auto loop = walk.remembered<BacklashRotation>();
+  walk.to(at(-1.5, 0)).to(at(-1, 0));
+  EXPECT_EQ(walk.remembered<BacklashRotation>(), loop);  // a closed loop closes
+  EXPECT_NEAR(loop[0], -closed[0], 1e-15);
+  EXPECT_EQ(walk.remembered<BacklashTranslation>()[0], 0);
+  walk.to(at(-1, 0, -0.34)).to(at(-1, 0, -0.34 - gap / 2));
+  EXPECT_NEAR(walk.remembered<BacklashTranslation>()[0], -gap / 2, 1e-15);
+}
+
+TEST(Backlash, DoesNotDependOnHowAMoveIsDivided) {
+  Catalogue::On<2> effects;
+  effect<BacklashRotation, 2>(effects).values = {0.3, 0.1};
+  Walk<2> once(two_tubes(), effects), divided = once;
+  once.to(at(0, 0)).to(at(1, 0.05)).to(at(0.8, -0.2));
+  divided.to(at(0, 0)).to(at(1, 0.05));
+  for (int k = 1; k <= 9; ++k) divided.to(at(1 - 0.2 * k / 9, 0.05 - 0.25 * k / 9));
+  for (std::size_t i = 0; i < 2; ++i)
+    EXPECT_NEAR(divided.remembered<BacklashRotation>()[i], once.remembered<BacklashRotation>()[i], 1e-14);
+}
+
+TEST(Backlash, MovesTheTubes) {
+  Catalogue::On<2> effects;
+  effect<BacklashRotation, 2>(effects).values = {0.02, 0.03};
+  const Solution<2> s = Walk<2>(two_tubes(), effects).to(at(-1, 2)).to(at(0.5, 0.4)).solution();
+  const Solution<2> expected = Walk<2>(two_tubes()).to(at(0.5 - 0.02, 0.4 + 0.03)).solution();
+  EXPECT_LE((s.position - expected.position).norm(), 1e-12);
+}
+
+TEST(Delay, IsThePoseOfAWhileAgo) {
+  Catalogue::On<2> effects;
+  const auto pose = [&](double delay) {
+    effect<Delay, 2>(effects).values = {delay};
+    return Walk<2>(two_tubes(), effects)
+        .to(at(0, 0), 10)
+        .to(at(0.4, -0.2, -0.34), 12)
+        .to(at(0.6, 0.2, -0.34), 13)
+        .solution();
+  };
+  for (const auto& [delay, q] : {std::pair(0.0, at(0.6, 0.2, -0.34)),
+                                 {0.25, at(0.55, 0.1, -0.34)},
+                                 {1.0, at(0.4, -0.2, -0.34)},
+                                 {2.0, at(0.2, -0.1, -0.345)}}) {
+    const Solution<2> expected = Walk<2>(two_tubes()).to(q).solution();
+    EXPECT_LE((pose(delay).position - expected.position).norm(), 1e-11) << delay;
+  }
+}
+
+TEST(Delay, VanishesAtRestAndWhereAClockStartsAnew) {
+  Catalogue::On<2> effects;
+  effect<Delay, 2>(effects).values = {0.3};
+  const auto lag = [](const Walk<2>& walk) { return walk.remembered<Delay>(); };
+  const std::array<double, 4> none{};
+  Walk<2> walk(two_tubes(), effects);
+  EXPECT_EQ(lag(walk.to(at(0, 0), 0)), none);
+  EXPECT_NE(lag(walk.to(at(1, 0), 1)), none);
+  EXPECT_EQ(lag(walk.to(at(1, 0), 2)), none);
+  EXPECT_EQ(lag(walk.to(at(2, 0), 0)), none);                                         // the first row of another run
+  EXPECT_NEAR(lag(walk.to(at(2.2, 0), 0.2))[2], -0.3, 1e-12);                         // along its first move, extended
+  EXPECT_EQ(lag(walk.to(at(3, 0), std::numeric_limits<double>::quiet_NaN())), none);  // without times there is none
+}
+
+}  // namespace
+}  // namespace ctcr

@@ -1,0 +1,198 @@
+#include "ctcr/pipeline/recorded.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "support/catalogue_cases.hpp"
+#include "support/no_alloc.hpp"
+
+namespace {
+
+using namespace ctcr;
+
+using Slopes = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+template <int N>
+using P = SystemParameters<N, Catalogue>;
+
+template <int N>
+std::vector<int> all_parameters() {
+  std::vector<int> all(P<N>::count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+/// How a parameter is varied: its usual changes, a step for differences, and where it may not be negative.
+struct Variation {
+  double size, h;
+  bool forward = false;
+};
+
+template <int N>
+Variation variation(const System<N, Catalogue>& system, int place) {
+  Variation v{};
+  if (place < ParameterVector<N>::count) {
+    const ParameterKind& kind = ParameterVector<N>::info(ParameterVector<N>::entry(place).kind);
+    if (kind.name.ends_with("diameter")) return {1e-3, 1e-6};
+    if (kind.unit == "m/rad") return {1e-3, 1e-8};
+    if (kind.unit == "m") return {0.1, 1e-5};
+    const double middle = kind.low > 0 ? std::sqrt(kind.low * kind.high) : 1.0;
+    return {middle, 1e-3 * middle};
+  }
+  system.model.effects().for_each([&](const auto& effect, int first) {
+    for (int k = 0; k < int(effect.parameters.size()); ++k)
+      for (int i = 0; i < effect.size(k); ++i)
+        if (ParameterVector<N>::count + first + effect.place(k, i) == place) {
+          const EffectParameter& p = effect.parameters[std::size_t(k)];
+          const bool at_edge = effect.values[std::size_t(effect.place(k, i))] <= p.hard_low;
+          // The plane that the tip touches must stay in touch; its push is known to 1e-8 N.
+          const double step = effect.info.id != "contact" ? 1e-2 : p.role == Role::shape ? 1e-4 : 0.1;
+          v = {p.sigma, step * p.sigma, at_edge};
+        }
+  });
+  return v;
+}
+
+/// Slope at 0 of what f(x) adds to f(0), of fourth order.
+template <class F>
+Vec6 slope(const F& f, const Variation& v) {
+  const double h = v.h;
+  if (v.forward) return (48 * f(h) - 36 * f(2 * h) + 16 * f(3 * h) - 3 * f(4 * h)) / (12 * h);
+  return (8 * (f(h) - f(-h)) - (f(2 * h) - f(-2 * h))) / (12 * h);
+}
+
+/// A plane that the tip has entered.
+template <int N>
+void touch(test::Recorded<N>& recorded, double depth, double stiffness) {
+  Workspace<N> ws;
+  RecordedPrediction<N, Catalogue> free;
+  auto effects = recorded.system.model.effects();
+  auto& contact = test::effect<Contact, N>(effects).values;
+  contact[0] = 0;
+  System<N, Catalogue> system = recorded.system;
+  system.model = Model<N, Catalogue>(recorded.system.model.robot(), effects);
+  ASSERT_EQ(test::predict_last(system, recorded.rows, ws, free), Status::ok);
+  const Vec3 n = (Vec3(1, 0.5, 0.3) + free.solution.rotation.col(0)).normalized();
+  contact = {stiffness, n.dot(free.solution.position) - depth, std::atan2(n.y(), n.x()), std::asin(n.z())};
+  recorded.system.model = Model<N, Catalogue>(recorded.system.model.robot(), effects);
+}
+
+template <int N>
+void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
+  const auto& [system, rows] = recorded;
+  Workspace<N> ws;
+  RecordedPrediction<N, Catalogue> prediction;
+  ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok) << what;
+  Slopes exact(6, P<N>::count);
+  ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, all_parameters<N>(), exact)), Status::ok);
+  const Eigen::VectorXd x = P<N>::values(system);
+  for (int place = 0; place < P<N>::count; ++place) {
+    if (ParameterVector<N>::index(Parameter::bending_stiffness) <= place &&
+        place < ParameterVector<N>::index(Parameter::gravity))
+      continue;  // not given
+    const Variation v = variation(system, place);
+    const auto change = [&](double by) {
+      Eigen::VectorXd moved = x;
+      moved[place] += by;
+      Workspace<N> from = ws;
+      RecordedPrediction<N, Catalogue> other;
+      EXPECT_EQ(test::predict_last(P<N>::with_values(system, moved), rows, from, other), Status::ok);
+      return test::difference(prediction.reading, other.reading);
+    };
+    const Vec6 expected = slope(change, v);
+    EXPECT_LE((exact.col(place) - expected).norm(), 1e-6 * (expected.norm() + 1e-2 / v.size))
+        << P<N>::name(place) << ", " << what << "\nexact      " << exact.col(place).transpose() << "\ndifference "
+        << expected.transpose();
+  }
+}
+
+template <int N>
+void expect_slopes(int cases) {
+  test::Random random(std::uint64_t(40 + N));
+  for (int n = 0; n < cases; ++n) {
+    const std::string what = std::to_string(N) + " tubes, case " + std::to_string(n);
+    expect_slopes(test::random_recording<N>({}, n % N, random), what + ", neutral");
+    auto recorded = test::random_recording<N>(test::random_effects<N>(random), n % N, random);
+    touch(recorded, 2e-3, n % 2 == 0 ? 3.0 : 1000.0);
+    expect_slopes(recorded, what);
+  }
+}
+
+TEST(RecordedDerivatives, AreSlopesByEveryParameterWithHistoryLoadsAndContact) {
+  expect_slopes<1>(test::cases(2));
+  expect_slopes<2>(test::cases(4));
+  expect_slopes<3>(test::cases(4));
+}
+
+TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
+  test::Random random(3);
+  auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
+  touch(recorded, 1e-3, 30);
+  const auto& [system, rows] = recorded;
+  Workspace<3> ws;
+  RecordedPrediction<3, Catalogue> prediction;
+  ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
+  Slopes all(6, P<3>::count);
+  (void)differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all_parameters<3>(), all);
+  for (const std::vector<int>& few : {std::vector<int>{}, {P<3>::count - 1}, {80, 3, 41}}) {
+    Slopes some(6, Eigen::Index(few.size()));
+    ASSERT_EQ((differentiate<3, Catalogue>(system, rows.back(), ws, prediction, few, some)), Status::ok);
+    for (std::size_t k = 0; k < few.size(); ++k)
+      EXPECT_LE((some.col(Eigen::Index(k)) - all.col(few[k])).norm(), 1e-12 * (1 + all.col(few[k]).norm()));
+  }
+}
+
+TEST(Recorded, AnswersParametersThatAreNoNumbers) {
+  test::Random random(4);
+  const auto recorded = test::random_recording<2>({}, 0, random);
+  for (int place = 0; place < Catalogue::On<2>::count; ++place)
+    for (const double absurd : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      Eigen::VectorXd x = P<2>::values(recorded.system);
+      x[ParameterVector<2>::count + place] = absurd;
+      const auto system = P<2>::with_values(recorded.system, x);
+      Workspace<2> ws;
+      RecordedPrediction<2, Catalogue> prediction;
+      EXPECT_EQ(test::predict_last(system, recorded.rows, ws, prediction), Status::not_finite)
+          << P<2>::name(ParameterVector<2>::count + place);
+      EXPECT_TRUE(prediction.reading.position.allFinite() && prediction.reading.rotation.allFinite());
+      EXPECT_TRUE(prediction.solution.position.isZero(0));
+      Slopes slopes(6, 1);
+      EXPECT_EQ((differentiate<2, Catalogue>(system, recorded.rows.back(), ws, prediction, std::vector{0}, slopes)),
+                Status::not_finite);
+      EXPECT_TRUE(slopes.isZero(0));
+    }
+}
+
+TEST(Recorded, DoesNotTouchTheHeap) {
+  test::Random random(5);
+  auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
+  touch(recorded, 1e-3, 30);
+  const auto& [system, rows] = recorded;
+  const auto memory = memories<3, Catalogue>(system, rows);
+  const std::vector<int> all = all_parameters<3>();
+  Slopes slopes(6, P<3>::count);
+  Workspace<3> ws;
+  RecordedPrediction<3, Catalogue> prediction;
+  const test::HeapGuard guard;
+  const Status predicted = predict(system, rows.back(), memory.back(), ws, prediction);
+  const Status differentiated = differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all, slopes);
+  EXPECT_EQ(guard.uses(), 0);
+  EXPECT_EQ(predicted, Status::ok);
+  EXPECT_EQ(differentiated, Status::ok);
+}
+
+template <class F>
+constexpr bool never_throws = false;
+template <class R, class... A>
+constexpr bool never_throws<R (*)(A...) noexcept> = true;
+
+TEST(Recorded, PromisesNotToThrow) {
+  static_assert(never_throws<decltype(&predict<3, Catalogue>)>);
+  static_assert(never_throws<decltype(&differentiate<3, Catalogue>)>);
+}
+
+}  // namespace

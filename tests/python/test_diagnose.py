@@ -1,0 +1,133 @@
+"""`diagnose` names what was hidden, says so where nothing was, and where the data cannot tell."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import effects, recording, robot_file
+from ctcr.diagnose import diagnose
+from ctcr.diagnose.engine import Linear
+from ctcr.diagnose.split import groups, locked_rows
+from ctcr.measurements import Measurements
+
+ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml"
+IDS = {
+    "friction", "backlash_rotation", "backlash_translation", "delay", "tip_load", "precurvature_profile", "softening",
+    "anisotropy", "straight_curvature", "clearance", "torsional_compliance", "sensor_offset", "field_distortion",
+    "frame_drift", "frame_jump", "periodic_rotation", "periodic_translation", "entry_compliance", "entry_clearance",
+    "helical_precurvature", "contact",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROBOT)
+
+
+def session(robot, random, runs=8, stops=6):
+    """Joints of runs that go out and come back through the same stops, every second one with a weight."""
+    home = 1e-3 * np.array(robot.actuation.home_translation_mm)
+    rows = []
+    for run in range(runs):
+        ends = [
+            (
+                home - random.uniform(0, 0.03) + np.array([-0.02, -0.01, 0]) * random.uniform(0.2, 1),
+                random.uniform(-3, 3, 3),
+            )
+            for _ in range(3)
+        ]
+        way = [
+            (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]))
+            for a, b in zip(ends, ends[1:], strict=False)
+            for u in np.linspace(0, 1, stops // 2, endpoint=False)
+        ]
+        for beta, alpha in [*way, *reversed(way)]:
+            rows.append((2.0 * len(rows), run, beta, alpha, (0, -0.1 * (run % 2), 0)))
+    t, run, beta, alpha, force = (np.array(column) for column in zip(*rows, strict=True))
+    empty = np.full((len(t), 3), np.nan)
+    return Measurements(
+        t, run, beta, alpha, force.astype(float), empty, np.full((len(t), 4), np.nan), np.arange(len(t)) + 2
+    )
+
+
+def measured(robot, random, hidden, calibration=0.5):
+    """Readings of a robot that differs from its file as its uncertainties say, and has a hidden effect."""
+    from ctcr import free_parameters
+    from ctcr.frames import product, quaternion_from_rotation_vector
+
+    names = free_parameters.expand("standard", robot)
+    mean, sd, _, _ = free_parameters.priors(robot, names)
+    truth = mean + calibration * sd * random.normal(size=len(names))
+    table = session(robot, random)
+    centred = dataclasses.replace(table, position=np.zeros((len(table), 3)))
+    core = recording.recording_of(robot, centred, [*names, *hidden], steps=4)
+    core.residual(np.array([*truth, *hidden.values()]))
+    position, quaternion = core.predicted()
+    jitter = quaternion_from_rotation_vector(
+        np.deg2rad(robot.tracker.jitter_deg) * random.normal(size=(len(table), 3))
+    )
+    position = position + 1e-3 * robot.tracker.jitter_mm * random.normal(size=position.shape)
+    return dataclasses.replace(table, position=position, quaternion=product(jitter, quaternion))
+
+
+def test_the_catalogue_has_its_stable_ids():
+    assert IDS <= set(effects.known_effects())
+
+
+def test_nothing_is_missing_where_nothing_was_hidden(robot):
+    result = diagnose(robot, measured(robot, np.random.default_rng(1), {}))
+    assert result.verdict.word == "nothing_missing"
+    assert not result.accepted
+    assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]
+    json.dumps(result.as_json(), allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "identity"),
+    [
+        (
+            {"effects.backlash_rotation.play.1": 0.01, "effects.backlash_rotation.play.2": 0.008},
+            "backlash_rotation",
+        ),
+        ({"effects.tip_load.mass": 2e-3}, "tip_load"),
+    ],
+)
+def test_a_hidden_effect_is_named(robot, hidden, identity):
+    result = diagnose(robot, measured(robot, np.random.default_rng(2), hidden))
+    assert result.accepted[0].ids[0] == identity
+    assert result.verdict.word in ("identified", "probable")
+    found = result.as_json()["effects"][0]
+    assert found["class"][0] == identity and found["delta_log_evidence"] > 8
+    rms = result.rms_mm
+    assert rms["with_effects"] < 1.2 * rms["noise_floor"] < rms["calibrated"] * 1.2
+    for name, value in hidden.items():
+        place = result.final.names.index(name)
+        assert abs(result.final.values[place] - value) < 4 * result.final.sd[place]
+
+
+def test_linear_gain_is_the_evidence_of_a_linear_model():
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        A, B, r = random.normal(size=(30, 4)), random.normal(size=(30, 2)), random.normal(size=30)
+        z = -np.linalg.solve(
+            A.T @ A + np.eye(4), A.T @ r
+        )  # the most probable calibration, prior of unit variance
+
+        def log_evidence(columns, r=r):
+            covariance = np.eye(30) + columns @ columns.T
+            return -0.5 * (r @ np.linalg.solve(covariance, r) + np.linalg.slogdet(covariance)[1])
+
+        gain = Linear(r + A @ z, A).gain(B)
+        assert gain.log_evidence == pytest.approx(log_evidence(np.hstack([A, B])) - log_evidence(A), abs=1e-9)
+
+
+def test_rows_are_locked_by_run(robot):
+    table = session(robot, np.random.default_rng(0))
+    locked = locked_rows(table)
+    assert 0.2 <= locked.mean() <= 0.3
+    for run in np.unique(table.run):
+        assert np.ptp(locked[table.run == run].astype(int)) == 0
+    one = dataclasses.replace(table, run=np.zeros_like(table.run))
+    assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)

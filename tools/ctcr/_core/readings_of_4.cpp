@@ -1,0 +1,3 @@
+#include "readings_of.hpp"
+
+CTCR_READINGS_OF(4)

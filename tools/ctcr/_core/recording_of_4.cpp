@@ -1,0 +1,3 @@
+#include "recording_of.hpp"
+
+CTCR_RECORDING_OF(4)

@@ -1,0 +1,133 @@
+"""What is wrong with, or worth knowing of, a table that is to be fitted."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.compare import wording
+from ctcr.errors import InputError, Problem
+from ctcr.frames import base_to_tracker
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+OUTLIER_WEIGHT = 0.3  # below it a reading hardly counts
+LISTED = 12
+RUN_LEVEL = 0.0125  # chance of a false alarm that runs differ
+# Runs have frames of their own where the error is that many noise floors, and such frames leave that share of it.
+FRAMES_BEYOND, FRAMES_LEAVE = 4.0, 0.5
+
+
+def start(robot: Robot, readings: Measurements) -> float:
+    """The tip's usual distance from the insertion axis [m], by the model as it is.
+
+    Raises InputError where nothing is measured or solved, and where the tracker frame is no start for a fit.
+    """
+    from ctcr.model import Model
+
+    if robot.effects:
+        raise InputError(Problem(
+            f"the robot has effects beyond the standard model ({', '.join(robot.effects)}), which this fit does not "
+            f"know: `ctcr add` fits a robot with its effects"
+        ))  # fmt: skip
+    if readings.position is None or not np.isfinite(readings.position).any():
+        raise InputError(Problem("no position is measured: columns x_m, y_m, z_m are missing or empty"))
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
+    answer = Model(robot).predict(beta, alpha, readings.force)
+    if not answer.solved.any():
+        raise InputError(Problem("the model solves no row of the table: are these the joints of this robot?"))
+    tip, _ = base_to_tracker(robot.tracker, answer.position, answer.quaternion)
+    distance = np.linalg.norm(readings.position - tip, axis=1)
+    usual, longest = float(np.nanmedian(distance)), robot.tubes[0].length
+    if usual > longest:
+        raise InputError(Problem(
+            f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
+            f"tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
+            f"`ctcr calibrate registration`"
+        ))  # fmt: skip
+    return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
+
+
+def without_unknown_roll(robot: Robot, readings: Measurements) -> tuple[Measurements, list[str]]:
+    """The readings without the orientations of a sensor whose roll is not known, and what to say about it."""
+    if robot.tracker.sensor_roll == "known" or readings.quaternion is None:
+        return readings, []
+    return replace(readings, quaternion=None), [
+        "The roll of the sensor is not known: orientations are not used."
+    ]
+
+
+def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
+    """Rows that say something new, and what to say about the others."""
+    columns = [readings.t[:, None], readings.run[:, None], readings.beta, readings.alpha, readings.force]
+    columns += [part for part in (readings.position, readings.quaternion) if part is not None]
+    content = np.nan_to_num(np.hstack(columns), nan=1e300)
+    _, first = np.unique(content, axis=0, return_index=True)
+    usable = np.zeros(len(readings), bool)
+    usable[first] = True
+    if usable.all():
+        return usable, []
+    repeated = readings.row[~usable]
+    return usable, [
+        f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."
+    ]
+
+
+def outlier_rows(fit, readings: Measurements) -> list[int]:
+    """Rows of the file whose readings hardly counted."""
+    small = (fit.weights > 0) & (fit.weights < OUTLIER_WEIGHT)  # 0: not fitted
+    return readings.row[small.any(axis=1)].tolist()
+
+
+def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> list[str]:
+    """What the user should know of a fit, in sentences."""
+    told_as_doubts = "prior standard deviations"
+    said = [_sentence(text) for text in fit.warnings if told_as_doubts not in text]
+    if not fit.converged:
+        said.append(f"The fit did not converge: {fit.status}.")
+    outliers = outlier_rows(fit, readings)
+    if outliers:
+        share = len(outliers) / max(int(np.sum(fit.used)), 1)
+        said.append(
+            f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted."
+        )
+    if not frame_per_run and len(np.unique(readings.run)) > 1:
+        said += _run_frames(after, readings, fit)
+    return said
+
+
+def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
+    """A sentence where the runs do not share one frame: the same joints give other positions in other runs, or an error
+    far beyond noise goes away with a frame for each."""
+    from ctcr.calibrate.run_frames import error_with_frames
+    from ctcr.compare.offsets import find_run_offsets
+    from ctcr.compare.sample import take_sample
+    from ctcr.compare.visits import find_revisits, find_stops
+    from ctcr.model import Model
+
+    before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
+    if before_mm > FRAMES_BEYOND * fit.floor_mm() and after_mm < FRAMES_LEAVE * before_mm:
+        text = f"The runs do not share one frame: a frame for each leaves {wording.mm(after_mm)} of the "
+        return [f"{text}{wording.mm(before_mm)} RMS error. --frame-per-run fits them."]
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
+    sample = take_sample(robot, readings, Model(robot).predict(beta, alpha, readings.force))
+    found = find_run_offsets(sample, find_revisits(find_stops(sample), sample.lever), RUN_LEVEL)
+    if not found.found:
+        return []
+    text = f"The runs do not share one frame or homing: an offset for each explains {wording.percent(found.share)} of "
+    text += "the squared error that is left"
+    if found.outlying:
+        far = wording.join([str(run) for run in found.outlying[:8]])
+        text += f"; runs {far} lie about {wording.mm(found.outlying_mm)} from the others"
+    return [text + ". --frame-per-run fits a frame for each."]
+
+
+def _sentence(text: str) -> str:
+    first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
+    return first + ("" if text.endswith(".") else ".")
+
+
+def _rows(rows: NDArray[np.int64]) -> str:
+    listed = ", ".join(map(str, rows[:LISTED])) + (", ..." if len(rows) > LISTED else "")
+    return f"{len(rows)} rows ({listed})" if len(rows) > 1 else f"Row {listed}"

@@ -1,0 +1,203 @@
+"""The pictures of the calibration report. Colours mean what they mean in the comparison's."""
+
+import numpy as np
+from scipy import stats
+
+from ctcr.calibrate.joint_fit import Calibration
+from ctcr.calibrate.parameters import SAYS_NOTHING
+from ctcr.compare.figures import ERROR, FAINT, INK, NOISE, OUT
+from ctcr.compare.wording import mm
+
+GOOD = "#2e7d4f"
+MOST_NAMES = 60
+MOST_POINTS = 4000
+
+
+def waterfall(figure, c: Calibration) -> None:
+    """The error from the robot file's values down to the noise floor."""
+    axes = figure.subplots()
+    steps = [(stage.name, stage.rms_mm) for stage in c.stages]
+    if c.held_out:
+        steps.append(("held out", c.held_out.error.rms_mm))
+    floor = c.held_out.floor.rms_mm if c.held_out else c.floor.rms_mm
+    for place, (name, size) in enumerate(steps):
+        previous = steps[place - 1][1] if place else 0.0
+        final = name == steps[-1][0]
+        axes.bar(place, size, width=0.62, color=ERROR if place == 0 else GOOD if final else OUT, zorder=2)
+        if place:
+            axes.bar(place, previous - size, bottom=size, width=0.62, color=FAINT, alpha=0.45, zorder=1)
+            axes.plot([place - 1 + 0.31, place + 0.31], [previous, previous], color=NOISE, lw=0.8)
+            change = 100 * (size / previous - 1)
+            axes.annotate(f"{change:+.0f} %", (place, max(size, previous)), (0, 4), textcoords="offset points",
+                          ha="center", fontsize=9, color=NOISE)  # fmt: skip
+        inside = size > 0.12 * steps[0][1]
+        axes.annotate(mm(size), (place, size), (0, -13 if inside else 3), textcoords="offset points",
+                      ha="center", color="white" if inside else INK, fontweight="bold", zorder=3)  # fmt: skip
+    last = len(steps)
+    axes.bar(last, floor, width=0.62, color=NOISE)
+    axes.annotate(
+        mm(floor), (last, floor), (0, 3), textcoords="offset points", ha="center", fontweight="bold"
+    )
+    axes.axhline(floor, color=NOISE, ls="--", lw=1)
+    labels = [_label(name, c) for name, _ in steps] + ["noise floor"]
+    axes.set_xticks(range(last + 1), labels)
+    axes.set(ylabel="error, mm RMS", ylim=(0, 1.12 * max(size for _, size in steps)))
+    axes.grid(axis="x", visible=False)
+
+
+def _label(name: str, c: Calibration) -> str:
+    if name == "held out":
+        return f"held out\n({c.held_out.kind})"
+    return {"nominal": "robot file", "frame alone": "tracker frame\nalone"}.get(name, name)
+
+
+def histogram(figure, c: Calibration) -> None:
+    """Error sizes before and after, against what noise would give."""
+    axes = figure.subplots()
+    before, after = (
+        _known(1e3 * np.linalg.norm(r[:, :3], axis=1)) for r in (c.fit.nominal_residual, c.fit.residual)
+    )
+    axis_sd = c.floor.rms_mm / np.sqrt(3)
+    low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
+    edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
+    for sizes, colour, label in ((before, ERROR, "robot file"), (after, GOOD, "calibrated")):
+        axes.hist(
+            sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label
+        )
+    axes.stairs(
+        100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)),
+        edges,
+        color=NOISE,
+        lw=1.5,
+        label="noise alone",
+    )
+    axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
+    _plain_ticks(axes.xaxis)
+    axes.legend(fontsize=9)
+
+
+def course(figure, c: Calibration) -> None:
+    """The error in the order measured, before and after."""
+    axes = figure.subplots()
+    size = [1e3 * np.linalg.norm(r[:, :3], axis=1) for r in (c.fit.nominal_residual, c.fit.residual)]
+    rows = np.arange(len(size[0]))[:: max(1, len(size[0]) // MOST_POINTS)]
+    run = c.readings.run
+    edges = np.flatnonzero(np.concatenate([[True], run[1:] != run[:-1], [True]]))
+    for number, (start, stop) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        if number % 2:
+            axes.axvspan(start, stop - 1, color="#f2f4f7", lw=0)
+    for values, colour, label in zip(size, (ERROR, GOOD), ("robot file", "calibrated"), strict=True):
+        axes.plot(rows, values[rows], color=colour, lw=0.9, label=label)
+    axes.axhline(c.floor.rms_mm, color=NOISE, ls="--", lw=1, label="noise floor, RMS")
+    axes.set(xlabel="reading (runs shaded in turn)", ylabel="error, mm", ylim=(0, None))
+    axes.margins(x=0.01)
+    axes.legend(fontsize=9)
+
+
+def shifts(figure, c: Calibration) -> None:
+    """How far each parameter moved and how well it is known now, in units of what was known before."""
+    items = c.fitted[:MOST_NAMES][::-1]
+    axes = figure.subplots()
+    for place, item in enumerate(items):
+        colour = ERROR if item.implausible or item.moved_far else FAINT if item.says_nothing else OUT
+        axes.plot([item.shift - item.ratio, item.shift + item.ratio], [place, place], color=colour, lw=2.2,
+                  solid_capstyle="butt")  # fmt: skip
+        axes.plot(item.shift, place, "o", color=colour, ms=4.5)
+    reach = max(3.0, 1.1 * max(abs(item.shift) + item.ratio for item in items))
+    axes.axvspan(-2, 2, color="#eef2f5", lw=0, zorder=0)
+    axes.axvspan(-1, 1, color="#dfe6eb", lw=0, zorder=0)
+    axes.axvline(0, color=NOISE, lw=0.8)
+    axes.set_yticks(range(len(items)), [item.name for item in items], fontsize=8)
+    axes.set(xlim=(-reach, reach), ylim=(-0.7, len(items) - 0.3),
+             xlabel="shift from the robot file, in standard deviations of what it says")  # fmt: skip
+    axes.grid(axis="y", visible=False)
+
+
+def correlations(figure, c: Calibration) -> None:
+    """What goes together: the correlations of the fitted values; right, how much of the old doubt is left."""
+    count = min(len(c.fitted), MOST_NAMES)
+    names = [item.name for item in c.fitted[:count]]
+    sd = np.sqrt(np.diag(c.fit.covariance))[:count]
+    matrix = c.fit.covariance[:count, :count] / np.outer(sd, sd)
+    left, right = figure.subplots(1, 2, width_ratios=(1, 0.22), sharey=True)
+    image = left.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto", interpolation="nearest")
+    left.set_xticks(range(count), names, rotation=90, fontsize=7)
+    left.set_yticks(range(count), names, fontsize=7.5)
+    left.grid(visible=False)
+    for edge in _group_edges(names):
+        left.axhline(edge, color="white", lw=1.5)
+        left.axvline(edge, color="white", lw=1.5)
+        right.axhline(edge, color="#e7ebef", lw=1.5)
+    figure.colorbar(image, ax=left, location="left", shrink=0.5, pad=0.02, label="correlation")
+    ratio = np.array([item.ratio for item in c.fitted[:count]])
+    colours = [FAINT if value > SAYS_NOTHING else OUT for value in ratio]
+    right.barh(range(count), 100 * ratio, color=colours, height=0.7)
+    right.axvline(100 * SAYS_NOTHING, color=NOISE, ls="--", lw=1)
+    right.set(xlim=(0, 105), xlabel="sd left, %")
+    right.set_title("sd after / before", fontsize=9)
+
+
+def _group_edges(names: list[str]) -> list[float]:
+    kinds = [name.split(".")[0] + name.split(".")[-1 if name.startswith("tubes") else 1] for name in names]
+    return [i - 0.5 for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
+
+
+def half_difference(figure, c: Calibration) -> bool | None:
+    """Where the models of two halves of the data disagree, and whether noise would drive them that far apart."""
+    if c.halves is None:
+        return False
+    tip, size, noise = (
+        1e3 * c.halves.tip,
+        1e3 * np.linalg.norm(c.halves.difference, axis=1),
+        1e3 * c.halves.noise,
+    )
+    views = figure.subplots(1, 3, width_ratios=(1, 1, 1.1))
+    top = max(np.percentile(size, 98), 1e-6)
+    for axes, (x, y) in zip(views[:2], ((2, 0), (2, 1)), strict=True):
+        order = np.argsort(size)
+        drawn = axes.scatter(
+            tip[order, x], tip[order, y], c=size[order], cmap="YlOrRd", vmin=0, vmax=top, s=16, lw=0
+        )
+        axes.set(xlabel=f"{'xyz'[x]} (base), mm", ylabel=f"{'xyz'[y]} (base), mm", aspect="equal")
+        axes.set_adjustable("datalim")
+    label = "difference of the two models, mm"
+    figure.colorbar(drawn, ax=views[:2], location="bottom", shrink=0.6, pad=0.02, label=label)
+    axes = views[2]
+    beyond = size > 2 * noise
+    for mask, colour, label in (
+        (~beyond, NOISE, "what noise can do"),
+        (beyond, ERROR, "beyond twice the noise"),
+    ):
+        if mask.any():
+            axes.plot(
+                noise[mask],
+                size[mask],
+                ".",
+                color=colour,
+                ms=5,
+                alpha=0.6,
+                label=f"{label} ({mask.mean():.0%})",
+            )
+    low, high = min(noise.min(), size.min()), max(noise.max(), size.max())
+    low = max(low, 1e-3 * high)
+    line = np.array([low, high])
+    axes.plot(line, line, color=INK, lw=1)
+    axes.plot(line, 2 * line, color=INK, lw=0.8, ls="--")
+    axes.set(xscale="log", yscale="log", xlabel="expected from noise, mm RMS", ylabel="difference, mm",
+             ylim=(low, 1.3 * high))  # fmt: skip
+    _plain_ticks(axes.xaxis)
+    _plain_ticks(axes.yaxis)
+    axes.legend(fontsize=8, loc="lower right")
+    return None
+
+
+def _known(values):
+    return values[np.isfinite(values)]
+
+
+def _plain_ticks(axis) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(NullFormatter())

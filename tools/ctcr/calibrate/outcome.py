@@ -1,0 +1,110 @@
+"""What a calibration procedure found, and how it is given back: table, JSON, robot file."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from math import isfinite, nan
+from typing import Any
+
+from ctcr import output, robot_update
+from ctcr.errors import InputError, Problem
+from ctcr.robot_update import Change, Entry
+
+
+@dataclass(frozen=True)
+class Row:
+    """A value with its unit and standard deviation (NaN: not known); `old`: in the robot file (NaN: no file)."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float = nan
+    old: float = nan
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The rows to show, what to say about them, and what changes in the robot file."""
+
+    title: str
+    rows: list[Row]
+    notices: list[str] = field(default_factory=list)
+    changes: list[Change] = field(default_factory=list)
+    figures: dict[str, Any] = field(default_factory=dict)
+    details: dict[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        values = [
+            {"name": row.name, "unit": row.unit, "value": row.value, "sd": row.deviation, "old": row.old}
+            for row in self.rows
+        ]
+        return {"values": values, "figures": self.figures, "notices": self.notices, **self.details}
+
+
+def computed(procedure: Callable, file: str, **arguments):
+    """Calls a procedure of the compiled core; what it refuses becomes the fault of the file."""
+    try:
+        return procedure(**arguments)
+    except ValueError as error:
+        raise InputError(Problem(str(error), file)) from None
+
+
+def check_target(robot, target: str | None, in_place: bool) -> str | None:
+    """The robot file to write, if any. Raises InputError where that asks for the impossible, before any work."""
+    if in_place and target:
+        raise InputError(Problem("give either -o or --in-place"))
+    if (in_place or target) and robot is None:
+        raise InputError(Problem("give --robot: the robot file whose values are to be updated"))
+    return robot._source.file if in_place else target
+
+
+def deliver(
+    outcome: Outcome,
+    robot,
+    command: str,
+    sources: Sequence[str],
+    target: str | None,
+    in_place: bool,
+    json_target: str | None,
+) -> None:
+    """Writes what was asked for, the files first, and prints the table."""
+    if target:
+        entry = Entry(command, sources, outcome.figures, " ".join(outcome.notices))
+        robot_update.write(robot, target, outcome.changes, entry, in_place=in_place)
+    if json_target:
+        output.write_json(outcome.as_dict(), json_target)
+    console = output.console(json_target)
+    show(console, outcome)
+    if target:
+        console.print(f"Robot file: {target}", markup=False)
+
+
+def show(console, outcome: Outcome) -> None:
+    with_old = any(isfinite(row.old) for row in outcome.rows)
+    columns = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"]
+    rows = [
+        [row.name, row.unit, *([number(row.old, row.deviation)] if with_old else []),
+         number(row.value, row.deviation), deviation(row.deviation)]
+        for row in outcome.rows
+    ]  # fmt: skip
+    console.print(output.table(outcome.title, columns, rows, text_columns=2))
+    for notice in outcome.notices:
+        console.print(f"  • {notice}", markup=False)
+
+
+def number(value: float, deviation: float = nan) -> str:
+    """A value to a tenth of its standard deviation, or to four digits."""
+    if not isfinite(value):
+        return "-"
+    if not isfinite(deviation) or deviation <= 0:
+        return f"{value:.4g}"
+    return f"{value:.{digits(deviation)}f}"
+
+
+def deviation(value: float) -> str:
+    """A standard deviation to two digits."""
+    return f"{value:.{digits(value)}f}" if isfinite(value) and value > 0 else "-"
+
+
+def digits(deviation: float) -> int:
+    """Decimals that show a standard deviation to two digits."""
+    return max(0, 1 - int(f"{deviation:.1e}".partition("e")[2]))

@@ -1,0 +1,382 @@
+"""The procedures that measure one thing at a time: from a small table to an Outcome. The numbers come from the core."""
+
+from math import degrees, isfinite, nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.calibrate.outcome import Outcome, Row, computed
+from ctcr.calibrate.tables import Column, Table
+from ctcr.errors import InputError, Problem
+from ctcr.robot import Robot
+from ctcr.robot_update import Change
+
+Array = NDArray[np.float64]
+
+SIGMAS_AT_95 = (
+    2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
+)
+AXES = "xyz"
+
+ROTATION_OFFSET = (
+    Column("tube", "count", needed=False),
+    Column("motor_angle", "angle"),
+    Column("direction", "sign", needed=False),
+    *(Column(axis, "length") for axis in AXES),
+)
+REGISTRATION = (
+    Column("point", "text"),
+    *(Column(f"cad_{axis}", "length") for axis in AXES),
+    *(Column(axis, "length", filled=False) for axis in AXES),
+)
+HOME = (
+    Column("tube", "count"),
+    Column("home_angle", "angle", needed=False, filled=False),
+    Column("distance", "length", needed=False, filled=False),
+    Column("flush_angle", "angle", needed=False, filled=False),
+    Column("length", "length", needed=False, filled=False),
+)
+CANTILEVER = (
+    Column("load", "load"),
+    Column("deflection", "length"),
+    Column("free_length", "length"),
+    Column("load_distance", "length", needed=False),
+)
+CURVATURE = (Column("x", "picture"), Column("y", "picture"))
+
+
+def tracker_noise(robot: Robot | None) -> dict[str, float]:
+    """Jitter and smooth error of a reading per axis [m], as the robot file states them; 0: not known."""
+    if robot is None:
+        return {}
+    tracker = robot.tracker
+    return {
+        "jitter": 1e-3 * (tracker.jitter_mm or 0.0),
+        "field_error": 1e-3 * (tracker.accuracy_95_mm or 0.0) / SIGMAS_AT_95,
+    }
+
+
+def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> Outcome:
+    """Home rotations from circles of the tip, one tube alone at a time. Ref: Boyer et al., eq. (5)."""
+    from ctcr import _core
+
+    tubes = table["tube"] if "tube" in table else np.ones(len(table), np.int64)
+    ratio = _rotation_ratio(robot, ratio)
+    rows, notices, changes, details = [], [], [], {}
+    for tube in np.unique(tubes).tolist():
+        mine = np.flatnonzero(tubes == tube)
+        _check_tube(tube, robot, table.file, int(table.row[mine[0]]))
+        fit = computed(
+            _core.fit_rotation_offset,
+            table.file,
+            motor_angle=table["motor_angle"][mine],
+            position=np.ascontiguousarray(table.stacked(*AXES)[mine]),
+            direction=table["direction"][mine].astype(np.int8) if "direction" in table else None,
+            ratio=ratio,
+            T_ref=_tracker_pose(robot) if robot else None,
+            bend_angle=-np.pi / 2 if robot is None or robot.tubes[tube - 1].curvature >= 0 else np.pi / 2,
+            **tracker_noise(robot),
+        )
+        name = f"tube {tube}"
+        old = robot.actuation.home_rotation_deg[tube - 1] if robot else nan
+        offset = degrees(fit.offset)
+        if robot:
+            offset += 360 * round((old - offset) / 360)  # the same angle, on the turn of the old value
+            changes.append(
+                Change(("actuation", "home_rotation_deg", tube - 1), "deg", offset, degrees(fit.offset_sd))
+            )
+        rows.append(Row(f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), old))
+        for way in ("forward", "backward"):
+            value, sd = getattr(fit, f"offset_{way}"), getattr(fit, f"offset_{way}_sd")
+            if isfinite(value):
+                turned = degrees(value) + 360 * round((offset - degrees(value)) / 360)
+                rows.append(Row(f"    turning {way}", "deg", turned, degrees(sd)))
+        rows.append(Row("    radius of the circle", "mm", 1e3 * fit.radius, 1e3 * fit.radius_sd))
+        rows.append(Row("    distance from the circle, RMS", "mm", 1e3 * fit.rms))
+        notices += [f"{name}: {notice.text}" for notice in fit.notices]
+        notices += _left_out(name, [int(table.row[mine[i]]) for i in fit.outliers])
+        details[f"tube_{tube}"] = {
+            "centre_mm": 1e3 * np.asarray(fit.centre), "normal": fit.normal, "arc_deg": degrees(fit.arc),
+            "in_base_frame": fit.in_base_frame, "rms_mm": 1e3 * fit.rms, "used": fit.used,
+            "direction_difference_deg": degrees(fit.direction_difference),
+            "direction_difference_sd_deg": degrees(fit.direction_difference_sd),
+        }  # fmt: skip
+    figures = {f"radius_rms_mm_{name}": detail["rms_mm"] for name, detail in details.items()}
+    return Outcome("Rotation offsets", rows, notices, changes, figures, {"tubes": details})
+
+
+def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> Outcome:
+    """T_ref from named points: CAD coordinates in the base frame, probe readings in the tracker frame."""
+    from scipy.spatial.transform import Rotation
+
+    from ctcr import _core
+
+    names = list(dict.fromkeys(table["point"]))
+    cad, reading = table.stacked(*(f"cad_{axis}" for axis in AXES)), table.stacked(*AXES)
+    first = np.array([table["point"].index(name) for name in names])
+    place = cad[first]
+    _check_same_place(table, names, cad, place)
+    measured = np.isfinite(reading).all(axis=1)
+    read = [name for name, there in zip(table["point"], measured, strict=True) if there]
+    targets = np.array([name not in read for name in names])
+    fit = computed(
+        _core.register_points,
+        table.file,
+        names=[name for name, target in zip(names, targets, strict=True) if not target],
+        cad=np.ascontiguousarray(place[~targets]),
+        reading_names=read,
+        readings=np.ascontiguousarray(reading[measured]),
+        targets=np.ascontiguousarray(place[targets]) if targets.any() else None,
+        placement_sd=1e-3 * placement_sd_mm,
+        **tracker_noise(robot),
+    )
+    position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
+    old_position = robot.tracker.position_mm if robot else [nan] * 3
+    old_turn = robot.tracker.rotation_vector_rad if robot else [nan] * 3
+    rows = [Row(f"origin of the base frame, {axis}", "mm", position[i], 1e3 * fit.position_sd[i], old_position[i])
+            for i, axis in enumerate(AXES)]  # fmt: skip
+    rows += [Row(f"rotation vector, {axis}", "rad", turn[i], fit.rotation_sd[i], old_turn[i])
+             for i, axis in enumerate(AXES)]  # fmt: skip
+    rows.append(Row("error at the points, RMS", "mm", 1e3 * fit.fre))
+    names_of_targets = [name for name, target in zip(names, targets, strict=True) if target]
+    rows += [Row(f"expected error at {name}, RMS", "mm", 1e3 * tre)
+             for name, tre in zip(names_of_targets, fit.tre, strict=True)]  # fmt: skip
+    changes = [
+        Change(("tracker", "position_mm", i), "mm", position[i], 1e3 * fit.position_sd[i]) for i in range(3)
+    ]
+    changes += [Change(("tracker", "rotation_vector_rad", i), "rad", turn[i]) for i in range(3)]
+    residual = 1e3 * np.linalg.norm(fit.residuals, axis=1)
+    figures = {"fiducial_error_rms_mm": 1e3 * fit.fre, "rotation_sd_deg": np.degrees(fit.rotation_sd)}
+    details = {
+        "points": [
+            {"name": name, "residual_mm": 1e3 * vector, "distance_mm": size, "readings": count,
+             "outlier": name in fit.outliers}
+            for name, vector, size, count in zip(fit.names, fit.residuals, residual, fit.counts, strict=True)
+        ],
+        "T_ref_m": fit.T_ref,
+        "degrees_of_freedom": fit.degrees_of_freedom,
+        "repeatability_mm": 1e3 * fit.repeatability_sd,
+    }  # fmt: skip
+    return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], changes, figures, details)
+
+
+def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict[str, float]) -> Outcome:
+    """Home translations and effective lengths, from what is measured by hand and by the encoders."""
+    from ctcr import _core
+
+    tubes = _all_tubes(table, robot)
+    pitch = robot.actuation.translation_mm_per_rev if robot and pitch_mm is None else pitch_mm
+    if pitch is None:
+        raise InputError(
+            Problem("give --pitch-mm, how far a tube moves in one turn of its motor, or --robot")
+        )
+
+    def values(tube: int, name: str) -> list[float]:
+        if name not in table:
+            return []
+        mine = table[name][table["tube"] == tube]
+        return mine[np.isfinite(mine)].tolist()
+
+    measured = []
+    for tube in tubes:
+        angles = values(tube, "home_angle")
+        measured.append(_core.TubeHome(
+            home_angle=float(np.mean(angles)) if angles else 0.0,
+            distances=values(tube, "distance"),
+            flush_angles=values(tube, "flush_angle"),
+            lengths=values(tube, "length"),
+        ))  # fmt: skip
+    fit = computed(
+        _core.home_offsets, table.file, translation_ratio=1e-3 * pitch / (2 * np.pi), tubes=measured,
+        **{name: 1e-3 * sd for name, sd in sds_mm.items()},
+    )  # fmt: skip
+    rows, changes = [], []
+    for i, tube in enumerate(tubes):
+        for name, path, value, sd, old in (
+            ("home translation", ("actuation", "home_translation_mm", i), fit.offset[i], fit.offset_sd[i],
+             robot.actuation.home_translation_mm[i] if robot else nan),
+            ("length", ("tubes", i, "length_mm"), fit.length[i], fit.length_sd[i],
+             robot.tubes[i].length_mm if robot else nan),
+        ):  # fmt: skip
+            rows.append(Row(f"tube {tube}: {name}", "mm", 1e3 * value, 1e3 * sd, old))
+            changes.append(Change(path, "mm", 1e3 * value, 1e3 * sd))
+        rows.append(Row("    deployed at home", "mm", 1e3 * fit.deployed[i], 1e3 * fit.deployed_sd[i]))
+    details = {"correlation": fit.correlation}
+    return Outcome("Home", rows, [notice.text for notice in fit.notices], changes, {}, details)
+
+
+def cantilever(
+    table: Table,
+    robot: Robot | None,
+    tube: int | None,
+    inner_mm: float | None,
+    outer_mm: float | None,
+    sds_mm: dict[str, float],
+    fit_zero: bool,
+) -> Outcome:
+    """Young's modulus from the deflection of a tube that is clamped at one end and loaded across."""
+    from ctcr import _core
+
+    described = _described_tube(robot, tube)
+    inner = inner_mm if inner_mm is not None else getattr(described, "inner_diameter_mm", None)
+    outer = outer_mm if outer_mm is not None else getattr(described, "outer_diameter_mm", None)
+    if inner is None or outer is None:
+        raise InputError(
+            Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot and --tube")
+        )
+    fit = computed(
+        _core.fit_cantilever, table.file, load=table["load"], deflection=table["deflection"],
+        free_length=table["free_length"], load_distance=table["load_distance"] if "load_distance" in table else None,
+        inner_diameter=1e-3 * inner, outer_diameter=1e-3 * outer, fit_zero=fit_zero,
+        **{name: 1e-3 * sd for name, sd in sds_mm.items()},
+    )  # fmt: skip
+    given_EI = described is not None and described.bending_stiffness_Nm2 is not None
+    old = described.youngs_modulus_GPa if described is not None and not given_EI else None
+    rows = [
+        Row("Young's modulus", "GPa", 1e-9 * fit.youngs_modulus, 1e-9 * fit.youngs_modulus_sd,
+            nan if old is None else old),
+        Row("bending stiffness EI", "N m^2", fit.bending_stiffness, fit.bending_stiffness_sd,
+            described.bending_stiffness if described else nan),
+        Row("distance from the readings, RMS", "mm", 1e3 * fit.rms),
+    ]  # fmt: skip
+    if fit_zero:
+        rows.append(Row("zero of the readings", "mm", 1e3 * fit.zero, 1e3 * fit.zero_sd))
+    changes = []
+    if described is not None:
+        path, unit, row = (
+            ("bending_stiffness_Nm2", "N m^2", rows[1])
+            if given_EI
+            else ("youngs_modulus_GPa", "GPa", rows[0])
+        )
+        changes.append(Change(("tubes", tube - 1, path), unit, row.value, row.deviation))
+    details = {
+        "rows": [{"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
+                 for row, modulus, residual in zip(table.row, fit.row_modulus, fit.residuals, strict=True)],
+        "largest_slope_deg": float(np.degrees(np.max(np.abs(fit.slope_angle)))),
+    }  # fmt: skip
+    figures = {"deflection_rms_mm": 1e3 * fit.rms}
+    return Outcome("Cantilever", rows, [notice.text for notice in fit.notices], changes, figures, details)
+
+
+def curvature(
+    table: Table,
+    robot: Robot | None,
+    tube: int | None,
+    scale_mm: float | None,
+    scale_sd_percent: float,
+    reference: tuple[float, float, float, float, float] | None,
+    point_sd: float,
+) -> Outcome:
+    """Curvature and curved length from points along the picture of a tube."""
+    from ctcr import _core
+
+    described = _described_tube(robot, tube)
+    unit = table.unit["x"]
+    if table.unit["y"] != unit:
+        raise InputError(
+            Problem(f"x is in {unit} but y in {table.unit['y']}: give both in one unit", table.file)
+        )
+    scale = {"scale": 1.0} if unit != "px" else {}
+    if unit == "px":
+        if (scale_mm is None) == (reference is None):
+            raise InputError(
+                Problem("points in px need their scale: give --mm-per-px, or --reference, not both")
+            )
+        if scale_mm is not None:
+            scale = {"scale": 1e-3 * scale_mm}
+        else:
+            scale = {
+                "reference": np.array(reference[:4]).reshape(2, 2),
+                "reference_length": 1e-3 * reference[4],
+            }
+    elif scale_mm is not None or reference is not None:
+        raise InputError(Problem(f"points in {unit} have their scale: leave out --mm-per-px and --reference"))
+    fit = computed(
+        _core.fit_tube_shape, table.file, points=np.ascontiguousarray(table.stacked("x", "y")),
+        scale_sd=1e-2 * scale_sd_percent, point_sd=point_sd if unit == "px" else 1e-3 * point_sd, **scale,
+    )  # fmt: skip
+    sign = -1.0 if described is not None and described.curvature < 0 else 1.0  # a picture does not tell it
+    rows = [
+        Row("curvature", "1/m", sign * fit.curvature, fit.curvature_sd, described.curvature if described else nan),
+        Row("curved length", "mm", 1e3 * fit.curved_length, 1e3 * fit.curved_length_sd,
+            described.curved_length_mm if described else nan),
+        Row("radius", "mm", 1e3 * fit.radius),
+        Row("straight length seen", "mm", 1e3 * fit.straight_length),
+        Row("distance from the points, RMS", "mm", 1e3 * fit.rms),
+    ]  # fmt: skip
+    changes = []
+    if described is not None:
+        for key, row in (("curvature_per_m", rows[0]), ("curved_length_mm", rows[1])):
+            changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.deviation))
+    notices = [notice.text for notice in fit.notices]
+    notices += _left_out("", [int(table.row[i]) for i in fit.outliers])
+    details = {"correlation": fit.correlation, "junction": fit.junction, "tip": fit.tip, "points_unit": unit}
+    return Outcome("Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details)
+
+
+def _tracker_pose(robot: Robot) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = robot.tracker.rotation, robot.tracker.position
+    return pose
+
+
+def _rotation_ratio(robot: Robot | None, ratio: float | None) -> float:
+    if ratio is None and robot is not None:
+        ratio = robot.actuation.rotation_rev_per_rev
+    if ratio is None:
+        raise InputError(Problem("give --ratio, turns of a tube in one turn of its motor, or --robot"))
+    return ratio
+
+
+def _check_tube(tube: int, robot: Robot | None, file: str, row: int | None = None) -> None:
+    if robot is not None and tube > robot.n_tubes:
+        raise InputError(
+            Problem(f"tube {tube} is not there: the robot has {robot.n_tubes}", file, row, "tube", "row")
+        )
+
+
+def _described_tube(robot: Robot | None, tube: int | None):
+    if robot is None:
+        return None
+    if tube is None:
+        raise InputError(
+            Problem(f"give --tube, 1 to {robot.n_tubes} from the innermost: which tube was measured")
+        )
+    _check_tube(tube, robot, robot._source.file)
+    return robot.tubes[tube - 1]
+
+
+def _all_tubes(table: Table, robot: Robot | None) -> list[int]:
+    there = sorted(set(table["tube"].tolist()))
+    count = robot.n_tubes if robot else there[-1]
+    missing = [tube for tube in range(1, count + 1) if tube not in there]
+    if missing or there[-1] > count:
+        text = (
+            f"tube {missing[0]} has no row"
+            if missing
+            else f"tube {there[-1]} is not there: the robot has {count}"
+        )
+        raise InputError(Problem(f"{text}: needs every tube, 1 to {count} from the innermost", table.file))
+    return there
+
+
+def _check_same_place(table: Table, names: list[str], cad: Array, place: Array) -> None:
+    problems = []
+    for name, there in zip(names, place, strict=True):
+        for i, (other, point) in enumerate(zip(table["point"], cad, strict=True)):
+            if other == name and np.max(np.abs(point - there)) > 1e-6:
+                text = f"the CAD coordinates of {name} differ from those in another row"
+                problems.append(Problem(text, table.file, int(table.row[i]), "cad_x", line_name="row"))
+    partly = np.isfinite(table.stacked(*AXES)).sum(axis=1)
+    for row in table.row[(partly > 0) & (partly < 3)]:
+        text = "some of x, y, z are empty: fill in all or none"
+        problems.append(Problem(text, table.file, int(row), line_name="row"))
+    if problems:
+        raise InputError(problems)
+
+
+def _left_out(name: str, rows: list[int]) -> list[str]:
+    if not rows:
+        return []
+    listed = ", ".join(map(str, rows[:10])) + (", ..." if len(rows) > 10 else "")
+    return [f"{name}: outliers, not used: rows {listed}".removeprefix(": ")]

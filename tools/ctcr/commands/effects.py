@@ -1,0 +1,132 @@
+"""`ctcr effects`: the physical effects that a robot may have beyond the standard model."""
+
+import click
+
+_NEEDS = {
+    "order": "rows in the order measured",
+    "time": "times",
+    "orientation": "orientation",
+    "loads": "several known loads",
+    "gravity": "gravity's direction",
+}
+
+
+@click.command(name="effects")
+@click.argument("name", required=False)
+@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="Show the effects of this file too.")
+@click.option(
+    "--tubes",
+    type=click.IntRange(1, 4),
+    default=3,
+    show_default=True,
+    help="Tubes of the robot, for full names.",
+)
+@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
+def command(name: str | None, own: tuple[str, ...], tubes: int, json_target: str | None) -> None:
+    """List the physical effects that can be added to a robot, or tell everything about the effect NAME."""
+    from ctcr import effects, output, user_effects
+
+    user_effects.load_all(own)
+    shown = [effects.get(name, tubes)] if name else list(effects.all_effects(tubes).values())
+    if json_target:
+        data = [_as_data(effect) for effect in shown]
+        output.write_json(data[0] if name else {"effects": data}, json_target)
+        if json_target == "-":
+            return
+    console = output.console()
+    if name:
+        _tell(console, shown[0])
+    else:
+        _list(console, shown)
+
+
+def _list(console, shown) -> None:
+    from ctcr.output import table
+
+    rows = [
+        [
+            effect.id,
+            effect.title,
+            ", ".join(need for need in _NEEDS if need in effect.needs),
+            "\n".join(effect.look_alikes),
+        ]
+        for effect in shown
+    ]
+    columns = ["id", "what it is", "the data need", "looks like"]
+    made = table(f"{len(shown)} physical effects", columns, rows, 4)
+    made.columns[0].no_wrap = made.columns[3].no_wrap = True
+    console.soft_wrap = False
+    console.print(made)
+    console.print("ctcr effects ID tells how one looks in the data and what to measure to see it.")
+
+
+def _tell(console, effect) -> None:
+    from rich.table import Table
+
+    from ctcr.output import table
+
+    needs = ", ".join(_NEEDS[need] for need in _NEEDS if need in effect.needs) or "nothing special"
+    console.soft_wrap = False
+    console.print(f"[bold]{effect.title}[/bold]  ({effect.id})\n")
+    facts = Table.grid(padding=(0, 2))
+    facts.add_column(style="bold", no_wrap=True)
+    for title, text in (
+        ("what happens", effect.physics), ("how it looks", effect.signature), ("what to measure", effect.measure),
+        ("the data need", needs), ("looks like", ", ".join(effect.look_alikes) or "no other"),
+        ("reference", effect.reference),
+        *((_shown_name(p), p.meaning) for p in effect.parameters),
+    ):  # fmt: skip
+        if text:
+            facts.add_row(title, text)
+    console.print(facts)
+    rows = [
+        [_shown_name(p), p.unit or "-", "shape" if p.is_shape else "strength", f"{p.neutral:.4g}", f"{p.sigma:.3g}",
+         _interval(p.soft), _interval(p.hard)]
+        for p in effect.parameters
+    ]  # fmt: skip
+    columns = ["parameter (SI)", "unit", "kind", "neutral", "sd", "usual", "possible"]
+    console.print()
+    console.print(table("", columns, rows, 3))
+
+
+def _shown_name(p) -> str:
+    return f"{p.name}.1..{len(p.full_names)}" if p.per_tube and len(p.full_names) > 1 else p.name
+
+
+def _interval(limits: tuple[float, float]) -> str:
+    from math import isinf
+
+    low, high = limits
+    if isinf(low) and isinf(high):
+        return "any"
+    if isinf(low) or isinf(high):
+        return f"<= {high:.3g}" if isinf(low) else f">= {low:.3g}"
+    return f"{low:.3g} to {high:.3g}"
+
+
+def _as_data(effect) -> dict:
+    return {
+        "id": effect.id,
+        "title": effect.title,
+        "physics": effect.physics,
+        "signature": effect.signature,
+        "measure": effect.measure,
+        "needs": sorted(effect.needs),
+        "look_alikes": effect.look_alikes,
+        "reference": effect.reference,
+        "parameters": [
+            {
+                "name": p.name,
+                "full_names": p.full_names,
+                "unit": p.unit,
+                "kind": "shape" if p.is_shape else "strength",
+                "neutral": p.neutral,
+                "sd": p.sigma,
+                "usual": p.soft,
+                "possible": p.hard,
+                "per_tube": p.per_tube,
+                "meaning": p.meaning,
+            }
+            for p in effect.parameters
+        ],
+    }

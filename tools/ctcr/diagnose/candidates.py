@@ -1,0 +1,70 @@
+"""What may be missing: each effect of the catalogue with the parameters by which it enters the race.
+
+An effect may enter in several variants, from few parameters to all; the evidence pays for the parameters that it needs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctcr import effects
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+VARIANTS = {
+    "tip_load": (("mass",), ("force_x", "force_y", "force_z")),
+    "precurvature_profile": (
+        ("linear",),
+        ("quadratic",),
+        ("linear", "quadratic"),
+        ("linear", "quadratic", "cubic"),
+    ),
+    "straight_curvature": (("bend_x",), ("bend_x", "bend_y")),
+    "sensor_offset": (("x", "y", "z"), ("x", "y", "z", "turn_x", "turn_y", "turn_z")),
+    "field_distortion": (("scale",), None),
+}  # None: all amplitudes
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect with the parameters that are fitted, and the values at which its shape parameters are held."""
+
+    id: str
+    names: tuple[str, ...]
+    shape: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def label(self) -> str:
+        return f"{self.id} ({', '.join(dict.fromkeys(name.split('.')[2] for name in self.names))})"
+
+
+def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
+    """Those that these data can show, and why not for the others."""
+    found, left_out = [], {}
+    for effect in effects.catalogue(robot.n_tubes).values():
+        reason = _unseen(effect, robot, measurements)
+        if reason:
+            left_out[effect.id] = reason
+            continue
+        for variant in VARIANTS.get(effect.id, (None,)):
+            names = effect.names(*variant) if variant else effect.amplitudes
+            if effect.id == "contact":
+                names = effect.names("stiffness")
+            if (
+                measurements.quaternion is None
+                and variant
+                and any(name.startswith("turn") for name in variant)
+            ):
+                continue
+            found.append(Candidate(effect.id, tuple(names)))
+    return found, left_out
+
+
+def _unseen(effect: effects.Effect, robot: Robot, measurements: Measurements) -> str | None:
+    if "time" in effect.needs and not np.isfinite(measurements.t).all():
+        return "times are missing"
+    if "order" in effect.needs and np.isfinite(measurements.t).all() and (np.diff(measurements.t) < 0).any():
+        return "the rows are not in the order of time"
+    if effect.id == "tip_load" and robot.gravity is None:
+        return "the direction of gravity is not known"
+    return None

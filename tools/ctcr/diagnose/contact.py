@@ -1,0 +1,43 @@
+"""Where a plane may stand that the tip touches: tried as a force along its normal, as far as the tip is inside."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import effects
+from ctcr.diagnose.candidates import Candidate
+
+FORCE = ["effects.tip_load.force_x", "effects.tip_load.force_y", "effects.tip_load.force_z"]
+STEM = "effects.contact."
+DEPTHS = (0.6, 0.75, 0.9)  # parts of the tips that are outside
+FEWEST = 5  # tips inside
+
+
+def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candidate, NDArray]]:
+    """The candidate with each plane, with its slope; `by_force` (M, 6, 3) are those of a force at the tip [1/N]."""
+    tracker = engine.robot.tracker
+    tips = (engine.places - tracker.position) @ tracker.rotation
+    sigma = effects.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
+    shapes = (STEM + "distance", STEM + "azimuth", STEM + "elevation")
+    options = []
+    for elevation in np.deg2rad((-60, -30, 0, 30, 60, 90)):
+        for azimuth in np.deg2rad(np.arange(0, 360, 30) if elevation < 1.5 else [0]):
+            normal = np.array(
+                [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+            )
+            height = tips @ normal
+            for part in DEPTHS:
+                distance = np.quantile(height, part)
+                inside = np.maximum(height - distance, 0.0)
+                if np.count_nonzero(inside) < FEWEST:
+                    continue
+                column = -sigma * inside[:, None] * (by_force @ normal)
+                shape = tuple(zip(shapes, (float(distance), float(azimuth), float(elevation)), strict=True))
+                options.append(
+                    (Candidate(candidate.id, (STEM + "stiffness", *shapes), shape), column[:, :, None])
+                )
+    return options
+
+
+def start_of(candidate: Candidate) -> dict[str, float]:
+    """Where a fit starts: with the plane that was found."""
+    return dict(candidate.shape) | {STEM + "stiffness": 0.1} if candidate.id == "contact" else {}

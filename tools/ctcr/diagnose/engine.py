@@ -1,0 +1,138 @@
+"""Fits and linearisations of a robot with any effects, at one table of measurements, one noise and one split."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import effects, free_parameters, identify, recording
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a candidate would bring, by the slopes at a fit alone."""
+
+    log_evidence: float  # over the fit without it
+    values: Array  # of its parameters, over their neutral values, in units of their prior sd
+    signal: Array  # whitened change of the residual that calibration cannot imitate (K,)
+
+
+class Linear:
+    """Whitened residual and slopes at a fit, everything in units of prior sd."""
+
+    def __init__(self, residual: Array, jacobian: Array) -> None:
+        self.residual, self.jacobian = residual, jacobian
+        information = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+        self.cholesky = np.linalg.cholesky(information)
+
+    def without_calibration(self, columns: Array) -> Array:
+        """What of whitened columns the fitted parameters cannot imitate, given their priors."""
+        inner = np.linalg.solve(self.cholesky, self.jacobian.T @ columns)
+        return columns - self.jacobian @ np.linalg.solve(self.cholesky.T, inner)
+
+    def gain(self, columns: Array) -> Gain:
+        """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
+        left = self.without_calibration(columns)
+        S = columns.T @ left + np.eye(columns.shape[1])
+        S = 0.5 * (S + S.T)
+        g = columns.T @ self.residual
+        eta = -np.linalg.solve(S, g)
+        log_evidence = -0.5 * g @ eta - 0.5 * np.linalg.slogdet(S)[1]
+        return Gain(float(log_evidence), eta, left @ eta)
+
+
+@dataclass
+class Engine:
+    robot: Robot
+    measurements: Measurements
+    noise: Any
+    rows: Mask  # that are fitted
+    steps: int = recording.STEPS
+    threads: int = 0
+    places: Array = field(init=False)
+    base: list[str] = field(init=False)  # calibration parameters
+
+    def __post_init__(self) -> None:
+        self.places = identify.places_of(self.robot, self.measurements)
+        self.base = free_parameters.expand("standard", self.robot)
+        self.measured = identify._measured(self.measurements)
+
+    def noise_with(self, part: float) -> Any:
+        """The tracker's noise with a part of its stated field error."""
+        n = self.noise
+        return identify.Noise(
+            position_jitter=n.position_jitter, rotation_jitter=n.rotation_jitter,
+            position_field=part * n.position_field, rotation_field=part * n.rotation_field,
+            correlation_length=n.correlation_length,
+        )  # fmt: skip
+
+    def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
+        own = [name for name in names if not name.startswith("effects.")]
+        added = [name for name in names if name.startswith("effects.")]
+        parts = [
+            source.priors(self.robot, some)
+            for source, some in ((free_parameters, own), (effects, added))
+            if some
+        ]
+        return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+    def recording(
+        self, names: Sequence[str], fixed: dict[str, float] | None = None, rows: Mask | None = None
+    ) -> Any:
+        table = recording.recording_of(
+            self.robot, self.measurements, names, fixed=fixed, steps=self.steps, threads=self.threads
+        )
+        table.activate((self.measured & (self.rows if rows is None else rows)).tolist())
+        return table
+
+    def fit(
+        self,
+        added: Iterable[str] = (),
+        *,
+        start: dict[str, float] | None = None,
+        fixed: dict[str, float] | None = None,
+        weights: Array | None = None,
+        inflation: Array | None = None,
+        rows: Mask | None = None,
+        noise: Any = None,
+    ) -> identify.Fit:
+        """Calibration and `added` parameters of effects together.
+
+        Frozen `weights` of outliers and `inflation` of the noise make evidences comparable; without them both follow
+        the fit: where the model is wrong, the noise is inflated so that calibration stays plausible.
+        """
+        names = [*self.base, *added]
+        mean, sd, low, high = self.priors(names)
+        mean_of = dict(zip(names, mean, strict=True))
+        at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
+        return identify.identify_with(
+            self.recording(names, fixed, rows), names, mean, sd, low, high, noise or self.noise, self.places,
+            robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
+            start=at, starts=1,
+        )  # fmt: skip
+
+    def linear(self, fit: identify.Fit) -> Linear:
+        residual, jacobian = fit.whitened()
+        return Linear(residual, jacobian * fit.prior_sd)
+
+    def columns(
+        self, fit: identify.Fit, names: Sequence[str], fixed: dict[str, float] | None = None
+    ) -> Array:
+        """Raw slopes (M, 6, k) of the residual by further parameters at a fit, in units of their prior sd."""
+        everything = [*fit.names, *names]
+        table = self.recording(everything, fixed)
+        neutral, sd, _, _ = self.priors(names)
+        _, jacobian, _ = table.residual(np.concatenate([fit.values, neutral]), True)
+        slopes = jacobian[:, len(fit.names) :] * sd
+        return np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(self.measurements), 6, len(names))
+
+
+def values_of(fit: identify.Fit) -> dict[str, float]:
+    return dict(zip(fit.names, map(float, fit.values), strict=True))

@@ -1,0 +1,101 @@
+"""The pictures of the diagnosis: error waterfall, candidates, the error before and after against what it depends on."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.diagnose.leftover import covariates
+
+if TYPE_CHECKING:
+    from ctcr.diagnose.analysis import Diagnosis
+
+GOOD = "#4b8b3b"
+CANDIDATES = 10
+
+
+def waterfall(figure, d: "Diagnosis") -> None:
+    """RMS error on locked runs, from the robot file to the noise floor."""
+    axes = figure.subplots()
+    rms = d.rms_mm
+    bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
+    if d.accepted:
+        names = " + ".join(" or ".join(a.ids[:2]) for a in d.accepted)
+        bars.append((f"with {names}", rms["with_effects"], GOOD))
+    for i, (_, value, colour) in enumerate(bars):
+        axes.bar(i, value, color=colour, width=0.62)
+        axes.text(i, value, f" {value:.3g} mm", ha="center", va="bottom", weight="bold")
+    axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
+    axes.text(-0.45, rms["noise_floor"], f"noise floor {rms['noise_floor']:.2g} mm", color=NOISE, va="bottom")
+    axes.set_xticks(range(len(bars)), [name.replace("_", " ") for name, _, _ in bars])
+    axes.set_ylabel("RMS error on locked runs, mm")
+    axes.set_yscale("log")
+    axes.set_ylim(0.5 * min([rms["noise_floor"], *[v for _, v, _ in bars]]), 2 * max(v for _, v, _ in bars))
+
+
+def candidates(figure, d: "Diagnosis") -> bool | None:
+    """Log evidence of every candidate in each round; what the data cannot tell apart is boxed."""
+    rounds = [r for r in d.rounds if r.entries]
+    if not rounds:
+        return False
+    panels = figure.subplots(1, len(rounds), squeeze=False)[0]
+    for number, (axes, round_) in enumerate(zip(panels, rounds, strict=True), start=1):
+        best: dict[str, float] = {}
+        for entry in round_.entries:
+            value = entry.refit if entry.refit is not None else entry.linear
+            best[entry.id] = max(value, best.get(entry.id, -np.inf))
+        shown = sorted(best.items(), key=lambda item: -item[1])[:CANDIDATES]
+        for i, (identity, value) in enumerate(shown):
+            accepted = identity in round_.ids
+            axes.barh(
+                i, max(value, 0.3), color=GOOD if accepted else FAINT, edgecolor=INK if accepted else "none",
+                linewidth=1.5,
+            )  # fmt: skip
+            axes.text(max(value, 0.3), i, f" {value:.3g}", va="center", fontsize=9)
+        axes.set_yticks(range(len(shown)), [identity.replace("_", " ") for identity, _ in shown])
+        axes.invert_yaxis()
+        axes.set_xscale("symlog", linthresh=10)
+        axes.set_xlim(0, 8 * max(10.0, *(value for _, value in shown)))
+        axes.set_xlabel("log evidence over none")
+        axes.set_title(f"round {number}")
+    return None
+
+
+def before_after(figure, d: "Diagnosis") -> bool | None:
+    """Position error before and after against the quantity that predicts it best before."""
+    found = covariates(d.robot, d.measurements)
+    scores = {name: share for name, share in d.leftover.shares_before.items() if name in found}
+    if not scores or d.final is d.calibrated:
+        return False
+    names = sorted(scores, key=lambda name: -scores[name])[:3]
+    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    for axes, name in zip(panels, names, strict=True):
+        x = found[name][:, 0]
+        for fit, colour, label in (
+            (d.calibrated, ERROR, "calibrated"),
+            (d.final, GOOD, "with the effects found"),
+        ):
+            size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
+            axes.plot(x, size, ".", color=colour, markersize=3, alpha=0.6, label=label)
+        axes.set_xlabel(f"{name} (first component)")
+    panels[0].set_ylabel("error, mm")
+    panels[0].set_yscale("log")
+    panels[0].legend(markerscale=3)
+    return None
+
+
+def directions(figure, d: "Diagnosis") -> None:
+    """The course of the error over the session, before and after."""
+    axes = figure.subplots()
+    for fit, colour, label in ((d.calibrated, OUT, "calibrated"), (d.final, BACK, "with the effects found")):
+        size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
+        axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
+    first = np.flatnonzero(np.diff(d.locked.astype(int)) != 0) + 1
+    edges = np.concatenate([[0], first, [len(d.locked)]])
+    for start, end in zip(edges, edges[1:], strict=False):
+        if end > start and d.locked[start]:
+            axes.axvspan(start + 0.5, end + 0.5, color="#eef2f5", zorder=0)
+    axes.set_yscale("log")
+    axes.set_xlabel("reading (grey: runs that no fit saw)")
+    axes.set_ylabel("error, mm")
+    axes.legend(markerscale=3)

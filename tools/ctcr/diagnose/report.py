@@ -1,0 +1,181 @@
+"""The diagnosis as one HTML page that needs nothing else: verdict first."""
+
+import html
+import json
+from datetime import date
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ctcr import effects
+from ctcr.compare.figures import draw
+from ctcr.compare.report import _table as table
+from ctcr.diagnose import figures
+from ctcr.output import atomic_writer
+
+if TYPE_CHECKING:
+    from ctcr.diagnose.analysis import Diagnosis
+
+MOST_ARROWS = 800
+COLOURS = {"calibrated": "#b3361e", "with the effects found": "#4b8b3b"}
+
+
+def write(d: "Diagnosis", target: str | Path, source: str) -> None:
+    """Write the report; source says what was diagnosed. Raises InputError when the file cannot be written."""
+    with atomic_writer(target) as file:
+        file.write(page(d, source))
+
+
+def page(d: "Diagnosis", source: str) -> str:
+    """The whole HTML text."""
+    from plotly.offline import get_plotlyjs
+
+    title = html.escape(f"Diagnosis: {d.robot.name}")
+    style = (files("ctcr.compare") / "report.css").read_text(encoding="utf-8")
+    sections = [
+        _opening(d, title),
+        _found(d),
+        _errors(d),
+        _view(),
+        _candidates(d),
+        _parameters(d),
+        _limits(d),
+    ]
+    drawing = scene(d).replace("</", "<\\/")
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{title}</title><style>{style}</style></head><body>"
+        + "\n".join(filter(None, sections))
+        + f"<footer>{html.escape(source)}. Made by ctcr diagnose on {date.today().isoformat()}.</footer>"
+        + f"<script>{get_plotlyjs()}</script>"
+        + f"<script>const drawing = {drawing};\n"
+        + 'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
+        + "</body></html>\n"
+    )
+
+
+def _opening(d: "Diagnosis", title: str) -> str:
+    rms = d.rms_mm
+    cards = [
+        ("error", f"{rms['nominal']:.3g} mm", "RMS error with the robot file"),
+        ("error", f"{rms['calibrated']:.3g} mm", "after calibration"),
+    ]
+    if d.accepted:
+        cards.append(("back", f"{rms['with_effects']:.3g} mm", "with the effects found"))
+    cards.append(("noise", f"{rms['noise_floor']:.2g} mm", "noise floor"))
+    numbers = "".join(
+        f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
+        for kind, value, text in cards
+    )
+    verdict = d.verdict.word.replace("_", " ")
+    lead = " ".join(d.verdict.sentences)
+    return (
+        f'<h1>{title}</h1><p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
+        f'<div class="numbers">{numbers}</div>'
+        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw.</p>'
+    )
+
+
+def _found(d: "Diagnosis") -> str:
+    if not d.accepted:
+        return ""
+    items = []
+    for a in d.accepted:
+        for identity in a.ids:
+            e = effects.get(identity, d.robot.n_tubes)
+            items.append(f"<li><b>{html.escape(e.title)}</b> ({identity}). {html.escape(e.physics)}</li>")
+    return f"<h2>What is missing</h2><ul>{''.join(items)}</ul>"
+
+
+def _errors(d: "Diagnosis") -> str:
+    left = _figure(figures.waterfall, d, 5.2, 3.8, "RMS error on runs that no fit saw (logarithmic axis).")
+    right = _figure(figures.directions, d, 5.2, 3.8, "The error of every reading, in the order measured.")
+    more = _figure(
+        figures.before_after, d, 10.4, 3.6, "The error against the quantities that predict it best.", True
+    )
+    return f'<h2>The error falls</h2><div class="pair">{left}{right}</div>{more}'
+
+
+def _view() -> str:
+    return (
+        '<h2>Before and after</h2><div id="view"></div><p class="soft">Errors as lines from the predicted towards the '
+        "measured tip, all drawn with the same factor; tracker frame. Click a name to hide it.</p>"
+    )
+
+
+def _candidates(d: "Diagnosis") -> str:
+    drawn = _figure(
+        figures.candidates, d, 10.4, 4.4,
+        "Every candidate was fitted together with the calibration. Boxed: accepted, with all that these data cannot "
+        "tell from it.", True,
+    )  # fmt: skip
+    reason = next((r.reason for r in reversed(d.rounds) if r.reason), "")
+    return f"<h2>All candidates</h2>{drawn}<p>{html.escape(reason.capitalize())}.</p>" if drawn else ""
+
+
+def _parameters(d: "Diagnosis") -> str:
+    known, rows = effects.parameter_of(d.robot.n_tubes), []
+    for name, value, sd, shift in zip(d.final.names, d.final.values, d.final.sd, d.final.shift, strict=True):
+        p = known.get(name)
+        unit, meaning = (p.unit, p.meaning) if p else ("SI", "")
+        rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
+    rows.sort(key=lambda row: not row[0].startswith("effects."))
+    columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]
+    return "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
+
+
+def _limits(d: "Diagnosis") -> str:
+    lines = [f"{identity}: {reason}" for identity, reason in d.unseen.items()]
+    if not d.leftover.structured:
+        lines.insert(0, "What is left is noise.")
+    else:
+        on = ", ".join(d.leftover.depends_on)
+        lines.insert(0, "What is left is more than noise" + (f"; it depends on {on}" if on else ""))
+    return (
+        "<h2>What is left, and what these data cannot say</h2><ul>"
+        + "".join(f"<li>{html.escape(line)}</li>" for line in lines)
+        + "</ul>"
+    )
+
+
+def _figure(plot, d: "Diagnosis", width: float, height: float, caption: str, wide: bool = False) -> str:
+    drawn = draw(plot, d, width, height)
+    kind = ' class="wide"' if wide else ""
+    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
+
+
+def scene(d: "Diagnosis") -> str:
+    """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
+    measured = d.measurements.position
+    rows = np.flatnonzero(np.isfinite(d.calibrated.residual[:, :3]).all(axis=1))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ARROWS)).astype(int))]
+    tips = 1e3 * measured[rows]
+    size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
+    factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
+    data = [_trace(tips, "measured", {"mode": "markers", "marker": {"size": 2, "color": "#6b7785"}})]
+    fits = {"calibrated": d.calibrated} | ({"with the effects found": d.final} if d.accepted else {})
+    for name, fit in fits.items():
+        lines = np.full((3 * len(rows), 3), np.nan)
+        lines[0::3], lines[1::3] = tips, tips - factor * 1e3 * fit.residual[rows, :3]
+        style = {"mode": "lines", "line": {"width": 4, "color": COLOURS[name]}, "connectgaps": False}
+        data.append(_trace(lines, f"error, {name}, × {factor:g}", style))
+    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
+    layout = {
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "paper_bgcolor": "#ffffff",
+        "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
+        "legend": {"orientation": "h", "y": 0, "x": 0, "itemsizing": "constant"},
+        "scene": {"aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 0.8}},
+                  **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"}},
+    }  # fmt: skip
+    return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
+
+
+def _trace(points: np.ndarray, name: str, style: dict) -> dict:
+    columns = {
+        axis: [round(float(v), 3) if np.isfinite(v) else None for v in column]
+        for axis, column in zip("xyz", points.T, strict=True)
+    }
+    return {"type": "scatter3d", "name": name, "hoverinfo": "name", **columns, **style}

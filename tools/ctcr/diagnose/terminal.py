@@ -1,0 +1,96 @@
+"""A diagnosis on the terminal: the verdict first, then why."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from ctcr import effects, output
+
+if TYPE_CHECKING:
+    from ctcr.diagnose.analysis import Diagnosis
+
+SHOWN = 8  # candidates of a round
+
+
+@contextmanager
+def progress() -> Iterator[Callable[[str], None]]:
+    """Says what is being tried, on a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("reading") as status:
+        yield lambda text: status.update(text)
+
+
+def show(console: Any, result: "Diagnosis") -> None:
+    verdict = result.verdict
+    console.print(f"[bold]{verdict.word.upper().replace('_', ' ')}[/bold]")
+    for sentence in verdict.sentences:
+        console.print(sentence, markup=False)
+    console.print()
+    console.print(_errors(result))
+    for number, round_ in enumerate(result.rounds, start=1):
+        if round_.entries:
+            console.print(_candidates(number, round_))
+        if round_.reason:
+            console.print(f"Nothing accepted: {round_.reason}.", markup=False)
+    if result.accepted:
+        console.print(_parameters(result))
+    _leftover(console, result)
+    for identity, reason in result.unseen.items():
+        console.print(f"Not looked for: {identity}: {reason}.", markup=False)
+
+
+def _errors(result: "Diagnosis") -> Any:
+    names = {
+        "nominal": "as described",
+        "calibrated": "calibrated",
+        "with_effects": "with the effects found",
+        "noise_floor": "noise floor",
+    }
+    runs = len(set(result.measurements.run[result.locked].tolist()))
+    rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
+    title = f"Position error (RMS) on {result.locked.sum()} readings of {runs} run(s) that no fit saw"
+    return output.table(title, ["model", "mm"], rows)
+
+
+def _candidates(number: int, round_: Any) -> Any:
+    rows = []
+    for entry in round_.entries[:SHOWN]:
+        refitted = entry.refit is not None
+        rows.append([
+            entry.candidate.label,
+            f"{entry.linear:.1f}",
+            f"{entry.refit:.1f}" if refitted else "",
+            f"{entry.share:.0%}" if refitted else "",
+            "accepted" if entry is round_.accepted else "cannot be told from it" if entry.id in round_.ids else "",
+        ])  # fmt: skip
+    columns = ["effect", "log evidence by slopes", "after refit", "excess removed", ""]
+    return output.table(
+        f"Round {number}: candidates, each fitted together with the calibration", columns, rows
+    )
+
+
+def _parameters(result: "Diagnosis") -> Any:
+    known, fit = effects.parameter_of(result.robot.n_tubes), result.final
+    rows = [
+        [name.removeprefix("effects."), f"{value:.4g}", f"{sd:.2g}", known[name].unit, known[name].meaning]
+        for name, value, sd in zip(fit.names, fit.values, fit.sd, strict=True)
+        if name in known
+    ]
+    return output.table("Fitted effects", ["parameter", "value", "sd", "unit", "meaning"], rows)
+
+
+def _leftover(console: Any, result: "Diagnosis") -> None:
+    left = result.leftover
+    if not left.structured:
+        console.print("What is left is noise.")
+    elif left.depends_on:
+        console.print(
+            f"What is left is more than noise; it depends on {', '.join(left.depends_on)}.", markup=False
+        )
+    else:
+        console.print("What is left is more than noise, and depends on nothing that was tried.")

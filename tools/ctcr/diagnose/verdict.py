@@ -1,0 +1,58 @@
+"""The verdict: one word for programs, plain sentences for people."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import identify
+from ctcr.diagnose import race as racing
+from ctcr.diagnose.leftover import Leftover
+
+if TYPE_CHECKING:
+    from ctcr.diagnose.analysis import Accepted
+
+EXPLAINED = (
+    0.5  # share of the excess error on locked runs that effects must remove to be the cause, not stand-ins
+)
+
+
+@dataclass
+class Verdict:
+    word: str  # nothing_missing, identified, probable, ambiguous, stand_in, not_in_catalogue
+    sentences: list[str] = field(default_factory=list)
+
+
+def judge(
+    calibrated: identify.Fit,
+    final: identify.Fit,
+    accepted: "list[Accepted]",
+    rounds: list[racing.Round],
+    leftover: Leftover,
+    locked: NDArray[np.bool_],
+) -> Verdict:
+    jitter = np.sqrt(3) * 1e3 * final.noise.position_jitter
+    before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, final))
+    explained = 1 - after / before
+    if not accepted:
+        if not leftover.structured:
+            return Verdict(
+                "nothing_missing", ["Calibration and the tracker's noise explain these measurements."]
+            )
+        return Verdict(
+            "not_in_catalogue",
+            ["Something is missing that no effect of the catalogue explains.", rounds[-1].reason],
+        )
+    first = accepted[0]
+    if leftover.structured and explained < EXPLAINED:
+        return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but most of it stays."])
+    if any(a.entry.implausible for a in accepted):
+        return Verdict(
+            "stand_in", ["The data want values that are hardly possible.", *first.entry.implausible]
+        )
+    if any(len(a.ids) > 1 for a in accepted):
+        return Verdict("ambiguous", ["These data cannot tell some effects apart."])
+    if any(a.margin < racing.SURE for a in accepted):
+        return Verdict("probable", ["Another effect is nearly as likely."])
+    return Verdict("identified", [f"{first.entry.id} explains the error."])

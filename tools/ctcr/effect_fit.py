@@ -1,0 +1,319 @@
+"""Effects put into a robot, fitted together with its calibration, and taken out again: `ctcr add` and `remove`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import effects, free_parameters, identify, robot_update, user_effects
+from ctcr.calibrate import parameters
+from ctcr.diagnose.split import locked_rows
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.measurements import Measurements
+from ctcr.output import Progress
+from ctcr.robot import Robot
+from ctcr.robot_update import Change, Entry
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SAYS_NOTHING = 0.9  # posterior over prior standard deviation
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The error of the judging rows at one stage, RMS; NaN: not measured."""
+
+    name: str
+    rms_mm: float
+    rms_deg: float
+
+
+@dataclass(frozen=True)
+class Added:
+    """Effects fitted to measurements."""
+
+    robot: Robot  # with them
+    ids: list[str]
+    fit: identify.Fit  # of all rows
+    stages: list[Stage]  # nominal, calibrated, each effect, noise floor
+    held_out: str  # what judged: runs, or blocks of time; empty: the rows that were fitted
+    notices: list[str]
+
+    def parameters(self) -> dict[str, dict[str, float]]:
+        """Value and standard deviation of every fitted parameter of an effect, SI."""
+        return {
+            name: {"value": float(value), "sd": float(sd)}
+            for name, value, sd in zip(self.fit.names, self.fit.values, self.fit.sd, strict=True)
+            if name.startswith("effects.")
+        }
+
+    def rms(self, unit: str) -> dict[str, float]:
+        """By stage; `unit` is rms_mm or rms_deg."""
+        return {stage.name: getattr(stage, unit) for stage in self.stages}
+
+
+def with_values(robot: Robot, ids: Sequence[str], given: Mapping[str, float]) -> Robot:
+    """The robot with these effects at their neutral values, but for those `given` by full name."""
+    for identity in ids:
+        effects.get(identity, robot.n_tubes)
+    holder = _copy(robot, robot.effects | {identity: robot.effects.get(identity, {}) for identity in ids})
+    return _copy(robot, effects.as_section(given.keys(), given.values(), holder))
+
+
+def add(
+    robot: Robot,
+    readings: Measurements,
+    ids: Sequence[str],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    free: Sequence[str] = ("standard",),
+) -> Added:
+    """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
+
+    Of each effect the amplitudes are fitted first, then its shape parameters are freed too. `fixed` parameters, by
+    full name in SI, keep their value. Every fourth run (where there are few: block of time) is kept out of the fits
+    that give the errors; the values are those of a fit to all rows. Raises InputError where no fit is possible.
+    """
+    base, fixed = identify.expand(list(free), robot), dict(fixed or {})
+    robot = with_values(robot, [*robot.effects, *ids], fixed)
+    held = locked_rows(readings)
+    fitted = [*robot_before(robot, ids).effects]
+    with Progress("fitting", 2 * len(ids) + 2) as progress:
+        stage = _Fitter(robot, readings, base, fixed)
+        start = stage.values()
+        fit = stage(fitted, fitted, ~held, start)
+        progress.advance(1)
+        judged = held if held.any() else np.ones(len(readings), bool)
+        stages = [Stage("nominal", *_rms(stage.nominal()[judged])), _stage("calibrated", fit, judged)]
+        for identity in ids:
+            fitted.append(identity)
+            for shaped in (fitted[:-1], fitted):
+                start |= dict(zip(fit.names, fit.values, strict=True))
+                if shaped is not fitted or stage.shapes(identity):
+                    fit = stage(fitted, shaped, ~held, start)
+                progress.advance(1)
+            stages.append(_stage(identity, fit, judged))
+        if held.any():
+            start |= dict(zip(fit.names, fit.values, strict=True))
+            fit = stage(fitted, fitted, np.ones(len(readings), bool), start)
+        progress.advance(1)
+    stages.append(Stage("noise_floor", fit.floor_mm(judged), fit.floor_deg(judged)))
+    return Added(
+        _applied(robot, fit),
+        list(ids),
+        fit,
+        stages,
+        _in_words(readings, held),
+        _notices(robot, fit, ids),
+    )
+
+
+def robot_before(robot: Robot, ids: Sequence[str]) -> Robot:
+    """The robot without these effects."""
+    return _copy(robot, {name: given for name, given in robot.effects.items() if name not in ids})
+
+
+def write_added(
+    before: Robot, added: Added, target: str | Path, measurements: str | Path, in_place: bool = False
+) -> Robot:
+    """Writes the robot with its effects and an entry of the ledger."""
+    fit = _only(added.fit, lambda name: not name.startswith("effects."))
+    changes = parameters.changes(fit, before, added.robot)
+    figures: dict[str, Any] = {"added": added.ids, "rms_mm": added.rms("rms_mm")}
+    if np.isfinite([stage.rms_deg for stage in added.stages]).all():
+        figures["rms_deg"] = added.rms("rms_deg")
+    figures |= {"held_out": added.held_out, "parameters": added.parameters()}
+    figures["effects_before"] = before.effects
+    command = f"ctcr add {' '.join(added.ids)}"
+    return robot_update.write(
+        before, target, changes, Entry(command, [measurements], figures, " ".join(added.notices)),
+        effects=added.robot.effects, in_place=in_place,
+    )  # fmt: skip
+
+
+def write_values(
+    before: Robot, after: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False
+) -> Robot:
+    """Writes the robot with effects whose values were given, not fitted."""
+    figures = {"added": list(ids), "effects_before": before.effects}
+    entry = Entry(f"ctcr add {' '.join(ids)}", [], figures, "Values as given, not fitted.")
+    return robot_update.write(before, target, [], entry, effects=after.effects, in_place=in_place)
+
+
+def remove(
+    robot: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False
+) -> tuple[Robot, list[str]]:
+    """Writes the robot without these effects; returns it and what there is to know.
+
+    Values that were fitted together with them go back to what they were, where nothing has changed them since and no
+    other effect that the robot keeps was added with them. Raises InputError for effects that it does not have.
+    """
+    absent = [identity for identity in ids if identity not in robot.effects]
+    if absent:
+        meant = did_you_mean(absent[0], robot.effects)
+        hint = f"did you mean {meant}?" if meant else f"it has {', '.join(robot.effects) or 'none'}"
+        raise InputError(Problem(f"the robot has no effect {absent[0]}: {hint}"))
+    section = {name: given for name, given in robot.effects.items() if name not in ids}
+    changes, notices = [], []
+    for entry in reversed(robot.history):
+        figures = entry.get("figures") or {}
+        with_it = figures.get("added") or []
+        if not set(with_it) & set(ids):
+            continue
+        if not set(with_it) <= set(ids):
+            notices.append(
+                f"{', '.join(with_it)} were fitted together: fit the others again with ctcr add --fit"
+            )
+            continue
+        undone, kept = _undone(robot, entry)
+        changes += [change for change in undone if change.path not in {other.path for other in changes}]
+        if kept:
+            notices.append(f"{kept} values of the calibration were changed since and stay: fit them again")
+        earlier = figures.get("effects_before") or {}
+        section = {name: earlier.get(name, given) for name, given in section.items()}
+    entry = Entry(f"ctcr remove {' '.join(ids)}", [], {"removed": list(ids)}, " ".join(notices))
+    return robot_update.write(robot, target, changes, entry, effects=section, in_place=in_place), notices
+
+
+def _undone(robot: Robot, entry: Mapping[str, Any]) -> tuple[list[Change], int]:
+    """The changes that bring the values of an entry back, and how many cannot be."""
+    changes, kept = [], 0
+    for row in entry.get("changes") or []:
+        path = _path(str(row.get("field", "")))
+        try:
+            now = parameters.value_at(robot, path)
+        except (AttributeError, IndexError, TypeError, KeyError):
+            kept += 1
+            continue
+        if row.get("old") is None or now != row.get("new"):
+            kept += 1
+        else:
+            changes.append(Change(path, str(row.get("unit", "")), float(row["old"])))
+    return changes, kept
+
+
+def _path(text: str) -> tuple[str | int, ...]:
+    """tubes[0].length_mm as ("tubes", 0, "length_mm")."""
+    import re
+
+    return tuple(int(part) if part.isdigit() else part for part in re.split(r"[.\[\]]+", text) if part)
+
+
+class _Fitter:
+    """Fits of one recording with more and more parameters free."""
+
+    def __init__(self, robot: Robot, readings: Measurements, base: Sequence[str], fixed: Mapping[str, float]):
+        self.robot, self.readings, self.base, self.fixed = robot, readings, list(base), fixed
+        self.noise, self.places = identify.noise_of(robot), identify.places_of(_plain(robot), readings)
+        self.measured = _measured(readings)
+        if not self.measured.any():
+            raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
+
+    def shapes(self, identity: str) -> list[str]:
+        return [name for name in effects.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]
+
+    def values(self) -> dict[str, float]:
+        known = [*self.base, *(name for name in effects.value_of(self.robot))]
+        recorded = user_effects.recording_of(self.robot, self.readings, known)
+        return dict(zip(known, recorded.nominal().tolist(), strict=True))
+
+    def nominal(self) -> Array:
+        """Residuals of the robot as its file describes it (M, 6)."""
+        return self._nominal
+
+    def __call__(
+        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, start: Mapping[str, float]
+    ) -> identify.Fit:
+        known = [effects.get(identity, self.robot.n_tubes) for identity in ids]
+        own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
+        own += [name for identity in shaped for name in self.shapes(identity)]
+        names = [*self.base, *own]
+        recorded = user_effects.recording_of(self.robot, self.readings, names)
+        if not hasattr(self, "_nominal"):
+            self._nominal = recorded.residual(recorded.nominal())[0].reshape(-1, 6)
+        recorded.activate((self.measured & rows).tolist())
+        plain, with_effects = identify.priors(self.robot, self.base), effects.priors(self.robot, own)
+        mean, sd, low, high = (np.concatenate(pair) for pair in zip(plain, with_effects, strict=True))
+        first = np.clip(np.array([start[name] for name in names]), low, high)
+        fit = identify.identify_with(
+            recorded, names, mean, sd, low, high, self.noise, self.places, start=first, starts=1,
+            known=free_parameters.known_directions(self.robot, names),
+        )  # fmt: skip
+        return replace(fit, units=[parameters.field_of(name).unit for name in names])
+
+
+def _in_words(readings: Measurements, held: Mask) -> str:
+    if not held.any():
+        return ""
+    runs = np.unique(readings.run[held])
+    if np.isin(readings.run[~held], runs).any():
+        return "every fourth block of time"
+    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
+
+
+def _measured(readings: Measurements) -> Mask:
+    found = np.zeros(len(readings), bool)
+    for values in (readings.position, readings.quaternion):
+        if values is not None:
+            found |= np.isfinite(values).all(axis=1)
+    return found
+
+
+def _applied(robot: Robot, fit: identify.Fit) -> Robot:
+    own = [i for i, name in enumerate(fit.names) if name.startswith("effects.")]
+    rest = [i for i in range(len(fit.names)) if i not in own]
+    section = effects.as_section([fit.names[i] for i in own], fit.values[own], robot)
+    return _copy(free_parameters.applied(robot, [fit.names[i] for i in rest], fit.values[rest]), section)
+
+
+def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
+    made = robot.model_copy(update={"effects": dict(section)})
+    made._source = robot._source
+    return made
+
+
+def _plain(robot: Robot) -> Robot:
+    return _copy(robot, {})
+
+
+def _only(fit: identify.Fit, kept) -> identify.Fit:
+    """Names, values and deviations of some parameters of a fit."""
+    places = [i for i, name in enumerate(fit.names) if kept(name)]
+    return replace(fit, names=[fit.names[i] for i in places], values=fit.values[places], sd=fit.sd[places])
+
+
+def _stage(name: str, fit: identify.Fit, rows: Mask) -> Stage:
+    return Stage(name, fit.rms_mm(rows), fit.rms_deg(rows))
+
+
+def _rms(residual: Array) -> tuple[float, float]:
+    parts = (residual[:, :3], residual[:, 3:])
+    sizes = [
+        np.sqrt(np.nanmean(np.sum(part**2, axis=1))) if np.isfinite(part).any() else np.nan for part in parts
+    ]
+    return 1e3 * float(sizes[0]), float(np.degrees(sizes[1]))
+
+
+def _notices(robot: Robot, fit: identify.Fit, ids: Sequence[str]) -> list[str]:
+    """What to doubt of the fitted effects."""
+    known, said = effects.parameter_of(robot.n_tubes), list(fit.warnings)
+    place = {name: i for i, name in enumerate(fit.names)}
+    for identity in ids:
+        effect = effects.get(identity, robot.n_tubes)
+        mine = [name for name in effect.amplitudes if name in place]
+        if mine and all(fit.ratio[place[name]] > SAYS_NOTHING for name in mine):
+            said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
+        elif mine and all(abs(fit.values[place[name]]) < 2 * fit.sd[place[name]] for name in mine):
+            said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")
+        for name in effect.names():
+            if name in place and not known[name].soft[0] <= fit.values[place[name]] <= known[name].soft[1]:
+                low, high = known[name].soft
+                said.append(
+                    f"{name} = {fit.values[place[name]]:.3g} is hardly physical ({low:g} to {high:g} is usual): the "
+                    "effect may stand in for another one."
+                )
+    return said

@@ -1,0 +1,78 @@
+"""Values of effects' parameters as the command line gives them: friction.coefficient.1=0.02, delay=0.05."""
+
+from collections.abc import Iterable, Sequence
+from math import isfinite
+
+from ctcr import effects
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.robot import Robot
+
+
+def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dict[str, float]:
+    """Values by full name, SI, from texts such as EFFECT.PARAMETER.TUBE=VALUE.
+
+    Without a tube the value is that of all tubes, or a list, one value a tube. Without a parameter it is that of the
+    effect's only amplitude. With a single effect in `ids` its name may be left out. Raises InputError with all that is
+    wrong.
+    """
+    found, problems = {}, []
+    for text in given:
+        try:
+            found |= _one(text, robot.n_tubes, list(ids))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
+    key, sign, value = text.partition("=")
+    if not sign:
+        raise _fault(text, "needs NAME=VALUE, such as friction.coefficient=0.02")
+    parts = key.strip().split(".")
+    parts = parts[1:] if parts[0] == "effects" else parts
+    known = effects.all_effects(n_tubes)
+    if len(ids) == 1 and parts[0] not in known:
+        parts = [ids[0], *parts]
+    effect = effects.get(parts[0], n_tubes)
+    if ids and effect.id not in ids:
+        raise _fault(text, f"{effect.id} is not among the effects to add")
+    if len(parts) == 1:
+        amplitudes = [p.name for p in effect.parameters if not p.is_shape]
+        if len(amplitudes) != 1:
+            raise _fault(text, f"{effect.id} has several parameters, name one: {', '.join(amplitudes)}")
+        parts.append(amplitudes[0])
+    parameter = next((p for p in effect.parameters if p.name == parts[1]), None)
+    if parameter is None:
+        names = [p.name for p in effect.parameters]
+        meant = did_you_mean(parts[1], names)
+        hint = f"did you mean {meant}?" if meant else f"its parameters are {', '.join(names)}"
+        raise _fault(text, f"{effect.id} has no parameter {parts[1]}: {hint}")
+    names = list(parameter.full_names)
+    if len(parts) > 2:
+        name = ".".join(["effects", *parts])
+        if name not in names:
+            what = f"a tube from 1 to {n_tubes}" if parameter.per_tube else "no tube: it has one value"
+            raise _fault(text, f"{parts[1]} needs {what}")
+        names = [name]
+    numbers = [_number(item, text, parameter) for item in value.split(",")]
+    if len(numbers) not in (1, len(names)):
+        raise _fault(text, f"needs one number, or {len(names)}")
+    return dict(zip(names, numbers * (len(names) // len(numbers)), strict=True))
+
+
+def _number(item: str, text: str, parameter: effects.EffectParameter) -> float:
+    unit = parameter.unit or "no unit"
+    try:
+        number = float(item)
+    except ValueError:
+        raise _fault(text, f"{item.strip()!r} is not a number (in {unit})") from None
+    low, high = parameter.hard
+    if not isfinite(number) or not low <= number <= high:
+        raise _fault(text, f"{number:g} is impossible: {parameter.name} is {low:g} to {high:g} ({unit})")
+    return number
+
+
+def _fault(text: str, message: str) -> InputError:
+    return InputError(Problem(message, field=text))

@@ -1,0 +1,245 @@
+"""The named parameters of a robot: names with wildcards, values and prior uncertainties of a robot file, and back.
+
+Names and units are those of the compiled library, in SI; tracker.rotation is the turn of the tracker frame from the one
+of the file, about the tracker's axes, as a rotation vector.
+"""
+
+from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
+from functools import cache
+from math import inf, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import _core
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.frames import matrix_from_rotation_vector
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+
+GROUPS = {  # short names
+    "tracker.frame": ("tracker.position.*", "tracker.rotation.*"),
+    "homes": ("actuation.home_translation.*", "actuation.home_rotation.*"),
+}
+STANDARD = "standard"  # the parameters of the paper's calibration
+_STANDARD_TUBE = ("stiffness", "curvature", "curved_length", "length")
+_FIELDS = {  # of a tube: field of the file, SI unit per unit of that field
+    "youngs_modulus": ("youngs_modulus_GPa", 1e9),
+    "poisson_ratio": ("poisson_ratio", 1.0),
+    "density": ("density_kg_m3", 1.0),
+    "inner_diameter": ("inner_diameter_mm", 1e-3),
+    "outer_diameter": ("outer_diameter_mm", 1e-3),
+    "length": ("length_mm", 1e-3),
+    "curved_length": ("curved_length_mm", 1e-3),
+    "curvature": ("curvature_per_m", 1.0),
+    "bending_stiffness": ("bending_stiffness_Nm2", 1.0),
+}
+_POSITIVE = ("youngs_modulus", "bending_stiffness", "density", "length", "curved_length", "outer_diameter")
+
+
+@cache
+def names_of(n_tubes: int) -> tuple[str, ...]:
+    """All parameters of a robot, in the order of the library."""
+    return tuple(_core.parameter_names(n_tubes)[0])
+
+
+@cache
+def units_of(n_tubes: int) -> tuple[str, ...]:
+    """Their SI units."""
+    return tuple(_core.parameter_names(n_tubes)[1])
+
+
+def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
+    """The parameters that names stand for, each once, in the library's order.
+
+    A name may hold `*` (tubes.*.youngs_modulus), may be a group (tracker.frame, homes), and may be several separated by
+    commas. `standard` is the calibration of the paper: tracker frame, homes, and stiffness, curvature, curved length
+    and length of each tube (of a straight tube: stiffness and length). Raises InputError for names that do not exist.
+    """
+    known = names_of(robot.n_tubes)
+    wanted = [
+        name.strip() for item in ([free] if isinstance(free, str) else free) for name in item.split(",")
+    ]
+    problems, chosen = [], set()
+    for name in filter(None, wanted):
+        patterns = _standard(robot) if name == STANDARD else GROUPS.get(name, (name,))
+        found = {other for pattern in patterns for other in known if _stands_for(pattern, other)}
+        if not found:
+            meant = did_you_mean(name, [*known, *GROUPS, STANDARD])
+            names = ", ".join([STANDARD, *GROUPS, known[0]])
+            hint = f"did you mean {meant}?" if meant else f"names are {names} and others"
+            problems.append(Problem(f"no parameter is named {name}: {hint}"))
+        chosen |= found
+    if not problems and not chosen:
+        problems.append(Problem("nothing is free: name at least one parameter, or standard"))
+    if problems:
+        raise InputError(problems)
+    return [name for name in known if name in chosen]
+
+
+def values(robot: Robot) -> Array:
+    """The value of every parameter; at tracker.rotation the rotation vector of the tracker frame."""
+    return np.array([_value(robot, name) for name in names_of(robot.n_tubes)])
+
+
+def priors(
+    robot: Robot, names: Iterable[str], sd: Mapping[str, float] | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Mean, standard deviation, lowest and highest value of each parameter.
+
+    Standard deviations are those of the file's `uncertainty`; `sd` {name: number in SI, or math.inf} comes before it,
+    and its names may be patterns. Raises InputError for all parameters of which neither says anything, or 0.
+    """
+    names = list(names)
+    given = {name: float(value) for item, value in (sd or {}).items() for name in expand(item, robot)}
+    mean = [0.0 if name.startswith("tracker.rotation.") else _value(robot, name) for name in names]
+    width = [given.get(name, _stated_sd(robot, name)) for name in names]
+    problems = [
+        Problem(
+            f"{name}: its prior standard deviation is {value:g}, but must be above 0; leave a parameter that is known "
+            "exactly out of the fit"
+            if value is not None
+            else f"{name}: the robot file does not state its uncertainty; give a standard deviation, or infinity"
+        )
+        for name, value in zip(names, width, strict=True)
+        if value is None or not value > 0
+    ]
+    if problems:
+        raise InputError(problems)
+    low, high = np.transpose([_bounds(name, value) for name, value in zip(names, mean, strict=True)])
+    return np.array(mean), np.array(width), low, high
+
+
+def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
+    """A copy of the robot with other values. New homes leave the old ones as those of the tables."""
+    changed = robot.model_copy(deep=True)
+    actuation, turn = changed.actuation, np.zeros(3)
+    for name, value in zip(names, fitted, strict=True):
+        group, *rest = name.split(".")
+        value = float(value)
+        if group == "tubes":
+            field, unit = _FIELDS[rest[1]]
+            setattr(changed.tubes[int(rest[0]) - 1], field, value / unit)
+        elif name == "actuation.translation_ratio":
+            actuation.translation_mm_per_rev = value * 2e3 * pi
+        elif name == "actuation.rotation_ratio":
+            actuation.rotation_rev_per_rev = value
+        elif group == "actuation":
+            field, unit = (
+                ("home_translation_mm", 1e-3) if "translation" in name else ("home_rotation_deg", pi / 180)
+            )
+            homes = list(getattr(actuation, field))
+            if getattr(actuation, f"recorded_{field}") is None:
+                setattr(actuation, f"recorded_{field}", list(homes))
+            homes[int(rest[1]) - 1] = value / unit
+            setattr(actuation, field, homes)
+        elif group == "gravity":
+            changed.gravity = _replaced(changed.gravity_vector, rest[0], value)
+        elif rest[0] == "position":
+            changed.tracker.position_mm = _replaced(changed.tracker.position_mm, rest[1], 1e3 * value)
+        else:
+            turn["xyz".index(rest[1])] = value
+    if turn.any():
+        from scipy.spatial.transform import Rotation
+
+        frame = matrix_from_rotation_vector(turn) @ robot.tracker.rotation
+        changed.tracker.rotation_vector_rad = Rotation.from_matrix(frame).as_rotvec().tolist()
+    return changed
+
+
+def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
+    """Changes of the parameters that leave the readings (nearly) as they are, with words, where all are free."""
+    axis = robot.tracker.rotation[:, 2]
+    yaw = {f"actuation.home_rotation.{i + 1}": 1.0 for i in range(robot.n_tubes)}
+    yaw |= {f"tracker.rotation.{'xyz'[j]}": -axis[j] for j in range(3)}
+    candidates = [("common rotation of all tubes = yaw of the tracker frame about the robot's axis", yaw)]
+    candidates += [
+        (f"translation offset of tube {i} against its length",
+         {f"actuation.home_translation.{i}": 1.0, f"tubes.{i}.length": -1.0})
+        for i in range(1, robot.n_tubes + 1)
+    ]  # fmt: skip
+    shift = {f"actuation.home_translation.{i + 1}": 1.0 for i in range(robot.n_tubes)}
+    shift |= {f"tracker.position.{'xyz'[j]}": -axis[j] for j in range(3)}
+    candidates.append(
+        ("common translation of all tubes = shift of the tracker frame along the robot's axis", shift)
+    )
+    stiffness = {
+        name: _value(robot, name) for name in names if name.endswith(("youngs_modulus", "bending_stiffness"))
+    }
+    if len(stiffness) == robot.n_tubes:
+        candidates.append(("common stiffness of all tubes", stiffness))
+    return [
+        (text, np.array([change.get(name, 0.0) for name in names]))
+        for text, change in candidates
+        if all(name in names or abs(part) < 1e-9 for name, part in change.items())
+    ]
+
+
+def _stands_for(pattern: str, name: str) -> bool:
+    return name == pattern or ("*" in pattern and fnmatchcase(name, pattern))
+
+
+def _standard(robot: Robot) -> list[str]:
+    found = [
+        "tracker.position.*",
+        "tracker.rotation.*",
+        "actuation.home_translation.*",
+        "actuation.home_rotation.*",
+    ]
+    for i, tube in enumerate(robot.tubes, start=1):
+        curved = tube.curvature != 0 and tube.curved_length != 0
+        stiffness = "youngs_modulus" if tube.bending_stiffness_Nm2 is None else "bending_stiffness"
+        own = _STANDARD_TUBE if curved else ("stiffness", "length")
+        found += [f"tubes.{i}.{stiffness if name == 'stiffness' else name}" for name in own]
+    return found
+
+
+def _value(robot: Robot, name: str) -> float:
+    group, *rest = name.split(".")
+    if group == "tubes":
+        field, unit = _FIELDS[rest[1]]
+        return unit * float(getattr(robot.tubes[int(rest[0]) - 1], field) or 0.0)
+    if group == "gravity":
+        return float(robot.gravity_vector["xyz".index(rest[0])])
+    if group == "tracker":
+        vector = robot.tracker.position if rest[0] == "position" else robot.tracker.rotation_vector_rad
+        return float(vector["xyz".index(rest[1])])
+    actuation = robot.actuation
+    if rest[0] == "translation_ratio":
+        return 1e-3 * (actuation.translation_mm_per_rev or 2e3 * pi) / (2 * pi)
+    if rest[0] == "rotation_ratio":
+        return actuation.rotation_rev_per_rev or 1.0
+    if rest[0] == "home_translation":
+        return 1e-3 * actuation.home_translation_mm[int(rest[1]) - 1]
+    return pi / 180 * actuation.home_rotation_deg[int(rest[1]) - 1]
+
+
+def _stated_sd(robot: Robot, name: str) -> float | None:
+    """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
+    u, kind = robot.uncertainty, name.split(".")[2 if name.startswith("tubes.") else 1]
+    size = abs(_value(robot, name))
+    if name.startswith("tracker."):
+        return 1e-3 * u.tracker_frame_mm if kind == "position" else pi / 180 * u.tracker_frame_deg
+    return {
+        "home_translation": 1e-3 * u.translation_offset_mm,
+        "home_rotation": pi / 180 * u.rotation_offset_deg,
+        "length": 1e-3 * u.length_mm,
+        "curved_length": 1e-3 * u.curved_length_mm,
+        "curvature": u.curvature_percent / 100 * size,
+        "youngs_modulus": u.youngs_modulus_percent / 100 * size,
+        "bending_stiffness": u.youngs_modulus_percent / 100 * size,
+    }.get(kind)
+
+
+def _bounds(name: str, value: float) -> tuple[float, float]:
+    """Beyond these no robot file may hold the value."""
+    kind = name.rpartition(".")[2]
+    if kind == "poisson_ratio":
+        return -0.9, 0.5
+    return (1e-3 * value if kind in _POSITIVE else -inf), inf
+
+
+def _replaced(vector: Iterable[float], axis: str, value: float) -> list[float]:
+    return [value if "xyz"[i] == axis else float(old) for i, old in enumerate(vector)]

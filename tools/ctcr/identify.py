@@ -1,0 +1,372 @@
+"""Joint identification: any set of parameters fitted to a table of readings, with what the readings cannot say.
+
+Positions in m, rotations in rad, tracker axes. Residuals are measured - predicted: position, then rotation vector.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, nan
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ctcr import _core, free_parameters
+from ctcr.errors import InputError, Problem
+from ctcr.frames import base_to_tracker
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MANY_ROWS = 5000  # beyond, one start is compared with the first, else two
+FEW_RUNS = 2
+Noise = _core.Noise
+expand = free_parameters.expand
+parameter_names = free_parameters.names_of
+priors = free_parameters.priors
+
+
+def noise_of(
+    robot: Robot,
+    correlation_length: float = 0.1,
+    field: bool = True,
+    kinds: Sequence[str] = ("position", "rotation"),
+) -> Noise:
+    """The tracker's noise: its jitter, and with `field` the smooth error that its 95 % accuracy implies.
+
+    `correlation_length` [m] is the distance over which that error changes; `kinds` is what was measured. Raises
+    InputError where the robot file does not state the jitter of one of these.
+    """
+    tracker, problems, figures = robot.tracker, [], {}
+    for kind, unit, scale in (("position", "mm", 1e-3), ("rotation", "deg", np.pi / 180)):
+        jitter, accuracy = (getattr(tracker, f"{name}_{unit}") for name in ("jitter", "accuracy_95"))
+        if kind in kinds and not jitter:
+            text = f"a fit needs the standard deviation of one reading, above 0, in {unit}"
+            problems.append(Problem(text, field=f"tracker.jitter_{unit}"))
+            continue
+        figures[f"{kind}_jitter"] = scale * (jitter or 1.0)  # of what was not measured any will do
+        smooth = field and kind in kinds and accuracy
+        figures[f"{kind}_field"] = scale * _core.field_of_accuracy(accuracy, jitter) if smooth else 0.0
+    if problems:
+        raise InputError(problems)
+    return Noise(**figures, correlation_length=correlation_length)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted parameters and what is known of them. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows."""
+
+    names: list[str]
+    units: list[str]
+    prior_mean: Array  # (n,)
+    prior_sd: Array  # (n,)
+    values: Array  # (n,)
+    sd: Array  # (n,) posterior; inf: not determined at all
+    covariance: Array  # (n, n)
+    shift: Array  # (n,) (value - mean) / prior sd; NaN without a prior
+    ratio: Array  # (n,) posterior / prior sd: 1 means that the readings say nothing
+    correlations: list[tuple[str, str, float]]  # beyond 0.9, strongest first
+    directions: list[Any]  # undetermined combinations: .text, .ratio, .coefficients in prior sd
+    chi_square: float  # under the noise as stated
+    shift_square: float
+    observations: int
+    bulk_observations: float  # without outliers: degrees of freedom of chi_square + shift_square
+    effective_parameters: float
+    reduced_chi_square: float
+    log_evidence: float  # Laplace, under this fit's weights and inflation; NaN where a prior is infinite
+    inflation: (
+        Array  # (2,) factor on the jitter of positions and rotations that the fit had to admit; 1: none
+    )
+    residual: Array  # (M, 6) at the fitted values; NaN where not measured or not solved
+    nominal_residual: Array  # (M, 6) at the robot file's values
+    field: Array  # (M, 6) posterior mean of the tracker's smooth error, a part of the residual
+    expected_square: (
+        Array  # (M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open
+    )
+    weights: Array  # (M, 2) 1 plain, less for outliers, 0 not fitted
+    excluded: list[int]  # rows that the model cannot solve
+    converged: bool
+    status: str
+    warnings: list[str]
+    starts: list[Any]  # .cost, .distance from the result in posterior sd, .converged
+    noise: Noise
+    iterations: int
+    evaluations: int
+    seconds: float
+    core: Any  # the compiled fit
+    jacobian_all: Array  # (6 M, n) derivative of `residual`
+
+    @property
+    def used(self) -> Mask:
+        """Rows that were fitted (M,)."""
+        return (self.weights > 0).any(axis=1)
+
+    @cached_property
+    def p_value(self) -> float:
+        """Probability of so large a chi-square where model, priors and noise are right."""
+        from scipy.stats import chi2
+
+        return float(chi2.sf(self.chi_square + self.shift_square, self.bulk_observations))
+
+    def rms_mm(self, rows: Mask | None = None) -> float:
+        """RMS length of the position residual of some rows, all by default."""
+        return 1e3 * _rms(self.residual[:, :3], rows)
+
+    def rms_deg(self, rows: Mask | None = None) -> float:
+        return float(np.rad2deg(_rms(self.residual[:, 3:], rows)))
+
+    def nominal_rms_mm(self, rows: Mask | None = None) -> float:
+        return 1e3 * _rms(self.nominal_residual[:, :3], rows)
+
+    def nominal_rms_deg(self, rows: Mask | None = None) -> float:
+        return float(np.rad2deg(_rms(self.nominal_residual[:, 3:], rows)))
+
+    def floor_mm(self, rows: Mask | None = None) -> float:
+        """RMS position residual that noise alone would leave, the uncertainty of the parameters included."""
+        return 1e3 * self._floor(0, rows)
+
+    def floor_deg(self, rows: Mask | None = None) -> float:
+        return float(np.rad2deg(self._floor(1, rows)))
+
+    def apply(self, robot: Robot) -> Robot:
+        """A copy of the robot with the fitted values."""
+        return free_parameters.applied(robot, self.names, self.values)
+
+    def whiten(self, columns: ArrayLike) -> Array:
+        """Columns (M, 6) or (M, 6, k) with the noise of the fit made independent and of unit variance, (6 M, k).
+
+        Rows that were not fitted become 0.
+        """
+        columns = np.asarray(columns, dtype=float)
+        return self.core.whiten(columns.reshape(6 * len(columns), -1))
+
+    def whitened(self) -> tuple[Array, Array]:
+        """Whitened residual (6 M,) and its derivative (6 M, n) by the parameters; the prior is not in it."""
+        both = self.core.whiten(np.column_stack([self.residual.ravel(), self.jacobian_all]))
+        return both[:, 0], both[:, 1:]
+
+    def _floor(self, kind: int, rows: Mask | None) -> float:
+        known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
+        return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
+
+
+def readings_of(
+    robot: Robot, measurements: Measurements, names: Sequence[str], *, steps: int = 1, threads: int = 0
+) -> Any:
+    """The compiled residuals of a table as functions of the named parameters."""
+    known = free_parameters.names_of(robot.n_tubes)
+    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
+    missing = np.full((len(measurements), 4), nan)
+    return _core.Readings(
+        parameters=free_parameters.values(robot),
+        sensor_tube=robot.tracker.sensor_on_tube - 1,
+        beta=beta,
+        alpha=alpha,
+        force=measurements.force,
+        position=missing[:, :3] if measurements.position is None else measurements.position,
+        quaternion=missing if measurements.quaternion is None else measurements.quaternion,
+        free=[known.index(name) for name in names],
+        steps=steps,
+        threads=threads,
+    )
+
+
+def places_of(robot: Robot, measurements: Measurements) -> Array:
+    """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
+    places = (
+        np.full((len(measurements), 3), nan)
+        if measurements.position is None
+        else measurements.position.copy()
+    )
+    missing = np.isnan(places).any(axis=1)
+    if missing.any():
+        from ctcr.model import Model
+
+        beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
+        tips = Model(robot).predict(beta, alpha, measurements.force[missing])
+        places[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
+    return places
+
+
+def fit(
+    robot: Robot,
+    measurements: Measurements,
+    free: str | Iterable[str] = "standard",
+    *,
+    rows: Mask | None = None,
+    sd: Mapping[str, float] | None = None,
+    noise: Noise | None = None,
+    robust: bool = True,
+    admit_model_error: bool = True,
+    weights: Array | None = None,
+    inflation: ArrayLike | None = None,
+    starts: int | None = None,
+    steps: int = 1,
+    threads: int = 0,
+) -> Fit:
+    """The most probable values of the named parameters (see `expand`), given the readings and the robot file's priors.
+
+    rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
+    sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
+    noise    of the tracker; `noise_of(robot)` by default. Where the sensor's roll is unknown, orientations are not used
+    robust   whether outliers count for little; `weights` (M, 2) of another fit freezes theirs
+    admit_model_error   whether jitter is added where the model misses what the noise cannot explain; `inflation` (2,)
+             of another fit freezes it. Compare evidences of models at frozen weights and inflation.
+    starts   how many starts to compare; steps, threads as in Model
+    Raises InputError where no fit is possible.
+    """
+    began = perf_counter()
+    names = expand(free, robot)
+    mean, width, low, high = priors(robot, names, sd)
+    if robot.tracker.sensor_roll == "unknown" and measurements.quaternion is not None:
+        measurements = replace(measurements, quaternion=None)
+        ignored = ["the sensor's roll is unknown: orientations are not used"]
+    else:
+        ignored = []
+    kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
+    noise = noise or noise_of(robot, kinds=kinds)
+    chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
+    warnings = ignored + list(_doubts(measurements, _measured(measurements) & chosen))
+    high = np.minimum(high, _home_limits(robot, measurements.beta[chosen], names))
+    table = readings_of(robot, measurements, names, steps=steps, threads=threads)
+    table.activate((_measured(measurements) & chosen).tolist())
+    if starts is None:
+        starts = 2 if len(measurements) > MANY_ROWS else 3
+    fitted = identify_with(
+        table, names, mean, width, low, high, noise, places_of(robot, measurements),
+        robust=robust, admit_model_error=admit_model_error, weights=weights, inflation=inflation, starts=starts,
+        known=free_parameters.known_directions(robot, names),
+    )  # fmt: skip
+    all_units = dict(
+        zip(parameter_names(robot.n_tubes), free_parameters.units_of(robot.n_tubes), strict=True)
+    )
+    return replace(
+        fitted,
+        units=[all_units[name] for name in names],
+        warnings=warnings + fitted.warnings,
+        seconds=perf_counter() - began,
+    )
+
+
+def identify_with(
+    predict: Any,
+    names: Sequence[str],
+    mean: Array,
+    sd: Array,
+    low: Array,
+    high: Array,
+    noise: Noise,
+    places: Array,
+    *,
+    robust: bool = True,
+    admit_model_error: bool = True,
+    weights: Array | None = None,
+    inflation: ArrayLike | None = None,
+    start: Array | None = None,
+    starts: int = 3,
+    known: Sequence[tuple[str, Array]] = (),
+) -> Fit:
+    """As `fit`, for any predictor: compiled Readings (whose active rows are fitted), or a function
+    (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
+    residual means not measured. Nominal is where x is `mean`. Raises InputError where no fit is possible."""
+    began = perf_counter()
+    compiled = hasattr(predict, "activate")
+    try:
+        core, excluded = _core.identify(
+            predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
+            places=np.asarray(places, dtype=float), robust=robust,
+            admit_model_error=admit_model_error, weights=weights,
+            inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
+            known=list(known),
+        )  # fmt: skip
+    except ValueError as error:
+        raise InputError([Problem(line) for line in str(error).splitlines()]) from None
+    if compiled:
+        active = np.ones(len(places), bool)
+        active[excluded] = False
+        predict.activate(active.tolist())
+    nominal = predict.residual(mean)[0] if compiled else predict(mean, False)[0]
+    residual, jacobian, field, expected = core.report(predict)
+    return Fit(
+        names=list(names),
+        units=[""] * len(names),
+        prior_mean=np.asarray(mean),
+        prior_sd=np.asarray(sd),
+        correlations=[(names[c.first], names[c.second], c.coefficient) for c in core.correlations],
+        residual=residual.reshape(-1, 6),
+        nominal_residual=np.asarray(nominal).reshape(-1, 6),
+        field=field.reshape(-1, 6),
+        expected_square=expected,
+        excluded=excluded,
+        noise=noise,
+        seconds=perf_counter() - began,
+        core=core,
+        jacobian_all=jacobian,
+        warnings=[*core.warnings, *_excluded_text(excluded)],
+        **{
+            name: getattr(core, name)
+            for name in (
+                "values", "sd", "covariance", "shift", "ratio", "directions", "chi_square", "shift_square",
+                "observations", "bulk_observations", "effective_parameters", "reduced_chi_square", "log_evidence",
+                "inflation", "weights", "converged", "status", "starts", "iterations", "evaluations",
+            )
+        },
+    )  # fmt: skip
+
+
+def _measured(measurements: Measurements) -> Mask:
+    """Rows that hold a position or an orientation."""
+    found = np.zeros(len(measurements), bool)
+    for values in (measurements.position, measurements.quaternion):
+        if values is not None:
+            found |= np.isfinite(values).all(axis=1)
+    return found
+
+
+def _is_measured(measurements: Measurements, kind: str) -> bool:
+    values = measurements.position if kind == "position" else measurements.quaternion
+    return values is not None and bool(np.isfinite(values).all(axis=1).any())
+
+
+def _home_limits(robot: Robot, beta: Array, names: Sequence[str]) -> Array:
+    """Highest values that leave nine readings in ten behind the plate; only the outermost tube's home has one."""
+    limits = np.full(len(names), inf)
+    outermost = f"actuation.home_translation.{robot.n_tubes}"
+    if outermost in names and len(beta):
+        room = -np.quantile(beta[:, -1] + robot.actuation.translation_correction[-1], 0.9)
+        limits[names.index(outermost)] = 1e-3 * robot.actuation.home_translation_mm[-1] + max(0.0, room)
+    return limits
+
+
+def _doubts(measurements: Measurements, rows: Mask) -> Iterable[str]:
+    if not rows.any():
+        return
+    joints = np.hstack([measurements.beta, measurements.alpha])[rows]
+    fixed = np.ptp(joints, axis=0) == 0
+    if fixed.all():
+        yield "all joints are the same in every row: one pose determines few of the parameters"
+    elif fixed.any():
+        n = measurements.beta.shape[1]
+        which = [f"beta{i + 1}" if i < n else f"alpha{i + 1 - n}" for i in np.flatnonzero(fixed)]
+        yield f"these joints never move: {', '.join(which)}"
+    if len(np.unique(measurements.run[rows])) < FEW_RUNS:
+        yield "there is only one run: readings that follow one another cannot check what was learned from them"
+    if measurements.quaternion is None or not np.isfinite(measurements.quaternion[rows]).any():
+        yield "no orientation was measured: positions alone tell the parameters apart less well"
+
+
+def _excluded_text(rows: Sequence[int]) -> list[str]:
+    if not rows:
+        return []
+    shown = ", ".join(str(row + 1) for row in rows[:8]) + (" .." if len(rows) > 8 else "")
+    return [f"{len(rows)} readings were left out, for which the model has no solution: number {shown}"]
+
+
+def _rms(residual: Array, rows: Mask | None) -> float:
+    square = np.sum(residual**2, axis=1)
+    known = np.isfinite(square) & (True if rows is None else rows)
+    return float(np.sqrt(square[known].mean())) if known.any() else nan

@@ -1,0 +1,76 @@
+"""Measurements in the order in which they were taken, beside a robot with effects."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import _core, effects, free_parameters
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+
+STEPS = 2  # integration steps per segment: a model error below 1 um, a thirtieth of a tracker's jitter
+
+
+def names_of(n_tubes: int) -> tuple[str, ...]:
+    """All parameters of a robot and of all effects."""
+    return (*free_parameters.names_of(n_tubes), *effects.names_of(n_tubes))
+
+
+def values(robot: Robot) -> Array:
+    """Their values, those of the robot's effects included; the turn of the tracker frame counts from the file's: 0."""
+    own = free_parameters.values(robot)
+    for i, name in enumerate(free_parameters.names_of(robot.n_tubes)):
+        if name.startswith("tracker.rotation."):
+            own[i] = 0.0
+    return np.concatenate([own, effects.values(robot)])
+
+
+def session_part(measurements: Measurements) -> Array:
+    """When each row was measured, from 0 (first) to 1 (last); by its number where times are missing."""
+    t = measurements.t if np.isfinite(measurements.t).all() else np.arange(len(measurements), dtype=float)
+    return (t - t[0]) / max(t[-1] - t[0], np.finfo(float).tiny)
+
+
+def recording_of(
+    robot: Robot,
+    measurements: Measurements,
+    names: Sequence[str] = (),
+    *,
+    fixed: Mapping[str, float] | None = None,
+    steps: int = STEPS,
+    threads: int = 0,
+    profiles: Array | None = None,
+) -> _core.Recording:
+    """The compiled residuals of all rows as functions of the named parameters.
+
+    `fixed` gives parameters of effects other values than the robot's. `profiles` (K, 3N): at K places along each tube,
+    equally spaced from its grasped point to its tip, the curvature about its x and y axes to add [1/m], and the
+    relative change of its bending stiffness.
+    """
+    known = names_of(robot.n_tubes)
+    own = dict(zip(effects.names_of(robot.n_tubes), effects.values(robot), strict=True)) | dict(fixed or {})
+    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
+    missing = np.full((len(measurements), 4), np.nan)
+    position = missing[:, :3] if measurements.position is None else measurements.position
+    measured = position[np.isfinite(position).all(axis=1)]
+    return _core.Recording(
+        parameters=free_parameters.values(robot),
+        effects=np.array(list(own.values())),
+        sensor_tube=robot.tracker.sensor_on_tube - 1,
+        beta=beta,
+        alpha=alpha,
+        force=measurements.force,
+        position=position,
+        quaternion=missing if measurements.quaternion is None else measurements.quaternion,
+        time=measurements.t,
+        part=session_part(measurements),
+        run=measurements.run.astype(np.int32),
+        centre=measured.mean(axis=0) if len(measured) else np.zeros(3),
+        free=[known.index(name) for name in names],
+        steps=steps,
+        threads=threads,
+        profiles=profiles,
+    )

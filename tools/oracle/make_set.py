@@ -1,0 +1,194 @@
+"""One measurement set with something hidden in it, and its answer in another folder.
+
+    python tools/oracle/make_set.py --effect softening --size 1 --seed 3 --noise jitter --robot table2 --out FOLDER
+
+writes FOLDER/robot.yaml (the bench as described, not as it is), FOLDER/measurements.csv, and the answer to
+FOLDER/../truth/NAME.yaml (elsewhere with --truth).
+"""
+
+import argparse
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from benches import ROBOTS, describe, joint_range
+from detectable import THINNED, detectability, thinned
+from hidden import hide
+from hidden_cause import CAUSES, Truth
+from mechanics import Mechanics
+from robot import from_description
+from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
+from session import Noise, Plan, Setup, draw_noise, draw_plan, run_session
+from simulate import Bench, draw_bench
+from tables import pose_fields, write_robot, write_table
+
+NOISES = ("jitter", "realistic")
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to measure. The same order always gives the same set."""
+
+    effects: tuple[tuple[str, float], ...]  # name and size
+    seed: int
+    noise: str = "jitter"
+    robot: str = "table2"
+    loads: bool = True
+    stream: bool = False
+    modulus_scatter: float = 1.0  # of the true moduli, relative to what the description promises
+
+    @property
+    def streamed(self) -> bool:
+        return self.stream or any(CAUSES[name].streamed for name, _ in self.effects)
+
+
+@dataclass(frozen=True)
+class Session:
+    """A measured set. Poses are in the tracker frame."""
+
+    description: dict
+    bench: Bench
+    plan: Plan
+    position: np.ndarray  # (R, 3) [m] without noise
+    rotation: Rotation  # (R) without noise
+    noise: Noise
+    truths: list[Truth]
+
+    def rows(self) -> list[list[float]]:
+        """Rows (t, run, joints, force, pose) of the table."""
+        position = self.position + self.noise.position + self.noise.field_position
+        rotation = Rotation.from_rotvec(self.noise.rotation + self.noise.field_rotation) * self.rotation
+        force = self.plan.mass[:, None] * np.array(self.description["gravity"])
+        leading = zip(self.plan.time, self.plan.run, self.plan.joints, force, strict=True)
+        return [
+            [time, run, *joints, *load, *pose_fields(place, turn)]
+            for (time, run, joints, load), place, turn in zip(
+                leading, position, rotation.as_matrix(), strict=True
+            )
+        ]
+
+
+def measure(order: Order) -> Session:
+    """Simulate the session. Bench, plan, noise and hidden causes are drawn apart: with other causes the rest stays."""
+    bench_rng, plan_rng, noise_rng, *hidden_rng = (
+        np.random.default_rng([order.seed, part]) for part in range(3 + len(order.effects))
+    )
+    description = describe(order.robot)
+    plan = draw_plan(joint_range(description), plan_rng, loads=order.loads, stream=order.streamed)
+    promised = description | {"uncertainty": dict(description["uncertainty"])}
+    promised["uncertainty"]["youngs_modulus_percent"] *= order.modulus_scatter
+    bench = draw_bench(promised, bench_rng)
+    setup = Setup(bench, plan, Mechanics(from_description(bench.description)))
+    truths = [
+        hide(setup, name, size, rng) for (name, size), rng in zip(order.effects, hidden_rng, strict=True)
+    ]
+    poses = list(run_session(setup))
+    position, rotation = np.array([p for p, _ in poses]), Rotation.concatenate([r for _, r in poses])
+    noise = draw_noise(description["tracker"], position, order.noise, noise_rng)
+    return Session(description, bench, plan, position, rotation, noise, truths)
+
+
+def answer(order: Order, session: Session) -> dict:
+    """The content of the truth file."""
+    few = thinned(session.plan)
+    plain = list(
+        run_session(Setup(session.bench, few, Mechanics(from_description(session.bench.description))))
+    )
+    moved = session.position[::THINNED] - np.array([position for position, _ in plain])
+    turned = session.rotation[::THINNED] * Rotation.concatenate([rotation for _, rotation in plain]).inv()
+    inliers = ~session.noise.outlier
+    left = detectability(session.bench, few, session.description["tracker"], order.noise, moved, turned)
+    ids = {name: CAUSES[name].ids for name, _ in order.effects}
+    in_catalogue = sorted({i for name in ids for i in ids[name]})
+    missing = [name for name in ids if not CAUSES[name].absorbed]
+    strange = [name for name in missing if not ids[name]]
+    return {
+        "verdict": "not_in_catalogue" if strange else "identified" if in_catalogue else "nothing_missing",
+        "classes": in_catalogue,
+        "causes": [
+            {"name": name, "ids": list(ids[name]), "size": size, "values": _plain(truth)}
+            for (name, size), truth in zip(order.effects, session.truths, strict=True)
+        ],
+        "robot": order.robot,
+        "noise": order.noise,
+        "seed": order.seed,
+        "half": "reporting" if order.seed % 2 else "tuning",
+        "loads": order.loads,
+        "streamed": order.streamed,
+        "rows": len(session.plan.time),
+        "outliers": np.flatnonzero(session.noise.outlier).tolist(),
+        "rms_mm": {
+            "effect": _rms_mm(moved),
+            "effect_after_calibration": left.after_calibration_mm,
+            "jitter": _rms_mm(session.noise.position[inliers]),
+            "field": _rms_mm(session.noise.field_position),
+        },
+        "chi_square_after_calibration": left.chi_square,
+        "bench": {
+            "tubes": session.bench.description["tubes"],
+            "beta_offset_m": session.bench.beta_offset.tolist(),
+            "alpha_offset_rad": session.bench.alpha_offset.tolist(),
+            "tracker_position_m": session.bench.tracker_position.tolist(),
+            "tracker_rotation_vector_rad": session.bench.tracker_rotation.as_rotvec().tolist(),
+        },
+    }
+
+
+def _rms_mm(error: np.ndarray) -> float:
+    return float(1e3 * np.sqrt(np.mean(np.sum(error**2, axis=1))))
+
+
+def _plain(truth: Truth) -> dict:
+    return {key: np.asarray(value).tolist() for key, value in truth.items()}
+
+
+def write_set(order: Order, folder: Path, truth: Path) -> dict:
+    """Write the set and its answer; the answer last, so that where it is the set is whole. Returns the answer."""
+    session = measure(order)
+    n_tubes = len(session.description["tubes"])
+    write_robot(folder / "robot.yaml", session.description)
+    write_table(folder / "measurements.csv", session.rows(), n_tubes, ("force",), ("t_s", "run"))
+    content = answer(order, session)
+    truth.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = truth.with_suffix(".unfinished")
+    with unfinished.open("w", encoding="utf-8") as file:
+        YAML(typ="safe").dump(content, file)
+    os.replace(unfinished, truth)
+    return content
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--effect", action="append", default=[], choices=sorted(CAUSES), help="may be repeated"
+    )
+    parser.add_argument(
+        "--size", action="append", default=[], type=float, help="one for each effect; 1 if left out"
+    )
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--noise", choices=NOISES, default="jitter")
+    parser.add_argument("--robot", choices=ROBOTS, default="table2")
+    parser.add_argument("--loads", action=argparse.BooleanOptionalAction, default=True, help="hung masses")
+    parser.add_argument("--stream", action="store_true", help="readings in motion, as a delay needs them")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--truth", type=Path)
+    given = parser.parse_args(arguments)
+    sizes = given.size or [1.0] * len(given.effect)
+    if len(sizes) != len(given.effect):
+        parser.error(f"{len(given.effect)} effects but {len(sizes)} sizes")
+    order = Order(tuple(zip(given.effect, sizes, strict=True)), given.seed, given.noise, given.robot, given.loads,
+                  given.stream)  # fmt: skip
+    truth = given.truth or given.out.parent / "truth" / f"{given.out.name}.yaml"
+    content = write_set(order, given.out, truth)
+    print(
+        f"{given.out}: {content['rows']} rows; effect {content['rms_mm']['effect']:.3f} mm RMS; answer in {truth}"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,174 @@
+"""The whole suite of sets with hidden causes, for scoring: every set fixed by this table, whole or absent on disk.
+
+    python tools/oracle/make_suite.py [--out build/suite] [--only GROUP] [--jobs 2]
+
+writes FOLDER/s001/robot.yaml and measurements.csv (nothing there tells what is hidden), FOLDER/truth/s001.yaml and
+FOLDER/truth/index.csv. Run again, it makes what is missing. Even seeds are for tuning, odd ones for reporting.
+"""
+
+import argparse
+import csv
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from itertools import count, cycle
+from pathlib import Path
+from time import monotonic
+
+for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are too small for more
+    os.environ.setdefault(_threads, "1")
+
+from hidden import CAUSES  # noqa: E402
+from make_set import Order, write_set  # noqa: E402
+
+SUITE = Path(__file__).resolve().parents[2] / "build" / "suite"
+SIZES = (0.5, 1.0, 2.0)
+EFFECTS = (
+    "friction", "backlash_rotation", "backlash_translation", "delay", "tip_load", "precurvature_profile", "softening",
+    "anisotropy", "straight_curvature", "clearance", "torsional_compliance", "sensor_offset", "field_distortion",
+    "frame_drift", "frame_jump", "periodic_rotation", "periodic_translation", "entry_compliance", "entry_clearance",
+    "helical_precurvature", "contact",
+)  # fmt: skip
+# The realistic noise contains a distorted field, so that a further one is no question there.
+REALISTIC_EFFECTS = tuple(name for name in EFFECTS if name != "field_distortion")
+SEPARABLE_PAIRS = (
+    ("friction", "tip_load"), ("delay", "clearance"), ("softening", "precurvature_profile"),
+    ("friction", "softening"), ("anisotropy", "sensor_offset"), ("entry_compliance", "frame_drift"),
+    ("backlash_rotation", "tip_load"), ("clearance", "sensor_offset"), ("straight_curvature", "backlash_rotation"),
+    ("frame_jump", "entry_clearance"), ("contact", "friction"), ("helical_precurvature", "periodic_rotation"),
+)  # fmt: skip
+ALIASED_PAIRS = (
+    ("shear_stiffness", "drive_compliance"), ("tip_mass", "tip_force"), ("translation_ratio", "bending_plane"),
+    ("tracker_yaw", "bending_plane"), ("tip_load", "bending_plane"), ("drive_compliance", "translation_ratio"),
+)  # fmt: skip
+# A cause and its look-alike, with the same bench, plan and noise: the same answer is right.
+LOOK_ALIKES = (
+    ("shear_stiffness", "drive_compliance"), ("tip_mass", "tip_force"), ("bending_plane", "tracker_yaw"),
+)  # fmt: skip
+UNLOADED_LOOK_ALIKES = ("entry_compliance", "entry_clearance")
+STRANGE = tuple(name for name, cause in CAUSES.items() if not cause.ids and not cause.absorbed)
+ROBOTS = ("table2", "B", "table2", "two_tubes", "table2", "four_tubes", "table2", "B", "table2")  # in turn
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One set of the suite."""
+
+    name: str
+    group: str
+    order: Order
+
+
+def orders() -> Iterator[tuple[str, Order]]:
+    """(group, order) of every set. New ones go to the end, so that the names of the others stay."""
+    robots, seeds = cycle(ROBOTS), count(1000)
+
+    def order(
+        *effects: tuple[str, float], noise: str = "jitter", seed: int | None = None, **rest: object
+    ) -> Order:
+        robot = str(rest.pop("robot", None) or next(robots))
+        return Order(effects, next(seeds) if seed is None else seed, noise, robot, **rest)
+
+    for name in EFFECTS:
+        for size in SIZES:
+            for _ in range(2):
+                yield "single", order((name, size))
+    for noise, n in (("jitter", 12), ("realistic", 12)):
+        for k in range(n):
+            scatter = 1.35 if k in (4, 5) else 1.0
+            yield (
+                "control",
+                order(noise=noise, modulus_scatter=scatter, loads=k not in (6, 7), stream=k == 11),
+            )
+    for k, name in enumerate(REALISTIC_EFFECTS):
+        for n, size in enumerate(SIZES):
+            seed = 3000 + 10 * k + 2 * n + (k + n) % 2
+            yield "single", order((name, size), noise="realistic", seed=seed)
+    for noise in ("jitter", "realistic"):
+        for pair in SEPARABLE_PAIRS:
+            yield "pair", order(*((name, 1.0) for name in pair), noise=noise)
+    for pair in ALIASED_PAIRS:
+        yield "aliased_pair", order(*((name, 1.0) for name in pair))
+    for alike in LOOK_ALIKES:
+        for _ in range(2):
+            seed = next(seeds)
+            for name in alike:
+                yield "look_alike", order((name, 1.5), seed=seed, robot="table2")
+    for name in UNLOADED_LOOK_ALIKES:
+        for _ in range(2):
+            yield "look_alike", order((name, 1.0), loads=False)
+    for noise in ("jitter", "realistic"):
+        for name in STRANGE:
+            yield "strange", order((name, 1.0), noise=noise)
+
+
+def entries() -> list[Entry]:
+    """The suite. Names say nothing about what is hidden."""
+    return [Entry(f"s{k:03d}", group, order) for k, (group, order) in enumerate(orders(), start=1)]
+
+
+def make(entry: Entry, folder: Path) -> tuple[str, str]:
+    """Make one set; its name, and what went wrong or nothing."""
+    try:
+        write_set(entry.order, folder / entry.name, _truth(entry, folder))
+    except Exception as error:  # one set that cannot be made must not lose the others
+        return entry.name, f"{type(error).__name__}: {error}"
+    return entry.name, ""
+
+
+def _truth(entry: Entry, folder: Path) -> Path:
+    return folder / "truth" / f"{entry.name}.yaml"
+
+
+def write_index(folder: Path, suite: Sequence[Entry]) -> None:
+    """truth/index.csv: what is in which set."""
+    path = folder / "truth" / "index.csv"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_suffix(".unfinished")
+    with unfinished.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(
+            ("set", "group", "effects", "sizes", "noise", "robot", "seed", "half", "loads", "streamed")
+        )
+        for entry in suite:
+            order = entry.order
+            names, sizes = zip(*order.effects, strict=True) if order.effects else ((), ())
+            half = "reporting" if order.seed % 2 else "tuning"
+            writer.writerow((entry.name, entry.group, "+".join(names), "+".join(map(str, sizes)), order.noise,
+                             order.robot, order.seed, half, int(order.loads), int(order.streamed)))  # fmt: skip
+    os.replace(unfinished, path)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--out", type=Path, default=SUITE)
+    parser.add_argument("--only", action="append", help="a group; may be repeated")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args(arguments)
+    suite = entries()
+    write_index(given.out, suite)
+    wanted = [entry for entry in suite if not given.only or entry.group in given.only]
+    missing = [entry for entry in wanted if not _truth(entry, given.out).exists()]
+    missing.sort(key=lambda entry: any(CAUSES[name].slow for name, _ in entry.order.effects))
+    start, failed = monotonic(), []
+    with ProcessPoolExecutor(given.jobs) as pool:
+        jobs = [pool.submit(make, entry, given.out) for entry in missing]
+        for done, job in enumerate(as_completed(jobs), start=len(wanted) - len(missing) + 1):
+            name, problem = job.result()
+            if problem:
+                failed.append(name)
+                print(f"\n{name}: {problem}")
+            print(f"\r{done} of {len(wanted)} sets, {monotonic() - start:.0f} s", end="", flush=True)
+    print(
+        f"\n{len(wanted) - len(failed)} sets in {given.out}"
+        + (f"; failed: {' '.join(failed)}" if failed else "")
+    )
+    if failed:
+        raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()
