@@ -24,11 +24,14 @@ TYPED_TEST_SUITE(NeutralEffects, EffectTubeCounts);
 TYPED_TEST(NeutralEffects, GiveTheStandardModel) {
   constexpr int N = TypeParam::N;
   Random random(7 + N);
-  const Settings settings{.tolerance = 1e-12, .steps = 2};
+  const Settings settings{.tolerance = 1e-12, .steps = 4};
   int compared = 0;
   for (int n = 0; n < test::cases(60); ++n) {
     Robot<N> robot = test::random_robot<N>(random);
     if (n % 3 > 0) robot.gravity = test::tilted_gravity;
+    // With effects a curve of no curvature is a segment of its own, which integrates a little better.
+    for (Tube& tube : robot.tubes)
+      if (tube.curvature == 0) tube.curved_length = 0;
     const Joints<N> q = test::random_joints(robot, random, n % 4 == 0 ? 0.2 : 0);
     const TipLoad load = test::random_load(random, 0.1, n % 2 == 0 ? 0.002 : 0);
     Workspace<N> ws, general_ws;
@@ -51,8 +54,10 @@ TYPED_TEST(NeutralEffects, GiveTheStandardModel) {
     EXPECT_LE((general.compliance - plain.compliance).norm(), 1e-9 * plain.compliance.norm()) << n;
     const auto error = (general.jacobian - plain.jacobian).eval();
     EXPECT_LE(error.template rightCols<2 * N - 1>().norm(), 1e-9 * plain.jacobian.norm()) << n;
-    // The standard path moves the plate by the continuous rates there, not by those of a step.
-    EXPECT_LE(error.col(0).norm(), 2e-4 * plain.jacobian.norm()) << n;
+    // The standard path moves the plate by the continuous rates there, not by those of a step; and where tubes are flush,
+    // each path has the slope of one side.
+    if (test::smallest_gap(robot, q) < 1e-9) continue;
+    EXPECT_LE(error.col(0).norm(), 1e-4 * plain.jacobian.norm()) << n;
   }
   EXPECT_GT(compared, test::cases(60) / 2);
 }

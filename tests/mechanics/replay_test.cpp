@@ -10,7 +10,7 @@ using test::Random, test::uniform;
 
 template <class T>
 struct Replayed : testing::Test {};
-TYPED_TEST_SUITE(Replayed, test::TubeCounts);
+TYPED_TEST_SUITE(Replayed, test::TwoAndThreeTubes);
 
 /// Values of all entries in comparable rows, each row with its own scale.
 template <class Ev>

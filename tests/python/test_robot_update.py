@@ -153,3 +153,12 @@ def test_a_robot_made_in_memory_can_be_written(robot, tmp_path):
     made = type(robot).model_validate(robot.model_dump())
     robot_update.write(made, tmp_path / "new.yaml", [LENGTH], Entry("x"))
     assert robot_file.load(tmp_path / "new.yaml").tubes[1].length_mm == 331.25
+
+
+def test_a_tube_at_the_plate_stays_there():
+    """A home that is corrected by less than the fit can tell does not put a tube in front of the plate."""
+    text = EXAMPLE.read_text().replace(
+        "actuation:", "actuation:\n  recorded_home_translation_mm: [-298, -220.5, -145.001]"
+    )
+    beta, _ = robot_file.parse(text.encode()).joints_of_table(np.array([[-0.2, -0.1, 0.0]]), np.zeros((1, 3)))
+    assert beta.tolist() == [[-0.2, -0.1, 0.0]]

@@ -38,19 +38,18 @@ void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& loa
   CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
 #define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
 
-#define CTCR_TEST_DECLARE(N)                       \
-  CTCR_TEST_SOLVER(extern template, none, N)       \
-  CTCR_TEST_SOLVER(extern template, jacobian, N)   \
-  CTCR_TEST_SOLVER(extern template, compliance, N) \
-  CTCR_TEST_DIRECT(extern template, none, N)       \
-  CTCR_TEST_DIRECT(extern template, jacobian, N)   \
-  CTCR_TEST_DIRECT(extern template, compliance, N)
+#define CTCR_TEST_DECLARE(KIND, N)              \
+  CTCR_TEST_##KIND(extern template, none, N)     \
+  CTCR_TEST_##KIND(extern template, jacobian, N) \
+  CTCR_TEST_##KIND(extern template, compliance, N)
 
 #ifndef CTCR_TEST_INSTANTIATE
 namespace ctcr {
-CTCR_TEST_DECLARE(1)
-CTCR_TEST_DECLARE(2)
-CTCR_TEST_DECLARE(3)
-CTCR_TEST_DECLARE(4)
+CTCR_TEST_DECLARE(SOLVER, 1)
+CTCR_TEST_DECLARE(SOLVER, 2)
+CTCR_TEST_DECLARE(SOLVER, 3)
+CTCR_TEST_DECLARE(SOLVER, 4)
+CTCR_TEST_DECLARE(DIRECT, 2)
+CTCR_TEST_DECLARE(DIRECT, 3)
 }  // namespace ctcr
 #endif

@@ -300,7 +300,8 @@ def _rms(residual: Array) -> tuple[float, float]:
 
 def _notices(robot: Robot, fit: identify.Fit, ids: Sequence[str]) -> list[str]:
     """What to doubt of the fitted effects."""
-    known, said = effects.parameter_of(robot.n_tubes), list(fit.warnings)
+    known = effects.parameter_of(robot.n_tubes)
+    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *fit.warnings]
     place = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = effects.get(identity, robot.n_tubes)

@@ -16,6 +16,7 @@ from ctcr.frames import matrix_from_rotation_vector
 from ctcr.quantities import Quantity
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
+AT_PLATE = 10e-6  # [m] in front of the plate: a calibration of a tube that never moves from it ends there
 
 Array = NDArray[np.float64]
 Three = Annotated[list[float], Len(3, 3)]
@@ -220,8 +221,13 @@ class Robot(Section):
         return np.array(self.gravity or (0.0, 0.0, 0.0))
 
     def joints_of_table(self, beta: Array, alpha: Array) -> tuple[Array, Array]:
-        """The joints beta [m], alpha [rad] (M, N) of this robot where a table holds those of its controller."""
-        return beta + self.actuation.translation_correction, alpha + self.actuation.rotation_correction
+        """The joints beta [m], alpha [rad] (M, N) of this robot where a table holds those of its controller.
+
+        What a correction puts in front of the plate by less than AT_PLATE is at the plate.
+        """
+        beta = beta + self.actuation.translation_correction
+        beta = np.where((beta > 0) & (beta < AT_PLATE), 0.0, beta)
+        return beta, alpha + self.actuation.rotation_correction
 
     def core_parameters(self) -> dict[str, Array]:
         """What the compiled model needs, in SI units: one array (N,) a tube property, and gravity (3,).

@@ -18,7 +18,7 @@ enum class Role { amplitude, shape };
 /// One named parameter of an effect.
 struct EffectParameter {
   std::string_view name;               ///< snake_case
-  std::string_view unit;               ///< SI; empty: a pure number
+  std::string_view unit{};             ///< SI; empty: a pure number
   double neutral = 0;                  ///< changes nothing (amplitude), or the usual value (shape)
   double sigma = 1;                    ///< plausible standard deviation about it, before any measurement
   double soft_low = 0, soft_high = 0;  ///< beyond: explains the data, but hardly by this physics
@@ -26,7 +26,7 @@ struct EffectParameter {
          hard_high = std::numeric_limits<double>::infinity();  ///< beyond: impossible
   bool per_tube = false;                                       ///< one value for each tube
   Role role = Role::amplitude;
-  std::string_view meaning;  ///< in plain words
+  std::string_view meaning{};  ///< in plain words
 };
 
 /// What measurements must have for an effect to be seen.
@@ -42,11 +42,11 @@ struct Needs {
 struct EffectInfo {
   std::string_view id;  ///< stable: in files, on the command line and in reports
   std::string_view title;
-  std::string_view physics;      ///< what happens, in plain words
-  std::string_view signature;    ///< how the error looks
-  std::string_view measure;      ///< what to measure to see it and to tell it from its look-alikes
-  std::string_view look_alikes;  ///< ids, separated by spaces
-  std::string_view reference;
+  std::string_view physics{};      ///< what happens, in plain words
+  std::string_view signature{};    ///< how the error looks
+  std::string_view measure{};      ///< what to measure to see it and to tell it from its look-alikes
+  std::string_view look_alikes{};  ///< ids, separated by spaces
+  std::string_view reference{};
   Needs needs{};
 };
 

@@ -21,10 +21,13 @@ CTCR_INLINE Lanes3 cross(const Lanes3& a, const Vec3& b) noexcept {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-/// The window of eight variables that one pass differentiates along.
+/// The window of variables that one pass differentiates along.
+template <int G>
 struct Window {
-  static constexpr int groups = 2, size = groups * lane_count;
-  using S = Dual<groups>;
+  static constexpr int groups = G, size = groups * lane_count;
+  /// Lane groups of the windows that hold `lanes` lanes.
+  static constexpr int groups_for(int lanes) noexcept { return (lanes + size - 1) / size * groups; }
+  using S = Dual<G>;
   int first = 0;
 
   /// `value` with derivative `slope` along a variable.
@@ -41,11 +44,12 @@ struct Window {
 
 /// One integration of the general path, differentiated along a window of variables. The unknowns come first among them:
 /// turns of the tip about the base axes, psi_2..N at the tubes' tips.
-template <int N, class Fx>
+template <int N, class Fx, int Groups>
 class EffectPass {
 public:
+  using Window = detail::Window<Groups>;
   static constexpr int turn = 0, psi = 3, unknowns = N + 2, rows = unknowns + 6;
-  using S = Window::S;
+  using S = typename Window::S;
   using Inputs = RodInputs<N, S, Fx>;
 
   /// @param in  with derivatives along the window's variables other than the unknowns
@@ -167,15 +171,17 @@ CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joi
                                    const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {
   static_assert(L == Loading::weight, "the general path has the general equations");
   using Col = Columns<N, L, D>;
-  using Pass = detail::EffectPass<N, Fx>;
-  using S = detail::Window::S;
-  constexpr int beta = Pass::unknowns, force = beta + (Col::jacobian ? N : 0), moment = force + 3;
+  constexpr int beta = N + 2, force = beta + (Col::jacobian ? N : 0), moment = force + 3;
   constexpr int count = Col::compliance ? moment + 3 : force;
-  constexpr int groups = lane_groups(count) + lane_groups(count) % detail::Window::groups;
+  using Window = detail::Window<(lane_groups(count) > 2 ? 4 : 2)>;  // J and C of three tubes in one pass
+  using Pass = detail::EffectPass<N, Fx, Window::groups>;
+  using S = typename Window::S;
+  static_assert(Pass::unknowns == beta);
+  constexpr int groups = Window::groups_for(count);
   LaneRow<groups> row[Pass::rows];
 
   const Events<N> events = sort_events(c.plain, q.beta);
-  for (detail::Window window; window.first < count; window.first += window.size) {
+  for (Window window; window.first < count; window.first += window.size) {
     const auto variable = [&](bool varied, double value, int lane) { return varied ? window(value, lane) : S(value); };
     RodInputs<N, S, Fx> in;
     for (std::size_t i = 0; i < N; ++i) {

@@ -2,8 +2,7 @@
 // The general path: the rod with effects, for any scalar S, from the robot tip to the front plate. Every tube may bend
 // anywhere and by any law of hooks.hpp; tubes may exchange torque and the frame may kink where tubes end or start to
 // curve. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
-#include "ctcr/effects/hooks.hpp"
-#include "ctcr/math/functions.hpp"
+#include "ctcr/mechanics/bending.hpp"
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
 
@@ -115,7 +114,7 @@ public:
       sincos(y.psi(j), b.sine[i], b.cosine[i]);
       b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
       add_stiffness(m, b, i, 1.0, slope);
-      const auto e = weighed(m, value(m.curvature[0]), value(m.curvature[1]));
+      const auto e = bending::weighed(m, value(m.curvature[0]), value(m.curvature[1]));
       const double k = value(m.bending_stiffness);
       moment[0] += k * (value(b.cosine[i]) * e[0] - value(b.sine[i]) * e[1]);
       moment[1] += k * (value(b.sine[i]) * e[0] + value(b.cosine[i]) * e[1]);
@@ -208,21 +207,6 @@ private:
     return m;
   }
 
-  /// (x, y) as the directions of bending weigh it: the bending moment is EI times that of d.
-  template <class T>
-  static std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept {
-    const T a = as<T>(m.anisotropy[0]), c = as<T>(m.anisotropy[1]);
-    return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
-  }
-  /// A number, or its value alone.
-  template <class T>
-  static T as(const S& x) noexcept {
-    if constexpr (std::is_same_v<T, S>)
-      return x;
-    else
-      return value(x);
-  }
-
   /// Adds f R K R^T.
   static void add_stiffness(const Material<S>& m, const Bend& b, std::size_t i, double f, Slope& slope) noexcept {
     const double s = value(b.sine[i]), c = value(b.cosine[i]), k = f * value(m.bending_stiffness);
@@ -233,27 +217,6 @@ private:
     slope.yy += s * s * xx + 2 * s * c * xy + c * c * yy;
   }
 
-  /// Bending moment of a tube whose curvature differs from that of the free one by (dx, dy), its own axes.
-  template <class T>
-  static std::array<T, 2> moment_of(const Material<S>& m, const T& dx, const T& dy) noexcept {
-    const std::array<T, 2> e = weighed(m, dx, dy);
-    const T k = as<T>(m.bending_stiffness) * stiffness_left(as<T>(m.softening), T(dx * e[0] + dy * e[1]));
-    return {k * e[0], k * e[1]};
-  }
-  /// What softening c leaves of a stiffness, f of Material.
-  template <class T>
-  static T stiffness_left(const T& c, const T& z) noexcept {
-    constexpr double r = Material<S>::stiffness_left;
-    if (value(c) == 0) return 1.0 - c * z;
-    return r + (1 - r) * inverse(square_root(1.0 + (2 / (1 - r)) * (c * z)));
-  }
-  /// df/dz.
-  static double loss_slope(double c, double z) noexcept {
-    constexpr double r = Material<S>::stiffness_left;
-    const double q = 1 / std::sqrt(1 + 2 / (1 - r) * c * z);
-    return -c * q * q * q;
-  }
-
   /// Slope of the tubes' moment by u, softening included.
   static Slope tangent(const Place& place, const std::array<Material<S>, N>& material, const Bend& b,
                        const std::array<double, 2>& u) noexcept {
@@ -262,10 +225,10 @@ private:
       const Material<S>& m = material[i];
       const double s = value(b.sine[i]), c = value(b.cosine[i]);
       const double dx = c * u[0] + s * u[1] - value(m.curvature[0]), dy = c * u[1] - s * u[0] - value(m.curvature[1]);
-      const auto e = weighed(m, dx, dy);
+      const auto e = bending::weighed(m, dx, dy);
       const double z = dx * e[0] + dy * e[1];
-      add_stiffness(m, b, i, stiffness_left(value(m.softening), z), slope);
-      const double loss = 2 * value(m.bending_stiffness) * loss_slope(value(m.softening), z);
+      add_stiffness(m, b, i, bending::stiffness_left(value(m.softening), z), slope);
+      const double loss = 2 * value(m.bending_stiffness) * bending::loss_slope(value(m.softening), z);
       const double x = c * e[0] - s * e[1], y = s * e[0] + c * e[1];
       slope.xx += loss * x * x;
       slope.xy += loss * x * y;
@@ -278,13 +241,14 @@ private:
   template <class T>
   static std::array<T, 2> unbalanced(const Place& place, const State& y, const std::array<Material<S>, N>& material,
                                      const Bend& b, const std::array<T, 2>& u, Bend* keep) noexcept {
-    T rx = as<T>(y.m(0)), ry = as<T>(y.m(1));
+    T rx = bending::as<T>(y.m(0)), ry = bending::as<T>(y.m(1));
     for (int j = 0; j < place.present; ++j) {
       const auto i = std::size_t(j);
       const Material<S>& m = material[i];
-      const T s = as<T>(b.sine[i]), c = as<T>(b.cosine[i]);
+      const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
       const T ux = c * u[0] + s * u[1], uy = c * u[1] - s * u[0];
-      const std::array<T, 2> q = moment_of(m, T(ux - as<T>(m.curvature[0])), T(uy - as<T>(m.curvature[1])));
+      const std::array<T, 2> q =
+          bending::moment(m, T(ux - bending::as<T>(m.curvature[0])), T(uy - bending::as<T>(m.curvature[1])));
       rx = rx - (c * q[0] - s * q[1]);
       ry = ry - (s * q[0] + c * q[1]);
       if constexpr (std::is_same_v<T, S>)
@@ -366,7 +330,7 @@ private:
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       const Material<S> mat = material_of(place, j);
-      const std::array<S, 2> q = moment_of(mat, mat.curvature[0], mat.curvature[1]);
+      const std::array<S, 2> q = bending::moment(mat, mat.curvature[0], mat.curvature[1]);
       S s, c;
       sincos(y.psi(j), s, c);
       m[i] = {s * q[1] - c * q[0], -(s * q[0] + c * q[1])};
@@ -381,7 +345,7 @@ private:
     S mz = 0.0;
     for (int i = 0; i < present; ++i) mz = mz + y.torque(i);
     const S square = y.m(0) * y.m(0) + y.m(1) * y.m(1);
-    if (value(square) > 0) {
+    if (value(square) > 1e-30) {
       const S half = 0.5 * mz * (turn[0] * y.m(0) + turn[1] * y.m(1)) * inverse(square);
       turn = {turn[0] + half * turn[1], turn[1] - half * turn[0]};
     }

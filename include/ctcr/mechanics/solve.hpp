@@ -16,6 +16,8 @@ inline constexpr double singular_det = 1e-2;
 inline constexpr int scattered_starts = 16;
 /// ||b|| up to which the pose after one evaluation is good to about ||b||^2 [rad].
 inline constexpr double one_step_residual = 0.05;
+/// Newton step up to which that holds: a longer one from so small a residual comes near a fold [rad].
+inline constexpr double one_step_change = 0.1;
 
 template <int N>
 inline TipGuess<N> straight_guess(const Joints<N>& q) noexcept {
@@ -278,7 +280,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   evaluate_at(guess, ev);
   out.iterations = 1;
   const VecN<N + 2> dx = newton_step<Ev, N>(ev);
-  if (!(ev.residual < one_step_residual) || !dx.allFinite())
+  if (!(ev.residual < one_step_residual && dx.squaredNorm() < one_step_change * one_step_change))
     return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   TipGuess<N> next = moved<N>(guess, dx, 1.0);
   if constexpr (L == Loading::none) next.rotation = ev.rotation;
@@ -345,8 +347,9 @@ Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
 }
 
 /// One evaluation from the warm start predicted to the new joints: the control step. Falls back to solve() when there is
-/// no warm start or the joints moved too far (||b|| > 0.05 rad). out.residual is that before the final correction, whose
-/// square bounds the error. Ask for the Jacobian to have the prediction and the corrected pose.
+/// no warm start, the joints moved too far (||b|| > 0.05 rad) or the robot is about to snap (Newton step > 0.1 rad).
+/// out.residual is that before the final correction, whose square bounds the error. Ask for the Jacobian to have the
+/// prediction and the corrected pose.
 /// Real time: yes, one evaluation.
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,

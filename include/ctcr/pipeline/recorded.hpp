@@ -209,18 +209,18 @@ Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
 /// some of the system's parameters. Rows: position [m], rotation [rad], tracker axes.
 /// @param variables  places in SystemParameters<N, Fx>, each once
 /// @param out        6 x variables.size()
-/// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for eight variables.
+/// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for sixteen variables.
 template <int N, class Fx>
 Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                      const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
                      Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
   using P = SystemParameters<N, Fx>;
   using V = ParameterVector<N>;
-  using Pass = detail::EffectPass<N, Fx>;
-  using S = detail::Window::S;
+  using Window = detail::Window<4>;
+  using Pass = detail::EffectPass<N, Fx, Window::groups>;
+  using S = Window::S;
   using On = typename Fx::template On<N>;
-  constexpr int max_lanes = Pass::unknowns + P::count + 3 + detail::Window::size;
-  constexpr int groups = lane_groups(max_lanes) + lane_groups(max_lanes) % detail::Window::groups;
+  constexpr int groups = Window::groups_for(Pass::unknowns + P::count + 3);
 
   out.setZero();
   const Status status = prediction.solution.status;
@@ -234,7 +234,7 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
   for (int j = 0; j < asked; ++j) slot[std::size_t(variables[std::size_t(j)])] = Pass::unknowns + j;
   const int force = Pass::unknowns + asked;
 
-  const auto seeding = [&](const detail::Window& window) {
+  const auto seeding = [&](const Window& window) {
     return [&slot, window](double x, int index) noexcept {
       const int lane = slot[std::size_t(index)];
       return lane < 0 ? S(x) : window(x, lane);
@@ -247,10 +247,10 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
 
   // What the surroundings add, and its slopes by the variables: it may be nothing and yet have some.
   bool pushed = false;
-  std::array<std::array<S, 3>, groups / detail::Window::groups> push;
+  std::array<std::array<S, 3>, groups / Window::groups> push;
   if constexpr (On::has_environment) {
     const Vec3& p = prediction.solution.position;
-    for (detail::Window window; window.first < force; window.first += window.size) {
+    for (Window window; window.first < force; window.first += window.size) {
       auto& f = push[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
       seeded_effects(seeding(window)).environment({p[0], p[1], p[2]}, f);
       for (const S& x : f) {
@@ -266,7 +266,7 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
     for (auto& x : r.x) x = Lanes{};
   const Events<N> events = sort_events(with_all_curves(model.robot()), prediction.q.beta);
   TipGuess<N> guess = ws.guess;
-  for (detail::Window window; window.first < count; window.first += window.size) {
+  for (Window window; window.first < count; window.first += window.size) {
     const auto seed = seeding(window);
     RodInputs<N, S, Fx> in;
     in.effects = seeded_effects(seed);
@@ -305,8 +305,8 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
         Vec3 A, direct;
         for (int i = 0; i < 3; ++i) {
           A[i] = rows[Pass::rows + i][j];
-          const int l = j % detail::Window::size;
-          direct[i] = push[std::size_t(j / detail::Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
+          const int l = j % Window::size;
+          direct[i] = push[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
         }
         const Vec6 change = by_force * lu.solve(direct + slope * A);
         for (int i = 0; i < 6; ++i) rows[Pass::unknowns + i].add(j, change[i]);
@@ -318,10 +318,10 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
   const Pose& T_base_tip = prediction.solution.tube_tips[std::size_t(system.sensor.tube)];
   const Mat3 R_tip_base = T_base_tip.rotation.transpose(),
              R_base_tracker = system.sensor.T_tracker_base.rotation.transpose();
-  for (detail::Window window; window.first < force; window.first += window.size) {
+  for (Window window; window.first < force; window.first += window.size) {
     const auto seed = seeding(window);
     Frame<S> tip = frame_of<S>(T_base_tip), T_ref = frame_of<S>(system.sensor.T_tracker_base);
-    for (int g = 0; g < detail::Window::groups; ++g) {
+    for (int g = 0; g < Window::groups; ++g) {
       const int at = window.first / lane_count + g;
       const auto& r = rows;
       constexpr int u = Pass::unknowns;

@@ -15,7 +15,7 @@ struct RecordedTable : Table {
 };
 
 class AnyRecording : public AnyReadings {
- public:
+public:
   /// T_tracker_sensor as predicted at the last call: (rows, 3) [m], (rows, 4) w first; NaN where not solved.
   virtual void predicted(RowMajor& position, RowMajor& quaternion) const = 0;
 };

@@ -31,7 +31,7 @@ auto with_tubes(Eigen::Index tubes, const F& f) {
 }
 
 class BoundRecording : public BoundReadings {
- public:
+public:
   using BoundReadings::BoundReadings;
   [[nodiscard]] const AnyRecording& recording() const { return static_cast<const AnyRecording&>(**this); }
 };
@@ -96,31 +96,44 @@ void bind_effects(nb::module_& m) {
       .def_ro("shape", &CatalogueParameter::shape)
       .def_ro("first", &CatalogueParameter::first);
   m.def("effect_catalogue", &catalogue, "All effects in words.");
-  m.def("effect_parameters", [](int tubes) {
-    return with_tubes(tubes, [](auto n) { return catalogue_parameters<n>(); });
-  }, "tubes"_a, "Parameters of all effects; `first` is the place of a parameter's value among those of the catalogue.");
-  m.def("system_parameter_names", [](int tubes) {
-    return with_tubes(tubes, [](auto n) { return system_parameter_names<n>(); });
-  }, "tubes"_a, "Names of all parameters of a robot and of the catalogue of effects.");
+  m.def(
+      "effect_parameters",
+      [](int tubes) { return with_tubes(tubes, [](auto n) { return catalogue_parameters<n>(); }); }, "tubes"_a,
+      "Parameters of all effects; `first` is the place of a parameter's value among those of the catalogue.");
+  m.def(
+      "system_parameter_names",
+      [](int tubes) { return with_tubes(tubes, [](auto n) { return system_parameter_names<n>(); }); }, "tubes"_a,
+      "Names of all parameters of a robot and of the catalogue of effects.");
 
   nb::class_<BoundRecording, BoundReadings>(m, "Recording", "As Readings, with effects and the path behind each row.")
-      .def("__init__", [](BoundRecording* self, const Eigen::VectorXd& parameters, const Eigen::VectorXd& effects,
-                          int sensor_tube, const RowMajor& beta, const RowMajor& alpha, const RowMajor& force,
-                          const RowMajor& position, const RowMajor& quaternion, const Eigen::VectorXd& time,
-                          const Eigen::VectorXd& part, const Eigen::VectorXi& run, const Eigen::Vector3d& centre,
-                          const std::vector<int>& free, int steps, int threads,
-                          const std::optional<RowMajor>& profiles) {
-        RecordedTable table{{parameters, sensor_tube, beta, alpha, force, position, quaternion, free, steps, threads},
-                            effects, time, run, centre, part, profiles.value_or(RowMajor())};
-        new (self) BoundRecording(make_any_recording(table));
-      }, nb::kw_only(), "parameters"_a, "effects"_a, "sensor_tube"_a, "beta"_a, "alpha"_a, "force"_a, "position"_a,
-           "quaternion"_a, "time"_a, "part"_a, "run"_a, "centre"_a, "free"_a, "steps"_a = 2, "threads"_a = 0,
-           "profiles"_a.none() = nb::none())
-      .def("predicted", [](const BoundRecording& self) {
-        RowMajor position, quaternion;
-        self.recording().predicted(position, quaternion);
-        return std::tuple(std::move(position), std::move(quaternion));
-      }, "T_tracker_sensor of all rows at the last call: position (rows, 3) [m], quaternion (rows, 4) w first.");
+      .def(
+          "__init__",
+          [](BoundRecording* self, const Eigen::VectorXd& parameters, const Eigen::VectorXd& effects, int sensor_tube,
+             const RowMajor& beta, const RowMajor& alpha, const RowMajor& force, const RowMajor& position,
+             const RowMajor& quaternion, const Eigen::VectorXd& time, const Eigen::VectorXd& part,
+             const Eigen::VectorXi& run, const Eigen::Vector3d& centre, const std::vector<int>& free, int steps,
+             int threads, const std::optional<RowMajor>& profiles) {
+            RecordedTable table{
+                {parameters, sensor_tube, beta, alpha, force, position, quaternion, free, steps, threads},
+                effects,
+                time,
+                run,
+                centre,
+                part,
+                profiles.value_or(RowMajor())};
+            new (self) BoundRecording(make_any_recording(table));
+          },
+          nb::kw_only(), "parameters"_a, "effects"_a, "sensor_tube"_a, "beta"_a, "alpha"_a, "force"_a, "position"_a,
+          "quaternion"_a, "time"_a, "part"_a, "run"_a, "centre"_a, "free"_a, "steps"_a = 2, "threads"_a = 0,
+          "profiles"_a.none() = nb::none())
+      .def(
+          "predicted",
+          [](const BoundRecording& self) {
+            RowMajor position, quaternion;
+            self.recording().predicted(position, quaternion);
+            return std::tuple(std::move(position), std::move(quaternion));
+          },
+          "T_tracker_sensor of all rows at the last call: position (rows, 3) [m], quaternion (rows, 4) w first.");
 }
 
 }  // namespace ctcr::python

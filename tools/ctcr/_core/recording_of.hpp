@@ -21,11 +21,11 @@ template <int N>
 class RecordingOf final : public AnyRecording {
   using Fx = WithProfiles<Catalogue>::type;
 
- public:
+public:
   explicit RecordingOf(const RecordedTable& table)
-      : pool_(table.threads),
-        profiles_(profiles(table)),
-        recording_(system(table, profiles_), rows(table), measured(table), table.free, pool_) {}
+    : pool_(table.threads),
+      profiles_(profiles(table)),
+      recording_(system(table, profiles_), rows(table), measured(table), table.free, pool_) {}
 
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) override {
     return recording_(x, residual, jacobian);
@@ -49,7 +49,7 @@ class RecordingOf final : public AnyRecording {
       if (!recording_.active()[std::size_t(i)]) clear(position, quaternion, i);
   }
 
- private:
+private:
   static void clear(RowMajor& position, RowMajor& quaternion, Eigen::Index i) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     position.row(i).setConstant(nan);
@@ -83,7 +83,8 @@ class RecordingOf final : public AnyRecording {
     std::vector<RecordedRow<N>> rows(plain.size());
     for (std::size_t i = 0; i < plain.size(); ++i) {
       const auto k = Eigen::Index(i);
-      rows[i] = {motor_angles(transmission, plain[i].q), plain[i].load,
+      rows[i] = {motor_angles(transmission, plain[i].q),
+                 plain[i].load,
                  {table.time[k], table.part[k], table.run[k], table.centre}};
     }
     return rows;
@@ -128,8 +129,8 @@ std::vector<std::string> system_parameter_names() {
 
 }  // namespace ctcr::python
 
-#define CTCR_RECORDING_OF(N)                                                                        \
-  template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(             \
-      const ctcr::python::RecordedTable&);                                                          \
-  template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>();   \
+#define CTCR_RECORDING_OF(N)                                                                      \
+  template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(           \
+      const ctcr::python::RecordedTable&);                                                        \
+  template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>(); \
   template std::vector<std::string> ctcr::python::system_parameter_names<N>();

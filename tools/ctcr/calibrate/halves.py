@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
@@ -39,18 +40,25 @@ class Halves:
         return 1e3 * float(np.sqrt(np.mean(self.noise**2)))
 
 
-def compare_halves(robot: Robot, readings: Measurements, first, second, kind: str) -> Halves:
-    """Halves of two fits of one robot to two halves of a table."""
+def compare_halves(robot: Robot, readings: Measurements, first, second, kind: str) -> Halves | None:
+    """Halves of two fits of one robot to two halves of a table; None where the models cannot be solved."""
     rows = np.unique(np.linspace(0, len(readings) - 1, min(len(readings), MOST_PLACES)).astype(np.int64))
     models = [fit.apply(robot) for fit in (first, second)]
     tips = [_tips(model, readings, rows) for model in models]
     spread = _root(_difference_covariance(first, second))
     rng = np.random.default_rng(SEED)
-    squares = np.zeros(len(rows))
+    squares = []
     for _ in range(DRAWS):
-        moved = _moved(first, first.values + spread @ rng.standard_normal(spread.shape[1]))
-        squares += np.sum((_tips(moved.apply(robot), readings, rows) - tips[0]) ** 2, axis=1) / DRAWS
+        values = first.values + spread @ rng.standard_normal(spread.shape[1])
+        try:
+            moved = _moved(first, values).apply(robot)
+        except ValidationError:  # a draw that no robot can have, such as a negative modulus
+            continue
+        squares.append(np.sum((_tips(moved, readings, rows) - tips[0]) ** 2, axis=1))
+    squares = np.mean(squares, axis=0) if squares else np.full(len(rows), np.nan)
     solved = np.isfinite(tips[0]).all(axis=1) & np.isfinite(tips[1]).all(axis=1) & np.isfinite(squares)
+    if not solved.any():
+        return None
     base = (tips[0] - models[0].tracker.position) @ models[0].tracker.rotation
     return Halves(
         kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(squares[solved])

@@ -10,8 +10,17 @@ import click
 @click.option(
     "--json", "json_target", metavar="FILE", help="Write the verdict as JSON; - for standard output."
 )
+@click.option(
+    "--effects",
+    "own",
+    multiple=True,
+    metavar="FILE.py",
+    help="File of your own effects that may be missing too.",
+)
 @click.option("--threads", type=click.IntRange(0), default=0, help="Threads; 0: all cores.")
-def command(robot: str, measurements: str, report: str | None, json_target: str | None, threads: int) -> None:
+def command(
+    robot: str, measurements: str, report: str | None, json_target: str | None, own, threads: int
+) -> None:
     """Find out which physical effect the model of ROBOT lacks to explain MEASUREMENTS.
 
     Calibrates first, then fits every effect of the catalogue together with the calibration, accepts one at a time, and
@@ -22,6 +31,10 @@ def command(robot: str, measurements: str, report: str | None, json_target: str 
     from ctcr import output, robot_file
     from ctcr.diagnose import diagnose, terminal
 
+    if own:
+        from ctcr import user_effects
+
+        user_effects.load_all(own)
     loaded = robot_file.load(robot)
     readings = table.load(measurements, loaded.n_tubes)
     console = output.console(json_target)

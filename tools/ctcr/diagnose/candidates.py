@@ -41,7 +41,7 @@ class Candidate:
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
     """Those that these data can show, and why not for the others."""
     found, left_out = [], {}
-    for effect in effects.catalogue(robot.n_tubes).values():
+    for effect in effects.all_effects(robot.n_tubes).values():
         reason = _unseen(effect, robot, measurements)
         if reason:
             left_out[effect.id] = reason

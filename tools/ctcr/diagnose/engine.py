@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, free_parameters, identify, recording
+from ctcr import effects, free_parameters, identify, recording, user_effects
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
@@ -86,7 +86,7 @@ class Engine:
     def recording(
         self, names: Sequence[str], fixed: dict[str, float] | None = None, rows: Mask | None = None
     ) -> Any:
-        table = recording.recording_of(
+        table = user_effects.recording_of(
             self.robot, self.measurements, names, fixed=fixed, steps=self.steps, threads=self.threads
         )
         table.activate((self.measured & (self.rows if rows is None else rows)).tolist())
