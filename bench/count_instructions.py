@@ -38,7 +38,9 @@ def main() -> int:
     try:
         compiler = run([str(arguments.driver), "--about"]).strip()
         counts = {case: per_step(arguments.driver, case) for case in CASES}
-        rivals = {case: per_step(arguments.driver, rival) for case, rival in RIVALS.items() if arguments.rival}
+        rivals = {
+            case: per_step(arguments.driver, rival) for case, rival in RIVALS.items() if arguments.rival
+        }
     except (OSError, RuntimeError) as error:
         print(f"count_instructions: {error}", file=sys.stderr)
         return 1

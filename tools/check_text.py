@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 MAX_LINES = 400
-FOLDERS = ("include", "tests", "bench", "tools", "examples", "cmake", ".ci")
+FOLDERS = ("include", "tests", "bench", "tools", "examples", "docs", "cmake", ".ci")
 CODE = {".hpp", ".cpp", ".py", ".sh", ".cmake"}
 TEXT = CODE | {".md", ".txt", ".toml", ".yaml", ".json", ""}
 FORBIDDEN = {

@@ -31,6 +31,8 @@ TEST(ToyEffect, EqualsTheRobotThatItAmountsTo) {
   for (int n = 0; n < test::cases(20); ++n) {
     auto [robot, q, load] =
         test::smooth_case<2>(random, 0.1, 0.002, n % 2 == 0 ? Vec3(Vec3::Zero()) : test::tilted_gravity);
+    for (Tube& tube : robot.tubes)  // with effects a curve of no curvature is a segment of its own
+      if (tube.curvature == 0) tube.curved_length = 0;
     Toys::On<2> toys;
     std::get<0>(toys.list).values = {1.1, 0.8, 0.9, 1.3};
     Robot<2> other = robot;

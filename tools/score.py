@@ -1,0 +1,130 @@
+"""Scores `ctcr diagnose` on the suite of sets with hidden effects that tools/oracle/make_suite.py writes.
+
+The command runs on robot.yaml and measurements.csv alone; the truth is read afterwards. Answers are kept beside the
+suite, so that an interrupted run goes on. Thresholds are set on the sets of the tuning half; the scores to quote are
+those of the reporting half.
+"""
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+ROOT = Path(__file__).parents[1]
+NAMED = ("identified", "probable", "ambiguous")
+
+
+def wilson(hits: int, count: int) -> str:
+    """`hits` of `count` with the 95 % Wilson interval."""
+    if not count:
+        return "none"
+    z, p = 1.96, hits / count
+    middle = (p + z * z / (2 * count)) / (1 + z * z / count)
+    half = z * math.sqrt(p * (1 - p) / count + z * z / (4 * count * count)) / (1 + z * z / count)
+    return f"{hits}/{count} = {100 * p:.0f} % ({100 * (middle - half):.0f} to {100 * (middle + half):.0f})"
+
+
+def answer(folder: Path, answers: Path, seconds: int) -> dict | None:
+    """What the command says of a set; None where it fails."""
+    target = answers / f"{folder.name}.json"
+    if not target.exists():
+        command = [
+            sys.executable,
+            "-m",
+            "ctcr",
+            "diagnose",
+            "robot.yaml",
+            "measurements.csv",
+            "--threads",
+            "1",
+        ]
+        try:
+            done = subprocess.run(
+                [*command, "--json", str(target)], cwd=folder, capture_output=True, text=True, timeout=seconds
+            )
+        except subprocess.TimeoutExpired:
+            return None
+        if done.returncode:
+            print(f"{folder.name}: {done.stderr.strip()}", file=sys.stderr)
+            return None
+    return json.loads(target.read_text())
+
+
+def judged(said: dict | None, truth: dict) -> dict[str, bool]:
+    """By score: whether this set counts for it and passes; a score that is absent does not apply."""
+    classes, hidden = [effect["class"] for effect in (said or {}).get("effects", [])], truth["classes"]
+    word = said["verdict"] if said else "failed"
+    found = [any(identity in members for members in classes) for identity in hidden]
+    scores = {}
+    if truth["verdict"] == "nothing_missing":
+        scores["controls: nothing named"] = word == "nothing_missing"
+    elif truth["verdict"] == "not_in_catalogue":
+        scores["outside the catalogue: never identified"] = word != "identified"
+        scores["outside the catalogue: flagged"] = word in ("not_in_catalogue", "stand_in")
+    elif hidden:
+        scores["right class first"] = bool(classes) and any(identity in classes[0] for identity in hidden)
+        scores["exactly the right classes"] = all(found) and len(classes) == len(hidden)
+        if len(hidden) > 1:
+            scores["pairs: both found"] = all(found)
+    if said and hidden:
+        floor = said["rms_mm"]["noise_floor"]
+        limit = 1.1 if truth["noise"] == "jitter" else 1.25
+        scores["locked error within its limit of the floor"] = said["rms_mm"]["with_effects"] <= limit * floor
+    return scores
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--suite", type=Path, default=ROOT / "build" / "suite")
+    parser.add_argument("--half", choices=("tuning", "reporting", "both"), default="reporting")
+    parser.add_argument("--every", type=int, default=1, help="score every n-th set only")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--seconds", type=int, default=300, help="longest time for one set")
+    options = parser.parse_args()
+    if not (options.suite / "truth").is_dir():
+        sys.exit(f"{options.suite} holds no suite: python tools/oracle/make_suite.py writes it")
+    yaml = YAML(typ="safe")
+    truths = {
+        path.stem: yaml.load(path.read_text()) for path in sorted((options.suite / "truth").glob("s*.yaml"))
+    }
+    chosen = [name for name, t in truths.items() if options.half in (t["half"], "both")][:: options.every]
+    answers = options.suite / "answers"
+    answers.mkdir(exist_ok=True)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        said = dict(
+            zip(
+                chosen,
+                pool.map(lambda n: answer(options.suite / n, answers, options.seconds), chosen),
+                strict=True,
+            )
+        )
+    report(chosen, said, truths)
+
+
+def report(chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict]) -> None:
+    """Prints the scores by noise, and who was taken for whom."""
+    hits, counts, confusion = Counter(), Counter(), Counter()
+    for name in chosen:
+        truth = truths[name]
+        for score, passed in judged(said[name], truth).items():
+            hits[score, truth["noise"]] += passed
+            counts[score, truth["noise"]] += 1
+        named = " + ".join("|".join(e["class"]) for e in (said[name] or {}).get("effects", [])) or "nothing"
+        confusion[" + ".join(truth["classes"]) or truth["verdict"], named] += 1
+    for (score, noise), count in sorted(counts.items()):
+        print(f"{score}, {noise}: {wilson(hits[score, noise], count)}")
+    print("\nhidden -> named")
+    for (hidden, named), count in sorted(confusion.items()):
+        print(f"{count:4d}  {hidden} -> {named}")
+
+
+if __name__ == "__main__":
+    main()
