@@ -23,6 +23,8 @@ REFITS = 6  # effects that are refitted, the best by their slopes
 NEAR = 0.5  # candidates below this part of the best linear gain are not refitted, unless few are left
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
+# Another noise must predict other runs so much better to be preferred to that of the most evidence.
+BETTER = 0.7
 FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
 
 
@@ -108,17 +110,19 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
     names = [name for entry in accepted for name in entry.candidate.names]
     fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
     held_out = engine.rows & (split.groups(engine.measurements) % 4 == 1)
-    best, least = fit, np.inf
+    errors = {}
     for part in FIELDS:
         progress(f"prediction with {part:.0%} of the stated field error")
         noise = engine.noise_with(part)
         trial = engine.fit(
             names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights * ~held_out[:, None]
         )
-        error = trial.rms_mm(held_out & (fit.weights[:, 0] > 0.3))
-        if error < least:
-            best, least = trial, error
-    return engine.fit(names, start=values_of(best), fixed=fixed, noise=best.noise, weights=fit.weights)
+        errors[noise] = trial.rms_mm(held_out & (fit.weights[:, 0] > 0.3))
+    usual = next(error for noise, error in errors.items() if noise.position_field == fit.noise.position_field)
+    noise = min(errors, key=lambda noise: errors[noise])
+    if errors[noise] > BETTER * usual:
+        return fit
+    return engine.fit(names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights)
 
 
 def race(

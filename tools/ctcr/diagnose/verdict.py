@@ -13,9 +13,8 @@ from ctcr.diagnose.leftover import Leftover
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Accepted
 
-EXPLAINED = (
-    0.5  # share of the excess error on locked runs that effects must remove to be the cause, not stand-ins
-)
+# Share of the excess, of error on locked runs or of chi-square, that effects must remove to be the cause, not stand-ins.
+EXPLAINED = 0.4
 
 
 @dataclass
@@ -45,7 +44,7 @@ def judge(
             ["Something is missing that no effect of the catalogue explains.", rounds[-1].reason],
         )
     first = accepted[0]
-    if leftover.structured and explained < EXPLAINED:
+    if leftover.structured and max(explained, first.share) < EXPLAINED:
         return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but most of it stays."])
     if any(a.entry.implausible for a in accepted):
         return Verdict(
