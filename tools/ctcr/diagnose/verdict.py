@@ -13,7 +13,7 @@ from ctcr.diagnose.leftover import Leftover
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Accepted
 
-# Share of the excess, of error on locked runs or of chi-square, that effects must remove to be the cause, not stand-ins.
+# Share of the excess, of the error on locked runs or of chi-square, that effects must remove to be no stand-ins.
 EXPLAINED = 0.4
 
 
