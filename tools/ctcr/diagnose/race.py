@@ -23,6 +23,7 @@ REFITS = 6  # effects that are refitted, the best by their slopes
 NEAR = 0.5  # candidates below this part of the best linear gain are not refitted, unless few are left
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
+SOUND = 1.05  # inflation of the noise up to which the model explains the readings
 # Another noise must predict other runs so much better to be preferred to that of the most evidence.
 BETTER = 0.7
 FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
@@ -107,6 +108,8 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
+    if np.max(fit.inflation) < SOUND:
+        return fit  # nothing is wrong with the model that the field could have been bent to hide
     names = [name for entry in accepted for name in entry.candidate.names]
     fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
     held_out = engine.rows & (split.groups(engine.measurements) % 4 == 1)
