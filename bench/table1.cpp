@@ -91,12 +91,10 @@ int main() {
     const double plain = rival_seconds<Case>(thread_cpu_time, rival::Serial{});
     const double plain_two = rival_seconds<Case>(wall_time, two_threads);
     const double by_hand = rival_by_hand_seconds<Case>();
-    const double ours = our_seconds<Case>(thread_cpu_time, [](auto&... arguments) {
-      return ctcr::step<Case::derivatives>(arguments..., {});
-    });
-    const double ours_two = our_seconds<Case>(wall_time, [&](auto&... arguments) {
-      return ctcr::split_step<Case::derivatives>(arguments..., pool);
-    });
+    const double ours = our_seconds<Case>(
+        thread_cpu_time, [](auto&... arguments) { return ctcr::step<Case::derivatives>(arguments..., {}); });
+    const double ours_two = our_seconds<Case>(
+        wall_time, [&](auto&... arguments) { return ctcr::split_step<Case::derivatives>(arguments..., pool); });
     final_ratio = plain / ours;
     std::printf("%-16s %4d  %8d %4d %4d/%-2d | %9.0f %4.0f  %13.0f | %8.0f %4.0f %15.1f %9.1f%s\n", p.name,
                 rival::Rival<3, Case::loaded>::ivps(Case::rival_outputs), p.one_thread, p.four_threads, p.best,

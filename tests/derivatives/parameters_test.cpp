@@ -157,8 +157,10 @@ TEST(TipDerivatives, OnlyRatiosOfStiffnessesMatterWithoutLoad) {
     ASSERT_EQ(differentiate_tip(Model<3>(c.robot), c.ws, 0, d), Status::ok);
     const Vec6 single = d.by_parameters.col(0) * c.robot.tubes[0].youngs_modulus;
     EXPECT_LE(all_together(d, c.robot, Parameter::youngs_modulus).norm(), 1e-12 + 1e-10 * single.norm());
-    EXPECT_LE((all_together(d, c.robot, Parameter::inner_diameter) +
-               all_together(d, c.robot, Parameter::outer_diameter)).norm(), 1e-12 + 1e-10 * single.norm());
+    EXPECT_LE(
+        (all_together(d, c.robot, Parameter::inner_diameter) + all_together(d, c.robot, Parameter::outer_diameter))
+            .norm(),
+        1e-12 + 1e-10 * single.norm());
   }
 }
 

@@ -70,11 +70,8 @@ Eigen::VectorXd rod_end(int steps) {
                                               .compliance = 1 / 0.03,
                                               .weight = 0.02,
                                               .straight_mz = 0.002};
-  RodState<double, 2> y{.psi = {0.3, 2.1},
-                        .w = {1.5, -0.8},
-                        .m = {0.02, -0.01},
-                        .n = {0.1, 0.05, -0.2},
-                        .g = {3, -5, 7.8}};
+  RodState<double, 2> y{
+      .psi = {0.3, 2.1}, .w = {1.5, -0.8}, .m = {0.02, -0.01}, .n = {0.1, 0.05, -0.2}, .g = {3, -5, 7.8}};
   Frame<double> frame;
   const double k = -0.3 / steps;
   for (int i = 0; i < steps; ++i) {

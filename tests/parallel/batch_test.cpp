@@ -47,11 +47,11 @@ std::vector<Answer> solved(const Model<3>& model, const std::vector<Configuratio
   std::vector<Answer> answers(cases.size());
   ThreadPool pool(threads);
   solve_batch<Derivatives::compliance>(
-    model, std::ptrdiff_t(cases.size()), [&](std::ptrdiff_t i) { return cases[std::size_t(i)]; },
-    [&](std::ptrdiff_t i, const Solution<3>& s) {
-      answers[std::size_t(i)] = {s.status, s.iterations, s.position, s.rotation, s.jacobian, s.compliance};
-    },
-    pool);
+      model, std::ptrdiff_t(cases.size()), [&](std::ptrdiff_t i) { return cases[std::size_t(i)]; },
+      [&](std::ptrdiff_t i, const Solution<3>& s) {
+        answers[std::size_t(i)] = {s.status, s.iterations, s.position, s.rotation, s.jacobian, s.compliance};
+      },
+      pool);
   return answers;
 }
 
@@ -61,7 +61,8 @@ TEST(Batch, IsBitForBitTheSameForAnyNumberOfThreads) {
   const auto serial = solved(model, cases, 1);
   for (const int threads : {2, 3, 8}) {
     const auto parallel = solved(model, cases, threads);
-    for (std::size_t i = 0; i < cases.size(); ++i) ASSERT_TRUE(serial[i] == parallel[i]) << threads << " threads, " << i;
+    for (std::size_t i = 0; i < cases.size(); ++i)
+      ASSERT_TRUE(serial[i] == parallel[i]) << threads << " threads, " << i;
   }
 }
 
@@ -104,8 +105,8 @@ TEST(Batch, CallsEveryIndexOnceWhateverTheCount) {
   for (const std::ptrdiff_t count : {0, 1, 63, 64, 65, 1000}) {
     std::vector<int> calls(std::size_t(count) + 1);
     solve_batch(
-      model, count, [](std::ptrdiff_t) { return Configuration<1>{}; },
-      [&](std::ptrdiff_t i, const Solution<1>&) { ++calls[std::size_t(i)]; }, pool);
+        model, count, [](std::ptrdiff_t) { return Configuration<1>{}; },
+        [&](std::ptrdiff_t i, const Solution<1>&) { ++calls[std::size_t(i)]; }, pool);
     EXPECT_EQ(calls.back(), 0);
     calls.pop_back();
     EXPECT_EQ(calls, std::vector<int>(std::size_t(count), 1));
@@ -117,8 +118,9 @@ TEST(Batch, MemoryDoesNotGrowWithTheCount) {
   ThreadPool pool(2);
   for (const std::ptrdiff_t count : {10, 1000}) {
     const test::HeapGuard guard;
-    solve_batch(model, count, [](std::ptrdiff_t) { return Configuration<3>{}; },
-                [](std::ptrdiff_t, const Solution<3>&) {}, pool);
+    solve_batch(
+        model, count, [](std::ptrdiff_t) { return Configuration<3>{}; }, [](std::ptrdiff_t, const Solution<3>&) {},
+        pool);
     EXPECT_EQ(guard.uses(), 2);  // the workspaces: one allocation, one release
   }
 }

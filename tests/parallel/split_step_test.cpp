@@ -19,8 +19,7 @@ void expect_equal(const Solution<3>& a, const Solution<3>& b) {
   EXPECT_NEAR(a.stability, b.stability, 1e-11 * std::abs(a.stability));
   EXPECT_LE((a.position - b.position).norm(), 1e-14);
   EXPECT_LE((a.rotation - b.rotation).norm(), 1e-13);
-  for (std::size_t i = 0; i < 3; ++i)
-    EXPECT_LE((a.tube_tips[i].position - b.tube_tips[i].position).norm(), 1e-14);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_LE((a.tube_tips[i].position - b.tube_tips[i].position).norm(), 1e-14);
   EXPECT_LE((a.jacobian - b.jacobian).norm(), 1e-11 * a.jacobian.norm());
   EXPECT_LE((a.compliance - b.compliance).norm(), 1e-11 * a.compliance.norm());
 }

@@ -29,7 +29,8 @@ Command<N> random_command(bool loaded, int tube, test::Random& random) {
                                      -0.1 * VecN<N>::Random().cwiseAbs(), VecN<N>::Random()};
   const PoseSensor sensor{{rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.5)}, tube};
   return {{transmission, Model<N>(c.robot), sensor, {.tolerance = 1e-12, .steps = 20}},
-          motor_angles(transmission, c.q), c.load};
+          motor_angles(transmission, c.q),
+          c.load};
 }
 
 template <int N>
@@ -89,16 +90,22 @@ void expect_derivatives_of_the_residual(bool loaded, int cases) {
       const auto [kind, i] = P::entry(p);
       if (kind == Parameter::bending_stiffness) continue;  // not given
       const auto [size, h] = scale(P::info(kind));
-      expect(exact.by_parameters.col(p), [&, index = p](double x) {
-        return residual(measured, predicted(changed(system, index, x), theta, load).reading);
-      }, size, h, std::string(P::name(p)));
+      expect(
+          exact.by_parameters.col(p),
+          [&, index = p](double x) {
+            return residual(measured, predicted(changed(system, index, x), theta, load).reading);
+          },
+          size, h, std::string(P::name(p)));
     }
     for (int j = 0; j < 2 * N; ++j)
-      expect(exact.by_motors.col(j), [&](double x) {
-        MotorAngles<N> moved = theta;
-        (j < N ? moved.translation[j] : moved.rotation[j - N]) += x;
-        return residual(measured, predicted(system, moved, load).reading);
-      }, 1.0, j < N ? 0.03 : 1e-3, "motor " + std::to_string(j));
+      expect(
+          exact.by_motors.col(j),
+          [&](double x) {
+            MotorAngles<N> moved = theta;
+            (j < N ? moved.translation[j] : moved.rotation[j - N]) += x;
+            return residual(measured, predicted(system, moved, load).reading);
+          },
+          1.0, j < N ? 0.03 : 1e-3, "motor " + std::to_string(j));
   }
 }
 

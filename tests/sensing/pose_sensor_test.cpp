@@ -28,7 +28,9 @@ TEST(PoseSensor, ReadsTheTubeThatCarriesIt) {
     const Vec3 point(0.1, 0.2, 0.3);  // of the tip, in both ways to the tracker
     const Vec3 in_base = tip.rotation * point + tip.position;
     EXPECT_LE((read.rotation * point + read.position -
-               (sensor.T_tracker_base.rotation * in_base + sensor.T_tracker_base.position)).norm(), 1e-15);
+               (sensor.T_tracker_base.rotation * in_base + sensor.T_tracker_base.position))
+                  .norm(),
+              1e-15);
   }
 }
 

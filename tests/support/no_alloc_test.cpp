@@ -103,7 +103,9 @@ TEST(HeapGuard, CatchesOtherThreads) {
 }
 
 TEST(HeapGuard, IsQuietAfterItsLife) {
-  { const HeapGuard guard; }
+  {
+    const HeapGuard guard;
+  }
   const auto pointer = std::make_unique<int>(1);
   keep(pointer.get());
   const HeapGuard guard;

@@ -34,13 +34,13 @@ inline Robot<3> paper_robot() {
   const double curvature[] = {10, 5, 7};
   for (std::size_t i = 0; i < 3; ++i)
     robot.tubes[i] = {.youngs_modulus = 58e9,
-      .poisson_ratio = 0.3,
-      .density = 6450,
-      .inner_diameter = inner_diameter[i],
-      .outer_diameter = outer_diameter[i],
-      .length = length[i],
-      .curved_length = 0.05,
-      .curvature = curvature[i]};
+                      .poisson_ratio = 0.3,
+                      .density = 6450,
+                      .inner_diameter = inner_diameter[i],
+                      .outer_diameter = outer_diameter[i],
+                      .length = length[i],
+                      .curved_length = 0.05,
+                      .curvature = curvature[i]};
   return robot;
 }
 

@@ -38,10 +38,9 @@ void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& loa
   CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
 #define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
 
-#define CTCR_TEST_DECLARE(KIND, N)              \
-  CTCR_TEST_##KIND(extern template, none, N)     \
-  CTCR_TEST_##KIND(extern template, jacobian, N) \
-  CTCR_TEST_##KIND(extern template, compliance, N)
+#define CTCR_TEST_DECLARE(KIND, N)                                                          \
+  CTCR_TEST_##KIND(extern template, none, N) CTCR_TEST_##KIND(extern template, jacobian, N) \
+      CTCR_TEST_##KIND(extern template, compliance, N)
 
 #ifndef CTCR_TEST_INSTANTIATE
 namespace ctcr {

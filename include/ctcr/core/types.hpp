@@ -20,9 +20,7 @@ struct Pose {
   friend Pose operator*(const Pose& T_a_b, const Pose& T_b_c) noexcept {
     return {T_a_b.rotation * T_b_c.rotation, T_a_b.rotation * T_b_c.position + T_a_b.position};
   }
-  [[nodiscard]] Pose inverse() const noexcept {
-    return {rotation.transpose(), -(rotation.transpose() * position)};
-  }
+  [[nodiscard]] Pose inverse() const noexcept { return {rotation.transpose(), -(rotation.transpose() * position)}; }
 };
 
 }  // namespace ctcr

@@ -24,7 +24,7 @@ namespace detail {
 /// All derivatives of a tube's tip by the first `variables` variables, the unknowns eliminated.
 template <int N, bool Loaded, bool Gravity, class Stepper>
 class TipSystem {
- public:
+public:
   using V = TipVariables<N, Loaded, Gravity>;
 
   TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int variables = V::count) noexcept {
@@ -44,7 +44,7 @@ class TipSystem {
     return column;
   }
 
- private:
+private:
   typename V::Row row_[V::rows] = {};
   Mat3 rotation_;
   double det_;

@@ -8,12 +8,12 @@ namespace ctcr::detail {
 /// Where the variables stand: unknowns first, those that only weight makes felt (gravity) next, tube masses last.
 template <int N, bool Loaded, bool Gravity>
 struct TipVariables {
-  static constexpr int turn = 0;                   ///< of the tip (3), its own axes
-  static constexpr int psi = Loaded ? 3 : 0;       ///< of tube 2
+  static constexpr int turn = 0;              ///< of the tip (3), its own axes
+  static constexpr int psi = Loaded ? 3 : 0;  ///< of tube 2
   static constexpr int unknowns = psi + N - 1;
   static constexpr int gravity = unknowns;
   static constexpr int beta = gravity + (Gravity ? 3 : 0);
-  static constexpr int k = beta + N;               ///< then the others of TubeParameters, N of each
+  static constexpr int k = beta + N;  ///< then the others of TubeParameters, N of each
   static constexpr int kz = k + N, kappa = kz + N, length = kappa + N, curved_length = length + N;
   static constexpr int mass = curved_length + N;
   static constexpr int alpha = mass + (Gravity ? N : 0);
@@ -39,7 +39,7 @@ class TipPass {
   };
   using Rod = Shooting<N, S, S, S, Loaded, Gravity, Stepper, WholeFrame>;
 
- public:
+public:
   /// @param first  the variables first..first + pass_lanes - 1 are differentiated along
   TipPass(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int first) noexcept : first_(first) {
     const Coefficients<N, S> c = coefficients(robot);
@@ -96,7 +96,7 @@ class TipPass {
     return R_base_tip;
   }
 
- private:
+private:
   static CTCR_INLINE Lanes3 group(const Lanes (&twist)[3][G], int g) noexcept {
     return {twist[0][g], twist[1][g], twist[2][g]};
   }

@@ -45,17 +45,27 @@ inline constexpr int groups_of<Dual<G>> = G;
 
 CTCR_INLINE double value(double x) noexcept { return x; }
 template <int G>
-CTCR_INLINE double value(const Dual<G>& x) noexcept { return x.v; }
+CTCR_INLINE double value(const Dual<G>& x) noexcept {
+  return x.v;
+}
 template <int G, int H>
-CTCR_INLINE double value(const TailDual<G, H>& x) noexcept { return x.v; }
+CTCR_INLINE double value(const TailDual<G, H>& x) noexcept {
+  return x.v;
+}
 
 /// Derivatives of a length in group g of G, whatever type carries it.
 template <int G>
-CTCR_INLINE Lanes length_tangent(double, int) noexcept { return Lanes{}; }
+CTCR_INLINE Lanes length_tangent(double, int) noexcept {
+  return Lanes{};
+}
 template <int G>
-CTCR_INLINE Lanes length_tangent(const Dual<G>& x, int g) noexcept { return x.d[g]; }
+CTCR_INLINE Lanes length_tangent(const Dual<G>& x, int g) noexcept {
+  return x.d[g];
+}
 template <int G, int H>
-CTCR_INLINE Lanes length_tangent(const TailDual<G, H>& x, int g) noexcept { return g < H ? Lanes{} : x.d[g - H]; }
+CTCR_INLINE Lanes length_tangent(const TailDual<G, H>& x, int g) noexcept {
+  return g < H ? Lanes{} : x.d[g - H];
+}
 
 /// Whether a length of type X has derivatives in group g.
 template <class X, int g>
@@ -99,7 +109,9 @@ CTCR_INLINE Dual<G> operator*(const Dual<G>& a, double b) noexcept {
   return r;
 }
 template <int G>
-CTCR_INLINE Dual<G> operator*(double a, const Dual<G>& b) noexcept { return b * a; }
+CTCR_INLINE Dual<G> operator*(double a, const Dual<G>& b) noexcept {
+  return b * a;
+}
 template <int G>
 CTCR_INLINE Dual<G> operator+(const Dual<G>& a, double b) noexcept {
   Dual<G> r = a;
@@ -107,13 +119,21 @@ CTCR_INLINE Dual<G> operator+(const Dual<G>& a, double b) noexcept {
   return r;
 }
 template <int G>
-CTCR_INLINE Dual<G> operator+(double a, const Dual<G>& b) noexcept { return b + a; }
+CTCR_INLINE Dual<G> operator+(double a, const Dual<G>& b) noexcept {
+  return b + a;
+}
 template <int G>
-CTCR_INLINE Dual<G> operator-(const Dual<G>& a, double b) noexcept { return a + (-b); }
+CTCR_INLINE Dual<G> operator-(const Dual<G>& a, double b) noexcept {
+  return a + (-b);
+}
 template <int G>
-CTCR_INLINE Dual<G> operator-(double a, const Dual<G>& b) noexcept { return -b + a; }
+CTCR_INLINE Dual<G> operator-(double a, const Dual<G>& b) noexcept {
+  return -b + a;
+}
 template <int G>
-CTCR_INLINE Dual<G>& operator+=(Dual<G>& a, const Dual<G>& b) noexcept { return a = a + b; }
+CTCR_INLINE Dual<G>& operator+=(Dual<G>& a, const Dual<G>& b) noexcept {
+  return a = a + b;
+}
 
 template <int G, int H>
 CTCR_INLINE Dual<G> operator*(const TailDual<G, H>& a, const Dual<G>& b) noexcept {
@@ -157,7 +177,9 @@ CTCR_INLINE Dual<G> inverse(const Dual<G>& a) noexcept {
 CTCR_INLINE double inverse(double a) noexcept { return 1.0 / a; }
 
 /// f(x) from its value and its slope at x. Real time: yes.
-CTCR_INLINE double mapped(double, double f, double) noexcept { return f; }
+CTCR_INLINE double mapped(double, double f, double) noexcept {
+  return f;
+}
 template <int G>
 CTCR_INLINE Dual<G> mapped(const Dual<G>& x, double f, double slope) noexcept {
   Dual<G> r;
@@ -176,8 +198,7 @@ CTCR_INLINE void sincos(const Dual<G>& a, Dual<G>& s, Dual<G>& c) noexcept {
   }
 }
 template <int G, std::size_t M>
-CTCR_INLINE void sincos(const std::array<Dual<G>, M>& a, std::array<Dual<G>, M>& s,
-                        std::array<Dual<G>, M>& c) noexcept {
+CTCR_INLINE void sincos(const std::array<Dual<G>, M>& a, std::array<Dual<G>, M>& s, std::array<Dual<G>, M>& c) noexcept {
   for (std::size_t i = 0; i < M; ++i) sincos(a[i], s[i], c[i]);
 }
 

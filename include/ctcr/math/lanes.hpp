@@ -27,14 +27,23 @@ struct alignas(32) Lanes {
   CTCR_INLINE Lanes operator op(const Lanes& a, const Lanes& b) noexcept {                              \
     return {{a.x[0] op b.x[0], a.x[1] op b.x[1], a.x[2] op b.x[2], a.x[3] op b.x[3]}};                  \
   }                                                                                                     \
-  CTCR_INLINE Lanes operator op(double a, const Lanes& b) noexcept { return Lanes{{a, a, a, a}} op b; } \
+  CTCR_INLINE Lanes operator op(double a, const Lanes& b) noexcept {                                    \
+    return Lanes {                                                                                      \
+      {                                                                                                 \
+        a, a, a, a                                                                                      \
+      }                                                                                                 \
+    }                                                                                                   \
+    op b;                                                                                               \
+  }                                                                                                     \
   CTCR_INLINE Lanes operator op(const Lanes& a, double b) noexcept { return a op Lanes{{b, b, b, b}}; } \
-  CTCR_INLINE Lanes& operator op##=(Lanes& a, const Lanes& b) noexcept { return a = a op b; }
+  CTCR_INLINE Lanes& operator op##=(Lanes & a, const Lanes & b) noexcept { return a = a op b; }
 CTCR_LANE_OPERATOR(+)
 CTCR_LANE_OPERATOR(-)
 CTCR_LANE_OPERATOR(*)
 #undef CTCR_LANE_OPERATOR
-CTCR_INLINE Lanes operator-(const Lanes& a) noexcept { return {{-a.x[0], -a.x[1], -a.x[2], -a.x[3]}}; }
+CTCR_INLINE Lanes operator-(const Lanes& a) noexcept {
+  return {{-a.x[0], -a.x[1], -a.x[2], -a.x[3]}};
+}
 #endif
 
 /// 1 in lane i, 0 elsewhere. Adding x * unit_lane(i) keeps vectors in registers where writing a lane would not.

@@ -124,7 +124,7 @@ CTCR_INLINE void move(Frame<double>& g, const Exponential& x) noexcept {
 /// translation E^T (t + f x p + T dO + D dv).
 template <TangentOf Of>
 CTCR_INLINE void move_twist(Lanes& f0, Lanes& f1, Lanes& f2, Lanes& t0, Lanes& t1, Lanes& t2, const Exponential& x,
-                            const Lanes (&o)[3], const Lanes (&v)[3]) noexcept {
+                       const Lanes (&o)[3], const Lanes (&v)[3]) noexcept {
   Lanes r[3], t[3];
   const Lanes f[3] = {f0, f1, f2};
   for (int i = 0; i < 3; ++i) r[i] = f[i] + x.D[i][0] * o[0] + x.D[i][1] * o[1] + x.D[i][2] * o[2];
@@ -154,9 +154,9 @@ CTCR_INLINE void move_by_exponential(Frame<S>& g, const S (&o)[3], const S& vx, 
   if constexpr (is_dual<S>) {
     constexpr int G = groups_of<S>;
     for (int i = 0; i < G; ++i)
-      move_twist<TangentOf::frame>(g.rotation_twist[0][i], g.rotation_twist[1][i], g.rotation_twist[2][i], g.translation_twist[0][i],
-                       g.translation_twist[1][i], g.translation_twist[2][i], x, {o[0].d[i], o[1].d[i], o[2].d[i]},
-                       {vx.d[i], vy.d[i], length_tangent<G>(vz, i)});
+      move_twist<TangentOf::frame>(g.rotation_twist[0][i], g.rotation_twist[1][i], g.rotation_twist[2][i],
+                                   g.translation_twist[0][i], g.translation_twist[1][i], g.translation_twist[2][i], x,
+                                   {o[0].d[i], o[1].d[i], o[2].d[i]}, {vx.d[i], vy.d[i], length_tangent<G>(vz, i)});
   }
 }
 

@@ -11,7 +11,7 @@
 namespace ctcr {
 namespace detail {
 
-inline constexpr double quarter_turns = 0.63661977236758134308;  // 2 / pi
+inline constexpr double quarter_turns = 0.63661977236758134308;                                  // 2 / pi
 inline constexpr double quarter_turn[2] = {1.57079632673412561417, 6.07710050650619224932e-11};  // pi / 2 in two parts
 inline constexpr double round_to_integer = 6755399441055744.0;  // 1.5 * 2^52: a sum with it ends in the integer
 

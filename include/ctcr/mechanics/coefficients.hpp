@@ -28,7 +28,8 @@ struct TubeParameters {
 };
 
 template <int N, class P>
-inline Coefficients<N, P> make_coefficients(const std::array<TubeParameters<P>, N>& tubes, const Vec3& gravity) noexcept {
+inline Coefficients<N, P> make_coefficients(const std::array<TubeParameters<P>, N>& tubes,
+                                            const Vec3& gravity) noexcept {
   Coefficients<N, P> c;
   c.gravity = gravity;
   P stiffness = 0.0, mass = 0.0;

@@ -20,15 +20,15 @@ template <int N, Loading L, Derivatives D>
 struct Evaluation {
   using Col = Columns<N, L, D>;
 
-  Mat3 rotation;        ///< R_base_tip
-  Vec3 position;        ///< tip in the base frame [m]
-  Vec3 turn;            ///< loaded: turn from the guessed tip frame to this one, base axes [rad]
-  VecN<N> angle;        ///< base angles of the tubes, up to a common turn [rad]
-  VecN<N> angle_error;  ///< angle - alpha, both against tube 1 [rad]
-  VecN<N> w;            ///< twist rate of each tube at the front plate [rad/m]
-  double residual;      ///< ||b|| of turn and angle errors [rad]
-  double det;           ///< det B_u: 1 without interaction, 0 where the robot snaps
-  TubeTips<N> tips;     ///< tips of all tubes as seen from the robot tip
+  Mat3 rotation;                               ///< R_base_tip
+  Vec3 position;                               ///< tip in the base frame [m]
+  Vec3 turn;                                   ///< loaded: turn from the guessed tip frame to this one, base axes [rad]
+  VecN<N> angle;                               ///< base angles of the tubes, up to a common turn [rad]
+  VecN<N> angle_error;                         ///< angle - alpha, both against tube 1 [rad]
+  VecN<N> w;                                   ///< twist rate of each tube at the front plate [rad/m]
+  double residual;                             ///< ||b|| of turn and angle errors [rad]
+  double det;                                  ///< det B_u: 1 without interaction, 0 where the robot snaps
+  TubeTips<N> tips;                            ///< tips of all tubes as seen from the robot tip
   Vec3 axis[Col::turns > 0 ? Col::turns : 1];  ///< axes of the unknown turns, base frame
 
   /// Rows: minus the change of the unknowns (the first Col::unknowns) by each lane of Col, then, with the Jacobian, the
@@ -97,7 +97,7 @@ CTCR_INLINE Vec3 felt_turn(const Mat3& found, const Mat3& guessed, const TipLoad
 
 template <class Col, class S, int N, std::size_t A>
 CTCR_INLINE RobotState<S, N> tip_state(const Coefficients<N>& c, const TipLoad& load, const TipGuess<N>& guess,
-                                       const Vec3 (&axis)[A]) noexcept {
+                                  const Vec3 (&axis)[A]) noexcept {
   RobotState<S, N> tip;
   for (int i = 0; i < N; ++i) {
     tip.psi[std::size_t(i)] = guess.psi[i];
@@ -174,16 +174,16 @@ CTCR_INLINE void turns_from_loads(LaneRow<Col::system_groups>& row, const TipLoa
 
 /// The integration that differentiates along the columns Col.
 template <int N, class Stepper, class Col>
-using Pass = Shooting<N, Dual<Col::groups>, double,
-                      std::conditional_t<(Col::first_beta_group < Col::groups),
-                                         TailDual<Col::groups, Col::first_beta_group>, double>,
-                      Col::loaded, Col::weight, Stepper, Col>;
+using Pass = Shooting<
+    N, Dual<Col::groups>, double,
+    std::conditional_t<(Col::first_beta_group < Col::groups), TailDual<Col::groups, Col::first_beta_group>, double>,
+    Col::loaded, Col::weight, Stepper, Col>;
 
 /// Integrates from the state at the tip to the front plate.
 /// @return tubes of the last segment
 template <class Stepper, class Col, int N, class S>
 CTCR_INLINE SegmentTubes<N> integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state,
-                                      Frame<S>& frame, TubeTips<N>& tips) noexcept {
+                                 Frame<S>& frame, TubeTips<N>& tips) noexcept {
   using H = typename Pass<N, Stepper, Col>::Length;
   const auto place = [](int event, double s) noexcept { return event_place<Col, N, H>(event, s); };
   return Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), place, steps, state, frame, tips);
@@ -192,8 +192,8 @@ CTCR_INLINE SegmentTubes<N> integrate(const Coefficients<N>& c, const Joints<N>&
 /// What follows from state and frame at the front plate; out.axis and out.tips are there already.
 template <Derivatives D, Loading L, class Stepper, int N, class S>
 CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
-                          const RobotState<S, N>& base, const Frame<S>& f, const SegmentTubes<N>& tubes,
-                          Evaluation<N, L, D>& out) noexcept {
+                     const RobotState<S, N>& base, const Frame<S>& f, const SegmentTubes<N>& tubes,
+                     Evaluation<N, L, D>& out) noexcept {
   using Ev = Evaluation<N, L, D>;
   using Col = typename Ev::Col;
   constexpr int G = Col::groups;
@@ -281,7 +281,8 @@ CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const Ti
         equation.x[g] = a[0] * rotation[0].x[g] + a[1] * rotation[1].x[g] + a[2] * rotation[2].x[g];
     // A turn of the guess about the force is not felt, so there may be any between the guessed and the found frame.
     if constexpr (Col::turns == 2)
-      for (int j = 0; j < 2; ++j) equation.add(Col::turn + j, -a.dot(out.rotation * (guess.rotation.transpose() * out.axis[j])));
+      for (int j = 0; j < 2; ++j)
+        equation.add(Col::turn + j, -a.dot(out.rotation * (guess.rotation.transpose() * out.axis[j])));
     else
       equation.add(Col::turn + i, -1.0);
     equation.add(Col::newton, Col::turns == 3 ? out.turn[i] : a.dot(out.turn));

@@ -12,7 +12,7 @@ namespace ctcr {
 template <int N>
 struct Events {
   std::array<double, 2 * N> s{};  ///< arc length from the front plate [m], descending
-  std::array<int, 2 * N> id{};    ///< i < N: tube i ends here (appears); N + i: its curved part starts (becomes straight)
+  std::array<int, 2 * N> id{};  ///< i < N: tube i ends here (appears); N + i: its curved part starts (becomes straight)
 };
 
 /// Real time: yes (sorting by rank, no branch).

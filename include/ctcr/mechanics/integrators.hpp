@@ -21,7 +21,7 @@ struct RungeKutta {
     Rod<false, false, S, P, NC>::step(r, y, frame, k);
   }
 
- private:
+private:
   template <bool Loaded, bool Gravity, class S, class P, int NC>
   struct Rod {
     using Section = RodSection<S, P, NC>;
@@ -42,7 +42,8 @@ struct RungeKutta {
     }
     /// All but the frame. `Wrench` is a RodState or a RodRates.
     template <class Wrench>
-    static void pack(Vector& x, const std::array<S, NC>& psi_part, const std::array<S, NC>& w_part, const Wrench& y) noexcept {
+    static void pack(Vector& x, const std::array<S, NC>& psi_part, const std::array<S, NC>& w_part,
+                     const Wrench& y) noexcept {
       put(x, psi, psi_part);
       put(x, w, w_part);
       if constexpr (Loaded) put(x, m, y.m), put(x, n, y.n);
@@ -110,7 +111,8 @@ struct RungeKutta {
       frame.y = turned(R_step + 3);
       frame.z = turned(R_step + 6);
       if constexpr (is_dual<S>)
-        for (std::size_t group = 0; group < std::size_t(groups_of<S>); ++group) move_twist(frame, R_step, p_step, group);
+        for (std::size_t group = 0; group < std::size_t(groups_of<S>); ++group)
+          move_twist(frame, R_step, p_step, group);
     }
 
     /// Rotation R^T f + vee(R^T dR), translation R^T (t + f x p + dp).
@@ -174,9 +176,18 @@ struct PrinceDormandTableau {
       {403863854. / 491063109, 0, 0, -5068492393. / 434740067, -411421997. / 543043805, 652783627. / 914296604,
        11173962825. / 925320556, -13158990841. / 6184727034, 3936647629. / 1978049680, -160528059. / 685178525,
        248638103. / 1413531060}};
-  static constexpr double b[stages] = {14005451. / 335480064, 0, 0, 0, 0, -59238493. / 1068277825,
-                                       181606767. / 758867731, 561292985. / 797845732, -1041891430. / 1371343529,
-                                       760417239. / 1151165299, 118820643. / 751138087, -528747749. / 2220607170,
+  static constexpr double b[stages] = {14005451. / 335480064,
+                                       0,
+                                       0,
+                                       0,
+                                       0,
+                                       -59238493. / 1068277825,
+                                       181606767. / 758867731,
+                                       561292985. / 797845732,
+                                       -1041891430. / 1371343529,
+                                       760417239. / 1151165299,
+                                       118820643. / 751138087,
+                                       -528747749. / 2220607170,
                                        1. / 4};
 };
 

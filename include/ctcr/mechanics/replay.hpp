@@ -51,7 +51,7 @@ struct GroupState {
 /// @tparam Dk  whether the step length has derivatives in this group
 template <bool Loaded, bool Gravity, bool Dk, int NC>
 class Replay {
- public:
+public:
   using Section = RodSection<double, double, NC>;
   using Tape = Stage<Loaded, Gravity, NC>;
   using Group = GroupState<NC>;
@@ -59,8 +59,8 @@ class Replay {
 
   /// @param straight_mz  tangent of the straight tubes' torsional moment
   /// @param u  out: tangents of the curvature at the start, 4 x the middle, the end
-  static CTCR_INLINE void loaded(const Section& r, const Tape (&s)[4], double k, Lanes dk, Lanes straight_mz,
-                                 Group& y, Curvature (&u)[3]) noexcept {
+  static CTCR_INLINE void loaded(const Section& r, const Tape (&s)[4], double k, Lanes dk, Lanes straight_mz, Group& y,
+                           Curvature (&u)[3]) noexcept {
     Group k1, sum = y;
     const double k6 = k / 6.0;
     const auto u1 = rates(r, s[0], straight_mz, y, k1);
@@ -95,7 +95,7 @@ class Replay {
   }
 
   static CTCR_INLINE void unloaded(const Section& r, const Tape (&s)[3], double k, Lanes dk, Group& y,
-                                   Curvature (&u)[3]) noexcept {
+                             Curvature (&u)[3]) noexcept {
     std::array<Lanes, NC> f1, f2, f3, psi;
     u[0] = torsion(r, s[0], y.psi, f1);
     const auto linear = [&](std::size_t i, double part) {
@@ -137,8 +137,8 @@ class Replay {
   /// Moves the body twist of the group by the tangent of the frame step.
   template <TangentOf Of>
   static CTCR_INLINE void frame(const Exponential& x, const std::array<double, 2>& u0, const std::array<double, 2>& u_mid,
-                                const std::array<double, 2>& u1, double k, Lanes dk, const Curvature (&u)[3], Lanes* rotation,
-                                Lanes* translation, std::size_t stride) noexcept {
+                          const std::array<double, 2>& u1, double k, Lanes dk, const Curvature (&u)[3], Lanes* rotation,
+                          Lanes* translation, std::size_t stride) noexcept {
     const double k6 = k / 6.0, kk12 = k * k / 12.0;
     Lanes o[3], v[3] = {Lanes{}, Lanes{}, Lanes{}};
     for (std::size_t i = 0; i < 2; ++i) o[i] = k6 * (u[0][i] + u[1][i] + u[2][i]);
@@ -156,10 +156,10 @@ class Replay {
       v[2] = dk;
     }
     move_twist<Of>(rotation[0], rotation[stride], rotation[2 * stride], translation[0], translation[stride],
-                            translation[2 * stride], x, o, v);
+                   translation[2 * stride], x, o, v);
   }
 
- private:
+private:
   static CTCR_INLINE void add(Group& sum, double h, const std::array<Lanes, NC>& w, const Group& f) noexcept {
     for (std::size_t i = 0; i < NC; ++i) {
       sum.psi[i] += h * w[i];
@@ -173,7 +173,7 @@ class Replay {
 
   /// State at a later stage; `f` holds the rates, those of w under the name w.
   static CTCR_INLINE Group at(const Group& y, double h, Lanes dh, const std::array<Lanes, NC>& w, const Group& f,
-                              const Tape& s) noexcept {
+                        const Tape& s) noexcept {
     Group z;
     const auto add = [&](Lanes a, Lanes rate, double value) {
       Lanes r = a + h * rate;
@@ -191,8 +191,8 @@ class Replay {
     return z;
   }
 
-  static CTCR_INLINE void torque(const Section& r, const Tape& s, const std::array<Lanes, NC>& psi, Lanes ux,
-                                 Lanes uy, std::array<Lanes, NC>& f) noexcept {
+  static CTCR_INLINE void torque(const Section& r, const Tape& s, const std::array<Lanes, NC>& psi, Lanes ux, Lanes uy,
+                           std::array<Lanes, NC>& f) noexcept {
     for (std::size_t i = 0; i < NC; ++i) {
       const double S = r.rho[i] * s.sin[i], C = r.rho[i] * s.cos[i];
       f[i] = (C * s.u[0] + S * s.u[1]) * psi[i] + S * ux - C * uy;
@@ -201,7 +201,7 @@ class Replay {
 
   /// Curvature and w' of an unloaded rod.
   static CTCR_INLINE Curvature torsion(const Section& r, const Tape& s, const std::array<Lanes, NC>& psi,
-                                       std::array<Lanes, NC>& f) noexcept {
+                                 std::array<Lanes, NC>& f) noexcept {
     Curvature u;
     for (std::size_t i = 0; i < NC; ++i) {
       const double a = r.a[i] * r.compliance;
@@ -238,7 +238,7 @@ class Replay {
 
   /// Tangent of -u x v.
   static CTCR_INLINE void cross(std::array<Lanes, 3>& k, double ux, double uy, const std::array<Lanes, 3>& dv, Lanes dux,
-                                Lanes duy, const std::array<double, 3>& v) noexcept {
+                          Lanes duy, const std::array<double, 3>& v) noexcept {
     k[0] = -(uy * dv[2]) - v[2] * duy;
     k[1] = ux * dv[2] + v[2] * dux;
     k[2] = uy * dv[0] - ux * dv[1] + v[0] * duy - v[1] * dux;

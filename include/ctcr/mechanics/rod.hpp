@@ -23,8 +23,8 @@ struct RodState {
 template <class S, int NC>
 struct RodRates {
   std::array<S, NC> sin, cos;  ///< of psi
-  std::array<S, NC> F;  ///< w' [rad/m^2]
-  std::array<S, 2> u;   ///< curvature of the centreline [1/m]
+  std::array<S, NC> F;         ///< w' [rad/m^2]
+  std::array<S, 2> u;          ///< curvature of the centreline [1/m]
   std::array<S, 2> m;
   std::array<S, 3> n;
   std::array<S, 3> g;
@@ -62,7 +62,7 @@ CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const std::array<S, 2>
 /// Curvature and torsional rate at a place. Real time: yes.
 template <bool Loaded, class S, class P, int NC, class Angles>
 CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const Angles& psi, const std::array<S, 2>& m,
-                           RodRates<S, NC>& k) noexcept {
+                      RodRates<S, NC>& k) noexcept {
   sincos(psi, k.sin, k.cos);
   curvature<Loaded>(r, m, k);
 }

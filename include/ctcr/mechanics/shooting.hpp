@@ -42,8 +42,8 @@ struct NoRecord {
 /// Tubes of the current segment.
 template <int N>
 struct SegmentTubes {
-  int present = 0;   ///< tubes 1..present
-  int near = 0;      ///< tubes present or beginning at the far end of the segment
+  int present = 0;  ///< tubes 1..present
+  int near = 0;     ///< tubes present or beginning at the far end of the segment
   int curved_count = 0, straight_count = 0;
   std::array<int, N> curved{}, straight{};
 
@@ -69,7 +69,7 @@ struct SegmentTubes {
 /// @tparam Col  the columns that S differentiates along (columns.hpp)
 template <int N, class S, class P, class H, bool Loaded, bool Gravity, class Stepper, class Col>
 class Shooting {
- public:
+public:
   using State = RobotState<S, N>;
   using Length = H;
 
@@ -82,9 +82,8 @@ class Shooting {
   /// @return tubes of the last segment
   /// Real time: yes (2N segments, `steps` steps each).
   template <class Place, class Record = NoRecord>
-  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const Place& place,
-                                         int steps, State& y, Frame<S>& frame, TubeTips<N>& tips,
-                                         const Record& record = {}) noexcept {
+  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const Place& place, int steps,
+                                   State& y, Frame<S>& frame, TubeTips<N>& tips, const Record& record = {}) noexcept {
     SegmentTubes<N> tubes;
     set_identity(frame);
     H here = place(events.id[0], events.s[0]);
@@ -110,8 +109,8 @@ class Shooting {
 
   /// Integrates over `h` from `s`, inside the segment of `tubes`, in `steps` steps. Real time: yes.
   template <class Record, int NC = 0>
-  static CTCR_INLINE void advance(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s,
-                                  int steps, State& y, Frame<S>& frame, const Record& record) noexcept {
+  static CTCR_INLINE void advance(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s, int steps,
+                            State& y, Frame<S>& frame, const Record& record) noexcept {
     if constexpr (NC < N) {
       if (tubes.curved_count != NC) return advance<Record, NC + 1>(c, tubes, h, s, steps, y, frame, record);
     }
@@ -121,7 +120,7 @@ class Shooting {
   /// Rates of the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
   template <int NC = 0>
   static CTCR_INLINE BaseRates<double, N> rates(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
-                                                const State& y) noexcept {
+                                          const State& y) noexcept {
     if constexpr (NC < N) {
       if (tubes.curved_count != NC) return rates<NC + 1>(c, tubes, y);
     }
@@ -145,7 +144,7 @@ class Shooting {
     return base;
   }
 
- private:
+private:
   static constexpr bool replayed = is_dual<S> && !is_dual<P> && Stepper::replayed;
   static constexpr TangentOf of =
       Col::jacobian ? TangentOf::frame : (Loaded ? TangentOf::rotation : TangentOf::nothing);
@@ -162,7 +161,7 @@ class Shooting {
 
   template <int NC>
   static CTCR_INLINE RodSection<S, P, NC> section(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
-                                                  const State& y) noexcept {
+                                            const State& y) noexcept {
     RodSection<S, P, NC> r;
     const auto last = std::size_t(tubes.present - 1);
     r.compliance = c.compliance[last];
@@ -217,7 +216,7 @@ class Shooting {
   /// A step of values and tangents together.
   template <int NC>
   static CTCR_INLINE void direct_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& k, State& y,
-                                      Frame<S>& frame) noexcept {
+                                Frame<S>& frame) noexcept {
     RodState<S, NC> z = gather<NC>(tubes, y);
     if constexpr (Loaded)
       Stepper::template loaded<Gravity>(section<NC>(c, tubes, y), z, frame, k);
@@ -240,7 +239,7 @@ class Shooting {
   /// The taped form of a step: values first, then four columns at a time.
   template <int NC>
   static CTCR_INLINE void replay_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, State& y,
-                                      Frame<S>& frame) noexcept {
+                                Frame<S>& frame) noexcept {
     RodSection<double, double, NC> r;
     const auto last = std::size_t(tubes.present - 1);
     r.compliance = c.compliance[last];
@@ -295,7 +294,7 @@ class Shooting {
   /// Groups g and later, those that have started.
   template <int g, class... A>
   static CTCR_INLINE void replay_groups(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
-                                        A&... rest) noexcept {
+                                  A&... rest) noexcept {
     if constexpr (g < groups_of<S>) {
       constexpr int first = Col::starts_with(g);
       if constexpr (first <= N)
@@ -306,10 +305,10 @@ class Shooting {
 
   template <int g, int NC>
   static CTCR_INLINE void replay_group(const Coefficients<N, P>& c, const RodSection<double, double, NC>& r,
-                                       const SegmentTubes<N>& tubes, const Stage<Loaded, Gravity, NC> (&stages)[Loaded ? 4 : 3],
-                                       const Exponential& step, const std::array<double, 2>& u_mid,
-                                       const std::array<double, 2>& u_end, const H& h, State& y,
-                                       Frame<S>& frame) noexcept {
+                                 const SegmentTubes<N>& tubes,
+                                 const Stage<Loaded, Gravity, NC> (&stages)[Loaded ? 4 : 3], const Exponential& step,
+                                 const std::array<double, 2>& u_mid, const std::array<double, 2>& u_end, const H& h,
+                                 State& y, Frame<S>& frame) noexcept {
     constexpr int G = groups_of<S>;
     constexpr bool Dk = has_length_tangent<H, g>;
     using R = Replay<Loaded, Gravity, Dk, NC>;
@@ -348,7 +347,7 @@ class Shooting {
     }
     if constexpr (of != TangentOf::nothing)
       R::template frame<of>(step, stages[0].u, u_mid, u_end, k, dk, u, &frame.rotation_twist[0][g],
-                                               &frame.translation_twist[0][g], std::size_t(G));
+                            &frame.translation_twist[0][g], std::size_t(G));
   }
 
   static CTCR_INLINE void move_straight(Frame<S>& g, const H& k) noexcept {

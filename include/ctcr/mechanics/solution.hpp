@@ -18,7 +18,7 @@ struct Settings {
 template <int N>
 struct Solution {
   Status status = Status::not_converged;
-  int iterations = 0;                                          ///< evaluations used
+  int iterations = 0;                                         ///< evaluations used
   double residual = std::numeric_limits<double>::infinity();  ///< ||b|| [rad]
   double stability = 0;  ///< det B_u: 1 without interaction between tubes or load, 0 where the robot snaps or buckles
 
@@ -38,11 +38,11 @@ struct Solution {
 template <int N>
 struct Workspace {
   TipGuess<N> guess;
-  Joints<N> q;   ///< joints and load that the guess belongs to
+  Joints<N> q;  ///< joints and load that the guess belongs to
   TipLoad load;
-  bool warm = false;           ///< whether the guess may be used
-  bool knows_joints = false;   ///< whether the change of the guess with the joints is known
-  bool knows_load = false;     ///< and with the load
+  bool warm = false;          ///< whether the guess may be used
+  bool knows_joints = false;  ///< whether the change of the guess with the joints is known
+  bool knows_load = false;    ///< and with the load
   /// Change of the unknowns (turn of the tip in base axes, psi_2..N) by beta, alpha, force, moment.
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 

@@ -60,8 +60,8 @@ inline VecN<N + 2> newton_step(const Ev& ev) noexcept {
 /// Damped Newton iteration from `guess`. On return `ev` belongs to `guess`.
 /// @return evaluations used; ev.residual tells whether it converged
 template <Derivatives D, Loading L, class Stepper, int N, class C>
-inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
-                  TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
+inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, TipGuess<N>& guess,
+                  Evaluation<N, L, D>& ev) noexcept {
   int used = 1;
   evaluate<D, L, Stepper>(c, q, load, guess, settings.steps, ev);
   if constexpr (L == Loading::none) guess.rotation = ev.rotation;
@@ -127,8 +127,8 @@ inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, con
   if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, guess);
   for (int k = 1; k <= ramp_steps; ++k) {
     const double part = double(k) / ramp_steps;
-    used += newton<Derivatives::none, L, Stepper>(
-        scaled(c, part, ramp_curvature ? part : 1), q, TipLoad{load.force * part, load.moment * part}, settings, guess, ev);
+    used += newton<Derivatives::none, L, Stepper>(scaled(c, part, ramp_curvature ? part : 1), q,
+                                                  TipLoad{load.force * part, load.moment * part}, settings, guess, ev);
   }
   return used;
 }
@@ -220,8 +220,8 @@ inline TipGuess<N> predicted_guess(const Workspace<N>& ws, const Joints<N>& q, c
 }
 
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
-inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
-                       const Settings& settings) noexcept {
+inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                       Solution<N>& out, const Settings& settings) noexcept {
   const auto& c = model.coefficients();
   Evaluation<N, L, D> ev;
   TipGuess<N> guess;
@@ -271,8 +271,8 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 
 /// @param evaluate_at  evaluate_at(guess, evaluation): evaluate() or an equal of it
 template <Derivatives D, Loading L, class Stepper, int N, class Fx, class Evaluate>
-inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
-                      const Settings& settings, const Evaluate& evaluate_at) noexcept {
+inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                      Solution<N>& out, const Settings& settings, const Evaluate& evaluate_at) noexcept {
   if (!ws.warm) return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   using Ev = Evaluation<N, L, D>;
   Ev ev;

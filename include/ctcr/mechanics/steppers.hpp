@@ -14,8 +14,8 @@ struct NoTape {
 /// Moves the frame by the fourth-order Magnus exponential of the curvatures met at the start, the middle and the end.
 /// @param k  step [m], negative towards the base
 template <class F, class S, class H>
-CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::array<S, 2>& u_mid,
-                            const std::array<S, 2>& u1, const H& k) noexcept {
+CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::array<S, 2>& u_mid, const std::array<S, 2>& u1,
+                       const H& k) noexcept {
   const auto k6 = (1.0 / 6.0) * k;
   const auto kk12 = (1.0 / 12.0) * (k * k);
   const S omega[3] = {k6 * (u0[0] + 4.0 * u_mid[0] + u1[0]), k6 * (u0[1] + 4.0 * u_mid[1] + u1[1]),
@@ -26,7 +26,7 @@ CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::arr
 /// Sines and cosines of the angles at two places at once.
 template <class S, int NC>
 CTCR_INLINE void sincos_of_two(const std::array<S, std::size_t(NC)>& a, const std::array<S, std::size_t(NC)>& b,
-                               RodRates<S, NC>& at_a, RodRates<S, NC>& at_b) noexcept {
+                          RodRates<S, NC>& at_a, RodRates<S, NC>& at_b) noexcept {
   if constexpr (is_dual<S>) {
     sincos(a, at_a.sin, at_a.cos);
     sincos(b, at_b.sin, at_b.cos);
@@ -47,7 +47,7 @@ struct MagnusRk4 {
   /// @param tape  called as tape(stage, state, rates) for each of the four stages
   template <bool Gravity, class S, class P, int NC, class F, class H, class Tape = NoTape>
   static CTCR_INLINE void loaded(const RodSection<S, P, NC>& r, RodState<S, NC>& y, F& frame, const H& k,
-                                 const Tape& tape = {}) noexcept {
+                           const Tape& tape = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
     const auto along = [](const auto& from, const auto& h, const auto& rate) {
@@ -102,7 +102,7 @@ struct MagnusRk4 {
   /// where one tube alone is curved.
   template <class S, class P, int NC, class F, class H, class Tape = NoTape>
   static CTCR_INLINE void unloaded(const RodSection<S, P, NC>& r, RodState<S, NC>& y, F& frame, const H& k,
-                                   const Tape& tape = {}) noexcept {
+                             const Tape& tape = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
     Rates k1, k2, k3, turn;

@@ -41,8 +41,8 @@ bool nearby(const Workspace<N>& ws, const Configuration<N>& next) noexcept {
 /// Both are called by several threads at once and must not throw.
 /// Real time: no (allocates the workspaces). @throws std::bad_alloc
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Input, class Output>
-void solve_batch(const Model<N>& model, std::ptrdiff_t count, const Input& input, const Output& output, ThreadPool& pool,
-                 const Settings& settings = {}) {
+void solve_batch(const Model<N>& model, std::ptrdiff_t count, const Input& input, const Output& output,
+                 ThreadPool& pool, const Settings& settings = {}) {
   struct alignas(64) Worker {
     Workspace<N> ws;
     Solution<N> solution;

@@ -58,7 +58,7 @@ struct alignas(64) SlicePass {
       }
   }
 
- private:
+private:
   template <class A, class B, class F>
   static void each(A& a, B& b, const F& f) noexcept {
     for (std::size_t i = 0; i < N; ++i) f(a.psi[i], b.psi[i]), f(a.w[i], b.w[i]);

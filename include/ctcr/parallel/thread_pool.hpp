@@ -117,7 +117,7 @@ private:
     int unclaimed = unclaimed_.load(std::memory_order_relaxed);
     while (unclaimed > 0) {
       if (!unclaimed_.compare_exchange_weak(unclaimed, unclaimed - 1, std::memory_order_acquire,
-                          std::memory_order_relaxed))
+                                            std::memory_order_relaxed))
         continue;
       job_.call(job_.function, job_.n - unclaimed, worker);
       if (unfinished_.fetch_sub(1) == 1) unfinished_.notify_one();

@@ -30,7 +30,7 @@ Status predict(const System<N>& system, const MotorAngles<N>& theta, const TipLo
 /// Derivatives of a reading or a residual. Rows: position [m], rotation [rad], both in tracker axes.
 template <int N>
 struct PredictionDerivatives {
-  Eigen::Matrix<double, 6, 2 * N> by_motors;                     ///< translation 1..N, rotation 1..N [rad]
+  Eigen::Matrix<double, 6, 2 * N> by_motors;                          ///< translation 1..N, rotation 1..N [rad]
   Eigen::Matrix<double, 6, ParameterVector<N>::count> by_parameters;  ///< columns as ParameterVector<N>
 };
 
@@ -41,9 +41,7 @@ Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const
                      const Prediction<N>& prediction, PredictionDerivatives<N>& out) noexcept {
   using P = ParameterVector<N>;
   const Transmission<N>& transmission = system.transmission;
-  const auto columns = [&](Parameter kind) {
-    return out.by_parameters.middleCols(P::index(kind), P::size(kind));
-  };
+  const auto columns = [&](Parameter kind) { return out.by_parameters.middleCols(P::index(kind), P::size(kind)); };
   Status status = prediction.solution.status;
   TipDerivatives<N> tip;
   if (status == Status::ok || status == Status::singular)

@@ -11,17 +11,30 @@ namespace ctcr {
 
 /// Kinds of parameters, in the order of parameter_kinds.
 enum class Parameter : int {
-  youngs_modulus, poisson_ratio, density, inner_diameter, outer_diameter, length, curved_length, curvature,
-  bending_stiffness, gravity, translation_ratio, rotation_ratio, home_translation, home_rotation, tracker_position,
+  youngs_modulus,
+  poisson_ratio,
+  density,
+  inner_diameter,
+  outer_diameter,
+  length,
+  curved_length,
+  curvature,
+  bending_stiffness,
+  gravity,
+  translation_ratio,
+  rotation_ratio,
+  home_translation,
+  home_rotation,
+  tracker_position,
   tracker_rotation
 };
 
 /// What is known of a kind of parameter before any robot is.
 struct ParameterKind {
-  std::string_view name;            ///< '#' stands for the number of a tube, innermost 1, '*' for x, y or z
-  std::string_view unit;            ///< SI; empty: a pure number
-  double low, high;                 ///< plausible magnitude, in that unit
-  double Tube::*field = nullptr;    ///< where a Tube keeps it
+  std::string_view name;           ///< '#' stands for the number of a tube, innermost 1, '*' for x, y or z
+  std::string_view unit;           ///< SI; empty: a pure number
+  double low, high;                ///< plausible magnitude, in that unit
+  double Tube::* field = nullptr;  ///< where a Tube keeps it
 };
 
 /// The tracker frame is T_ref, from base to tracker coordinates. Its rotation is a turn about the tracker's axes that

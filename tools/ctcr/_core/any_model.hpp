@@ -2,13 +2,12 @@
 // A model whose number of tubes is known at run time: the border between numpy arrays and the templates.
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <span>
-#include <utility>
-
 #include <ctcr/core/status.hpp>
 #include <ctcr/core/types.hpp>
 #include <ctcr/robot/tube.hpp>
+#include <memory>
+#include <span>
+#include <utility>
 
 namespace ctcr::python {
 
@@ -55,7 +54,7 @@ struct ShapeArrays {
 };
 
 class AnyModel {
- public:
+public:
   virtual ~AnyModel() = default;
   virtual void predict(const Rows& rows, const Answers& answers, const Options& options) const = 0;
   /// Shape at the one row of `row`, at `points` places and the breakpoints. @return status and places written

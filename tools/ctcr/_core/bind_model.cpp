@@ -4,11 +4,10 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
+#include <ctcr/core/status.hpp>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <ctcr/core/status.hpp>
 
 #include "any_model.hpp"
 
@@ -43,7 +42,7 @@ std::unique_ptr<AnyModel> make_any_model(const std::vector<Tube>& tubes, const V
 
 /// The model with the number of tubes that the arrays must have.
 class BoundModel {
- public:
+public:
   BoundModel(const Vector& youngs_modulus, const Vector& poisson_ratio, const Vector& density,
              const Vector& inner_diameter, const Vector& outer_diameter, const Vector& length,
              const Vector& curved_length, const Vector& curvature, const Vector& bending_stiffness,
@@ -87,23 +86,23 @@ class BoundModel {
     require(steps >= 1, "steps must be at least 1");
     const Rows rows{std::ptrdiff_t(count), beta.data(), alpha.data(), force ? force->data() : nullptr,
                     moment ? moment->data() : nullptr};
-    const Answers answers{position.data(),  quaternion.data(), status.data(),
-                          stability.data(), jacobian ? jacobian->data() : nullptr,
+    const Answers answers{position.data(),
+                          quaternion.data(),
+                          status.data(),
+                          stability.data(),
+                          jacobian ? jacobian->data() : nullptr,
                           compliance ? compliance->data() : nullptr};
     const nb::gil_scoped_release released;
     model_->predict(rows, answers, {.integrator = integrator, .steps = steps, .tip_of = tip_of, .threads = threads});
   }
 
-  std::pair<Status, std::size_t> shape(const Vector& beta, const Vector& alpha, const Triple& force,
-                                       const Triple& moment, std::size_t points, int steps,
-                                       const Array<double, nb::ndim<1>>& arc_length,
-                                       const Array<double, nb::shape<-1, 3>>& position,
-                                       const Array<double, nb::shape<-1, 4>>& quaternion,
-                                       const Array<double, nb::shape<-1, 3>>& internal_force,
-                                       const Array<double, nb::shape<-1, 3>>& internal_moment,
-                                       const Array<double, nb::ndim<2>>& tube_angle,
-                                       const Array<double, nb::shape<-1, -1, 3>>& tube_curvature,
-                                       const Array<double, nb::shape<-1, -1, 3>>& tube_moment) const {
+  std::pair<Status, std::size_t> shape(
+      const Vector& beta, const Vector& alpha, const Triple& force, const Triple& moment, std::size_t points, int steps,
+      const Array<double, nb::ndim<1>>& arc_length, const Array<double, nb::shape<-1, 3>>& position,
+      const Array<double, nb::shape<-1, 4>>& quaternion, const Array<double, nb::shape<-1, 3>>& internal_force,
+      const Array<double, nb::shape<-1, 3>>& internal_moment, const Array<double, nb::ndim<2>>& tube_angle,
+      const Array<double, nb::shape<-1, -1, 3>>& tube_curvature,
+      const Array<double, nb::shape<-1, -1, 3>>& tube_moment) const {
     const std::size_t room = arc_length.shape(0);
     require(beta.shape(0) == tubes_ && alpha.shape(0) == tubes_, "beta and alpha need one value a tube");
     require(points >= 2 && room >= points + 2 * tubes_, "points must be at least 2, and arrays need room for 2N more");
@@ -118,7 +117,7 @@ class BoundModel {
                           internal_moment.data(), tube_angle.data(), tube_curvature.data(), tube_moment.data()});
   }
 
- private:
+private:
   std::size_t tubes_;
   std::unique_ptr<AnyModel> model_;
 };

@@ -1,13 +1,12 @@
 #pragma once
 // The model of N tubes behind AnyModel. Each N is compiled in a file of its own.
 #include <algorithm>
-#include <limits>
-#include <vector>
-
 #include <ctcr/ctcr.hpp>
 #include <ctcr/mechanics/integrators.hpp>
 #include <ctcr/mechanics/shape.hpp>
 #include <ctcr/parallel/batch.hpp>
+#include <limits>
+#include <vector>
 
 #include "any_model.hpp"
 
@@ -37,7 +36,7 @@ inline Eigen::Vector4d quaternion(const Mat3& rotation) {
 
 template <int N>
 class ModelOf final : public AnyModel {
- public:
+public:
   ModelOf(std::span<const Tube> tubes, const Vec3& gravity) : model_(make_robot(tubes, gravity)) {}
 
   void predict(const Rows& rows, const Answers& answers, const Options& options) const override {
@@ -58,8 +57,7 @@ class ModelOf final : public AnyModel {
     std::vector<ShapePoint<N>> places(s.size());
     Workspace<N> ws;
     Solution<N> solution;
-    const Status status =
-        ctcr::shape<N>(model_, c.joints, c.load, s, places, ws, solution, Settings{.steps = steps});
+    const Status status = ctcr::shape<N>(model_, c.joints, c.load, s, places, ws, solution, Settings{.steps = steps});
     for (std::size_t k = 0; k < s.size(); ++k) {
       const ShapePoint<N>& place = places[k];
       const auto i = std::ptrdiff_t(k);
@@ -79,7 +77,7 @@ class ModelOf final : public AnyModel {
     return {status, s.size()};
   }
 
- private:
+private:
   static Robot<N> make_robot(std::span<const Tube> tubes, const Vec3& gravity) {
     Robot<N> robot;
     std::copy_n(tubes.begin(), N, robot.tubes.begin());

@@ -25,7 +25,7 @@ MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
 SOUND = 1.05  # inflation of the noise up to which the model explains the readings
 # Another noise must predict other runs so much better to be preferred to that of the most evidence.
-BETTER = 0.7
+BETTER = 0.95
 FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
 
 
@@ -112,18 +112,26 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
         return fit  # nothing is wrong with the model that the field could have been bent to hide
     names = [name for entry in accepted for name in entry.candidate.names]
     fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
-    held_out = engine.rows & (split.groups(engine.measurements) % 4 == 1)
-    errors = {}
+    fold = split.groups(engine.measurements) % 4  # the fourth is locked away
+    plain = fit.weights[:, 0] > 0.3
+    errors: dict[float, float] = {}
     for part in FIELDS:
         progress(f"prediction with {part:.0%} of the stated field error")
-        noise = engine.noise_with(part)
-        trial = engine.fit(
-            names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights * ~held_out[:, None]
-        )
-        errors[noise] = trial.rms_mm(held_out & (fit.weights[:, 0] > 0.3))
-    usual = next(error for noise, error in errors.items() if noise.position_field == fit.noise.position_field)
-    noise = min(errors, key=lambda noise: errors[noise])
-    if errors[noise] > BETTER * usual:
+        square = 0.0
+        for out in (engine.rows & (fold == k) for k in range(3)):
+            trial = engine.fit(
+                names,
+                start=values_of(fit),
+                fixed=fixed,
+                noise=engine.noise_with(part),
+                weights=fit.weights * ~out[:, None],
+            )
+            square += np.nan_to_num(trial.rms_mm(out & plain)) ** 2
+        errors[part] = square
+    part = min(errors, key=lambda part: errors[part])
+    noise = engine.noise_with(part)
+    usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
+    if errors[part] > BETTER**2 * errors[usual]:
         return fit
     return engine.fit(names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights)
 
