@@ -20,8 +20,8 @@ def waterfall(figure, d: "Diagnosis") -> None:
     rms = d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
     if d.accepted:
-        names = " + ".join(" or ".join(a.ids[:2]) for a in d.accepted)
-        bars.append((f"with {names}", rms["with_effects"], GOOD))
+        names = "\n+ ".join(" or ".join(a.ids[:2]) for a in d.accepted)
+        bars.append((f"+ {names}", rms["with_effects"], GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
         axes.text(i, value, f" {value:.3g} mm", ha="center", va="bottom", weight="bold")

@@ -54,4 +54,6 @@ def judge(
         return Verdict("ambiguous", ["These data cannot tell some effects apart."])
     if any(a.margin < racing.SURE for a in accepted):
         return Verdict("probable", ["Another effect is nearly as likely."])
-    return Verdict("identified", [f"{first.entry.id} explains the error."])
+    names = " and ".join(a.entry.id for a in accepted)
+    verb = "explains" if len(accepted) == 1 else "explain"
+    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])
