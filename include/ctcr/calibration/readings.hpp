@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "ctcr/parallel/batch.hpp"
+#include "ctcr/pipeline/parameters.hpp"
 #include "ctcr/pipeline/predict.hpp"
 
 namespace ctcr {
@@ -27,6 +28,8 @@ struct Reading {
 /// Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
 template <int N>
 class Readings {
+  using P = SystemParameters<N, Standard>;
+
 public:
   /// @param parameters  places of x in ParameterVector<N>
   /// @param pool        must outlive this
@@ -45,26 +48,12 @@ public:
   [[nodiscard]] Eigen::Index size() const { return Eigen::Index(rows_.size()); }
 
   /// Values of the nominal system.
-  [[nodiscard]] Eigen::VectorXd nominal() const {
-    Eigen::VectorXd x(Eigen::Index(parameters_.size()));
-    for (Eigen::Index k = 0; k < x.size(); ++k) x[k] = value(nominal_, parameters_[std::size_t(k)]);
-    return x;
-  }
+  [[nodiscard]] Eigen::VectorXd nominal() const { return P::values(nominal_)(parameters_); }
   /// The system with other values.
   [[nodiscard]] System<N> system(const Eigen::VectorXd& x) const {
-    System<N> system = nominal_;
-    const Eigen::VectorXd from = nominal();
-    Vec3 turn = Vec3::Zero();
-    for (Eigen::Index k = 0; k < x.size(); ++k) {
-      const int place = parameters_[std::size_t(k)];
-      const auto [kind, i] = ParameterVector<N>::entry(place);
-      if (kind == Parameter::tracker_rotation)
-        turn[i] = x[k];
-      else
-        system = changed(system, place, x[k] - from[k]);
-    }
-    system.sensor.T_tracker_base.rotation = rotation_matrix(turn) * nominal_.sensor.T_tracker_base.rotation;
-    return system;
+    Eigen::VectorXd all = P::values(nominal_);
+    all(parameters_) = x;
+    return P::with_values(nominal_, all);
   }
 
   /// Residuals at x, six a row: measured - predicted position [m], rotation vector [rad], tracker axes. NaN where not
@@ -160,27 +149,6 @@ private:
       if (kind == Parameter::tracker_rotation) turn[i] = x[Eigen::Index(k)];
     }
     return turn;
-  }
-  /// exp(turn + d) = exp(left_jacobian(turn) d) exp(turn) to first order.
-  static Mat3 left_jacobian(const Vec3& turn) {
-    const ExpCoefficients c = exp_coefficients(turn.squaredNorm());
-    Mat3 W;
-    W << 0, -turn.z(), turn.y(), turn.z(), 0, -turn.x(), -turn.y(), turn.x(), 0;
-    return Mat3::Identity() + c.B * W + c.C * (W * W);
-  }
-
-  static double value(const System<N>& system, int place) {
-    const auto [kind, i] = ParameterVector<N>::entry(place);
-    switch (kind) {
-      case Parameter::gravity: return system.model.robot().gravity[i];
-      case Parameter::translation_ratio: return system.transmission.translation_ratio;
-      case Parameter::rotation_ratio: return system.transmission.rotation_ratio;
-      case Parameter::home_translation: return system.transmission.home_translation[i];
-      case Parameter::home_rotation: return system.transmission.home_rotation[i];
-      case Parameter::tracker_position: return system.sensor.T_tracker_base.position[i];
-      case Parameter::tracker_rotation: return 0;
-      default: return system.model.robot().tubes[std::size_t(i)].*ParameterVector<N>::info(kind).field;
-    }
   }
 
   System<N> nominal_;

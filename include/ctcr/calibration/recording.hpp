@@ -160,13 +160,6 @@ private:
       if (const int j = parameters_[k] - rotation; j >= 0 && j < 3) turn[j] = x[Eigen::Index(k)];
     return turn;
   }
-  /// exp(turn + d) = exp(left_jacobian(turn) d) exp(turn) to first order.
-  static Mat3 left_jacobian(const Vec3& turn) {
-    const ExpCoefficients c = exp_coefficients(turn.squaredNorm());
-    Mat3 W;
-    W << 0, -turn.z(), turn.y(), turn.z(), 0, -turn.x(), -turn.y(), turn.x(), 0;
-    return Mat3::Identity() + c.B * W + c.C * (W * W);
-  }
 
   System<N, Fx> nominal_;
   std::vector<RecordedRow<N>> rows_;

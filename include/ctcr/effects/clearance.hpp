@@ -1,6 +1,5 @@
 #pragma once
-#include "ctcr/effects/hooks.hpp"
-#include "ctcr/math/functions.hpp"
+#include "ctcr/effects/lean.hpp"
 
 namespace ctcr {
 namespace clearance {
@@ -25,16 +24,7 @@ inline constexpr std::array parameters{
                     .hard_high = 0.2,
                     .per_tube = true,
                     .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
-    EffectParameter{.name = "moment",
-                    .unit = "N m",
-                    .neutral = 0.01,
-                    .sigma = 0.005,
-                    .soft_low = 0.002,
-                    .soft_high = 0.05,
-                    .hard_low = 0.0005,
-                    .hard_high = 0.5,
-                    .role = Role::shape,
-                    .meaning = "at which 76 % of the tilt is reached"},
+    leaning_moment,
 };
 }  // namespace clearance
 
@@ -44,9 +34,7 @@ struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
   void station(Station<P, N>& s) const noexcept {
-    if (s.kind != Station<P, N>::Kind::tube_tip) return;
-    const std::array<P, 2> direction = saturated(s.moment, this->template get<1>());
-    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + this->template get<0>(s.tube) * direction[i];
+    if (s.kind == Station<P, N>::Kind::tube_tip) lean(s, this->template get<0>(s.tube), this->template get<1>());
   }
 };
 

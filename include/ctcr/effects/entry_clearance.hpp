@@ -1,6 +1,5 @@
 #pragma once
-#include "ctcr/effects/hooks.hpp"
-#include "ctcr/math/functions.hpp"
+#include "ctcr/effects/lean.hpp"
 
 namespace ctcr {
 namespace entry_clearance {
@@ -24,16 +23,7 @@ inline constexpr std::array parameters{
                     .hard_low = -0.1,
                     .hard_high = 0.2,
                     .meaning = "largest tilt"},
-    EffectParameter{.name = "moment",
-                    .unit = "N m",
-                    .neutral = 0.01,
-                    .sigma = 0.005,
-                    .soft_low = 0.002,
-                    .soft_high = 0.05,
-                    .hard_low = 0.0005,
-                    .hard_high = 0.5,
-                    .role = Role::shape,
-                    .meaning = "at which 76 % of the tilt is reached"},
+    leaning_moment,
 };
 }  // namespace entry_clearance
 
@@ -43,9 +33,7 @@ struct EntryClearance : EffectValues<entry_clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = entry_clearance::info;
 
   void station(Station<P, N>& s) const noexcept {
-    if (s.kind != Station<P, N>::Kind::plate) return;
-    const std::array<P, 2> direction = saturated(s.moment, this->template get<1>());
-    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + this->template get<0>() * direction[i];
+    if (s.kind == Station<P, N>::Kind::plate) lean(s, this->template get<0>(), this->template get<1>());
   }
 };
 

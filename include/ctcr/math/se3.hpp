@@ -182,6 +182,14 @@ inline Mat3 rotation_matrix(const Vec3& o) noexcept {
   return Mat3::Identity() + (1.0 - z * q.C) * W + q.B * (W * W);
 }
 
+/// exp(o + d) = exp(left_jacobian(o) d) exp(o) to first order in d, for rotation vectors [rad]. Real time: yes.
+inline Mat3 left_jacobian(const Vec3& o) noexcept {
+  const ExpCoefficients c = exp_coefficients(o.squaredNorm());
+  Mat3 W;
+  W << 0, -o.z(), o.y(), o.z(), 0, -o.x(), -o.y(), o.x(), 0;
+  return Mat3::Identity() + c.B * W + c.C * (W * W);
+}
+
 /// Rotation about z by `angle` [rad]. Real time: yes.
 inline Mat3 rotation_z(double angle) noexcept {
   double s, c;
