@@ -2,7 +2,6 @@
 
 import html
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 from ctcr.output import atomic_writer, table
@@ -94,13 +93,11 @@ def show(console, robot: Robot, lines: list[Line], stages: list[Stage]) -> None:
 
 def write_report(robot: Robot, target: str | Path, file: str) -> None:
     """Both as one HTML page that needs nothing else."""
-    from importlib.resources import files
-
+    from ctcr import html_page
     from ctcr.compare.figures import draw
 
     stages, lines = waterfall(robot), entries(robot)
-    title = html.escape(f"History: {robot.name}")
-    style = (files("ctcr.compare") / "report.css").read_text(encoding="utf-8")
+    title = f"History: {robot.name}"
     head = "".join(f'<th class="text">{name}</th>' for name in ("date", "command", "from", "what", "error"))
     body = "".join(
         "<tr>"
@@ -110,15 +107,12 @@ def write_report(robot: Robot, target: str | Path, file: str) -> None:
     )
     picture = draw(_draw, stages, 10.4, 4.4) if stages else ""
     lead = _lead(stages) if stages else "Nothing was changed yet." if not lines else ""
+    section = (
+        f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(lead)}</p><figure>{picture}</figure>'
+        f"<h2>Ledger</h2><table><tr>{head}</tr>{body}</table>"
+    )
     with atomic_writer(target) as page:
-        page.write(
-            '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>"
-            f'<p class="lead">{html.escape(lead)}</p><figure>{picture}</figure>'
-            f"<h2>Ledger</h2><table><tr>{head}</tr>{body}</table>"
-            f"<footer>{html.escape(file)}. Made by ctcr history on {date.today().isoformat()}.</footer></body></html>\n"
-        )
+        page.write(html_page.page(title, [section], file, "ctcr history"))
 
 
 def _lead(stages: list[Stage]) -> str:

@@ -1,18 +1,17 @@
 """The calibration as one HTML page that needs nothing else: no network, no other file."""
 
 import html
-from datetime import date
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
+from ctcr import html_page
 from ctcr.calibrate import figures, terminal
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.calibrate.parameters import doubts
 from ctcr.calibrate.view import view
-from ctcr.compare.figures import draw
 from ctcr.compare.wording import mm
+from ctcr.html_page import bullets, cards, figure, table
 from ctcr.output import atomic_writer
 
 
@@ -24,57 +23,37 @@ def write(c: Calibration, target: str | Path, source: str) -> None:
 
 def page(c: Calibration, source: str) -> str:
     """The whole HTML text."""
-    from plotly.offline import get_plotlyjs
-
-    title = html.escape(f"Calibration: {c.before.name}")
-    style = (files("ctcr.compare") / "report.css").read_text(encoding="utf-8")
+    title = f"Calibration: {c.before.name}"
     sections = [_opening(c, title), _doubts(c), _waterfall(c), _parameters(c), _together(c), _halves(c), _residuals(c),
                 _numbers(c)]  # fmt: skip
-    drawing = view(c).replace("</", "<\\/")
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{style}.number.good {{ border-color: var(--good); }}</style></head><body>"
-        + "\n".join(filter(None, sections))
-        + f"<footer>{html.escape(source)}. Made by ctcr calibrate fit on {date.today().isoformat()}.</footer>"
-        + f"<script>{get_plotlyjs()}</script><script>const drawing = {drawing};\n"
-        + 'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
-        + "</body></html>\n"
-    )
+    return html_page.page(title, sections, source, "ctcr calibrate fit", view(c))
 
 
 def _opening(c: Calibration, title: str) -> str:
     error, floor = (c.held_out.error, c.held_out.floor) if c.held_out else (c.stages[-1], c.floor)
-    cards = [
+    numbers = [
         ("error", f"{c.stages[0].rms_mm:.3g} mm", "RMS error with the values of the robot file"),
         ("good", f"{c.stages[-1].rms_mm:.3g} mm", f"RMS error with {len(c.fitted)} parameters fitted"),
     ]
     if c.held_out:
-        cards.append(
+        numbers.append(
             ("good", f"{error.rms_mm:.3g} mm", f"RMS error on {c.held_out.kind} that a fit has not seen")
         )
     smooth = " and smooth error" if c.fit.noise.position_field > 0 else ""
-    cards.append(
+    numbers.append(
         ("noise", f"{floor.rms_mm:.2g} mm", f"noise floor: what the tracker's jitter{smooth} would give")
     )
-    cards.append(
+    numbers.append(
         ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all")
     )
-    numbers = "".join(
-        f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
-        for kind, value, text in cards
-    )
-    return (
-        f"<h1>{title}</h1>"
-        f'<p class="lead">{html.escape(terminal.headline(c))}</p><div class="numbers">{numbers}</div>'
-    )
+    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(terminal.headline(c))}</p>{cards(numbers)}'
 
 
 def _doubts(c: Calibration) -> str:
     text = ""
     for title, lines in (("Doubts", doubts(c.fitted)), ("To know", c.notices)):
         if lines:
-            text += f"<h2>{title}</h2>" + _list(lines)
+            text += f"<h2>{title}</h2>" + bullets(lines)
     return text
 
 
@@ -82,7 +61,7 @@ def _waterfall(c: Calibration) -> str:
     caption = (
         "From the robot file's values to what noise leaves. What counts is the error of readings not seen."
     )
-    return "<h2>What calibration brings</h2>" + _figure(figures.waterfall, c, 10.4, 4.2, caption)
+    return "<h2>What calibration brings</h2>" + figure(figures.waterfall, c, 10.4, 4.2, caption, wide=True)
 
 
 def _parameters(c: Calibration) -> str:
@@ -93,8 +72,8 @@ def _parameters(c: Calibration) -> str:
     )
     return (
         "<h2>The parameters</h2>"
-        + _figure(figures.shifts, c, 10.4, height, caption)
-        + _table("Values ± one standard deviation", terminal.PARAMETER_COLUMNS, terminal.parameter_rows(c), 2)
+        + figure(figures.shifts, c, 10.4, height, caption, wide=True)
+        + table("Values ± one standard deviation", terminal.PARAMETER_COLUMNS, terminal.parameter_rows(c), 2)
     )
 
 
@@ -103,7 +82,11 @@ def _together(c: Calibration) -> str:
     caption = "Dark red and dark blue: the data determine only the sum or the difference of the two."
     text = "<h2>What the data cannot tell apart</h2>"
     lines = terminal.undetermined(c)
-    return text + (_list(lines) if lines else "") + _figure(figures.correlations, c, 10.4, size, caption)
+    return (
+        text
+        + (bullets(lines) if lines else "")
+        + figure(figures.correlations, c, 10.4, size, caption, wide=True)
+    )
 
 
 def _halves(c: Calibration) -> str:
@@ -123,13 +106,13 @@ def _halves(c: Calibration) -> str:
     caption = "Left, middle: where the two disagree. Right: against what noise can do (line) and twice that (dashed)."
     return (
         f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>"
-        + _figure(figures.half_difference, c, 10.4, 4.6, caption)
+        + figure(figures.half_difference, c, 10.4, 4.6, caption, wide=True)
     )  # fmt: skip
 
 
 def _residuals(c: Calibration) -> str:
-    left = _figure(figures.histogram, c, 5.2, 3.5, "How large the errors are (logarithmic axis).", wide=False)
-    right = _figure(figures.course, c, 5.2, 3.5, "The error in the order measured.", wide=False)
+    left = figure(figures.histogram, c, 5.2, 3.5, "How large the errors are (logarithmic axis).")
+    right = figure(figures.course, c, 5.2, 3.5, "The error in the order measured.")
     return (
         f'<h2>The error before and after</h2><div class="pair">{left}{right}</div><div id="view"></div>'
         '<p class="soft">Arrows lead from the predicted towards the measured tip, tracker frame. The buttons choose '
@@ -148,35 +131,12 @@ def _numbers(c: Calibration) -> str:
     ]  # fmt: skip
     frames = ""
     if c.frames:
-        frames = _table(
+        frames = table(
             "Frames of the runs against the typical one", list(c.frames.COLUMNS), c.frames.rows(), 0
         )
     return (
         "<h2>Numbers</h2>"
-        + _table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1)
-        + _table("The fit", ["", ""], rows, 1)
+        + table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1)
+        + table("The fit", ["", ""], rows, 1)
         + frames
-    )
-
-
-def _list(lines: list[str]) -> str:
-    return '<ul class="limits">' + "".join(f"<li>{html.escape(line)}</li>" for line in lines) + "</ul>"
-
-
-def _figure(plot, c: Calibration, width: float, height: float, caption: str, wide: bool = True) -> str:
-    drawn = draw(plot, c, width, height)
-    kind = ' class="wide"' if wide else ""
-    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
-
-
-def _table(caption: str, columns: list[str], rows: list[list[str]], text_columns: int) -> str:
-    def cell(tag: str, index: int, value: str) -> str:
-        kind = ' class="text"' if index < text_columns else ""
-        return f"<{tag}{kind}>{html.escape(value)}</{tag}>"
-
-    head = "".join(cell("th", i, name) for i, name in enumerate(columns))
-    body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{html.escape(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )

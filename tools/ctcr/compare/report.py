@@ -1,17 +1,17 @@
 """The comparison as one HTML page that needs nothing else: no network, no other file."""
 
 import html
-from datetime import date
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
+from ctcr import html_page
 from ctcr.compare import figures, terminal
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.limits import limits
 from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
 from ctcr.compare.summary import findings, headline, quiet
+from ctcr.html_page import bullets, cards, figure, table
 from ctcr.output import atomic_writer
 
 
@@ -23,10 +23,7 @@ def write(c: Comparison, target: str | Path, source: str) -> None:
 
 def page(c: Comparison, source: str) -> str:
     """The whole HTML text."""
-    from plotly.offline import get_plotlyjs
-
-    title = html.escape(f"Model and measurement: {c.robot}")
-    style = (files("ctcr.compare") / "report.css").read_text(encoding="utf-8")
+    title = f"Model and measurement: {c.robot}"
     sections = [
         _opening(c, title),
         _findings(c),
@@ -36,43 +33,26 @@ def page(c: Comparison, source: str) -> str:
         _dependences(c),
         _tables(c),
     ]
-    drawing = scene(c).replace("</", "<\\/")
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{style}</style></head><body>"
-        + "\n".join(filter(None, sections))
-        + f"<footer>{html.escape(source)}. Made by ctcr compare on {date.today().isoformat()}.</footer>"
-        + f"<script>{get_plotlyjs()}</script>"
-        + f"<script>const drawing = {drawing};\n"
-        + 'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
-        + "</body></html>\n"
-    )
+    return html_page.page(title, sections, source, "ctcr compare", scene(c))
 
 
 def _opening(c: Comparison, title: str) -> str:
     p, n, d = c.position_mm, c.noise, c.direction
-    cards = [
+    numbers = [
         ("error", f"{p.rms:.3g} mm", f"RMS error: {c.percent_of_length.rms:.2g} % of the deployed length"),
         ("error", f"{p.p95:.3g} mm", f"95 % are below; the largest is {p.maximum:.3g} mm"),
     ]
     if c.angle_deg:
         angle, most = c.angle_deg.rms, c.angle_deg.maximum
-        cards.append(("error", f"{angle:.3g}°", f"RMS {c.angle_kind} error, at most {most:.3g}°"))
+        numbers.append(("error", f"{angle:.3g}°", f"RMS {c.angle_kind} error, at most {most:.3g}°"))
     if np.isfinite(n.rms_mm):
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
-        cards.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
+        numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
     if d:
-        cards.append(
+        numbers.append(
             ("back", f"{d.rms_mm:.3g} mm", f"out against return, RMS over {d.pairs} pairs of visits")
         )
-    numbers = "".join(
-        f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
-        for kind, value, text in cards
-    )
-    return (
-        f'<h1>{title}</h1><p class="lead">{html.escape(headline(c))}</p><div class="numbers">{numbers}</div>'
-    )
+    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
 
 
 def _findings(c: Comparison) -> str:
@@ -89,12 +69,7 @@ def _findings(c: Comparison) -> str:
     for title, lines in (("", quiet(c)), ("What these data cannot say", limits(c))):
         if lines:
             heading = f"<h2>{title}</h2>" if title else ""
-            text += (
-                heading
-                + '<ul class="limits">'
-                + "".join(f"<li>{html.escape(x)}</li>" for x in lines)
-                + "</ul>"
-            )
+            text += heading + bullets(lines)
     return text
 
 
@@ -111,24 +86,24 @@ def _view(c: Comparison) -> str:
 
 
 def _sizes(c: Comparison) -> str:
-    left = _figure(
+    left = figure(
         figures.histogram, c, 5.2, 3.4, "How large the errors are, against noise alone (logarithmic axis)."
     )
-    right = _figure(figures.course, c, 5.2, 3.4, "The error in the order measured.")
+    right = figure(figures.course, c, 5.2, 3.4, "The error in the order measured.")
     return f'<h2>How large, and when</h2><div class="pair">{left}{right}</div>'
 
 
 def _directions(c: Comparison) -> str:
-    figure = _figure(
+    drawn = figure(
         figures.out_and_return, c, 10.4, 3.6,
         "Visits of the same joints. The errors of two visits are compared, so that small differences of the joints "
         "do not count.", wide=True,
     )  # fmt: skip
-    return f"<h2>Out and return</h2>{figure}" if figure else ""
+    return f"<h2>Out and return</h2>{drawn}" if drawn else ""
 
 
 def _dependences(c: Comparison) -> str:
-    bars = _figure(
+    bars = figure(
         figures.ranking, c, 10.4, 4.6,
         f"How much of the squared error (its constant part removed) each quantity predicts on "
         f"{c.ranking.block_kind} that were left out. Red: findings, the later ones in what the stronger ones left. "
@@ -136,7 +111,7 @@ def _dependences(c: Comparison) -> str:
     )  # fmt: skip
     if not bars:
         return ""
-    panels = _figure(
+    panels = figure(
         figures.strongest, c, 10.4, 6.4,
         "The error against the strongest quantities, in the frame where each predicts best: readings (points) and "
         "means of equal groups (lines). An asterisk marks a finding.", wide=True,
@@ -144,18 +119,12 @@ def _dependences(c: Comparison) -> str:
     return f"<h2>Where the error comes from</h2>{bars}{panels}"
 
 
-def _figure(plot, c: Comparison, width: float, height: float, caption: str, wide: bool = False) -> str:
-    drawn = figures.draw(plot, c, width, height)
-    kind = ' class="wide"' if wide else ""
-    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
-
-
 def _tables(c: Comparison) -> str:
     parts = [
-        _table("Error, measured minus predicted", ["", "unit", *terminal.COLUMNS], terminal.error_rows(c), 2),
-        _table("Repeatability, mm", terminal.REPEAT_COLUMNS, terminal.repeat_rows(c), 1),
-        _table("By run, mm; mean error vector in the tracker frame", terminal.RUN_COLUMNS, terminal.run_rows(c), 0),
-        _table(terminal.ranking_title(c), terminal.RANKING_COLUMNS, terminal.ranking_rows(c), 2)
+        table("Error, measured minus predicted", ["", "unit", *terminal.COLUMNS], terminal.error_rows(c), 2),
+        table("Repeatability, mm", terminal.REPEAT_COLUMNS, terminal.repeat_rows(c), 1),
+        table("By run, mm; mean error vector in the tracker frame", terminal.RUN_COLUMNS, terminal.run_rows(c), 0),
+        table(terminal.ranking_title(c), terminal.RANKING_COLUMNS, terminal.ranking_rows(c), 2)
         if c.ranking.alone else "",
     ]  # fmt: skip
     for what, rows in (("not measured", c.sample.not_measured), ("not solved", c.sample.not_solved)):
@@ -163,16 +132,3 @@ def _tables(c: Comparison) -> str:
             listed = ", ".join(map(str, rows[:200])) + (", ..." if len(rows) > 200 else "")
             parts.append(f"<p>{len(rows)} rows {what}: {listed}</p>")
     return "<h2>Numbers</h2>" + "".join(parts)
-
-
-def _table(caption: str, columns: list[str], rows: list[list[str]], text_columns: int) -> str:
-    def cell(tag: str, index: int, value: str) -> str:
-        kind = ' class="text"' if index < text_columns else ""
-        return f"<{tag}{kind}>{html.escape(value)}</{tag}>"
-
-    head = "".join(cell("th", i, name) for i, name in enumerate(columns))
-    body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{html.escape(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-    )

@@ -2,17 +2,14 @@
 
 import html
 import json
-from datetime import date
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr import effects
-from ctcr.compare.figures import draw
-from ctcr.compare.report import _table as table
+from ctcr import effects, html_page
 from ctcr.diagnose import figures
+from ctcr.html_page import cards, figure, table
 from ctcr.output import atomic_writer
 
 if TYPE_CHECKING:
@@ -30,10 +27,7 @@ def write(d: "Diagnosis", target: str | Path, source: str) -> None:
 
 def page(d: "Diagnosis", source: str) -> str:
     """The whole HTML text."""
-    from plotly.offline import get_plotlyjs
-
-    title = html.escape(f"Diagnosis: {d.robot.name}")
-    style = (files("ctcr.compare") / "report.css").read_text(encoding="utf-8")
+    title = f"Diagnosis: {d.robot.name}"
     sections = [
         _opening(d, title),
         _found(d),
@@ -43,38 +37,24 @@ def page(d: "Diagnosis", source: str) -> str:
         _parameters(d),
         _limits(d),
     ]
-    drawing = scene(d).replace("</", "<\\/")
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{title}</title><style>{style}</style></head><body>"
-        + "\n".join(filter(None, sections))
-        + f"<footer>{html.escape(source)}. Made by ctcr diagnose on {date.today().isoformat()}.</footer>"
-        + f"<script>{get_plotlyjs()}</script>"
-        + f"<script>const drawing = {drawing};\n"
-        + 'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
-        + "</body></html>\n"
-    )
+    return html_page.page(title, sections, source, "ctcr diagnose", scene(d))
 
 
 def _opening(d: "Diagnosis", title: str) -> str:
     rms = d.rms_mm
-    cards = [
+    numbers = [
         ("error", f"{rms['nominal']:.3g} mm", "RMS error with the robot file"),
         ("error", f"{rms['calibrated']:.3g} mm", "after calibration"),
     ]
     if d.accepted:
-        cards.append(("back", f"{rms['with_effects']:.3g} mm", "with the effects found"))
-    cards.append(("noise", f"{rms['noise_floor']:.2g} mm", "noise floor"))
-    numbers = "".join(
-        f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
-        for kind, value, text in cards
-    )
+        numbers.append(("back", f"{rms['with_effects']:.3g} mm", "with the effects found"))
+    numbers.append(("noise", f"{rms['noise_floor']:.2g} mm", "noise floor"))
     verdict = d.verdict.word.replace("_", " ")
     lead = " ".join(d.verdict.sentences)
     return (
-        f'<h1>{title}</h1><p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
-        f'<div class="numbers">{numbers}</div>'
+        f"<h1>{html.escape(title)}</h1>"
+        f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
+        f"{cards(numbers)}"
         f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw.</p>'
     )
 
@@ -91,9 +71,9 @@ def _found(d: "Diagnosis") -> str:
 
 
 def _errors(d: "Diagnosis") -> str:
-    left = _figure(figures.waterfall, d, 5.2, 3.8, "RMS error on runs that no fit saw (logarithmic axis).")
-    right = _figure(figures.directions, d, 5.2, 3.8, "The error of every reading, in the order measured.")
-    more = _figure(
+    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on runs that no fit saw (logarithmic axis).")
+    right = figure(figures.directions, d, 5.2, 3.8, "The error of every reading, in the order measured.")
+    more = figure(
         figures.before_after, d, 10.4, 3.6, "The error against the quantities that predict it best.", True
     )
     return f'<h2>The error falls</h2><div class="pair">{left}{right}</div>{more}'
@@ -107,7 +87,7 @@ def _view() -> str:
 
 
 def _candidates(d: "Diagnosis") -> str:
-    drawn = _figure(
+    drawn = figure(
         figures.candidates, d, 10.4, 4.4,
         "Every candidate was fitted together with the calibration. Boxed: accepted, with all that these data cannot "
         "tell from it.", True,
@@ -139,12 +119,6 @@ def _limits(d: "Diagnosis") -> str:
         + "".join(f"<li>{html.escape(line)}</li>" for line in lines)
         + "</ul>"
     )
-
-
-def _figure(plot, d: "Diagnosis", width: float, height: float, caption: str, wide: bool = False) -> str:
-    drawn = draw(plot, d, width, height)
-    kind = ' class="wide"' if wide else ""
-    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
 
 
 def scene(d: "Diagnosis") -> str:
