@@ -9,10 +9,20 @@ namespace ctcr {
 /// @param sigma       plausible standard deviation of a displacement [m]
 /// @param turn_sigma  and of a turn [rad]
 constexpr std::array<EffectParameter, 6> frame_displacement(double sigma, double turn_sigma) noexcept {
-  const EffectParameter along{
-      .unit = "m", .sigma = sigma, .soft_low = -0.003, .soft_high = 0.003, .hard_low = -0.1, .hard_high = 0.1};
-  const EffectParameter about{
-      .unit = "rad", .sigma = turn_sigma, .soft_low = -0.03, .soft_high = 0.03, .hard_low = -0.5, .hard_high = 0.5};
+  const EffectParameter along{.name = {},
+                              .unit = "m",
+                              .sigma = sigma,
+                              .soft_low = -0.003,
+                              .soft_high = 0.003,
+                              .hard_low = -0.1,
+                              .hard_high = 0.1};
+  const EffectParameter about{.name = {},
+                              .unit = "rad",
+                              .sigma = turn_sigma,
+                              .soft_low = -0.03,
+                              .soft_high = 0.03,
+                              .hard_low = -0.5,
+                              .hard_high = 0.5};
   std::array<EffectParameter, 6> all{along, along, along, about, about, about};
   constexpr std::string_view names[]{"x", "y", "z", "turn_x", "turn_y", "turn_z"};
   constexpr std::string_view meanings[]{"along the tracker axis x", "along the tracker axis y",
