@@ -13,10 +13,10 @@ option(CTCR_BUILD_EXAMPLES "Build the C++ examples" ${own_programs})
 option(CTCR_BUILD_BENCH "Build the benchmarks (needs Google Benchmark)" OFF)
 option(CTCR_BUILD_PYTHON "Build the Python module (needs nanobind)" ${python_package})
 
-# The default instruction set is the one with AVX2 and FMA, where the building machine runs it. A Python package may
-# travel to another machine, so it stays with the compiler's own default.
+# The default instruction set is the one with AVX2 and FMA, where the building machine runs it. A Python package that is
+# not installed in place may travel to another machine, so it stays with the compiler's own default.
 set(default_arch "")
-if(own_programs AND NOT CMAKE_CROSSCOMPILING AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+if((own_programs OR SKBUILD_STATE STREQUAL "editable") AND NOT CMAKE_CROSSCOMPILING AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   include(CheckCXXSourceRuns)
   check_cxx_source_runs("
     int main() { return __builtin_cpu_supports(\"avx2\") && __builtin_cpu_supports(\"fma\") ? 0 : 1; }"

@@ -37,7 +37,8 @@ TYPED_TEST(NeutralEffects, GiveTheStandardModel) {
     Workspace<N> ws, general_ws;
     Solution<N> plain, general;
     const Model<N> standard(robot);
-    const Model<N, Catalogue> model(robot);
+    const Model<N, Catalogue> model(robot, test::hardly_any_effects<N>());
+    ASSERT_TRUE(model.coefficients().on_rod);
     if (solve<Derivatives::compliance>(standard, q, load, ws, plain, settings) != Status::ok) continue;
     // From the same equilibrium: a robot that can snap has several.
     general_ws.guess = ws.guess;
@@ -70,11 +71,30 @@ TYPED_TEST(NeutralEffects, GiveTheStandardModelWithoutLoad) {
     const auto c = test::smooth_case<N>(random, 0, 0, Vec3::Zero());
     Workspace<N> ws;
     Solution<N> general;
-    ASSERT_EQ(solve(Model<N, Catalogue>(c.robot), c.q, {}, ws, general, settings), Status::ok);
+    ASSERT_EQ(solve(Model<N, Catalogue>(c.robot, test::hardly_any_effects<N>()), c.q, {}, ws, general, settings),
+              Status::ok);
     const Solution<N> plain = test::solved<Derivatives::none>(c.robot, c.q, {}, settings.steps);
     EXPECT_LE((general.position - plain.position).norm(), 1e-9) << n;
     EXPECT_LE((general.rotation - plain.rotation).norm(), 1e-8) << n;
   }
+}
+
+TYPED_TEST(NeutralEffects, TakeTheFastPathWhereNoEffectChangesTheRod) {
+  constexpr int N = TypeParam::N;
+  Random random(23 + N);
+  const auto c = test::smooth_case<N>(random, 0.1, 0.002, test::tilted_gravity);
+  Catalogue::On<N> effects;
+  EXPECT_FALSE((Model<N, Catalogue>(c.robot, effects).coefficients().on_rod));
+  test::effect<SensorOffset>(effects).values[0] = 1e-3;
+  test::effect<BacklashRotation>(effects).values[0] = 1e-3;
+  const Model<N, Catalogue> model(c.robot, effects);
+  EXPECT_FALSE(model.coefficients().on_rod);
+  Workspace<N> ws, plain_ws;
+  Solution<N> general, plain;
+  ASSERT_EQ(solve(model, c.q, c.load, ws, general), Status::ok);
+  ASSERT_EQ(solve(Model<N>(c.robot), c.q, c.load, plain_ws, plain), Status::ok);
+  EXPECT_EQ(general.position, plain.position);
+  EXPECT_EQ(general.rotation, plain.rotation);
 }
 
 TYPED_TEST(NeutralEffects, HaveExactDerivativesByJointsAndLoad) {
@@ -84,7 +104,7 @@ TYPED_TEST(NeutralEffects, HaveExactDerivativesByJointsAndLoad) {
   for (int n = 0; n < test::cases(8); ++n) {
     auto c = test::smooth_case<N>(random, 0.1, 0.002, test::tilted_gravity);
     const bool neutral = n % 2 == 0;
-    const Model<N, Catalogue> model(c.robot, neutral ? Catalogue::On<N>{} : test::random_effects<N>(random));
+    const Model<N, Catalogue> model(c.robot, neutral ? test::hardly_any_effects<N>() : test::random_effects<N>(random));
     Workspace<N> ws;
     Solution<N> exact;
     ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, exact, settings), Status::ok);

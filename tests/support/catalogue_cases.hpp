@@ -27,6 +27,18 @@ Catalogue::On<N> random_effects(Random& random, double sigmas = 1) {
   return effects;
 }
 
+/// Every amplitude too small to change anything, yet not neutral: all hooks are called.
+template <int N>
+Catalogue::On<N> hardly_any_effects() {
+  Catalogue::On<N> effects;
+  effects.for_each([](auto& effect, int) {
+    for (std::size_t k = 0; k < effect.parameters.size(); ++k)
+      if (effect.parameters[k].role == Role::amplitude)
+        for (int i = 0; i < effect.size(int(k)); ++i) effect.values[std::size_t(effect.place(int(k), i))] += 1e-100;
+  });
+  return effects;
+}
+
 template <int N>
 struct Recorded {
   System<N, Catalogue> system;

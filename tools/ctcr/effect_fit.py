@@ -209,7 +209,7 @@ class _Fitter:
     def __init__(self, robot: Robot, readings: Measurements, base: Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.readings, self.base, self.fixed = robot, readings, list(base), fixed
         self.noise, self.places = identify.noise_of(robot), identify.places_of(_plain(robot), readings)
-        self.measured = _measured(readings)
+        self.measured = identify.measured_rows(readings)
         if not self.measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
 
@@ -253,14 +253,6 @@ def _in_words(readings: Measurements, held: Mask) -> str:
     if np.isin(readings.run[~held], runs).any():
         return "every fourth block of time"
     return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
-
-
-def _measured(readings: Measurements) -> Mask:
-    found = np.zeros(len(readings), bool)
-    for values in (readings.position, readings.quaternion):
-        if values is not None:
-            found |= np.isfinite(values).all(axis=1)
-    return found
 
 
 def _applied(robot: Robot, fit: identify.Fit) -> Robot:

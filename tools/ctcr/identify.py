@@ -81,12 +81,6 @@ class Fit:
     inflation: (
         Array  # (2,) factor on the jitter of positions and rotations that the fit had to admit; 1: none
     )
-    residual: Array  # (M, 6) at the fitted values; NaN where not measured or not solved
-    nominal_residual: Array  # (M, 6) at the robot file's values
-    field: Array  # (M, 6) posterior mean of the tracker's smooth error, a part of the residual
-    expected_square: (
-        Array  # (M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open
-    )
     weights: Array  # (M, 2) 1 plain, less for outliers, 0 not fitted
     excluded: list[int]  # rows that the model cannot solve
     converged: bool
@@ -98,12 +92,51 @@ class Fit:
     evaluations: int
     seconds: float
     core: Any  # the compiled fit
-    jacobian_all: Array  # (6 M, n) derivative of `residual`
+    predict: Any  # what was fitted
 
     @property
     def used(self) -> Mask:
         """Rows that were fitted (M,)."""
         return (self.weights > 0).any(axis=1)
+
+    @cached_property
+    def _every_row(self) -> Any:
+        """The predictor, of rows that were not fitted too."""
+        if hasattr(self.predict, "activate"):
+            active = np.ones(len(self.weights), bool)
+            active[self.excluded] = False
+            self.predict.activate(active.tolist())
+        return self.predict
+
+    @cached_property
+    def _report(self) -> tuple[Array, Array, Array, Array]:
+        return self.core.report(self._every_row)
+
+    @property
+    def residual(self) -> Array:
+        """(M, 6) at the fitted values; NaN where not measured or not solved."""
+        return self._report[0].reshape(-1, 6)
+
+    @property
+    def jacobian_all(self) -> Array:
+        """(6 M, n) derivative of `residual`."""
+        return self._report[1]
+
+    @property
+    def field(self) -> Array:
+        """(M, 6) posterior mean of the tracker's smooth error, a part of the residual."""
+        return self._report[2].reshape(-1, 6)
+
+    @property
+    def expected_square(self) -> Array:
+        """(M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open."""
+        return self._report[3]
+
+    @cached_property
+    def nominal_residual(self) -> Array:
+        """(M, 6) at the robot file's values."""
+        predict = getattr(self._every_row, "residual", self.predict)
+        return np.asarray(predict(self.prior_mean, False)[0]).reshape(-1, 6)
 
     @cached_property
     def p_value(self) -> float:
@@ -230,10 +263,10 @@ def fit(
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    warnings = ignored + list(_doubts(measurements, _measured(measurements) & chosen))
+    warnings = ignored + list(_doubts(measurements, measured_rows(measurements) & chosen))
     high = np.minimum(high, _home_limits(robot, measurements.beta[chosen], names))
     table = readings_of(robot, measurements, names, steps=steps, threads=threads)
-    table.activate((_measured(measurements) & chosen).tolist())
+    table.activate((measured_rows(measurements) & chosen).tolist())
     if starts is None:
         starts = 2 if len(measurements) > MANY_ROWS else 3
     fitted = identify_with(
@@ -274,7 +307,6 @@ def identify_with(
     (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
     residual means not measured. Nominal is where x is `mean`. Raises InputError where no fit is possible."""
     began = perf_counter()
-    compiled = hasattr(predict, "activate")
     try:
         core, excluded = _core.identify(
             predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
@@ -285,27 +317,17 @@ def identify_with(
         )  # fmt: skip
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
-    if compiled:
-        active = np.ones(len(places), bool)
-        active[excluded] = False
-        predict.activate(active.tolist())
-    nominal = predict.residual(mean)[0] if compiled else predict(mean, False)[0]
-    residual, jacobian, field, expected = core.report(predict)
     return Fit(
         names=list(names),
         units=[""] * len(names),
         prior_mean=np.asarray(mean),
         prior_sd=np.asarray(sd),
         correlations=[(names[c.first], names[c.second], c.coefficient) for c in core.correlations],
-        residual=residual.reshape(-1, 6),
-        nominal_residual=np.asarray(nominal).reshape(-1, 6),
-        field=field.reshape(-1, 6),
-        expected_square=expected,
         excluded=excluded,
         noise=noise,
         seconds=perf_counter() - began,
         core=core,
-        jacobian_all=jacobian,
+        predict=predict,
         warnings=[*core.warnings, *_excluded_text(excluded)],
         **{
             name: getattr(core, name)
@@ -318,8 +340,8 @@ def identify_with(
     )  # fmt: skip
 
 
-def _measured(measurements: Measurements) -> Mask:
-    """Rows that hold a position or an orientation."""
+def measured_rows(measurements: Measurements) -> Mask:
+    """Rows that hold a position or an orientation (M,)."""
     found = np.zeros(len(measurements), bool)
     for values in (measurements.position, measurements.quaternion):
         if values is not None:

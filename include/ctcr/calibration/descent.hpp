@@ -30,26 +30,38 @@ public:
 
   void set_whitening(const Whitening& whitening) { whitening_ = &whitening; }
 
-  /// Residual as predicted.
-  bool predict(const Eigen::VectorXd& z, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) const {
-    ++evaluations_;
-    return predict_(x(z), residual, jacobian);
+  /// Residual as predicted and its derivatives by x, or null where the prediction fails. Valid until the next call.
+  ///
+  /// Both are computed at once, and kept: of what a descent tries it keeps nearly all, and asks for it again.
+  struct Point {
+    Eigen::VectorXd z, residual;
+    Eigen::MatrixXd jacobian;
+    bool predicted = false;
+  };
+  const Point* at(const Eigen::VectorXd& z) const {
+    if (point_.z.size() != z.size() || point_.z != z) {
+      ++evaluations_;
+      point_.z = z;
+      point_.predicted = predict_(x(z), point_.residual, &point_.jacobian);
+    }
+    return point_.predicted ? &point_ : nullptr;
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Index n = scale_.size(), count = num_residuals() - n;
     const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(parameters[0], n);
-    Eigen::MatrixXd* jacobian = jacobians && jacobians[0] ? &jacobian_ : nullptr;
-    if (!predict(z, residual_, jacobian)) return false;
-    whitening_->apply(residual_);
+    const Point* point = at(z);
+    if (!point) return false;
     Eigen::Map<Eigen::VectorXd> out(residuals, num_residuals());
-    out.head(count) = residual_;
+    out.head(count) = point->residual;
+    whitening_->apply(out.head(count));
     out.tail(n) = prior_.cwiseProduct(z);
-    if (jacobian) {
-      whitening_->apply(jacobian_);
+    if (jacobians && jacobians[0]) {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       Eigen::Map<RowMajor> J(jacobians[0], num_residuals(), n);
-      J.topRows(count).noalias() = jacobian_ * scale_.asDiagonal();
+      Eigen::MatrixXd whitened = point->jacobian * scale_.asDiagonal();
+      whitening_->apply(whitened);
+      J.topRows(count) = whitened;
       J.bottomRows(n) = prior_.asDiagonal();
     }
     return out.allFinite();
@@ -59,8 +71,7 @@ private:
   const Predictor& predict_;
   Eigen::VectorXd scale_, origin_, prior_;
   const Whitening* whitening_ = nullptr;
-  mutable Eigen::VectorXd residual_;
-  mutable Eigen::MatrixXd jacobian_;
+  mutable Point point_;
   mutable int evaluations_ = 0;
 };
 

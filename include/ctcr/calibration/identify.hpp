@@ -90,49 +90,66 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
 
   Eigen::VectorXd z = objective.z(x);
   detail::Descent best;
-  const bool finds_weights = options.robust && !options.weights;
-  const bool finds_inflation = options.admit_model_error && !options.inflation;
-  // The inflation with which the residual would be no surprise.
-  const auto inflate = [&] {
-    const Whitening stated(noise, field, out.weights);
-    for (int kind = 0; kind < 2; ++kind) {
-      const double rows = detail::bulk_rows(out.weights, kind);
-      out.inflation[kind] = std::sqrt(stated.axes(kind).inflation(Whitening::gathered(residual, kind), 3 * rows));
-    }
-  };
-  const auto descend_robustly = [&] {
-    constexpr int rounds = 8;
-    const double settled = std::max(0.5, 1e-3 * double(places.rows()));  // rows
-    for (int round = 0; round < rounds; ++round) {
-      best = detail::descend(objective, bounds, options.max_iterations, z);
-      out.iterations += best.iterations;
-      if (!(finds_weights || finds_inflation) || round + 1 == rounds || !objective.predict(z, residual, nullptr))
-        return;
-      const RowWeights weights = out.weights;
-      const Eigen::Array2d inflation = out.inflation;
-      if (finds_weights) out.weights = outlier_weights(noise, out.inflation, out.whitening, residual, use);
-      if (finds_inflation) inflate();
-      const double changed = (weights - out.weights).cwiseAbs().sum();
-      const bool done = changed < settled && (out.inflation / inflation).log().abs().maxCoeff() < 0.02;
-      if (done) out.weights = weights, out.inflation = inflation;  // those that the descent was made with
-      set_whitening();
-      if (done) return;
-    }
-  };
-  // The first descent takes all that is wrong at the start for noise: far from the truth, details mislead.
-  if (finds_inflation) inflate();
-  set_whitening();
   Eigen::MatrixXd information;
   const auto linearise = [&] {
-    if (!objective.predict(z, residual, &jacobian))
-      throw std::invalid_argument("the readings cannot be predicted at the fitted values");
+    const auto* point = objective.at(z);
+    if (!point) throw std::invalid_argument("the readings cannot be predicted at the fitted values");
+    residual = point->residual;
+    jacobian = point->jacobian * sd.asDiagonal();
     out.whitening.apply(residual);
     out.whitening.apply(jacobian);
-    jacobian *= sd.asDiagonal();
     information = Eigen::MatrixXd::Zero(n, n);
     information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
     information = information.selfadjointView<Eigen::Lower>();
   };
+  const bool finds_weights = options.robust && !options.weights;
+  const bool finds_inflation = options.admit_model_error && !options.inflation;
+  // The inflation with which a residual would be no surprise.
+  const auto inflate = [&](const Eigen::VectorXd& left) {
+    const Whitening stated(noise, field, out.weights);
+    for (int kind = 0; kind < 2; ++kind) {
+      const double rows = detail::bulk_rows(out.weights, kind);
+      out.inflation[kind] = std::sqrt(stated.axes(kind).inflation(Whitening::gathered(left, kind), 3 * rows));
+    }
+  };
+  // Weights and inflation that belong to the best parameters of the model linearised at z, found without predictions.
+  // Returns whether they are others than before.
+  const auto settle = [&] {
+    constexpr int rounds = 20;
+    const double settled = std::max(0.5, 1e-3 * double(places.rows()));  // rows
+    for (int round = 0; round < rounds; ++round) {
+      linearise();
+      const Eigen::MatrixXd precision = information + Eigen::MatrixXd(objective.prior().asDiagonal());
+      const Eigen::VectorXd step =
+          -precision.ldlt().solve(jacobian.transpose() * residual + objective.prior().cwiseProduct(z));
+      const auto* point = objective.at(z);
+      const Eigen::VectorXd left = point->residual + point->jacobian * sd.cwiseProduct(step);
+      const RowWeights weights = out.weights;
+      const Eigen::Array2d inflation = out.inflation;
+      if (finds_weights) out.weights = outlier_weights(noise, out.inflation, out.whitening, left, use);
+      if (finds_inflation) inflate(left);
+      const double changed = (weights - out.weights).cwiseAbs().sum();
+      if (changed < settled && (out.inflation / inflation).log().abs().maxCoeff() < 0.02) {
+        out.weights = weights, out.inflation = inflation;  // those that the whitening has
+        return round > 0;
+      }
+      set_whitening();
+    }
+    return true;
+  };
+  const auto descend_robustly = [&] {
+    constexpr int rounds = 8;
+    for (int round = 0; round < rounds; ++round) {
+      best = detail::descend(objective, bounds, options.max_iterations, z);
+      out.iterations += best.iterations;
+      if (!(finds_weights || finds_inflation) || !objective.at(z) || !settle()) return;
+    }
+    best = detail::descend(objective, bounds, options.max_iterations, z);
+    out.iterations += best.iterations;
+  };
+  // The first descent takes all that is wrong at the start for noise: far from the truth, details mislead.
+  if (finds_inflation) inflate(residual);
+  set_whitening();
   descend_robustly();
   linearise();
 
@@ -145,13 +162,8 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
       const double drawn = normal(random);
       if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn, p.low, p.high) - p.mean) / p.sd;
     }
-    Eigen::VectorXd unused;
-    bool solved = objective.predict(other, unused, nullptr);
-    for (int halving = 0; halving < 5 && !solved; ++halving) {
-      other = 0.5 * (other + z);
-      solved = objective.predict(other, unused, nullptr);
-    }
-    if (!solved) continue;
+    for (int halving = 0; halving < 5 && !objective.at(other); ++halving) other = 0.5 * (other + z);
+    if (!objective.at(other)) continue;
     const Eigen::MatrixXd precision = information + Eigen::MatrixXd(objective.prior().asDiagonal());
     detail::Arrival arrival(other, z, precision);
     const detail::Descent there = detail::descend(objective, bounds, options.max_iterations, other, &arrival);
@@ -184,7 +196,7 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
 
   const Eigen::VectorXd gradient = jacobian.transpose() * residual + objective.prior().cwiseProduct(z);
   const double fitted_chi_square = residual.squaredNorm();
-  (void)objective.predict(z, residual, nullptr);
+  residual = objective.at(z)->residual;
   Whitening(noise, field, out.weights).apply(residual);
   out.chi_square = residual.squaredNorm();
   out.shift_square = z.cwiseProduct(objective.prior()).squaredNorm();

@@ -86,6 +86,17 @@ concept HasEnvironment = requires(const Effect& effect, const std::array<P, 3>& 
 template <class Effect, class P, int N>
 concept HasStation = requires(const Effect& effect, Station<P, N>& station) { effect.station(station); };
 
+/// An effect that changes the equilibrium of the rod.
+template <class Effect, class P, int N>
+concept ActsOnRod =
+    HasStation<Effect, P, N> || requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) {
+      effect.material(place, m);
+    } || requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
+      effect.grip(torque, angle);
+    } || requires(const Effect& effect, const std::array<P, 3>& gravity, std::array<P, 3>& force) {
+      effect.tip_force(gravity, force);
+    };
+
 /// Numbers without derivatives.
 struct Constant {};
 
@@ -134,6 +145,15 @@ struct EffectList {
         for (const P& x : e.values) all = all && std::isfinite(value(x));
       });
       return all;
+    }
+
+    /// Whether any effect changes the equilibrium of the rod; the others act on joints, load and readings.
+    [[nodiscard]] bool act_on_rod() const noexcept {
+      bool any = false;
+      for_each([&](const auto& e, int) {
+        if constexpr (ActsOnRod<std::remove_cvref_t<decltype(e)>, P, N>) any = any || acts(e);
+      });
+      return any;
     }
 
     /// Whether an effect that is active has something to do where tubes end or start to curve.
@@ -204,7 +224,7 @@ struct EffectList {
     /// Whether an amplitude differs from its neutral value or has derivatives.
     template <class Effect>
     static bool acts(const Effect& effect) noexcept {
-      if constexpr (requires { effect.profiles; }) return true;
+      if constexpr (requires { effect.profiles; }) return effect.profiles != nullptr && !effect.profiles->empty();
       for (int k = 0; k < int(effect.parameters.size()); ++k) {
         const EffectParameter& parameter = effect.parameters[std::size_t(k)];
         if (parameter.role != Role::amplitude) continue;

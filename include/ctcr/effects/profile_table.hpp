@@ -18,6 +18,10 @@ template <int N>
 struct Profiles {
   std::array<std::vector<ProfileNode>, N> nodes;  ///< empty, or at least two
   std::array<double, N> length{};                 ///< [m]
+
+  [[nodiscard]] bool empty() const noexcept {
+    return std::all_of(nodes.begin(), nodes.end(), [](const auto& tube) { return tube.size() < 2; });
+  }
 };
 
 namespace profile_table {

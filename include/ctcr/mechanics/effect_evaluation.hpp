@@ -165,11 +165,13 @@ private:
 
 }  // namespace detail
 
-/// As for the standard model; the general path has one integration scheme.
+/// As for the standard model; the general path has one integration scheme. Where no effect changes the rod, it is that of
+/// the standard model.
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joints<N>& q, const TipLoad& load,
                                    const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {
   static_assert(L == Loading::weight, "the general path has the general equations");
+  if (!c.on_rod) return evaluate<D, L, Stepper>(c.plain, q, load, guess, steps, out);
   using Col = Columns<N, L, D>;
   constexpr int beta = N + 2, force = beta + (Col::jacobian ? N : 0), moment = force + 3;
   constexpr int count = Col::compliance ? moment + 3 : force;

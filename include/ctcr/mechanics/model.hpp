@@ -22,6 +22,7 @@ struct EffectCoefficients {
   Coefficients<N> plain;  ///< without effects: where tubes end and curve
   Vec3 gravity;           ///< base frame [m/s^2]
   typename Fx::template On<N> effects;
+  bool on_rod;  ///< whether effects change the equilibrium of the rod: else `plain` has the same
 };
 
 /// Whether coefficients C are those of a model with effects.
@@ -42,7 +43,7 @@ public:
     if constexpr (Fx::none)
       coefficients_ = make_coefficients(robot);
     else
-      coefficients_ = {tube_parameters(robot), with_all_curves(robot), robot.gravity, effects};
+      coefficients_ = {tube_parameters(robot), with_all_curves(robot), robot.gravity, effects, effects.act_on_rod()};
   }
 
   [[nodiscard]] const Robot<N>& robot() const noexcept { return robot_; }

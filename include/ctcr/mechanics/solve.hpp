@@ -99,6 +99,7 @@ inline Coefficients<N> scaled(Coefficients<N> c, double weight, double curvature
 }
 template <int N, class Fx>
 inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weight, double curvature) noexcept {
+  c.plain = scaled(c.plain, weight, curvature);
   c.gravity *= weight;
   for (auto& tube : c.tubes) tube.kappa *= curvature;
   return c;

@@ -20,8 +20,9 @@ struct SystemParameters {
       for (int k = 0; k < int(effect.parameters.size()); ++k)
         for (int i = 0; i < effect.size(k); ++i)
           if (Robot::count + first + effect.place(k, i) == index) {
-            text = "effects." + std::string(effect.info.id) + "." + std::string(effect.parameters[std::size_t(k)].name);
-            if (effect.parameters[std::size_t(k)].per_tube) text += "." + std::to_string(i + 1);
+            const EffectParameter& parameter = effect.parameters[std::size_t(k)];
+            text.append("effects.").append(effect.info.id).append(".").append(parameter.name);
+            if (parameter.per_tube) text.append(".").append(std::to_string(i + 1));
           }
     });
     return text;

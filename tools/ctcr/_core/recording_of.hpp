@@ -58,7 +58,7 @@ private:
 
   static Profiles<N> profiles(const RecordedTable& table) {
     Profiles<N> out;
-    const auto& tubes = system_of<N>(table).model.robot().tubes;
+    const auto tubes = system_of<N>(table).model.robot().tubes;
     for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
       out.length[i] = tubes[i].length;
       for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {

@@ -1,6 +1,6 @@
 """All steps of a diagnosis, in their order."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ctcr import effects, identify
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates
+from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.race import Entry, Progress, Round
@@ -130,16 +130,19 @@ def _with_shapes(
     if not shapes:
         return fit
     progress(f"freeing the shape of {last.id}")
-    names = (*last.candidate.names, *shapes)
+    entry = replace(last, candidate=replace(last.candidate, names=(*last.candidate.names, *shapes)))
+    names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
     freed = engine.fit(
-        [n for a in accepted[:-1] for n in a.entry.candidate.names] + list(names),
-        start=values_of(fit), fixed=dict(pair for a in accepted for pair in a.entry.candidate.shape),
-        noise=fit.noise, weights=fit.weights, inflation=fit.inflation,
-    )  # fmt: skip
+        names,
+        start=values_of(fit),
+        fixed=fixed,
+        noise=fit.noise,
+        weights=fit.weights,
+        inflation=fit.inflation,
+    )
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
-    candidate = Candidate(last.id, names, last.candidate.shape)
-    accepted[-1].entry = Entry(candidate, last.linear, last.refit, last.share, freed, last.implausible)
+    accepted[-1].entry = replace(entry, fit=freed)
     return racing.baseline(engine, [a.entry for a in accepted], values_of(freed), progress)
 
 
@@ -150,12 +153,15 @@ def _backward(
     for a in list(accepted[:-1]):
         rest = [b for b in accepted if b is not a]
         progress(f"without {a.entry.id}")
-        names = [name for b in rest for name in b.entry.candidate.names]
+        names, fixed = racing.parameters(b.entry for b in rest)
         without = engine.fit(
-            names, start={k: v for k, v in values_of(fit).items() if k not in a.entry.candidate.names},
-            fixed=dict(pair for b in rest for pair in b.entry.candidate.shape),
-            noise=fit.noise, weights=fit.weights, inflation=fit.inflation,
-        )  # fmt: skip
+            names,
+            start=values_of(fit),
+            fixed=fixed,
+            noise=fit.noise,
+            weights=fit.weights,
+            inflation=fit.inflation,
+        )
         a.log_evidence = fit.log_evidence - without.log_evidence
         if a.log_evidence < racing.EVIDENCE:
             accepted.remove(a)

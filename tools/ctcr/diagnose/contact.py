@@ -36,8 +36,3 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
                     (Candidate(candidate.id, (STEM + "stiffness", *shapes), shape), column[:, :, None])
                 )
     return options
-
-
-def start_of(candidate: Candidate) -> dict[str, float]:
-    """Where a fit starts: with the plane that was found."""
-    return dict(candidate.shape) | {STEM + "stiffness": 0.1} if candidate.id == "contact" else {}

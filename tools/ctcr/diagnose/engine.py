@@ -21,7 +21,9 @@ class Gain:
 
     log_evidence: float  # over the fit without it
     values: Array  # of its parameters, over their neutral values, in units of their prior sd
+    calibration: Array  # change of the fitted parameters that goes with them, in units of their prior sd
     signal: Array  # whitened change of the residual that calibration cannot imitate (K,)
+    columns: Array  # whitened slopes that calibration cannot imitate (K, k)
 
 
 class Linear:
@@ -32,20 +34,20 @@ class Linear:
         information = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
         self.cholesky = np.linalg.cholesky(information)
 
-    def without_calibration(self, columns: Array) -> Array:
-        """What of whitened columns the fitted parameters cannot imitate, given their priors."""
-        inner = np.linalg.solve(self.cholesky, self.jacobian.T @ columns)
-        return columns - self.jacobian @ np.linalg.solve(self.cholesky.T, inner)
+    def imitation(self, columns: Array) -> Array:
+        """The change of the fitted parameters that imitates whitened columns best, given their priors."""
+        return np.linalg.solve(self.cholesky.T, np.linalg.solve(self.cholesky, self.jacobian.T @ columns))
 
     def gain(self, columns: Array) -> Gain:
         """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
-        left = self.without_calibration(columns)
+        imitation = self.imitation(columns)
+        left = columns - self.jacobian @ imitation
         S = columns.T @ left + np.eye(columns.shape[1])
         S = 0.5 * (S + S.T)
         g = columns.T @ self.residual
         eta = -np.linalg.solve(S, g)
         log_evidence = -0.5 * g @ eta - 0.5 * np.linalg.slogdet(S)[1]
-        return Gain(float(log_evidence), eta, left @ eta)
+        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left)
 
 
 @dataclass
@@ -62,7 +64,7 @@ class Engine:
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
         self.base = free_parameters.expand("standard", self.robot)
-        self.measured = identify._measured(self.measurements)
+        self.measured = identify.measured_rows(self.measurements)
 
     def noise_with(self, part: float) -> Any:
         """The tracker's noise with a part of its stated field error."""
@@ -83,14 +85,10 @@ class Engine:
         ]
         return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
 
-    def recording(
-        self, names: Sequence[str], fixed: dict[str, float] | None = None, rows: Mask | None = None
-    ) -> Any:
-        table = user_effects.recording_of(
+    def recording(self, names: Sequence[str], fixed: dict[str, float] | None = None) -> Any:
+        return user_effects.recording_of(
             self.robot, self.measurements, names, fixed=fixed, steps=self.steps, threads=self.threads
         )
-        table.activate((self.measured & (self.rows if rows is None else rows)).tolist())
-        return table
 
     def fit(
         self,
@@ -100,7 +98,6 @@ class Engine:
         fixed: dict[str, float] | None = None,
         weights: Array | None = None,
         inflation: Array | None = None,
-        rows: Mask | None = None,
         noise: Any = None,
     ) -> identify.Fit:
         """Calibration and `added` parameters of effects together.
@@ -112,25 +109,48 @@ class Engine:
         mean, sd, low, high = self.priors(names)
         mean_of = dict(zip(names, mean, strict=True))
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
+        table = self.recording(names, fixed)
+        table.activate((self.measured & self.rows).tolist())
         return identify.identify_with(
-            self.recording(names, fixed, rows), names, mean, sd, low, high, noise or self.noise, self.places,
+            table, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
             start=at, starts=1,
+        )  # fmt: skip
+
+    def linear_fit(
+        self,
+        at: identify.Fit,
+        *,
+        noise: Any = None,
+        weights: Array | None = None,
+        inflation: Array | None = None,
+    ) -> identify.Fit:
+        """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap."""
+        fitted = at.residual if weights is not None else np.where(self.rows[:, None], at.residual, np.nan)
+        residual = fitted.ravel()
+        _, _, low, high = self.priors(at.names)
+
+        def predict(x: Array, _: bool) -> tuple[Array, Array]:
+            return residual + at.jacobian_all @ (x - at.values), at.jacobian_all
+
+        return identify.identify_with(
+            predict, at.names, at.prior_mean, at.prior_sd, low, high, noise or at.noise, self.places,
+            robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
+            start=at.values, starts=1,
         )  # fmt: skip
 
     def linear(self, fit: identify.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)
 
-    def columns(
-        self, fit: identify.Fit, names: Sequence[str], fixed: dict[str, float] | None = None
-    ) -> Array:
-        """Raw slopes (M, 6, k) of the residual by further parameters at a fit, in units of their prior sd."""
-        everything = [*fit.names, *names]
-        table = self.recording(everything, fixed)
-        neutral, sd, _, _ = self.priors(names)
-        _, jacobian, _ = table.residual(np.concatenate([fit.values, neutral]), True)
-        slopes = jacobian[:, len(fit.names) :] * sd
+    def slopes(self, fit: identify.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
+        """Raw slopes (M, 6, k) of the residual by parameters, fitted or neutral, in units of their prior sd."""
+        everything = [*fit.names, *(name for name in names if name not in fit.names)]
+        neutral, sd, _, _ = self.priors(everything)
+        at = np.concatenate([fit.values, neutral[len(fit.names) :]])
+        _, jacobian, _ = self.recording(everything, fixed).residual(at, True)
+        chosen = [everything.index(name) for name in names]
+        slopes = jacobian[:, chosen] * sd[chosen]
         return np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(self.measurements), 6, len(names))
 
 

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
-from ctcr.diagnose.leftover import covariates
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -62,22 +61,24 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
 
 
 def before_after(figure, d: "Diagnosis") -> bool | None:
-    """Position error before and after against the quantity that predicts it best before."""
-    found = covariates(d.robot, d.measurements)
-    scores = {name: share for name, share in d.leftover.shares_before.items() if name in found}
-    if not scores or d.final is d.calibrated:
+    """Position error before and after against what predicts it best before."""
+    ranking, sample = d.leftover.before, d.leftover.sample
+    if not ranking.chosen or d.final is d.calibrated:
         return False
-    names = sorted(scores, key=lambda name: -scores[name])[:3]
-    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    for axes, name in zip(panels, names, strict=True):
-        x = found[name][:, 0]
+    rows = np.searchsorted(d.measurements.row, sample.row)
+    quantities = [item.form.covariate for item in ranking.chosen if item.form.covariate][:3]
+    if not quantities:
+        return False
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
         for fit, colour, label in (
             (d.calibrated, ERROR, "calibrated"),
             (d.final, GOOD, "with the effects found"),
         ):
-            size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
+            size = 1e3 * np.linalg.norm(fit.residual[rows, :3], axis=1)
+            x = quantity.scale * quantity.value
             axes.plot(x, size, ".", color=colour, markersize=3, alpha=0.6, label=label)
-        axes.set_xlabel(f"{name} (first component)")
+        axes.set_xlabel(f"{quantity.label}, {quantity.unit}" if quantity.unit else quantity.label)
     panels[0].set_ylabel("error, mm")
     panels[0].set_yscale("log")
     panels[0].legend(markerscale=3)

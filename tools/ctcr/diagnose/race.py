@@ -1,6 +1,6 @@
 """The race: every candidate judged after a joint refit with the calibration, one accepted at a time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from ctcr import effects, identify
 from ctcr.diagnose import contact, jump, split
 from ctcr.diagnose.candidates import Candidate
-from ctcr.diagnose.engine import Engine, Linear, values_of
+from ctcr.diagnose.engine import Engine, Gain, values_of
+from ctcr.errors import InputError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -20,7 +21,7 @@ TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told ap
 SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 REFITS = 6  # effects that are refitted, the best by their slopes
-NEAR = 0.5  # candidates below this part of the best linear gain are not refitted, unless few are left
+NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
 SOUND = 1.05  # inflation of the noise up to which the model explains the readings
@@ -34,11 +35,15 @@ class Entry:
     """A candidate in one round of the race."""
 
     candidate: Candidate
-    linear: float  # log evidence over none, by slopes
-    refit: float | None = None  # after a joint refit; None: too far behind to be refitted
+    gain: Gain  # over none, by slopes
+    refit: float | None = None  # log evidence after a joint refit; None: too far behind to be refitted
     share: float = 0.0  # of the excess chi-square that it removes
     fit: identify.Fit | None = None
     implausible: tuple[str, ...] = ()  # what its values, or those of the calibration, would have to be
+
+    @property
+    def linear(self) -> float:
+        return self.gain.log_evidence
 
     @property
     def score(self) -> float:
@@ -76,31 +81,27 @@ def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
     """Whether noise alone, as stated, does not explain what is left."""
     if np.max(fit.inflation) > 1.2:
         return True
-    names = [name for name in fit.names if name.startswith("effects.")]
-    plain = engine.fit(
-        names, start=values_of(fit), noise=fit.noise, weights=fit.weights, inflation=np.ones(2)
-    )
-    return plain.p_value < SIGNIFICANCE
+    return engine.linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value < SIGNIFICANCE
+
+
+def parameters(entries: Iterable[Entry]) -> tuple[list[str], dict[str, float]]:
+    """Names of all parameters of effects that are fitted, and the values at which others are held."""
+    names = [name for entry in entries for name in entry.candidate.names]
+    return names, dict(pair for entry in entries for pair in entry.candidate.shape)
 
 
 def baseline(
     engine: Engine, accepted: list[Entry], start: dict[str, float], progress: Progress
 ) -> identify.Fit:
     """Calibration and the accepted effects, outliers weighted; the part of the field error that the data ask for."""
-    names = [name for entry in accepted for name in entry.candidate.names]
-    fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
-    fits: list[identify.Fit] = []
-    for part in FIELDS:
-        progress(f"calibration with {part:.0%} of the stated field error")
-        weights = fits[0].weights if fits else None
-        fits.append(
-            engine.fit(names, start=start, fixed=fixed, noise=engine.noise_with(part), weights=weights)
-        )
-        start = values_of(fits[-1])
-    best = max(fits, key=lambda fit: fit.log_evidence)
-    if best is not fits[0]:
-        best = engine.fit(names, start=values_of(best), fixed=fixed, noise=best.noise)
-    return best
+    progress("calibration")
+    names, fixed = parameters(accepted)
+    full = engine.fit(names, start=start, fixed=fixed)
+    others = [
+        engine.linear_fit(full, noise=engine.noise_with(part), weights=full.weights) for part in FIELDS[1:]
+    ]
+    best = max([full, *others], key=lambda fit: fit.log_evidence)
+    return full if best is full else engine.fit(names, start=values_of(best), fixed=fixed, noise=best.noise)
 
 
 def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
@@ -110,30 +111,24 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
     """
     if np.max(fit.inflation) < SOUND:
         return fit  # nothing is wrong with the model that the field could have been bent to hide
-    names = [name for entry in accepted for name in entry.candidate.names]
-    fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
+    progress("prediction of other runs")
     fold = split.groups(engine.measurements) % 4  # the fourth is locked away
     plain = fit.weights[:, 0] > 0.3
     errors: dict[float, float] = {}
     for part in FIELDS:
-        progress(f"prediction with {part:.0%} of the stated field error")
-        square = 0.0
+        noise, square = engine.noise_with(part), 0.0
         for out in (engine.rows & (fold == k) for k in range(3)):
-            trial = engine.fit(
-                names,
-                start=values_of(fit),
-                fixed=fixed,
-                noise=engine.noise_with(part),
-                weights=fit.weights * ~out[:, None],
-            )
+            trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None])
             square += np.nan_to_num(trial.rms_mm(out & plain)) ** 2
         errors[part] = square
     part = min(errors, key=lambda part: errors[part])
-    noise = engine.noise_with(part)
     usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
     if errors[part] > BETTER**2 * errors[usual]:
         return fit
-    return engine.fit(names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights)
+    names, fixed = parameters(accepted)
+    return engine.fit(
+        names, start=values_of(fit), fixed=fixed, noise=engine.noise_with(part), weights=fit.weights
+    )
 
 
 def race(
@@ -145,12 +140,11 @@ def race(
 ) -> Round:
     """One round: screens all candidates by their slopes, refits the best, and decides."""
     progress("screening all candidates")
-    linear = engine.linear(before)
-    fixed = dict(pair for entry in accepted for pair in entry.candidate.shape)
-    screened = screen(engine, before, linear, candidates, fixed)
+    _, fixed = parameters(accepted)
+    screened = screen(engine, before, candidates, fixed)
     if not screened:
         return Round(before, [], {}, reason="no effect is left to try")
-    worth = [entry for entry in screened if entry.linear > 1.0]
+    worth = [entry for entry in screened if entry.linear > max(1.0, NEAR * screened[0].linear)]
     chosen: list[Entry] = []
     for entry in worth:
         same = [other for other in chosen if other.id == entry.id]
@@ -160,33 +154,33 @@ def race(
     entries += [entry for entry in screened if entry not in chosen]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
-    decide(engine, round_, linear, fixed, len({c.id for c in candidates}))
+    decide(round_, len({c.id for c in candidates}))
     return round_
 
 
 def screen(
-    engine: Engine, before: identify.Fit, linear: Linear, candidates: list[Candidate], fixed: dict[str, float]
+    engine: Engine, before: identify.Fit, candidates: list[Candidate], fixed: dict[str, float]
 ) -> list[Entry]:
-    """All candidates with their linear gain, best first."""
-    names = list(dict.fromkeys(name for c in candidates for name in c.names if name not in before.names))
-    slopes = engine.columns(before, names, fixed | {jump.WHEN: -1.0})
+    """All candidates with their gain by slopes, best first."""
+    linear = engine.linear(before)
+    candidates = [c for c in candidates if not set(c.names) & set(before.names)]
+    names = list(dict.fromkeys([name for c in candidates for name in c.names] + contact.FORCE))
+    slopes = engine.slopes(before, names, fixed | {jump.WHEN: -1.0})
     place = {name: i for i, name in enumerate(names)}
-    tip = engine.columns(before, contact.FORCE, fixed) / engine.priors(contact.FORCE)[1]
     entries = []
     for candidate in candidates:
-        if any(name not in place for name in candidate.names):
-            continue
         own = slopes[:, :, [place[name] for name in candidate.names]]
         if candidate.id == "frame_jump":
             options = jump.moments(engine, candidate, own)
         elif candidate.id == "contact":
+            tip = slopes[:, :, [place[name] for name in contact.FORCE]] / engine.priors(contact.FORCE)[1]
             options = contact.planes(engine, candidate, tip)
         else:
             options = [(candidate, own)]
         gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
         if gains:
             gain, variant = max(gains, key=lambda pair: pair[0].log_evidence)
-            entries.append(Entry(variant, gain.log_evidence))
+            entries.append(Entry(variant, gain))
     return sorted(entries, key=lambda entry: -entry.linear)
 
 
@@ -197,15 +191,17 @@ def refit(
     candidate = entry.candidate
     progress(f"fitting {candidate.label}")
     added = [name for name in before.names if name.startswith("effects.")]
-    names = [*added, *candidate.names]
-    try:
-        fit = engine.fit(
-            names, start=values_of(before) | contact.start_of(candidate), fixed=fixed | dict(candidate.shape),
-            noise=before.noise, weights=before.weights, inflation=before.inflation,
-        )  # fmt: skip
-    except identify.InputError:
+    for start in (_start(engine, before, entry), values_of(before)):
+        try:
+            fit = engine.fit(
+                [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape), noise=before.noise,
+                weights=before.weights, inflation=before.inflation,
+            )  # fmt: skip
+            break
+        except InputError:
+            continue  # the model has no solution there
+    else:
         return entry
-    gained = fit.log_evidence - before.log_evidence
     removed = (
         before.chi_square + before.shift_square - fit.chi_square - fit.shift_square - len(candidate.names)
     )
@@ -213,11 +209,20 @@ def refit(
     share = removed / max(excess(before), spread, removed, 1.0)
     return replace(
         entry,
-        refit=gained,
+        refit=fit.log_evidence - before.log_evidence,
         share=float(share),
         fit=fit,
         implausible=tuple(implausible(engine, fit, candidate)),
     )
+
+
+def _start(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float]:
+    """Where the slopes say that the refit will end."""
+    fitted = entry.candidate.names[: len(entry.gain.values)]  # the shapes of a contact come after
+    neutral, sd, _, _ = engine.priors(fitted)
+    moved = before.values + before.prior_sd * entry.gain.calibration
+    own = dict(zip(fitted, neutral + sd * entry.gain.values, strict=True))
+    return dict(zip(before.names, map(float, moved), strict=True)) | dict(entry.candidate.shape) | own
 
 
 def implausible(engine: Engine, fit: identify.Fit, candidate: Candidate) -> list[str]:
@@ -233,7 +238,7 @@ def implausible(engine: Engine, fit: identify.Fit, candidate: Candidate) -> list
     return found
 
 
-def decide(engine: Engine, round_: Round, linear: Linear, fixed: dict[str, float], tried: int) -> None:
+def decide(round_: Round, tried: int) -> None:
     """Accepts the best entry, with all that the data cannot tell from it, or says why not."""
     best = next((entry for entry in round_.entries if entry.fit is not None), None)
     if best is None:
@@ -250,7 +255,9 @@ def decide(engine: Engine, round_: Round, linear: Linear, fixed: dict[str, float
         round_.reason = f"the best candidate, {best.id}, removes {share}, as stand-ins do"
         return
     rivals = [entry for entry in round_.entries if entry.fit is not None and entry.id != best.id]
-    round_.overlaps = overlaps(engine, round_.before, linear, best, rivals, fixed)
+    for rival in rivals:
+        overlap = min(_imitated(best, rival), _imitated(rival, best))
+        round_.overlaps[rival.id] = max(overlap, round_.overlaps.get(rival.id, 0.0))
     same = [entry for entry in rivals if best.score - entry.score < TIE or round_.overlaps[entry.id] >= SAME]
     round_.accepted = best
     round_.ids = [best.id, *dict.fromkeys(entry.id for entry in same)]
@@ -258,35 +265,9 @@ def decide(engine: Engine, round_: Round, linear: Linear, fixed: dict[str, float
     round_.margin = best.score - max(others, default=-np.inf)
 
 
-def overlaps(
-    engine: Engine,
-    before: identify.Fit,
-    linear: Linear,
-    best: Entry,
-    rivals: list[Entry],
-    fixed: dict[str, float],
-) -> dict[str, float]:
-    """By id: the share of the winner's signal that a rival imitates, or of the rival's by the winner: the less."""
-
-    def left(entry: Entry) -> tuple[Array, Array]:
-        columns = before.whiten(
-            engine.columns(before, entry.candidate.names, fixed | dict(entry.candidate.shape))
-        )
-        rest = linear.without_calibration(columns)
-        mean, sd, _, _ = engine.priors(entry.candidate.names)
-        fitted = values_of(entry.fit)
-        eta = (np.array([fitted[name] for name in entry.candidate.names]) - mean) / sd
-        return rest, rest @ eta
-
-    def imitated(signal: Array, by: Array) -> float:
-        q, r = np.linalg.qr(by)
-        keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
-        return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))
-
-    own, signal = left(best)
-    found: dict[str, float] = {}
-    for rival in rivals:
-        others, theirs = left(rival)
-        overlap = min(imitated(signal, others), imitated(theirs, own))
-        found[rival.id] = max(overlap, found.get(rival.id, 0.0))
-    return found
+def _imitated(entry: Entry, by: Entry) -> float:
+    """Share of an entry's signal that another one can imitate together with the calibration."""
+    signal = entry.gain.signal
+    q, r = np.linalg.qr(by.gain.columns)
+    keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
+    return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))

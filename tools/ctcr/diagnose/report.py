@@ -112,7 +112,7 @@ def _limits(d: "Diagnosis") -> str:
     if not d.leftover.structured:
         lines.insert(0, "What is left is noise.")
     else:
-        on = ", ".join(d.leftover.depends_on)
+        on = ", ".join(item.label for item in d.leftover.after.chosen)
         lines.insert(0, "What is left is more than noise" + (f"; it depends on {on}" if on else ""))
     return (
         "<h2>What is left, and what these data cannot say</h2><ul>"

@@ -90,7 +90,8 @@ def _leftover(console: Any, result: "Diagnosis") -> None:
         console.print("What is left is noise.")
     elif left.depends_on:
         console.print(
-            f"What is left is more than noise; it depends on {', '.join(left.depends_on)}.", markup=False
+            f"What is left is more than noise; it depends on {', '.join(i.label for i in left.after.chosen)}.",
+            markup=False,
         )
     else:
         console.print("What is left is more than noise, and depends on nothing that was tried.")
