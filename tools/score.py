@@ -17,7 +17,7 @@ from pathlib import Path
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).parents[1]
-NAMED = ("identified", "probable", "ambiguous")
+VISIBLE = 30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 
 
 def wilson(hits: int, count: int) -> str:
@@ -67,6 +67,8 @@ def judged(said: dict | None, truth: dict) -> dict[str, bool]:
     elif truth["verdict"] == "not_in_catalogue":
         scores["outside the catalogue: never identified"] = word != "identified"
         scores["outside the catalogue: flagged"] = word in ("not_in_catalogue", "stand_in")
+    elif hidden and truth["chi_square_after_calibration"] < VISIBLE:
+        scores["below what the data can show: nothing else named"] = not classes or all(found)
     elif hidden:
         scores["right class first"] = bool(classes) and any(identity in classes[0] for identity in hidden)
         scores["exactly the right classes"] = all(found) and len(classes) == len(hidden)

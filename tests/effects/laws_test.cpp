@@ -139,17 +139,19 @@ TEST(Softening, GivesWayTowardsAPlateau) {
   OneTube tube(0);
   tube.q.alpha << 0;
   Catalogue::On<1> effects;
-  for (const double gamma : {-0.0005, 0.004, 0.08}) {
-    effect<Softening>(effects).values = {gamma};
-    for (const double u : {0.5, 5.0, 15.0}) {
-      const double left = 0.25 + 0.75 / std::sqrt(1 + 2 * gamma * u * u / 0.75);
-      if (u == 0.5) {
-        EXPECT_NEAR(left, 1 - gamma * u * u, 3 * std::pow(gamma * u * u, 2));
+  for (const double gamma : {0.004, 0.08})
+    for (const double r : {0.25, 0.6})
+      for (const double p : {2.0, 5.0, 8.0}) {
+        effect<Softening>(effects).values = {gamma, r, p};
+        for (const double u : {0.5, 5.0, 15.0}) {
+          const double q = 2 * gamma * u * u / (1 - r), left = r + (1 - r) * std::pow(1 + std::pow(q, p / 2), -1 / p);
+          if (u == 0.5 && p == 2) {
+            EXPECT_NEAR(left, 1 - gamma * u * u, 3 * std::pow(gamma * u * u, 2));
+          }
+          const TipLoad bend{.force = Vec3::Zero(), .moment = {left * tube.EI() * u, 0, 0}};
+          expect_pose(solved(tube.robot, effects, tube.q, bend).pose(), arc({u, 0, 0}, tube.deployed), 1e-11);
+        }
       }
-      const TipLoad bend{.force = Vec3::Zero(), .moment = {left * tube.EI() * u, 0, 0}};
-      expect_pose(solved(tube.robot, effects, tube.q, bend).pose(), arc({u, 0, 0}, tube.deployed), 1e-11);
-    }
-  }
 }
 
 TEST(Anisotropy, IsStifferOneWayThanTheOther) {
@@ -237,11 +239,11 @@ TEST(Effects, AreReciprocal) {
 
 TEST(Softening, IsSolvedUpToItsHardBounds) {
   Random random(9);
-  for (const double gamma : {-0.001, 0.016, 0.08})
+  for (const auto& [gamma, plateau, sharpness] : {std::array{0.0, 0.25, 2.0}, {0.016, 0.25, 2.0}, {0.08, 0.02, 8.0}})
     for (int n = 0; n < test::cases(15); ++n) {
       const auto [robot, q, load] = test::smooth_case<3>(random, 0.1, 0, test::tilted_gravity);
       Catalogue::On<3> effects;
-      effect<Softening, 3>(effects).values = {gamma, gamma, gamma};
+      effect<Softening, 3>(effects).values = {gamma, gamma, gamma, plateau, sharpness};
       Workspace<3> ws;
       Solution<3> s;
       const Status status = solve<Derivatives::compliance>(Model<3, Catalogue>(robot, effects), q, load, ws, s);

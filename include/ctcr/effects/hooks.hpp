@@ -34,16 +34,17 @@ struct TubePlace {
 };
 
 /// What a tube is made of at a place; on entry as its data sheet says. Its bending moment, tube frame x and y, is
-/// f EI A d, d = u - curvature, A = 1 + [a0 a1; a1 -a0], f = r + (1 - r) / sqrt(1 + 2 c d A d / (1 - r)), c the
-/// softening: f = 1 - c d A d at first, r in the end. That has a convex potential: every moment has one curvature.
+/// f EI A d, d = u - curvature, A = 1 + [a0 a1; a1 -a0]. What softening leaves of the stiffness, with z = d A d and
+/// q = 2 c z / (1 - r), is f = r + (1 - r) (1 + q^(p/2))^(-1/p): all of it at first, r in the end. The potential is
+/// convex: every moment has one curvature.
 template <class P>
 struct Material {
   P bending_stiffness;                      ///< EI, mean of all directions [N m^2]
   std::array<P, 2> anisotropy{{0.0, 0.0}};  ///< a0, a1
   std::array<P, 2> curvature;               ///< of the free tube about its x and y axes [1/m]
   P softening = 0.0;                        ///< c [m^2]
-
-  static constexpr double stiffness_left = 0.25;  ///< r
+  P plateau = 0.25;                         ///< r
+  P sharpness = 2.0;                        ///< p: how sudden the knee is
 };
 
 /// A place where a tube ends or starts to be curved, or the front plate. Vectors in the Bishop frame on its far side.

@@ -22,22 +22,44 @@ inline constexpr std::array parameters{
                     .sigma = 0.004,
                     .soft_low = 0,
                     .soft_high = 0.016,
-                    .hard_low = -0.001,
+                    .hard_low = 0,
                     .hard_high = 0.08,
                     .per_tube = true,
                     .meaning = "part of the stiffness that is lost per square of the change of curvature, as long as "
-                               "that is small; three quarters at most"},
+                               "that is small"},
+    EffectParameter{.name = "plateau",
+                    .unit = {},
+                    .neutral = 0.25,
+                    .sigma = 0.15,
+                    .soft_low = 0.05,
+                    .soft_high = 0.6,
+                    .hard_low = 0.02,
+                    .hard_high = 0.9,
+                    .role = Role::shape,
+                    .meaning = "part of the stiffness that is left in the end"},
+    EffectParameter{.name = "sharpness",
+                    .unit = {},
+                    .neutral = 2,
+                    .sigma = 1.5,
+                    .soft_low = 2,
+                    .soft_high = 8,
+                    .hard_low = 2,
+                    .hard_high = 8,
+                    .role = Role::shape,
+                    .meaning = "how suddenly the tube gives way: 2 gradually, 8 at a knee"},
 };
 }  // namespace softening
 
-/// Superelastic softening: m = EI d (1 - gamma |d|^2) for a small change d of curvature, towards a plateau for a large one
-/// (Material).
+/// Superelastic softening: m = EI d (1 - gamma |d|^2) for a small change d of curvature where the sharpness is 2, towards
+/// a plateau for a large one (Material).
 template <int N, class P = double>
 struct Softening : EffectValues<softening::parameters, N, P> {
   static constexpr const EffectInfo& info = softening::info;
 
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     m.softening = m.softening + this->template get<0>(place.tube);
+    m.plateau = this->template get<1>();
+    m.sharpness = this->template get<2>();
   }
 };
 

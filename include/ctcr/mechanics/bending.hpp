@@ -22,25 +22,29 @@ std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept 
   return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
 }
 
-/// f, what softening c leaves of a stiffness where d A d = z.
-template <class T>
-T stiffness_left(const T& c, const T& z) noexcept {
-  constexpr double r = Material<T>::stiffness_left;
-  if (value(c) == 0) return 1.0 - c * z;  // the same with its derivatives, for less
-  return r + (1 - r) * inverse(square_root(1.0 + (2 / (1 - r)) * (c * z)));
+/// f, what softening leaves of a stiffness where d A d = z.
+template <class T, class S>
+T stiffness_left(const Material<S>& m, const T& z) noexcept {
+  const T c = as<T>(m.softening);
+  if (!(value(c) * value(z) > 1e-12)) return 1.0 - c * z;  // there the same, with the derivatives of p = 2
+  const T r = as<T>(m.plateau), p = as<T>(m.sharpness), rest = 1.0 - r;
+  const T t = exponential_of(T(0.5 * p * logarithm_of(T(2.0 * c * z * inverse(rest)))));
+  return r + rest * exponential_of(T(-(logarithm_of(T(1.0 + t)) * inverse(p))));
 }
 /// df/dz.
-inline double loss_slope(double c, double z) noexcept {
-  constexpr double r = Material<double>::stiffness_left;
-  const double q = 1 / std::sqrt(1 + 2 / (1 - r) * c * z);
-  return -c * q * q * q;
+template <class S>
+double loss_slope(const Material<S>& m, double z) noexcept {
+  const double c = value(m.softening), p = value(m.sharpness), rest = 1 - value(m.plateau);
+  if (!(c * z > 1e-12)) return -c;
+  const double t = std::pow(2 * c * z / rest, p / 2);
+  return -rest / (2 * z) * t * std::pow(1 + t, -1 / p - 1);
 }
 
 /// Bending moment of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [N m].
 template <class T, class S>
 std::array<T, 2> moment(const Material<S>& m, const T& dx, const T& dy) noexcept {
   const std::array<T, 2> e = weighed(m, dx, dy);
-  const T k = as<T>(m.bending_stiffness) * stiffness_left(as<T>(m.softening), T(dx * e[0] + dy * e[1]));
+  const T k = as<T>(m.bending_stiffness) * stiffness_left(m, T(dx * e[0] + dy * e[1]));
   return {k * e[0], k * e[1]};
 }
 

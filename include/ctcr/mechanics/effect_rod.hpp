@@ -164,7 +164,7 @@ public:
   }
 
 private:
-  static constexpr int softening_iterations = 8;  ///< convex and quadratic: 3 are usual, 6 at the strongest softening
+  static constexpr int softening_iterations = 12;  ///< convex and quadratic: 3 are usual
 
   /// A symmetric 2 x 2 matrix.
   struct Slope {
@@ -227,8 +227,8 @@ private:
       const double dx = c * u[0] + s * u[1] - value(m.curvature[0]), dy = c * u[1] - s * u[0] - value(m.curvature[1]);
       const auto e = bending::weighed(m, dx, dy);
       const double z = dx * e[0] + dy * e[1];
-      add_stiffness(m, b, i, bending::stiffness_left(value(m.softening), z), slope);
-      const double loss = 2 * value(m.bending_stiffness) * bending::loss_slope(value(m.softening), z);
+      add_stiffness(m, b, i, bending::stiffness_left(m, z), slope);
+      const double loss = 2 * value(m.bending_stiffness) * bending::loss_slope(m, z);
       const double x = c * e[0] - s * e[1], y = s * e[0] + c * e[1];
       slope.xx += loss * x * x;
       slope.xy += loss * x * y;

@@ -56,6 +56,7 @@ class Engine:
     measurements: Measurements
     noise: Any
     rows: Mask  # that are fitted
+    robust: bool = True  # whether readings that are far off count for little
     steps: int = recording.STEPS
     threads: int = 0
     places: Array = field(init=False)
@@ -111,6 +112,8 @@ class Engine:
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
         table.activate((self.measured & self.rows).tolist())
+        if weights is None and not self.robust:
+            weights = np.ones((len(self.measurements), 2))
         return identify.identify_with(
             table, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,

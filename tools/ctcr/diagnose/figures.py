@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.diagnose.race import Entry, imitated
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -61,27 +62,56 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
 
 
 def before_after(figure, d: "Diagnosis") -> bool | None:
-    """Position error before and after against what predicts it best before."""
+    """The error after calibration against what predicts it best, and the part of it that the effects found explain.
+
+    Both along the direction in which the effects act most.
+    """
     ranking, sample = d.leftover.before, d.leftover.sample
-    if not ranking.chosen or d.final is d.calibrated:
+    quantities = [item.form.covariate for item in ranking.chosen if item.form.covariate][:3]
+    if not quantities or not d.accepted:
         return False
     rows = np.searchsorted(d.measurements.row, sample.row)
-    quantities = [item.form.covariate for item in ranking.chosen if item.form.covariate][:3]
-    if not quantities:
-        return False
+    error = 1e3 * d.calibrated.residual[rows, :3]
+    explained = error - 1e3 * d.with_effects.residual[rows, :3]
+    known = np.isfinite(explained).all(axis=1)
+    _, _, axes_of_effect = np.linalg.svd(
+        explained[known] - explained[known].mean(axis=0), full_matrices=False
+    )
     panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
     for axes, quantity in zip(panels, quantities, strict=True):
-        for fit, colour, label in (
-            (d.calibrated, ERROR, "calibrated"),
-            (d.final, GOOD, "with the effects found"),
+        x = quantity.scale * quantity.value
+        for vectors, colour, label in (
+            (error, ERROR, "error after calibration"),
+            (explained, GOOD, "explained by the effects found"),
         ):
-            size = 1e3 * np.linalg.norm(fit.residual[rows, :3], axis=1)
-            x = quantity.scale * quantity.value
-            axes.plot(x, size, ".", color=colour, markersize=3, alpha=0.6, label=label)
+            axes.plot(x, vectors @ axes_of_effect[0], ".", color=colour, markersize=4, alpha=0.6, label=label)
+        axes.axhline(0, color=INK, linewidth=0.6)
         axes.set_xlabel(f"{quantity.label}, {quantity.unit}" if quantity.unit else quantity.label)
-    panels[0].set_ylabel("error, mm")
-    panels[0].set_yscale("log")
+    panels[0].set_ylabel("along the main direction, mm")
     panels[0].legend(markerscale=3)
+    return None
+
+
+def overlap(figure, d: "Diagnosis") -> bool | None:
+    """How much of the signal of each candidate of the first round another one can imitate together with calibration."""
+    best: dict[str, Entry] = {}
+    for entry in d.rounds[0].entries:
+        if entry.fit is not None:
+            best.setdefault(entry.id, entry)
+    if len(best) < 2:
+        return False
+    share = np.array([[imitated(of, by) for by in best.values()] for of in best.values()])
+    axes = figure.subplots()
+    picture = axes.imshow(share, vmin=0, vmax=1, cmap="Blues")
+    for i, j in np.ndindex(share.shape):
+        axes.text(
+            j, i, f"{share[i, j]:.2f}", ha="center", va="center", color="w" if share[i, j] > 0.6 else INK
+        )
+    names = [identity.replace("_", " ") for identity in best]
+    axes.set_xticks(range(len(best)), names, rotation=30, ha="right")
+    axes.set_yticks(range(len(best)), names)
+    axes.set_xlabel("imitated by")
+    figure.colorbar(picture, ax=axes, label="share of the signal")
     return None
 
 

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having looked at many: log(number of candidates)
-SHARE = 0.25  # of the excess that an effect must remove
+UNASKED = 10.0  # evidence needed besides where noise alone explains what is left
+SHARE = 0.25  # of the excess that a further effect must remove, and
+FIRST_SHARE = 0.1  # the first one
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
 SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
@@ -24,9 +26,10 @@ REFITS = 6  # effects that are refitted, the best by their slopes
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
-SOUND = 1.05  # inflation of the noise up to which the model explains the readings
 # Another noise must predict other runs so much better to be preferred to that of the most evidence.
 BETTER = 0.95
+OUTLIER = 0.3  # weight below which a reading is taken for one
+MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
 
 
@@ -77,6 +80,19 @@ def excess(fit: identify.Fit) -> float:
     return fit.chi_square + fit.shift_square - explained
 
 
+def share_of(before: identify.Fit, after: identify.Fit, added: int) -> float:
+    """Part of the excess that `added` parameters remove, at the same weights and noise."""
+    removed = before.chi_square + before.shift_square - after.chi_square - after.shift_square - added
+    spread = np.sqrt(2 * before.observations)
+    return float(removed / max(excess(before), spread, removed, 1.0))
+
+
+def outliers(fit: identify.Fit) -> float:
+    """Share of the fitted readings that are taken for outliers."""
+    used = fit.weights[:, 0] > 0
+    return float(np.mean(fit.weights[used, 0] < OUTLIER)) if used.any() else 0.0
+
+
 def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
     """Whether noise alone, as stated, does not explain what is left."""
     if np.max(fit.inflation) > 1.2:
@@ -109,15 +125,13 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
-    if np.max(fit.inflation) < SOUND:
-        return fit  # nothing is wrong with the model that the field could have been bent to hide
     progress("prediction of other runs")
-    fold = split.groups(engine.measurements) % 4  # the fourth is locked away
-    plain = fit.weights[:, 0] > 0.3
+    fold = split.groups(engine.measurements) % split.FOLDS  # one of them is locked away
+    plain = fit.weights[:, 0] > OUTLIER
     errors: dict[float, float] = {}
     for part in FIELDS:
         noise, square = engine.noise_with(part), 0.0
-        for out in (engine.rows & (fold == k) for k in range(3)):
+        for out in (engine.rows & (fold == k) for k in np.unique(fold[engine.rows])):
             trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None])
             square += np.nan_to_num(trial.rms_mm(out & plain)) ** 2
         errors[part] = square
@@ -154,7 +168,7 @@ def race(
     entries += [entry for entry in screened if entry not in chosen]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
-    decide(round_, len({c.id for c in candidates}))
+    decide(round_, len({c.id for c in candidates}), bool(accepted), is_rejected(engine, before))
     return round_
 
 
@@ -202,15 +216,10 @@ def refit(
             continue  # the model has no solution there
     else:
         return entry
-    removed = (
-        before.chi_square + before.shift_square - fit.chi_square - fit.shift_square - len(candidate.names)
-    )
-    spread = np.sqrt(2 * before.observations)
-    share = removed / max(excess(before), spread, removed, 1.0)
     return replace(
         entry,
         refit=fit.log_evidence - before.log_evidence,
-        share=float(share),
+        share=share_of(before, fit, len(candidate.names)),
         fit=fit,
         implausible=tuple(implausible(engine, fit, candidate)),
     )
@@ -238,25 +247,31 @@ def implausible(engine: Engine, fit: identify.Fit, candidate: Candidate) -> list
     return found
 
 
-def decide(round_: Round, tried: int) -> None:
-    """Accepts the best entry, with all that the data cannot tell from it, or says why not."""
-    best = next((entry for entry in round_.entries if entry.fit is not None), None)
+def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> None:
+    """Accepts the best entry, with all that the data cannot tell from it, or says why not.
+
+    tried: number of effects that were looked at; is_further: whether others are in the model already; is_rejected:
+    whether the noise as stated does not explain what is left.
+    """
+    fitted = [entry for entry in round_.entries if entry.fit is not None]
+    best = next((entry for entry in fitted if not (is_further and entry.implausible)), None)
     if best is None:
         round_.reason = "no candidate explains anything"
         return
-    threshold = EVIDENCE + np.log(tried)
+    threshold = EVIDENCE + np.log(tried) + (UNASKED if is_further and not is_rejected else 0.0)
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
         )
         return
-    if best.share < SHARE:
-        share = f"{best.share:.0%} of what is left: below {SHARE:.0%}"
+    needed = SHARE if is_further else FIRST_SHARE
+    if best.share < needed:
+        share = f"{best.share:.0%} of what is left: below {needed:.0%}"
         round_.reason = f"the best candidate, {best.id}, removes {share}, as stand-ins do"
         return
     rivals = [entry for entry in round_.entries if entry.fit is not None and entry.id != best.id]
     for rival in rivals:
-        overlap = min(_imitated(best, rival), _imitated(rival, best))
+        overlap = min(imitated(best, rival), imitated(rival, best))
         round_.overlaps[rival.id] = max(overlap, round_.overlaps.get(rival.id, 0.0))
     same = [entry for entry in rivals if best.score - entry.score < TIE or round_.overlaps[entry.id] >= SAME]
     round_.accepted = best
@@ -265,7 +280,7 @@ def decide(round_: Round, tried: int) -> None:
     round_.margin = best.score - max(others, default=-np.inf)
 
 
-def _imitated(entry: Entry, by: Entry) -> float:
+def imitated(entry: Entry, by: Entry) -> float:
     """Share of an entry's signal that another one can imitate together with the calibration."""
     signal = entry.gain.signal
     q, r = np.linalg.qr(by.gain.columns)

@@ -34,6 +34,7 @@ def page(d: "Diagnosis", source: str) -> str:
         _errors(d),
         _view(),
         _candidates(d),
+        _next(d),
         _parameters(d),
         _limits(d),
     ]
@@ -74,7 +75,12 @@ def _errors(d: "Diagnosis") -> str:
     left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on runs that no fit saw (logarithmic axis).")
     right = figure(figures.directions, d, 5.2, 3.8, "The error of every reading, in the order measured.")
     more = figure(
-        figures.before_after, d, 10.4, 3.6, "The error against the quantities that predict it best.", True
+        figures.before_after,
+        d,
+        10.4,
+        3.6,
+        "The error after calibration against the quantities that predict it best, and what the effects found explain.",
+        True,
     )
     return f'<h2>The error falls</h2><div class="pair">{left}{right}</div>{more}'
 
@@ -92,8 +98,26 @@ def _candidates(d: "Diagnosis") -> str:
         "Every candidate was fitted together with the calibration. Boxed: accepted, with all that these data cannot "
         "tell from it.", True,
     )  # fmt: skip
+    apart = figure(
+        figures.overlap, d, 7.2, 4.6,
+        "How much of one candidate's signal another one can imitate together with calibration: near 1 both ways, these "
+        "data cannot tell the two apart.",
+    )  # fmt: skip
     reason = next((r.reason for r in reversed(d.rounds) if r.reason), "")
-    return f"<h2>All candidates</h2>{drawn}<p>{html.escape(reason.capitalize())}.</p>" if drawn else ""
+    why = f"<p>{html.escape(reason.capitalize())}.</p>" if reason else ""
+    return f"<h2>All candidates</h2>{drawn}{apart}{why}" if drawn else ""
+
+
+def _next(d: "Diagnosis") -> str:
+    """What to measure to be surer."""
+    ids = list(dict.fromkeys(identity for a in d.accepted for identity in a.ids))
+    if not ids:
+        return ""
+    advice = [f"<li><b>{i}</b>: {html.escape(effects.get(i, d.robot.n_tubes).measure)}</li>" for i in ids]
+    return (
+        f"<h2>What to measure next</h2><ul>{''.join(advice)}</ul>"
+        "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
+    )
 
 
 def _parameters(d: "Diagnosis") -> str:
@@ -130,7 +154,7 @@ def scene(d: "Diagnosis") -> str:
     size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
     factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
     data = [_trace(tips, "measured", {"mode": "markers", "marker": {"size": 2, "color": "#6b7785"}})]
-    fits = {"calibrated": d.calibrated} | ({"with the effects found": d.final} if d.accepted else {})
+    fits = {"calibrated": d.calibrated} | ({"with the effects found": d.with_effects} if d.accepted else {})
     for name, fit in fits.items():
         lines = np.full((3 * len(rows), 3), np.nan)
         lines[0::3], lines[1::3] = tips, tips - factor * 1e3 * fit.residual[rows, :3]

@@ -7,6 +7,7 @@ from ctcr.measurements import Measurements
 
 FEWEST_RUNS = 4
 BLOCKS = 12  # of a single run, in time
+FOLDS = 4
 
 
 def groups(measurements: Measurements) -> NDArray[np.int64]:
@@ -19,6 +20,6 @@ def groups(measurements: Measurements) -> NDArray[np.int64]:
     return np.arange(len(measurements)) * BLOCKS // max(len(measurements), 1)
 
 
-def locked_rows(measurements: Measurements) -> NDArray[np.bool_]:
-    """Every fourth group (M,)."""
-    return groups(measurements) % 4 == 3
+def locked_rows(measurements: Measurements, turn: int = 0) -> NDArray[np.bool_]:
+    """Every fourth group (M,); `turn` 0 to 3 says which."""
+    return groups(measurements) % FOLDS == FOLDS - 1 - turn

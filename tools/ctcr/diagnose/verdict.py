@@ -25,14 +25,14 @@ class Verdict:
 
 def judge(
     calibrated: identify.Fit,
-    final: identify.Fit,
+    with_effects: identify.Fit,
     accepted: "list[Accepted]",
     rounds: list[racing.Round],
     leftover: Leftover,
     locked: NDArray[np.bool_],
 ) -> Verdict:
-    jitter = np.sqrt(3) * 1e3 * final.noise.position_jitter
-    before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, final))
+    jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
+    before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     explained = 1 - after / before
     if not accepted:
         if not leftover.structured:

@@ -1,0 +1,149 @@
+"""The runs that best tell rival explanations of the measurements apart.
+
+Each rival is a fit: a robot with an effect. Where two of them predict different readings that no calibration within
+what is known of it can make alike, a measurement decides. Runs are added one by one, each the one that raises the
+smallest expected evidence between any two rivals most (T-optimal design: Atkinson and Fedorov 1975).
+"""
+
+from dataclasses import dataclass, replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import effects, identify, user_effects
+from ctcr.diagnose.analysis import Diagnosis
+from ctcr.diagnose.race import SURE, Entry
+from ctcr.measurements import Measurements
+from ctcr.plan.runs import Run, random_runs, table
+
+Array = NDArray[np.float64]
+
+POOL = 120  # runs to choose from
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An explanation that the measurements leave open."""
+
+    id: str
+    fit: identify.Fit
+    fixed: dict[str, float]  # values of parameters of effects that are not fitted
+
+
+@dataclass(frozen=True)
+class Proposal:
+    rivals: list[Rival]
+    now: float  # log evidence between the two that the measurements tell apart least
+    runs: list[Run]
+    gain: list[float]  # expected log evidence between those two after each further run
+    plan: Measurements | None  # the runs, without poses
+
+    @property
+    def decides(self) -> bool:
+        return bool(self.gain) and self.gain[-1] >= SURE
+
+
+def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
+    """Fits of the effects of the first round whose effect the measurements cannot tell from others."""
+    before: list[Entry] = []
+    for round_, accepted in zip(diagnosis.rounds, diagnosis.accepted, strict=False):
+        entries: dict[str, Entry] = {}
+        for entry in round_.entries:
+            near = entry.refit is not None and round_.accepted.score - entry.score < SURE
+            if entry.fit is not None and (entry.id in round_.ids or near):
+                entries.setdefault(entry.id, entry)
+        if len(entries) > 1:
+            shapes = dict(pair for entry in before for pair in entry.candidate.shape)
+            return [
+                Rival(entry.id, entry.fit, shapes | dict(entry.candidate.shape)) for entry in entries.values()
+            ]
+        before.append(accepted.entry)
+    return []
+
+
+def propose(
+    diagnosis: Diagnosis, runs: int = 4, masses: tuple[float, ...] = (0.0, 0.01, 0.02), seed: int = 1
+) -> Proposal:
+    """The next `runs` runs; `masses` [kg] can be hung at the tip. Raises InputError where the model has no solution."""
+    rivals = rivals_of(diagnosis)
+    if len(rivals) < 2:
+        return Proposal(rivals, np.inf, [], [], None)
+    robot, measurements = diagnosis.robot, diagnosis.measurements
+    offered = np.array(masses if robot.gravity is not None else (0.0,))
+    pool = random_runs(robot, measurements, POOL, offered, np.random.default_rng(seed))
+    if not pool:
+        return Proposal(rivals, _margin(rivals), [], [], None)
+    plan = table(robot, pool)
+    contests = [_contest(diagnosis, a, b, plan) for a, b in permutations(rivals, 2)]
+    usable = np.flatnonzero(np.all([contest.solved for contest in contests], axis=0)).tolist()
+    chosen: list[int] = []
+    gain: list[float] = []
+    while usable and len(chosen) < runs:
+        value = {k: min(contest.evidence([*chosen, k]) for contest in contests) for k in usable}
+        best = max(value, key=lambda k: value[k])
+        chosen.append(best)
+        usable.remove(best)
+        gain.append(float(value[best]))
+    picked = [pool[k] for k in chosen]
+    first = int(measurements.run.max()) + 1
+    return Proposal(rivals, _margin(rivals), picked, gain, table(robot, picked, first) if picked else None)
+
+
+def _margin(rivals: list[Rival]) -> float:
+    best, second = sorted((rival.fit.log_evidence for rival in rivals), reverse=True)[:2]
+    return float(best - second)
+
+
+def instead(proposal: Proposal, n_tubes: int) -> dict[str, str]:
+    """By effect: what else can be measured to see it."""
+    return {rival.id: effects.get(rival.id, n_tubes).measure for rival in proposal.rivals}
+
+
+class Contest:
+    """How far readings of one explanation would be from what another can explain, run by run, in normal equations.
+
+    residual (rows,) and jacobian (rows, n) by the other's parameters, in units of the noise; run (rows,) from 0;
+    covariance (n, n) of the other's parameters before these runs.
+    """
+
+    def __init__(self, residual: Array, jacobian: Array, run: NDArray[np.int64], covariance: Array) -> None:
+        parts = [run == k for k in range(int(run.max()) + 1)]
+        self.square = np.array([residual[part] @ residual[part] for part in parts])
+        self.cross = np.array([jacobian[part].T @ residual[part] for part in parts])
+        self.information = np.array([jacobian[part].T @ jacobian[part] for part in parts])
+        self.known = np.linalg.inv(covariance)
+
+    @property
+    def solved(self) -> NDArray[np.bool_]:
+        """Runs (count,) that both explanations predict."""
+        return np.isfinite(self.square)
+
+    def evidence(self, runs: list[int]) -> float:
+        """Expected log evidence for the first explanation after these runs."""
+        cross, information = self.cross[runs].sum(axis=0), self.information[runs].sum(axis=0)
+        explained = cross @ np.linalg.solve(self.known + information, cross)
+        return 0.5 * float(self.square[runs].sum() - explained)
+
+
+def _contest(diagnosis: Diagnosis, truth: Rival, other: Rival, plan: Measurements) -> Contest:
+    position, quaternion = _readings(diagnosis, truth, plan)
+    seen = replace(plan, position=position, quaternion=quaternion)
+    recorded = user_effects.recording_of(diagnosis.robot, seen, other.fit.names, fixed=other.fixed)
+    residual, jacobian, _ = recorded.residual(other.fit.values, True)
+    # The field error is the same for both, so that jitter remains, as much as the fit had to admit.
+    noise = other.fit.noise
+    sd = np.repeat([noise.position_jitter, noise.rotation_jitter], 3) * np.repeat(other.fit.inflation, 3)
+    if diagnosis.measurements.quaternion is None:
+        sd[3:] = np.inf
+    weight = np.tile(1 / sd, len(plan))
+    run = np.repeat(plan.run - plan.run[0], 6)
+    return Contest(residual * weight, jacobian * weight[:, None], run, other.fit.covariance)
+
+
+def _readings(diagnosis: Diagnosis, rival: Rival, plan: Measurements) -> tuple[Array, Array]:
+    """What the tracker would read, (rows, 3) [m] and (rows, 4), NaN where the model has no solution."""
+    recorded: Any = user_effects.recording_of(diagnosis.robot, plan, rival.fit.names, fixed=rival.fixed)
+    recorded.residual(rival.fit.values)
+    return recorded.predicted()
