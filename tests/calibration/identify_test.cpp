@@ -272,6 +272,104 @@ TEST(Identify, StaysWithinBoundsAndSaysSo) {
   EXPECT_NE(fit.warnings[0].find("stopped at its bound"), std::string::npos);
 }
 
+/// The minimum of |y - slope x|^2_W + |x|^2 where change . x >= low of every bound, by trying all sets of bounds that hold
+/// it back.
+Eigen::VectorXd minimum_within(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                               const std::vector<LinearBound>& within) {
+  const Eigen::Index n = g.size();
+  Eigen::VectorXd best;
+  double least = infinity;
+  for (unsigned set = 0; set < 1u << within.size(); ++set) {
+    Eigen::MatrixXd KKT = H;
+    Eigen::VectorXd right = g;
+    for (std::size_t k = 0; k < within.size(); ++k) {
+      if (!(set >> k & 1u)) continue;
+      const Eigen::Index m = KKT.rows();
+      KKT.conservativeResizeLike(Eigen::MatrixXd::Zero(m + 1, m + 1));
+      KKT.col(m).head(n) = within[k].change;
+      KKT.row(m).head(n) = within[k].change.transpose();
+      right.conservativeResize(m + 1);
+      right[m] = within[k].low;
+    }
+    const Eigen::VectorXd x = KKT.fullPivLu().solve(right).head(n);
+    bool inside = true;
+    for (const LinearBound& bound : within) inside = inside && bound.change.dot(x) >= bound.low - 1e-9;
+    const double cost = 0.5 * x.dot(H * x) - g.dot(x);
+    if (inside && cost < least) least = cost, best = x;
+  }
+  return best;
+}
+
+TEST(Identify, KeepsSumsOfParametersWithinBounds) {
+  int stopped = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    Toy toy(20, 5, 0, random);
+    toy.slope.col(1) = toy.slope.col(0) + 0.1 * toy.slope.col(1);  // a projected step would lead astray
+    toy.y = toy.model(toy.truth);
+    toy.add_noise(noise, random);
+    std::vector<LinearBound> within;
+    for (int k = 0; k < 3; ++k) within.push_back({"bound", normals(5, random), -test::uniform(random, 0, 0.5)});
+    IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1, .within = within};
+    const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
+    const Eigen::LLT<Eigen::MatrixXd> inverse(toy.covariance(noise));
+    const Eigen::MatrixXd H = toy.slope.transpose() * inverse.solve(toy.slope) + Eigen::MatrixXd::Identity(5, 5);
+    const Eigen::VectorXd x = minimum_within(H, toy.slope.transpose() * inverse.solve(toy.y), within);
+    EXPECT_TRUE(fit.converged) << fit.status;
+    EXPECT_LT(std::sqrt((fit.values - x).dot(H * (fit.values - x))), 0.02) << seed;
+    stopped += int(!fit.warnings.empty());
+  }
+  EXPECT_GT(stopped, 20);
+}
+
+TEST(Identify, KeepsTheNearerOfBoundsThatDepend) {
+  test::Random random(9);
+  Toy toy(20, 1, 0, random);
+  toy.truth << 2;
+  toy.y = toy.model(toy.truth);
+  IdentifyOptions options;
+  options.within = {{"far", Eigen::VectorXd::Constant(1, -2), -3}, {"near", Eigen::VectorXd::Constant(1, -1), -1}};
+  const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
+  EXPECT_NEAR(fit.values[0], 1, 1e-9);
+  EXPECT_NE(fit.warnings.front().find("stopped where near"), std::string::npos) << fit.warnings.front();
+}
+
+TEST(Identify, FindsAMinimumOnAKinkAndTheWayAlongIt) {
+  // One row bends up where a sum of parameters changes sign, the others pull there: the minimum is that of the others on
+  // the plane of the kink.
+  for (int seed = 0; seed < 40; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    Toy toy(20, 6, 0, random);
+    toy.add_noise(noise, random);
+    const Eigen::VectorXd across = normals(6, random).normalized();
+    const double pull = 1e-3, bend = 1e-3;
+    const Predictor inner = toy.predictor();
+    const Predictor kinked = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+      (void)inner(x, residual, jacobian);
+      const double beyond = across.dot(x - toy.truth) + 0.5;  // the truth is on the side that costs
+      residual[0] = pull + (beyond > 0 ? bend * beyond : 0);
+      if (jacobian) jacobian->row(0) = (beyond > 0 ? bend : 0) * across.transpose();
+      return true;
+    };
+    const Noise jitter{.position_jitter = 2e-4, .rotation_jitter = 4e-3};
+    IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1};
+    const Identification fit = identify(kinked, toy.parameters(), jitter, toy.places, options);
+    EXPECT_TRUE(fit.converged) << seed << fit.status;
+
+    const Predictor without = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+      (void)inner(x, residual, jacobian);
+      residual[0] = 0;
+      if (jacobian) jacobian->row(0).setZero();
+      return true;
+    };
+    options.within = {{"the kink", -across, 0.5 - across.dot(toy.truth)}};
+    if (!(options.within[0].low <= 0)) continue;
+    const Identification on_it = identify(without, toy.parameters(), jitter, toy.places, options);
+    const Eigen::VectorXd apart = fit.values - on_it.values;
+    EXPECT_LT(std::sqrt(apart.dot(fit.covariance.llt().solve(apart))), 0.1) << seed;
+  }
+}
+
 TEST(Identify, ShortensAStepThatCannotBePredicted) {
   test::Random random(7);
   Toy toy(30, 2, 0, random);
@@ -309,6 +407,11 @@ TEST(Identify, RefusesInWords) {
   expect_refusal("p2: its prior standard deviation is 0", with([](auto& p) { p[1].sd = 0; }));
   expect_refusal("p1: its prior mean is not finite", with([](auto& p) { p[0].mean = std::nan(""); }));
   expect_refusal("outside its bounds", with([](auto& p) { p[0].low = 1; }));
+  expect_refusal("a bound of a sum of parameters (order)", [&] {
+    IdentifyOptions options;
+    options.within = {{"order", Eigen::VectorXd::Ones(2), 0.1}};
+    (void)identify(predict, toy.parameters(), noise, toy.places, options);
+  });
   expect_refusal("do not fit together",
                  [&] { (void)identify(predict, toy.parameters(), noise, toy.places.topRows(9)); });
   expect_refusal("jitter", [&] { (void)identify(predict, toy.parameters(), Noise{}, toy.places); });

@@ -177,6 +177,41 @@ def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
     ]
 
 
+def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, Array, float]]:
+    """What must stay true of the named parameters for joints beta (M, N) [m] of a table to be possible.
+
+    Each with words for where it just is, and as the least value of a sum of changes of the parameters: tubes are
+    grasped behind the plate and one behind the other, tips are in front of it and one before the other, and no tube is
+    longer curved than it is long. Nine rows in ten stay possible; where fewer are, none more become impossible.
+    """
+    beta = beta + robot.actuation.translation_correction
+    tip, tubes = beta + [tube.length for tube in robot.tubes], range(1, robot.n_tubes + 1)
+    home, length, curved = "actuation.home_translation.{}", "tubes.{}.length", "tubes.{}.curved_length"
+    last = robot.n_tubes
+    found = [
+        (f"tube {last} is grasped at the plate", {home: {last: -1}}, -beta[:, -1]),
+        (f"the tip of tube {last} is flush with the plate", {home: {last: 1}, length: {last: 1}}, tip[:, -1]),
+    ]
+    for i in tubes[:-1]:
+        apart = {i: 1, i + 1: -1}
+        found += [
+            (f"tubes {i} and {i + 1} are grasped at one place", {home: {i: -1, i + 1: 1}}, beta[:, i] - beta[:, i - 1]),
+            (f"the tips of tubes {i} and {i + 1} are flush", {home: apart, length: apart}, tip[:, i - 1] - tip[:, i]),
+        ]  # fmt: skip
+    found += [
+        (f"tube {i} is curved over all its length", {length: {i: 1}, curved: {i: -1}},
+         np.array([robot.tubes[i - 1].length - robot.tubes[i - 1].curved_length]))
+        for i in tubes
+    ]  # fmt: skip
+    limits = []
+    for text, parts, room in found:
+        change = {kind.format(i): float(sign) for kind, signs in parts.items() for i, sign in signs.items()}
+        row = np.array([change.get(name, 0.0) for name in names])
+        if row.any() and len(room):
+            limits.append((text, row, -max(0.0, float(np.quantile(room, 0.1)))))
+    return limits
+
+
 def _stands_for(pattern: str, name: str) -> bool:
     return name == pattern or ("*" in pattern and fnmatchcase(name, pattern))
 

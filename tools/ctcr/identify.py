@@ -6,7 +6,7 @@ Positions in m, rotations in rad, tracker axes. Residuals are measured - predict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, nan
+from math import nan
 from time import perf_counter
 from typing import Any
 
@@ -264,7 +264,6 @@ def fit(
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     warnings = ignored + list(_doubts(measurements, measured_rows(measurements) & chosen))
-    high = np.minimum(high, _home_limits(robot, measurements.beta[chosen], names))
     table = readings_of(robot, measurements, names, steps=steps, threads=threads)
     table.activate((measured_rows(measurements) & chosen).tolist())
     if starts is None:
@@ -273,6 +272,7 @@ def fit(
         table, names, mean, width, low, high, noise, places_of(robot, measurements),
         robust=robust, admit_model_error=admit_model_error, weights=weights, inflation=inflation, starts=starts,
         known=free_parameters.known_directions(robot, names),
+        within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
     all_units = dict(
         zip(parameter_names(robot.n_tubes), free_parameters.units_of(robot.n_tubes), strict=True)
@@ -302,6 +302,7 @@ def identify_with(
     start: Array | None = None,
     starts: int = 3,
     known: Sequence[tuple[str, Array]] = (),
+    within: Sequence[tuple[str, Array, float]] = (),
 ) -> Fit:
     """As `fit`, for any predictor: compiled Readings (whose active rows are fitted), or a function
     (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
@@ -313,7 +314,7 @@ def identify_with(
             places=np.asarray(places, dtype=float), robust=robust,
             admit_model_error=admit_model_error, weights=weights,
             inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
-            known=list(known),
+            known=list(known), within=list(within),
         )  # fmt: skip
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
@@ -352,16 +353,6 @@ def measured_rows(measurements: Measurements) -> Mask:
 def _is_measured(measurements: Measurements, kind: str) -> bool:
     values = measurements.position if kind == "position" else measurements.quaternion
     return values is not None and bool(np.isfinite(values).all(axis=1).any())
-
-
-def _home_limits(robot: Robot, beta: Array, names: Sequence[str]) -> Array:
-    """Highest values that leave nine readings in ten behind the plate; only the outermost tube's home has one."""
-    limits = np.full(len(names), inf)
-    outermost = f"actuation.home_translation.{robot.n_tubes}"
-    if outermost in names and len(beta):
-        room = -np.quantile(beta[:, -1] + robot.actuation.translation_correction[-1], 0.9)
-        limits[names.index(outermost)] = 1e-3 * robot.actuation.home_translation_mm[-1] + max(0.0, room)
-    return limits
 
 
 def _doubts(measurements: Measurements, rows: Mask) -> Iterable[str]:

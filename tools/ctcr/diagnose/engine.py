@@ -117,7 +117,7 @@ class Engine:
         return identify.identify_with(
             table, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, starts=1,
+            start=at, starts=1, within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 
     def linear_fit(
