@@ -301,6 +301,7 @@ def identify_with(
     inflation: ArrayLike | None = None,
     start: Array | None = None,
     starts: int = 3,
+    max_iterations: int = 50,
     known: Sequence[tuple[str, Array]] = (),
     within: Sequence[tuple[str, Array, float]] = (),
 ) -> Fit:
@@ -314,7 +315,7 @@ def identify_with(
             places=np.asarray(places, dtype=float), robust=robust,
             admit_model_error=admit_model_error, weights=weights,
             inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
-            known=list(known), within=list(within),
+            max_iterations=max_iterations, known=list(known), within=list(within),
         )  # fmt: skip
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None

@@ -100,6 +100,7 @@ class Engine:
         weights: Array | None = None,
         inflation: Array | None = None,
         noise: Any = None,
+        max_iterations: int = 50,
     ) -> identify.Fit:
         """Calibration and `added` parameters of effects together.
 
@@ -117,7 +118,8 @@ class Engine:
         return identify.identify_with(
             table, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, starts=1, within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
+            start=at, starts=1, max_iterations=max_iterations,
+            within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 
     def linear_fit(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +20,12 @@ EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having lo
 UNASKED = 10.0  # evidence needed besides where noise alone explains what is left
 SHARE = 0.25  # of the excess that a further effect must remove, and
 FIRST_SHARE = 0.1  # the first one
+HELD_OUT_SHARE = 0.1  # of the error of other runs that a further effect must remove
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
 SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 REFITS = 6  # effects that are refitted, the best by their slopes
+ITERATIONS = 10  # of a refit: kinks of an effect that is far behind need not be followed to the end
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
@@ -120,21 +123,25 @@ def baseline(
     return full if best is full else engine.fit(names, start=values_of(best), fixed=fixed, noise=best.noise)
 
 
+def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> float:
+    """Mean square position error [mm^2] of runs left out in turn, of the model linearised at a fit."""
+    fold = split.groups(engine.measurements) % split.FOLDS  # one of them is locked away
+    plain, squares = fit.weights[:, 0] > OUTLIER, []
+    for out in (engine.rows & (fold == k) for k in np.unique(fold[engine.rows])):
+        trial = engine.linear_fit(
+            fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=fit.inflation
+        )
+        squares.append(np.nan_to_num(trial.rms_mm(out & plain)) ** 2)
+    return float(np.mean(squares))
+
+
 def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
     """The same parameters fitted for prediction: with the part of the field error that predicts other runs best.
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
     progress("prediction of other runs")
-    fold = split.groups(engine.measurements) % split.FOLDS  # one of them is locked away
-    plain = fit.weights[:, 0] > OUTLIER
-    errors: dict[float, float] = {}
-    for part in FIELDS:
-        noise, square = engine.noise_with(part), 0.0
-        for out in (engine.rows & (fold == k) for k in np.unique(fold[engine.rows])):
-            trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None])
-            square += np.nan_to_num(trial.rms_mm(out & plain)) ** 2
-        errors[part] = square
+    errors = {part: held_out(engine, fit, engine.noise_with(part)) for part in FIELDS}
     part = min(errors, key=lambda part: errors[part])
     usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
     if errors[part] > BETTER**2 * errors[usual]:
@@ -169,7 +176,17 @@ def race(
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
     decide(round_, len({c.id for c in candidates}), bool(accepted), is_rejected(engine, before))
+    if round_.accepted and accepted and not _predicts(engine, before, round_.accepted.fit):
+        round_.reason = f"{round_.accepted.id} would not predict other runs better"
+        round_.accepted, round_.ids = None, []
     return round_
+
+
+def _predicts(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:
+    """Whether a further effect makes errors of runs left out smaller by its share of what noise does not explain."""
+    jitter = 3e6 * engine.noise.position_jitter**2
+    old, new = held_out(engine, before), held_out(engine, after)
+    return old - new >= HELD_OUT_SHARE * max(old - jitter, 0.0)
 
 
 def screen(
@@ -209,7 +226,7 @@ def refit(
         try:
             fit = engine.fit(
                 [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape), noise=before.noise,
-                weights=before.weights, inflation=before.inflation,
+                weights=before.weights, inflation=before.inflation, max_iterations=ITERATIONS,
             )  # fmt: skip
             break
         except InputError:
