@@ -41,7 +41,7 @@ struct LoopRequest {
   SystemValues controller, plant;
   TaskValues tasks;
   LimitValues limits;
-  RowMajor points;  ///< (points, 3) of the path [m], base frame
+  RowMajor points;  ///< (points, 3) of the path [m], plant's base frame
   bool spline;
   double speed, acceleration, period, settle;
   Eigen::VectorXd beta, alpha;  ///< where the robot starts to settle
@@ -51,7 +51,7 @@ struct LoopRequest {
   std::uint64_t seed;
 };
 
-/// What happened, one row a period. Positions [m] in the controller's base frame.
+/// What happened, one row a period. Positions [m] in the plant's base frame, where the path is given.
 struct LoopResult {
   std::string status;  ///< of the plant at the end, in words; "start refused" and why
   bool started = false;

@@ -63,7 +63,7 @@ void bind_control(nb::module_& m) {
       .def(nb::init<double, double, double, double, const Eigen::VectorXd&, const Eigen::VectorXd&, bool>(),
            nb::kw_only(), "base_gap"_a, "tip_gap"_a, "translation_speed"_a, "rotation_speed"_a, "beta_low"_a,
            "beta_high"_a, "redistribute"_a);
-  nb::class_<LoopResult>(m, "LoopResult", "What happened, one row a period; SI units, the controller's base frame.")
+  nb::class_<LoopResult>(m, "LoopResult", "What happened, one row a period; SI units, the plant's base frame.")
       .def_ro("status", &LoopResult::status)
       .def_ro("started", &LoopResult::started)
       .def_ro("settled", &LoopResult::settled)

@@ -96,18 +96,24 @@ auto with_system(const SystemValues& values, const F& f) {
 template <int N>
 LoopResult closed_loop(const LoopRequest& r) {
   LoopResult out;
-  std::vector<Vec3> points;
-  for (Eigen::Index i = 0; i < r.points.rows(); ++i) points.emplace_back(r.points.row(i).transpose());
-  const AnyPath path = r.spline ? AnyPath{SplinePath(points, r.speed, r.acceleration)}
-                                : AnyPath{Polyline(points, r.speed, r.acceleration)};
-  const AnyPath start{StillPath{path.at(0), r.settle}};
   const Limits<N> limits{r.limits.base_gap,       r.limits.tip_gap,  r.limits.translation_speed,
                          r.limits.rotation_speed, r.limits.beta_low, r.limits.beta_high};
   const TipLoad load{r.force, Vec3::Zero()};
 
   return with_system<N>(r.controller, [&]<class Fx>(const System<N, Fx>& system) {
+    // The path and the obstacle stand in space: a controller with another T_ref sees them elsewhere.
+    const Pose T_base_world = system.sensor.T_tracker_base.inverse() * plain_system<N>(r.plant).sensor.T_tracker_base;
+    std::vector<Vec3> points;
+    for (Eigen::Index i = 0; i < r.points.rows(); ++i)
+      points.push_back((T_base_world * Pose{Mat3::Identity(), r.points.row(i).transpose()}).position);
+    const AnyPath path = r.spline ? AnyPath{SplinePath(points, r.speed, r.acceleration)}
+                                  : AnyPath{Polyline(points, r.speed, r.acceleration)};
+    const AnyPath start{StillPath{path.at(0), r.settle}};
+    TaskValues seen = r.tasks;
+    seen.obstacle = (T_base_world * Pose{Mat3::Identity(), seen.obstacle}).position;
+
     const MotorAngles<N> home = motor_angles(system.transmission, Joints<N>{r.beta, r.alpha});
-    Controller<N, AllTasks<N>, Fx> controller(system, limits, r.period, tasks_of<N>(r.tasks));
+    Controller<N, AllTasks<N>, Fx> controller(system, limits, r.period, tasks_of<N>(seen));
     controller.at_limits = r.limits.redistribute ? AtLimits::redistribute : AtLimits::hold;
     controller.tip_force = r.tip_force == "known"       ? TipForce::known
                            : r.tip_force == "estimated" ? TipForce::estimated
@@ -121,10 +127,12 @@ LoopResult closed_loop(const LoopRequest& r) {
           return std::make_unique<PlantOf<N, Px>>(real, home, load, TrackerNoise{r.noise_position, r.noise_rotation},
                                                   r.seed);
         });
-    const Pose T_base_tracker = system.sensor.T_tracker_base.inverse();
-    const auto tip = [&] { return (T_base_tracker * plant->exact_reading()).position; };
+    const Pose T_world_base = T_base_world.inverse();
+    const Pose T_world_tracker = T_world_base * system.sensor.T_tracker_base.inverse();
+    const auto tip = [&] { return (T_world_tracker * plant->exact_reading()).position; };
+    const auto wanted = [&](const Reference& reference) { return (T_world_base * reference.pose).position; };
     Status status = run(controller, *plant, start, r.period, load, [](const auto&) { return true; });
-    out.settled = (tip() - path.at(0).pose.position).norm();
+    out.settled = (tip() - wanted(path.at(0))).norm();
     out.started = status == Status::ok;
 
     const auto rows = Eigen::Index(path.duration() / r.period + 0.5) + 1;
@@ -144,7 +152,7 @@ LoopResult closed_loop(const LoopRequest& r) {
         out.time[k] = row.time;
         out.joints.row(k) << q.beta.transpose(), q.alpha.transpose();
         out.tip.row(k) = tip().transpose();
-        out.wanted.row(k) = row.reference.pose.position.transpose();
+        out.wanted.row(k) = wanted(row.reference).transpose();
         for (int t = 0; t < AllTasks<N>::size; ++t) out.shortfall(k, t) = row.report.shortfall[std::size_t(t)];
         const LimitReport& held = row.report.limits;
         out.held.row(k) << held.base_gaps, held.tip_gaps, held.travel, held.speed;

@@ -22,7 +22,7 @@ UNSETTLED = 1e-3  # [m]
 
 @dataclass(frozen=True)
 class Run:
-    """One run; rows are control periods. Positions [m], controller's base frame."""
+    """One run; rows are control periods. Positions [m], base frame of the plant."""
 
     mass_g: float
     repetition: int

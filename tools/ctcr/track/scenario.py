@@ -1,7 +1,8 @@
 """A scenario file: the path of the tip, the tasks and limits of the controller, the surroundings, and the repetitions.
 
 Fields carry their unit in their name; the properties and `ctcr.track.runs` give SI units. Positions are those of the
-sensor in the robot's base frame. Defaults are the paper's scenario S2 (Boyer et al., Section IV).
+sensor in the base frame of the robot that is controlled: they stand in space, and a controller with another T_ref sees
+them elsewhere. Defaults are the paper's scenario S2 (Boyer et al., Section IV).
 """
 
 from math import pi
