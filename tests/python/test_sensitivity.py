@@ -138,7 +138,7 @@ def test_memory_does_not_grow():
 def scenario():
     s = scenario_file.load(S2, 3)
     s.trajectory.kind = "polyline"
-    s.trajectory.points_mm = [[-18.0, 9.0, 170.0], [12.0, 9.0, 170.0], [12.0, 9.0, 200.0]]
+    s.trajectory.points_mm = [[-18.0, 9.0, 170.0], [-18.0, 39.0, 170.0], [8.0, 39.0, 170.0]]
     return s
 
 

@@ -61,7 +61,7 @@ public:
     if (!allowed_.exist() || !allowed_.contain(q.beta)) return Status::joints_out_of_order;
     Workspace<N> ws;
     Solution<N> solution;
-    return solve(system_.model, q, TipLoad{}, ws, solution, system_.settings);
+    return solve<Derivatives::jacobian>(system_.model, q, TipLoad{}, ws, solution, system_.settings);
   }
 
   /// One period.

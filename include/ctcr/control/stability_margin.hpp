@@ -3,8 +3,8 @@
 
 namespace ctcr {
 
-/// Keep away from snapping: where Solution::stability is below `wanted`, up its gradient, found by differences (2N
-/// evaluations without derivatives, only there). Real time: yes.
+/// Keep away from snapping: where Solution::stability is below `wanted`, up its gradient, found by differences (2N + 1
+/// solves from the warm start, only there). Real time: yes.
 struct StabilityMargin {
   static constexpr const char* name = "stability margin";
   Weight weight{};
@@ -20,7 +20,7 @@ struct StabilityMargin {
     const auto at = [&s](const Joints<N>& q, double& stability) noexcept {
       Workspace<N> ws = s.ws;
       Solution<N> there;
-      const Status status = solve(s.model, q, s.load, ws, there, s.settings);
+      const Status status = solve<Derivatives::jacobian>(s.model, q, s.load, ws, there, s.settings);
       stability = there.stability;
       return status == Status::ok || status == Status::singular;
     };

@@ -5,6 +5,7 @@ sensor in the base frame of the robot that is controlled: they stand in space, a
 them elsewhere. Defaults are the paper's scenario S2 (Boyer et al., Section IV).
 """
 
+from importlib.resources import files
 from math import pi
 from pathlib import Path
 from typing import Annotated, Literal
@@ -143,6 +144,12 @@ class Scenario(Section):
 _SECTIONS = {
     "trajectory": Trajectory, "start": Start, "tasks": Tasks, "limits": Limits, "obstacle": Obstacle, "load": TipLoad,
 }  # fmt: skip
+
+
+def shipped(name: str) -> Scenario:
+    """One of the scenarios that come with the package, for three tubes: S1 to S4 of the paper, and S5."""
+    text = (files("ctcr") / "track" / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")
+    return parse(text, name, 3)
 
 
 def load(path: str | Path, n_tubes: int) -> Scenario:
