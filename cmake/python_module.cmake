@@ -10,6 +10,9 @@ execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARI
 find_package(nanobind CONFIG REQUIRED)
 
 nanobind_add_module(_core NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
+# Half the compile time of -O3, nearly its speed.
+file(GLOB control CONFIGURE_DEPENDS tools/ctcr/_core/control_of_*.cpp)
+set_source_files_properties(${control} PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
 target_link_libraries(_core PRIVATE ctcr::calibration ctcr_flags)
 target_compile_definitions(_core PRIVATE CTCR_VERSION="${PROJECT_VERSION}")
 nanobind_add_stub(core_stub MODULE _core OUTPUT _core.pyi MARKER_FILE py.typed

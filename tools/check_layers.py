@@ -16,8 +16,9 @@ LAYERS = {
     "pipeline": 7,
     "parallel": 8,
     "control": 9,
-    "calibration": 10,
-    "io": 11,
+    "simulation": 10,
+    "calibration": 11,
+    "io": 12,
 }
 # Devices know the robot, not how it is solved: they see the layers below this one, and themselves.
 HIGHEST_SEEN = {"actuation": 2, "sensing": 2}

@@ -129,6 +129,7 @@ namespace ctcr::python {
 void bind_calibration(nb::module_& m);
 void bind_identify(nb::module_& m);
 void bind_effects(nb::module_& m);
+void bind_control(nb::module_& m);
 }  // namespace ctcr::python
 
 NB_MODULE(_core, m) {
@@ -176,4 +177,5 @@ NB_MODULE(_core, m) {
   ctcr::python::bind_calibration(m);
   ctcr::python::bind_identify(m);
   ctcr::python::bind_effects(m);
+  ctcr::python::bind_control(m);
 }

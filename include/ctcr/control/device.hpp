@@ -1,0 +1,26 @@
+#pragma once
+// The small interface between a controller and what it controls, simulated or real.
+#include <concepts>
+
+#include "ctcr/actuation/transmission.hpp"
+#include "ctcr/core/types.hpp"
+
+namespace ctcr {
+
+/// What a robot tells once a period.
+template <int N>
+struct Measurement {
+  MotorAngles<N> theta;  ///< [rad]
+  Pose reading;          ///< T_tracker_sensor
+};
+
+/// A robot that can be moved and measured. Both calls are real time.
+template <class D, int N>
+concept Device = requires(D& device, const MotorAngles<N>& velocity, double period, Measurement<N>& measured) {
+  /// Motor velocities [rad/s] for one period [s].
+  { device.move(velocity, period) } noexcept -> std::same_as<Status>;
+  /// What encoders and tracker read now.
+  { device.measure(measured) } noexcept -> std::same_as<Status>;
+};
+
+}  // namespace ctcr

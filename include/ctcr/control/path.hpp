@@ -1,0 +1,118 @@
+#pragma once
+// Paths of the tip in space and time: through corners on straight lines, or through points on a smooth curve.
+#include <span>
+#include <unsupported/Eigen/Splines>
+#include <vector>
+
+#include "ctcr/control/situation.hpp"
+#include "ctcr/control/trapezoid.hpp"
+
+namespace ctcr {
+
+/// Straight lines from corner to corner, with a rest at each: a corner at speed would need infinite acceleration.
+class Polyline {
+public:
+  /// @param corners  [m], base frame   @param orientation  of the tip, all along
+  /// Allocates. speed and acceleration as Trapezoid.
+  Polyline(std::span<const Vec3> corners, double speed, double acceleration, const Mat3& orientation = Mat3::Identity())
+    : orientation_(orientation), start_(corners.empty() ? Vec3(Vec3::Zero()) : corners[0]) {
+    for (std::size_t i = 1; i < corners.size(); ++i) {
+      const Vec3 way = corners[i] - corners[i - 1];
+      const double length = way.norm();
+      if (!(length > 0)) continue;
+      edges_.push_back({corners[i - 1], way / length, {length, speed, acceleration}, duration_});
+      duration_ += edges_.back().motion.duration();
+    }
+  }
+
+  [[nodiscard]] double duration() const noexcept { return duration_; }
+
+  /// Real time: yes.
+  [[nodiscard]] Reference at(double t) const noexcept {
+    Reference r{{orientation_, start_}};
+    if (edges_.empty()) return r;
+    std::size_t k = 0;
+    while (k + 1 < edges_.size() && edges_[k + 1].begin <= t) ++k;
+    const Edge& edge = edges_[k];
+    const auto [s, v] = edge.motion.at(t - edge.begin);
+    r.pose.position = edge.start + s * edge.direction;
+    r.velocity.head<3>() = v * edge.direction;
+    return r;
+  }
+
+private:
+  struct Edge {
+    Vec3 start, direction;
+    Trapezoid motion;
+    double begin;  ///< [s]
+  };
+  std::vector<Edge> edges_;
+  Mat3 orientation_;
+  Vec3 start_;
+  double duration_ = 0;
+};
+
+/// A cubic spline through points, travelled from rest to rest along its arc length.
+class SplinePath {
+public:
+  /// @param points  at least 4, none twice in a row [m], base frame. Allocates. Otherwise as Polyline.
+  SplinePath(std::span<const Vec3> points, double speed, double acceleration,
+             const Mat3& orientation = Mat3::Identity())
+    : orientation_(orientation) {
+    Eigen::Matrix3Xd columns(3, Eigen::Index(points.size()));
+    for (std::size_t i = 0; i < points.size(); ++i) columns.col(Eigen::Index(i)) = points[i];
+    curve_ = Eigen::SplineFitting<Curve>::Interpolate(columns, 3);
+    const auto parts = 64 * (points.size() - 1);
+    arc_length_.push_back(0);
+    for (std::size_t k = 0; k < parts; ++k)
+      arc_length_.push_back(arc_length_.back() +
+                            length_between(double(k) / double(parts), double(k + 1) / double(parts)));
+    motion_ = {arc_length_.back(), speed, acceleration};
+  }
+
+  [[nodiscard]] double length() const noexcept { return arc_length_.back(); }
+  [[nodiscard]] double duration() const noexcept { return motion_.duration(); }
+
+  /// Real time: yes.
+  [[nodiscard]] Reference at(double t) const noexcept {
+    const auto [s, v] = motion_.at(t);
+    const auto [point, slope] = here(parameter(s));
+    Reference r{{orientation_, point}};
+    r.velocity.head<3>() = v * slope.normalized();
+    return r;
+  }
+
+private:
+  using Curve = Eigen::Spline<double, 3, 3>;
+  struct Here {
+    Vec3 point, slope;
+  };
+
+  [[nodiscard]] Here here(double u) const noexcept {
+    const auto d = curve_.derivatives<1>(u);
+    return {d.col(0), d.col(1)};
+  }
+  /// By Gauss' rule of three points.
+  [[nodiscard]] double length_between(double a, double b) const noexcept {
+    const double middle = 0.5 * (a + b), half = 0.5 * (b - a), node = std::sqrt(0.6) * half;
+    const auto speed = [this](double u) { return here(u).slope.norm(); };
+    return half * (5 * speed(middle - node) + 8 * speed(middle) + 5 * speed(middle + node)) / 9;
+  }
+  /// Where the arc length is s: by bisection of the table, then Newton's method.
+  [[nodiscard]] double parameter(double s) const noexcept {
+    const auto after = std::upper_bound(arc_length_.begin() + 1, arc_length_.end() - 1, s);
+    const auto k = after - arc_length_.begin() - 1;
+    const double parts = double(arc_length_.size() - 1), start = double(k) / parts;
+    double u = start + (s - arc_length_[std::size_t(k)]) / (*after - arc_length_[std::size_t(k)]) / parts;
+    for (int round = 0; round < 3; ++round)
+      u += (s - arc_length_[std::size_t(k)] - length_between(start, u)) / here(u).slope.norm();
+    return std::clamp(u, 0.0, 1.0);
+  }
+
+  Curve curve_;
+  std::vector<double> arc_length_;
+  Trapezoid motion_;
+  Mat3 orientation_;
+};
+
+}  // namespace ctcr

@@ -1,0 +1,118 @@
+// Limits hold whatever the goals ask for, and the report says where a step was held.
+#include <gtest/gtest.h>
+
+#include "random_control.hpp"
+
+namespace ctcr {
+namespace {
+
+using test::Random, test::uniform;
+
+constexpr double period = 0.025;
+
+Limits<3> random_limits(const Robot<3>& robot, Random& random) {
+  Limits<3> limits{uniform(random, 0, 5e-3), uniform(random, 0, 5e-3), uniform(random, 0.01, 0.2),
+                   uniform(random, 1, 10)};
+  for (int i = 0; i < 3; ++i)
+    if (test::chance(random, 0.3)) limits.beta_low[i] = -uniform(random, 0.3, 0.9) * robot.tubes[std::size_t(i)].length;
+  return limits;
+}
+
+bool same_side(double gap, double least) { return gap >= least - 1e-9; }
+
+TEST(Limits, HoldWhateverIsAsked) {
+  Random random(11);
+  int held = 0;
+  for (int n = 0; n < test::cases(2000); ++n) {
+    const auto robot = test::random_robot<3>(random);
+    const Limits<3> limits = random_limits(robot, random);
+    const AllowedPositions<3> allowed(robot, limits);
+    if (!allowed.exist()) continue;
+    const Vec3 beta = allowed.clamped(test::random_joints(robot, random).beta);
+    ASSERT_TRUE(allowed.contain(beta));
+    const LeastSquares<3> goals = test::RandomGoals(random).sum();
+    for (const auto at_limits : {AtLimits::hold, AtLimits::redistribute}) {
+      JointVelocity<3> v;
+      LimitReport report;
+      ASSERT_EQ(limited_minimum(goals, allowed, limits, beta, period, at_limits, v, report), Status::ok);
+      const Vec3 next = beta + period * v.head<3>();
+      const Gaps<3> g = gaps(robot, next);
+      for (int i = 0; i < 3; ++i) {
+        EXPECT_TRUE(same_side(g.bases[i], limits.base_gap) && same_side(g.tips[i], limits.tip_gap));
+        EXPECT_GE(next[i], limits.beta_low[i] - 1e-9);
+      }
+      EXPECT_LE(v.head<3>().cwiseAbs().maxCoeff(), limits.translation_speed * (1 + 1e-9));
+      EXPECT_LE(v.tail<3>().cwiseAbs().maxCoeff(), limits.rotation_speed * (1 + 1e-9));
+      held += report.any();
+    }
+  }
+  EXPECT_GT(held, test::cases(2000) / 10);
+}
+
+TEST(Limits, AStepInsideIsTheMinimumItself) {
+  Random random(12);
+  const Robot<3> robot = test::paper_robot();
+  const Limits<3> limits;
+  const AllowedPositions<3> allowed(robot, limits);
+  for (int n = 0; n < test::cases(100); ++n) {
+    const LeastSquares<3> goals = test::RandomGoals(random).sum();
+    JointVelocity<3> v, free;
+    LimitReport report;
+    ASSERT_EQ(goals.minimum(free), Status::ok);
+    Limits<3> wide = limits;
+    wide.translation_speed = wide.rotation_speed = 1e3;
+    (void)limited_minimum(goals, allowed, wide, {-0.3, -0.2, -0.1}, 1e-4, AtLimits::hold, v, report);
+    EXPECT_FALSE(report.any());
+    EXPECT_LT((v - free).norm(), 1e-9 * (1 + free.norm()));
+  }
+}
+
+TEST(Limits, TheReportNamesTheGap) {
+  const Robot<3> robot = test::paper_robot();
+  const Limits<3> limits{.base_gap = 5e-3, .tip_gap = 4e-3};
+  const AllowedPositions<3> allowed(robot, limits);
+  LimitReport report;
+  const Vec3 bases = allowed.clamped({-0.201, -0.2, -0.1}, &report);  // tube 1 runs into the base of tube 2
+  EXPECT_EQ(report.base_gaps, 1);
+  EXPECT_EQ(report.tip_gaps | report.travel, 0);
+  EXPECT_NEAR(bases[0], -0.205, 1e-12);
+  report = {};
+  const Vec3 tips = allowed.clamped({-0.3, -0.17, -0.1}, &report);  // its tip would be inside that of tube 2
+  EXPECT_EQ(report.tip_gaps, 1);
+  EXPECT_NEAR(robot.tubes[0].length + tips[0] - robot.tubes[1].length - tips[1], 4e-3, 1e-12);
+  report = {};
+  (void)allowed.clamped({-0.3, -0.2, 0.1}, &report);
+  EXPECT_EQ(report.base_gaps & 4, 4);
+}
+
+TEST(Limits, WhatExcludesEverythingIsFound) {
+  EXPECT_TRUE(AllowedPositions<3>(test::paper_robot(), {}).exist());
+  EXPECT_FALSE(AllowedPositions<3>(test::paper_robot(), {.base_gap = 0.1, .tip_gap = 0.1}).exist());
+  EXPECT_FALSE(AllowedPositions<3>(test::paper_robot(), {.beta_low = Vec3(0.1, 0.1, 0.1)}).exist());
+}
+
+TEST(Limits, TheOtherJointsTakeOver) {
+  Random random(13);
+  const Robot<3> robot = test::paper_robot();
+  Limits<3> limits;
+  limits.translation_speed = limits.rotation_speed = 1e3;
+  const AllowedPositions<3> allowed(robot, limits);
+  int better = 0;
+  for (int n = 0; n < test::cases(300); ++n) {
+    const Vec3 beta = allowed.clamped(test::random_joints(robot, random, 0.5).beta);
+    const test::RandomGoals goals(random);
+    JointVelocity<3> held, shared;
+    LimitReport report;
+    (void)limited_minimum(goals.sum(), allowed, limits, beta, period, AtLimits::hold, held, report);
+    if (!report.any()) continue;
+    (void)limited_minimum(goals.sum(), allowed, limits, beta, period, AtLimits::redistribute, shared, report);
+    better += goals.cost(shared) < goals.cost(held) * (1 - 1e-9);
+    if (std::popcount(unsigned(report.base_gaps | report.tip_gaps)) == 1) {
+      EXPECT_LE(goals.cost(shared), goals.cost(held) * (1 + 1e-5));
+    }
+  }
+  EXPECT_GT(better, 20);
+}
+
+}  // namespace
+}  // namespace ctcr

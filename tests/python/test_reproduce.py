@@ -1,0 +1,52 @@
+"""The paper's numbers beside ours."""
+
+import numpy as np
+import pytest
+
+from ctcr.model import Model
+from ctcr.reproduce import control, model
+from ctcr.reproduce.claim import Claim
+from ctcr.reproduce.robot import paper_robot, random_design, random_rows
+
+
+def test_a_claim_has_a_ratio_where_the_paper_is_not_zero():
+    assert Claim("I", "x", 2.0, 3.0, "mm").ratio == 1.5
+    assert Claim("I", "x", 0.0, 3.0, "mm").ratio is None
+    assert Claim("I", "x", 2.0, 3.0, "mm", "because").row() == ["I", "x", "2 mm", "3 mm", "1.5", "because"]
+
+
+def test_random_rows_are_in_order():
+    random = np.random.default_rng(5)
+    robot = random_design(random)
+    beta, _, force = random_rows(robot, 200, random, 0.3)
+    assert beta.shape == (200, 3) and (np.diff(beta, axis=1) >= 0).all() and (beta <= 0).all()
+    assert (np.linalg.norm(force, axis=1) <= 0.3).all()
+    assert Model(robot).predict(beta[:20], np.zeros((20, 3))).solved.all()
+
+
+def test_schemes_rank_as_in_figure_2():
+    done = []
+    errors, seconds = model.integration_errors(3, 40, done.append)
+    mean = {name: error.mean() for name, error in errors.items()}
+    assert mean["RK8"] < mean["RK4"] < mean["RK3"] and len(done) == 3 and min(seconds.values()) > 0
+    of = {claim.what: claim for claim in model.integration_claims(errors, seconds)}
+    assert of["RK4, mean error"].ours == pytest.approx(100 * mean["RK4"])
+
+
+def test_the_reference_has_converged():
+    random = np.random.default_rng(6)
+    robot = random_design(random)
+    beta, alpha, force = random_rows(robot, 20, random, 0.3)
+    at = [Model(robot, steps=n, integrator="rk8").predict(beta, alpha, force).position for n in (10, 30)]
+    assert np.abs(at[0] - at[1]).max() < 1e-9
+
+
+def test_scenarios_hold_what_the_text_says():
+    runs = control.scenarios(1, lambda amount: None)
+    of = {claim.what: claim for claim in control.tracking_claims(runs)}
+    assert of["S1: runs that fail"].ours == 100 and of["S2: runs that fail"].ours == 0
+    assert of["S3 and S4 up to 20 g: runs that fail"].ours == 0
+    assert of["S3 and S4 above 20 g: runs that fail"].ours == 100
+    assert of["20 g unknown: increase of the mean error"].ours <= 0.012
+    assert of["largest error of all"].ours <= 1.22
+    assert paper_robot().n_tubes == 3

@@ -1,0 +1,55 @@
+"""Which parameters deserve calibration for a wanted accuracy: as few as possible (paper, Section V)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import hypot
+
+
+@dataclass(frozen=True)
+class Advice:
+    """`calibrate` in the order of their influence; with the others at nominal values the error is `error` [mm]."""
+
+    accuracy: float
+    calibrate: list[str]
+    keep: list[str]
+    error: float
+
+    def text(self) -> str:
+        if not self.error <= self.accuracy:
+            return f"{self.accuracy:g} mm is out of reach: the error is {self.error:.3g} mm with true parameters."
+        if not self.calibrate:
+            return f"Within {self.accuracy:g} mm nothing needs calibration: the error is {self.error:.3g} mm."
+        rest = f"leave the other {len(self.keep)} at nominal values, the error is then {self.error:.3g} mm"
+        return f"For {self.accuracy:g} mm calibrate {grouped(self.calibrate)}; {rest}."
+
+
+def advise(
+    influence_mm: Mapping[str, float], accuracy_mm: float, base_mm: float = 0.0, independent: bool = False
+) -> Advice:
+    """Calibrates the most influential parameters until what the others cause stays within the accuracy.
+
+    base_mm      the error with true parameters, to which influences add
+    independent  influences add as independent errors do, squared; otherwise all at once, as in the worst case
+    """
+    order = sorted(influence_mm, key=lambda name: -influence_mm[name])
+
+    def error(kept: list[str]) -> float:
+        sizes = [influence_mm[name] for name in kept]
+        return base_mm + (hypot(*sizes) if independent else sum(sizes))
+
+    count = 0
+    while count < len(order) and not error(order[count:]) <= accuracy_mm:
+        count += 1
+    return Advice(accuracy_mm, order[:count], order[count:], error(order[count:]))
+
+
+def grouped(names: Iterable[str]) -> str:
+    """Names with those of several tubes as one: "length of tubes 1, 3, tracker position x"."""
+    tubes: dict[str, list[str]] = {}
+    for name in names:
+        kind, _, tube = name.partition(", tube ")
+        tubes.setdefault(kind, []).append(tube)
+    return ", ".join(
+        kind + (f" of tube{'s' if len(found) > 1 else ''} {' and '.join(sorted(found))}" if found[0] else "")
+        for kind, found in tubes.items()
+    )

@@ -1,0 +1,47 @@
+"""The pictures of the study, as SVG text through `html_page.figure`."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ctcr.compare.figures import AXES, ERROR, FAINT
+from ctcr.sensitivity.closed_loop import ClosedLoop
+from ctcr.sensitivity.open_loop import OpenLoop
+
+
+def bars(figure: Figure, study: OpenLoop) -> None:
+    """Mean, 95 % and largest tip error of each parameter, logarithmic."""
+    axes = figure.subplots()
+    order = [study.together, *sorted(study.influences, key=lambda one: one.p95)]
+    place = np.arange(len(order))
+    axes.barh(
+        place,
+        [max(one.p95, 1e-4) for one in order],
+        color=ERROR,
+        alpha=0.8,
+        height=0.65,
+        label="95 % are below",
+    )
+    axes.plot([max(one.mean, 1e-4) for one in order], place, "D", color="#1c2733", ms=3.5, label="mean")
+    axes.plot([max(one.maximum, 1e-4) for one in order], place, "|", color="#1c2733", ms=8, label="largest")
+    axes.set_yticks(place, [one.name for one in order])
+    axes.set(xscale="log", xlabel="tip error, mm")
+    axes.legend(loc="lower right", fontsize=9)
+
+
+def curves(figure: Figure, study: ClosedLoop) -> None:
+    """Increase of the largest error along the range of each kind of parameter, a line a tube (paper, Fig. 4)."""
+    kinds = list(dict.fromkeys(curve.varied.kind for curve in study.curves if curve.varied.tube))
+    panels = figure.subplots(-(-len(kinds) // 4), 4, squeeze=False, sharey=True).ravel()
+    for panel, kind in zip(panels, kinds, strict=False):
+        for curve in (one for one in study.curves if one.varied.kind == kind):
+            change = [curve.varied.change(fraction) for fraction in curve.fraction]
+            panel.plot(change, 1e3 * curve.maximum, "o-", ms=3, color=AXES[(curve.varied.tube - 1) % 3],
+                       label=f"tube {curve.varied.tube}")  # fmt: skip
+        unit = next(one.varied.unit for one in study.curves if one.varied.kind == kind)
+        panel.axhline(0, color=FAINT, lw=1)
+        panel.set_title(kind, fontsize=9.5)
+        panel.set(xlabel=unit or "change")
+    for panel in panels[len(kinds) :]:
+        panel.set_visible(False)
+    panels[0].legend(fontsize=8)
+    figure.supylabel("increase of the largest error, µm", fontsize=10)

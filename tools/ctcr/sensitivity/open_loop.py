@@ -1,0 +1,180 @@
+"""Tip errors of wrong parameters over random configurations: sums, not samples, so memory does not grow with them."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import _core, free_parameters
+from ctcr.robot import Robot
+from ctcr.sensitivity.progress_file import ProgressFile
+from ctcr.sensitivity.ranges import Varied, together
+from ctcr.sensitivity.work import workers
+
+Array = NDArray[np.float64]
+
+BLOCK = 1024  # configurations that share a seed
+CHUNK = 16  # blocks a job
+EDGES_MM = 1e3 * np.geomspace(1e-7, 1.0, 241)  # of the histogram's bins
+
+
+@dataclass
+class Totals:
+    """What has been seen so far: a column for each end of each parameter, the last for all together."""
+
+    count: Array
+    unsolved: Array
+    sum: Array
+    sum_of_squares: Array
+    maximum: Array
+    histogram: Array
+    evaluations: float = 0.0
+    seconds: float = 0.0  # of processors
+    jobs: int = 0
+
+    @classmethod
+    def empty(cls, columns: int) -> "Totals":
+        return cls(*(np.zeros(columns) for _ in range(5)), np.zeros((columns, len(EDGES_MM) - 1)))
+
+    def add(self, part: dict[str, Any]) -> None:
+        """Takes the result of the next job; in their order, so that sums do not depend on who did them."""
+        for name in ("count", "unsolved", "sum", "sum_of_squares"):
+            for row in part[name]:
+                setattr(self, name, getattr(self, name) + row)
+        self.maximum = np.maximum(self.maximum, np.max(part["maximum"], axis=0))
+        self.histogram = self.histogram + part["histogram"]
+        self.evaluations += part["evaluations"]
+        self.seconds += part["seconds"]
+        self.jobs += 1
+
+    def as_state(self) -> dict[str, Any]:
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in vars(self).items()
+        }
+
+    @classmethod
+    def from_state(cls, state: dict[str, Any]) -> "Totals":
+        return cls(**{name: np.array(v) if isinstance(v, list) else v for name, v in state.items()})
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Tip errors that one parameter causes at the ends of its range [mm]."""
+
+    name: str
+    mean: float
+    p95: float
+    maximum: float
+    unsolved: int
+
+
+@dataclass(frozen=True)
+class OpenLoop:
+    """The study. `together` is that of all parameters drawn at random within their ranges."""
+
+    configurations: int
+    influences: list[Influence]
+    together: Influence
+    solved: float  # predictions of a tip
+    evaluations: float  # of the model, several a prediction
+    seconds: float = field(compare=False)  # of processors
+
+
+@dataclass(frozen=True)
+class Job:
+    """One piece of the study: everything a worker needs."""
+
+    tubes: int
+    nominal: Array
+    varied: Array
+    low: Array
+    high: Array
+    most_force: float
+    seed: int
+    first_block: int
+    blocks: int
+    configurations: int
+    threads: int
+
+
+def work(job: Job) -> dict[str, Any]:
+    """Runs one job."""
+    start = time.thread_time() if job.threads == 1 else time.process_time()
+    clock = time.thread_time if job.threads == 1 else time.process_time
+    result = _core.sensitivity(
+        job.tubes,
+        nominal=_core.SystemValues(parameters=job.nominal, effects=np.empty(0), has_effects=False),
+        varied=job.varied, low=job.low, high=job.high, most_force=job.most_force, seed=job.seed,
+        first_block=job.first_block, blocks=job.blocks, configurations=job.configurations, threads=job.threads,
+    )  # fmt: skip
+    names = ("count", "unsolved", "sum", "sum_of_squares", "maximum", "histogram", "evaluations")
+    return {name: getattr(result, name) for name in names} | {"seconds": clock() - start}
+
+
+def study(
+    robot: Robot,
+    varied: list[Varied],
+    configurations: int,
+    *,
+    most_force: float = 0.3,
+    seed: int = 1,
+    dask: str | None = None,
+    keep: str | None = None,
+    advance: Callable[[float], None] = lambda amount: None,
+) -> OpenLoop:
+    """The study over random configurations with tip forces up to `most_force` [N].
+
+    `keep` names a file of progress: an interrupted study with the same options goes on from there. The result does not
+    depend on `dask` nor on the number of cores.
+    """
+    ends = np.array([one.at(fraction) for one in varied for fraction in (-1.0, 1.0)])
+    low, high = together(robot, varied)
+    jobs = [
+        Job(robot.n_tubes, free_parameters.values(robot), ends, low, high, most_force, seed, first, blocks, size, 1)
+        for first, blocks, size in _pieces(configurations)
+    ]  # fmt: skip
+    settings = {
+        "study": "open loop", "nominal": jobs[0].nominal.tolist(), "ends": ends.tolist(),
+        "configurations": configurations, "most_force": most_force, "seed": seed,
+    }  # fmt: skip
+    kept = ProgressFile(keep, settings)
+    state = kept.load()
+    totals = Totals.from_state(state) if state else Totals.empty(len(ends) + 1)
+    done = totals.jobs
+    advance(sum(job.blocks * job.configurations for job in jobs[:done]))
+    with workers(dask) as in_order:
+        for job, part in zip(jobs[done:], in_order(work, jobs[done:]), strict=True):
+            totals.add(part)
+            kept.save(totals.as_state())
+            advance(job.blocks * job.configurations)
+    return _told(varied, configurations, totals)
+
+
+def _pieces(configurations: int):
+    """(first block, blocks, configurations a block) of each job; the last block may be smaller."""
+    whole, rest = divmod(configurations, BLOCK)
+    for first in range(0, whole, CHUNK):
+        yield first, min(CHUNK, whole - first), BLOCK
+    if rest:
+        yield whole, 1, rest
+
+
+def _told(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:
+    def influence(name: str, columns: slice) -> Influence:
+        count, histogram = t.count[columns].sum(), t.histogram[columns].sum(axis=0)
+        if not count:
+            return Influence(name, np.nan, np.nan, np.nan, int(t.unsolved[columns].sum()))
+        place = int(np.searchsorted(np.cumsum(histogram), 0.95 * count))
+        p95 = min(EDGES_MM[place + 1], 1e3 * t.maximum[columns].max())
+        return Influence(
+            name, 1e3 * t.sum[columns].sum() / count, p95, 1e3 * t.maximum[columns].max(),
+            int(t.unsolved[columns].sum()),
+        )  # fmt: skip
+
+    each = [influence(one.name, slice(2 * k, 2 * k + 2)) for k, one in enumerate(varied)]
+    all_at_once = influence("all together", slice(2 * len(varied), None))
+    return OpenLoop(configurations, each, all_at_once, float(t.count.sum()), t.evaluations, t.seconds)

@@ -1,0 +1,102 @@
+"""A scenario as one HTML page that needs nothing else: no network, no other file."""
+
+import html
+from pathlib import Path
+
+from ctcr import html_page
+from ctcr.html_page import bullets, cards, figure, table
+from ctcr.output import atomic_writer
+from ctcr.robot import Robot
+from ctcr.track import figures
+from ctcr.track.runs import FAILED, FAR, Run
+from ctcr.track.scenario import Scenario
+from ctcr.track.scene import scene
+from ctcr.track.summary import COLUMNS, by_mass, rows, summary
+
+
+def write(runs: list[Run], scenario: Scenario, robot: Robot, target: str | Path, source: str) -> None:
+    """Writes the page; source says what was run. Raises InputError where the file cannot be written."""
+    with atomic_writer(target) as file:
+        file.write(page(runs, scenario, robot, source))
+
+
+def page(runs: list[Run], scenario: Scenario, robot: Robot, source: str) -> str:
+    """The whole HTML text."""
+    numbers = summary(runs)
+    worst = [_worst(group) for group in by_mass(runs).values()]
+    sections = [
+        _opening(numbers, scenario),
+        '<h2>The path</h2><div id="view"></div>'
+        '<p class="soft">The tip without noise, the worst run of each weight. Drag to turn, scroll to zoom.</p>',
+        _errors(runs, numbers, scenario),
+        *(_one(run, scenario, robot) for run in _shown(worst)),
+    ]
+    title = f"Scenario {scenario.name}: {robot.name}"
+    return html_page.page(title, sections, source, "ctcr track", scene(worst, scenario))
+
+
+def _worst(group: list[Run]) -> Run:
+    return max(group, key=lambda run: (run.failed, run.counted.max() if run.started else 0))
+
+
+def _shown(worst: list[Run]) -> list[Run]:
+    """The first weight, the last that did what it was told, and the first that did not."""
+    started = [run for run in worst if run.started]
+    good = [run for run in started if not run.failed]
+    bad = [run for run in started if run.failed]
+    chosen = {id(run): run for run in (*started[:1], *good[-1:], *bad[:1])}
+    return list(chosen.values())
+
+
+def _opening(numbers: dict, scenario: Scenario) -> str:
+    done = [f for f in numbers.values() if not f["failed"] and f["mean_mm"] is not None]
+    failed = [weight for weight, f in numbers.items() if f["failed"]]
+    shown = []
+    if done:
+        shown += [
+            (
+                "good",
+                f"{max(f['mean_mm'] for f in done):.3f} mm",
+                "largest mean error of a weight that did not fail",
+            ),
+            ("good", f"{max(f['max_mm'] for f in done):.2f} mm", "largest error of all these"),
+        ]
+    if scenario.obstacle:
+        clearance = min(f["obstacle_mm"] for f in numbers.values())
+        shown.append(
+            ("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle")
+        )
+    shown.append(("error" if failed else "good", str(len(failed)), f"of {len(numbers)} weights failed"))
+    lead = f"<p class='lead'>{html.escape(scenario.about)}</p>" if scenario.about else ""
+    return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}" + bullets(
+        f"{weight}: {f['verdict']}" for weight, f in numbers.items()
+    )
+
+
+def _errors(runs: list[Run], numbers: dict, scenario: Scenario) -> str:
+    text = (
+        "Distance between the tip and its reference; boxes are quartiles, whiskers reach to all values, diamonds are "
+        f"means. Left out: references nearer than {1e3 * FAR:g} mm to the obstacle, where the tip has to deviate."
+    )
+    told = figure(figures.boxes, runs, 8.5, 3.8, text, wide=True)
+    columns = [
+        "weight",
+        *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS),
+    ]
+    note = (
+        f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
+        f"{scenario.repetitions} runs a weight, noise {scenario.noise_mm:g} mm a reading and axis.</p>"
+    )
+    return f"<h2>Tracking errors</h2>{told}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
+
+
+def _one(run: Run, scenario: Scenario, robot: Robot) -> str:
+    drawn = figure(
+        figures.actuators, (run, robot, scenario), 10.4, 3.6,
+        "Grasped ends and angles of the tubes, with their limits; red: held at a limit.", wide=True,
+    )  # fmt: skip
+    gave = figure(
+        figures.tasks, (run, scenario), 10.4, 3.8, "The error, and when each task gave way.", wide=True
+    )
+    heading = html.escape(f"{run.mass_g:g} g, run {run.repetition}: {run.verdict()}")
+    return f"<h2>{heading}</h2>{drawn}{gave}"

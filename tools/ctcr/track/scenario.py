@@ -1,0 +1,256 @@
+"""A scenario file: the path of the tip, the tasks and limits of the controller, the surroundings, and the repetitions.
+
+Fields carry their unit in their name; the properties and `ctcr.track.runs` give SI units. Positions are those of the
+sensor in the base frame of the robot that is controlled: they stand in space, and a controller with another T_ref sees
+them elsewhere. Defaults are the paper's scenario S2 (Boyer et al., Section IV).
+"""
+
+from importlib.resources import files
+from math import pi
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Len
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from ctcr import yaml_document
+from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
+from ctcr.quantities import Quantity
+from ctcr.robot import Section, Three
+from ctcr.robot_checks import path_text
+
+Array = NDArray[np.float64]
+
+# All twelve edges of a cube: three are travelled twice, as eight of its corners have three edges. Bit k of a corner's
+# number: its place along axis k.
+CUBE_TOUR = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
+TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stability margin", "posture")
+MOST_BYTES = 1 << 18
+
+Weight = Annotated[
+    list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)
+]
+
+
+class Trajectory(Section):
+    """The way of the tip, from rest to rest: a polyline rests at each corner, a spline only at its ends."""
+
+    kind: Literal["cube", "polyline", "spline"] = Field(description="cube, polyline or spline")
+    corner_mm: Annotated[Three | None, Quantity("mm", usual=(0, 1000), count="three numbers")] = None
+    side_mm: Annotated[float, Quantity("mm", usual=(1, 200), above=0)] = 30.0
+    points_mm: list[Three] | None = Field(None, description="a list of points of three numbers in mm")
+    speed_mm_s: Annotated[float, Quantity("mm/s", usual=(0.05, 200), above=0)] = 5.0
+    acceleration_mm_s2: Annotated[float, Quantity("mm/s^2", usual=(0.05, 5000), above=0)] = 2.5
+
+    @property
+    def points(self) -> Array:
+        """(K, 3) [m]."""
+        if self.kind != "cube":
+            return 1e-3 * np.array(self.points_mm)
+        bits = np.array([[corner >> axis & 1 for axis in range(3)] for corner in CUBE_TOUR])
+        return 1e-3 * (np.array(self.corner_mm) + self.side_mm * bits)
+
+
+class Start(Section):
+    """Where the robot is put before it settles at the start of the path."""
+
+    beta_mm: Annotated[list[float], Quantity("mm", usual=(0, 2000), count="one number a tube,")]
+    alpha_deg: Annotated[list[float], Quantity("deg", usual=(0, 720), count="one number a tube,")]
+    settle_s: Annotated[float, Quantity("s", usual=(0.1, 600), least=0)] = 20.0
+
+
+class Tasks(Section):
+    """Weights [of translation, of rotation] and settings; a weight of 0 leaves a task out. Paper, Section IV.B."""
+
+    tracking: Weight = [1e7, 0.0]
+    damping: Weight = [1e6, 10.0]
+    limit_avoidance: Weight = [100.0, 0.0]
+    obstacle_avoidance: Weight = [10.0, 0.0]
+    stability_margin: Weight = [0.0, 0.0]
+    posture: Weight = [0.0, 0.0]
+    feedback_per_s: Annotated[float, Quantity("1/s", usual=(0.1, 80), above=0)] = 30.0
+    fastest_feedback_mm_s: Annotated[float, Quantity("mm/s", usual=(0.1, 500), above=0)] = 20.0
+    limit_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 1e4), least=0)] = 100.0
+    obstacle_strength_m3_s: Annotated[float, Quantity("m^3/s", usual=(1e-6, 100), least=0)] = 0.1
+    stability_wanted: Annotated[float, Quantity("", usual=(0.01, 1), least=0)] = 0.3
+    posture_beta_mm: Annotated[
+        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
+    ] = None
+    posture_alpha_deg: Annotated[
+        list[float] | None, Quantity("deg", usual=(0, 720), count="one number a tube,")
+    ] = None
+    posture_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 10), least=0)] = 0.1
+
+
+class Limits(Section):
+    """What no step may violate. `at_limits` hold: as the paper; redistribute: the other joints take over."""
+
+    base_gap_mm: Annotated[float, Quantity("mm", usual=(0.1, 300), least=0)] = 2.0
+    tip_gap_mm: Annotated[float, Quantity("mm", usual=(0.1, 300), least=0)] = 2.0
+    translation_mm_s: Annotated[float, Quantity("mm/s", usual=(1, 1000), above=0)] = 100.0
+    rotation_deg_s: Annotated[float, Quantity("deg/s", usual=(5, 5000), above=0)] = 570.0
+    beta_low_mm: Annotated[
+        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
+    ] = None
+    beta_high_mm: Annotated[
+        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
+    ] = None
+    at_limits: Literal["hold", "redistribute"] = Field("hold", description="hold or redistribute")
+
+
+class Obstacle(Section):
+    """A ball that the tip must not touch."""
+
+    centre_mm: Annotated[Three, Quantity("mm", usual=(0, 1000), count="three numbers")]
+    radius_mm: Annotated[float, Quantity("mm", usual=(0.1, 200), above=0)]
+
+
+class TipLoad(Section):
+    """Weights that hang at the tip; `direction` in the base frame is that of their pull."""
+
+    mass_g: Annotated[
+        list[float], Len(1), Quantity("g", usual=(0.1, 500), least=0, count="a list of numbers")
+    ] = [0.0]
+    direction: Annotated[Three, Quantity("", usual=(0, 1), count="three numbers")] = [0.0, -1.0, 0.0]
+    controller: Literal["unknown", "known", "estimated"] = Field(
+        "unknown", description="unknown, known or estimated"
+    )
+
+
+class Scenario(Section):
+    """The whole file."""
+
+    name: str = Field(description="text")
+    about: str = Field("", description="text")
+    rate_Hz: Annotated[float, Quantity("Hz", usual=(1, 5000), above=0)] = 40.0
+    trajectory: Trajectory = Field(description="its fields, indented below it")
+    start: Start = Field(description="its fields, indented below it")
+    tasks: Tasks = Field(default_factory=Tasks, description="its fields, indented below it")
+    limits: Limits = Field(default_factory=Limits, description="its fields, indented below it")
+    obstacle: Obstacle | None = Field(None, description="its fields, indented below it")
+    load: TipLoad = Field(default_factory=TipLoad, description="its fields, indented below it")
+    noise_mm: Annotated[float, Quantity("mm", usual=(1e-4, 5), least=0)] = 0.035
+    noise_deg: Annotated[float, Quantity("deg", usual=(1e-4, 5), least=0)] = 0.0
+    repetitions: Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")] = 10
+
+    def force(self, mass_g: float) -> Array:
+        """Pull of a weight (3,) [N], base frame."""
+        direction = np.array(self.load.direction)
+        return 9.80665e-3 * mass_g * direction / np.linalg.norm(direction)
+
+
+_SECTIONS = {
+    "trajectory": Trajectory, "start": Start, "tasks": Tasks, "limits": Limits, "obstacle": Obstacle, "load": TipLoad,
+}  # fmt: skip
+
+
+def shipped(name: str) -> Scenario:
+    """One of the scenarios that come with the package, for three tubes: S1 to S4 of the paper, and S5."""
+    text = (files("ctcr") / "track" / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")
+    return parse(text, name, 3)
+
+
+def load(path: str | Path, n_tubes: int) -> Scenario:
+    """The scenario of a file for a robot of so many tubes. Raises InputError with all faults of the file."""
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+    if len(content) > MOST_BYTES:
+        raise InputError(Problem("is over 256 kB: this is not a scenario", str(path)))
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(Problem("is not text in UTF-8", str(path))) from None
+    return parse(text, str(path), n_tubes)
+
+
+def parse(text: str, file: str, n_tubes: int) -> Scenario:
+    """The scenario described by a text; `file` is its name in errors."""
+    document = yaml_document.parse(text, file)
+    if not isinstance(document.data, dict):
+        raise InputError(
+            Problem("does not describe a scenario: no fields such as name, trajectory, start", file)
+        )
+    scenario, faults = None, []
+    try:
+        scenario = Scenario.model_validate(document.data)
+    except ValidationError as error:
+        faults = [_told(item) for item in error.errors(include_url=False)]
+    if scenario:
+        faults = list(_relations(scenario, n_tubes)) + list(_unusual(scenario))
+    if scenario is None or faults:
+        found = [Problem(text, file, document.line(path), path_text(path)) for path, text in faults]
+        raise InputError(sorted(found, key=lambda problem: problem.line or 0))
+    return scenario
+
+
+def _owner(path: tuple) -> tuple[type[Section], str]:
+    section = _SECTIONS.get(path[0]) if len(path) > 1 else None
+    return (section, path[1]) if section else (Scenario, path[0])
+
+
+def _told(error: dict) -> tuple[tuple, str]:
+    path = error["loc"]
+    section, field = _owner(path)
+    if error["type"] == "extra_forbidden":
+        meant = did_you_mean(str(field), section.model_fields)
+        return path, f"unknown field{f': did you mean {meant}?' if meant else ''}"
+    expected = section.expected(field) if field in section.model_fields else "its fields"
+    if error["type"] == "missing":
+        return path, f"is missing: needs {expected}"
+    return path, f"{shown(error['input'])}: needs {expected}"
+
+
+def _relations(s: Scenario, n: int):
+    t = s.trajectory
+    if t.kind == "cube" and t.corner_mm is None:
+        yield ("trajectory", "corner_mm"), f"is missing: a cube needs {Trajectory.expected('corner_mm')}"
+    if t.kind != "cube":
+        least = 4 if t.kind == "spline" else 2
+        distinct = np.unique(np.array(t.points_mm or np.empty((0, 3))), axis=0)
+        if len(distinct) < least:
+            yield ("trajectory", "points_mm"), f"a {t.kind} needs at least {least} different points"
+        elif t.kind == "spline" and (np.linalg.norm(np.diff(t.points_mm, axis=0), axis=1) == 0).any():
+            yield ("trajectory", "points_mm"), "a point of a spline may not follow itself"
+    per_tube = [("start", "beta_mm"), ("start", "alpha_deg"), ("tasks", "posture_beta_mm"),
+                ("tasks", "posture_alpha_deg"), ("limits", "beta_low_mm"), ("limits", "beta_high_mm")]  # fmt: skip
+    for section, field in per_tube:
+        values = getattr(getattr(s, section), field)
+        if values is not None and len(values) != n:
+            yield (section, field), f"has {len(values)} values: this robot needs {n}, one a tube"
+    if any(s.tasks.posture) and not (s.tasks.posture_beta_mm and s.tasks.posture_alpha_deg):
+        yield ("tasks", "posture"), "needs posture_beta_mm and posture_alpha_deg"
+    if not (any(s.tasks.damping) and s.tasks.damping[0] > 0 and s.tasks.damping[1] > 0):
+        yield ("tasks", "damping"), "both weights must be above 0: without damping the step is not determined"
+    if any(s.load.mass_g) and not np.linalg.norm(s.load.direction) > 0:
+        yield ("load", "direction"), "has no length"
+    if s.tasks.feedback_per_s > 2 * s.rate_Hz:
+        text = f"{s.tasks.feedback_per_s:g} 1/s is unstable at {s.rate_Hz:g} Hz: at most twice the rate"
+        yield ("tasks", "feedback_per_s"), text
+    given = t.corner_mm if t.kind == "cube" else t.points_mm
+    if given and np.abs(given).max() < 1:
+        yield ("trajectory", "corner_mm" if t.kind == "cube" else "points_mm"), "all below 1 mm: is this m?"
+    if s.obstacle and given:
+        inside = np.linalg.norm(1e3 * t.points[0] - s.obstacle.centre_mm) <= s.obstacle.radius_mm
+        if inside:
+            yield ("obstacle", "centre_mm"), "the obstacle lies on the start of the path: move one of them"
+
+
+def _unusual(s: Scenario):
+    """Values that look like another unit: in a file that moves a robot they are faults."""
+    for name in ("trajectory", "start", "tasks", "limits", "obstacle", "load", None):
+        section = getattr(s, name) if name else s
+        for field in type(section).model_fields if section else ():
+            quantity, value = type(section).quantity(field), getattr(section, field)
+            for number in value if isinstance(value, list) else [value]:
+                if quantity and isinstance(number, float | int) and not quantity.is_usual(number):
+                    yield ((name, field) if name else (field,)), quantity.doubt(number)
+                    break
+
+
+def radians(degrees: list[float]) -> Array:
+    """[rad]"""
+    return pi / 180 * np.array(degrees)
