@@ -47,13 +47,52 @@ def aurora(robot, folder, hidden, noise, seed, scenario) -> None:
     from ctcr.simulators.aurora import AuroraSimulator
 
     simulator = AuroraSimulator(_robot(robot, hidden, noise, seed), _folder(folder), scenario, seed)
-    try:
-        click.echo(f"tracker: {simulator.line.link}")
-        simulator.run()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        simulator.close()
+    _serve(simulator, f"tracker: {simulator.line.link}")
+
+
+@command.command(name="ethercat")
+@click.option("--interface", metavar="NAME", help="Answer on this one, instead of making a virtual pair.")
+@click.option("--motors", type=click.IntRange(1, 8), default=6, show_default=True)
+@click.option(
+    "--variant", type=click.Choice(["EL7041", "EL7031"]), default="EL7041", show_default=True,
+    help="Type of the terminals.",
+)  # fmt: skip
+@folder_option
+@seed_option
+@scenario_option
+def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
+    """Simulate a coupler EK1100 and stepper terminals, which answer EtherCAT frames on a network interface.
+
+    Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
+    """
+    from ctcr.simulators import network
+    from ctcr.simulators.ethercat import EthercatSimulator
+
+    place = _folder(folder)
+    if not interface:
+        network.make_cable()
+    simulator = EthercatSimulator(interface or network.BUS, place, motors, variant, scenario, seed)
+    _serve(simulator, f"bus: drive it from {network.MASTER}" if not interface else f"bus on {interface}")
+
+
+@command.command(name="bench", context_settings={"ignore_unknown_options": True})
+@click.argument("robot")
+@click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
+@folder_option
+@hide_option
+@noise_option
+@seed_option
+@click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
+@click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
+def bench(robot, program, folder, hidden, noise, seed, tracker_scenario, bus_scenario) -> int:
+    """Simulate a whole bench around ROBOT while COMMAND runs (a shell without one); its motors move the tracked tip.
+
+    Needs no rights: bus and COMMAND get a network of their own.
+    """
+    from ctcr.simulators import bench as simulated
+
+    robots = _robot(robot, hidden, noise, seed)
+    return simulated.run(list(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed)
 
 
 @command.command(name="set")
@@ -77,6 +116,19 @@ def set_(device, settings, force, line_break, folder) -> None:
     rows = [[name, str(value).lower()] for name, value in state.pop("faults").items()]
     rows += [[name, str(value)] for name, value in state.items()]
     output.console().print(output.table(f"Simulator: {device}", ["", "value"], rows))
+
+
+def _serve(simulator, text) -> None:
+    import signal
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        click.echo(text)
+        simulator.run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        simulator.close()
 
 
 def _robot(robot, hidden, noise, seed):
