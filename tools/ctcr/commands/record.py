@@ -45,9 +45,9 @@ def command(
 ) -> None:  # fmt: skip
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
-    Every row is on the disk as soon as it is measured; the same command goes on where a recording was interrupted. Where
-    the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home first
-    with `ctcr move --home`.
+    Every row is on the disk as soon as it is measured; the same command goes on where a recording was interrupted.
+    Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
+    first with `ctcr move --home`.
     """
     import numpy as np
 
@@ -68,12 +68,12 @@ def command(
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
     options = Options(dwell, readings, speed, patience)
     console = output.console(json_target)
+    recording = Folder(
+        target, {"robot": robot, "plan": plan, "bench": bench_path}, options, way, loaded.n_tubes
+    )
     with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
-        recording = Folder(
-            target, {"robot": robot, "plan": plan, "bench": bench_path}, options, way, loaded.n_tubes
-        )
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)

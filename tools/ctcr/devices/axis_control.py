@@ -11,8 +11,12 @@ from ctcr.devices.motion import StraightMove, VelocityMove
 
 Array = NDArray[np.float64]
 
-GAIN = 10.0  # [1/s] of the position loop around the encoders
+GAIN = 20.0  # [1/s] of the position loop around the encoders
 STOP_RAMPS = 4.0  # a stop brakes so much harder than a move
+SETTLED, SETTLE_S = (
+    0.01,
+    0.5,
+)  # a move ends this near to its target, as a share of the largest lag, or so long after
 SLACK_M, SLACK_RAD = (
     0.5e-3,
     5e-3,
@@ -37,7 +41,7 @@ class AxisSettings:
 
 
 class AxisControl:
-    """One robot's joints. Until homing joints count from where they were switched on, and only short moves are possible.
+    """One robot's joints. Until homing, joints count from power on, and only short moves are possible.
 
     `fault` is the reason of a stop; it stays until a new connection is made.
     """
@@ -47,6 +51,7 @@ class AxisControl:
         self.wanted = self.joints = np.array(joints, float)
         self._speeds = 0 * self.wanted
         self._motion: StraightMove | VelocityMove | None = None
+        self._settling = 0.0  # [s] since the end of the motion
         self._watched = False  # a velocity whose way has to be watched
         self.limited = False  # the last velocity ended at a limit
         self.fault: DeviceFault | None = None
@@ -127,7 +132,10 @@ class AxisControl:
                 self.halt()
                 self.limited = True
             if self._motion.is_finished:
-                self._motion, self._speeds = None, 0 * self._speeds
+                self._settling += dt
+                left = np.abs(self.wanted - joints)
+                if (left < SETTLED * settings.lag).all() or self._settling > SETTLE_S:
+                    self._motion, self._speeds, self._settling = None, 0 * self._speeds, 0.0
         if self.fault and not self._motion:
             self.wanted = joints  # hold, do not push
             return 0 * joints

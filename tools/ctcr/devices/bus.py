@@ -95,6 +95,7 @@ class Bus:
             master.send_processdata()
             master.receive_processdata(CYCLE_US)
             if master.state_check(pysoem.OP_STATE, CYCLE_US) == pysoem.OP_STATE:
+                pysoem.settings.timeouts.ret = CYCLE_US  # from here on nothing may hold up the cycle for long
                 return
         raise self._state_fault()
 

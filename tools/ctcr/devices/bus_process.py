@@ -1,8 +1,8 @@
 """The process that owns the bus: exchanges process data in a steady cycle and moves the joints as it is asked.
 
 Python threads share one lock, and a tracker's client in a thread beside the bus held it up by 376 ms; so the bus has a
-process of its own. It is asked through a pipe, and tells its state in a shared record. When the other end of the pipe is
-gone it stops the motors and ends.
+process of its own. It is asked through a pipe, and tells its state in a shared record. When the other end of the pipe
+is gone it stops the motors and ends.
 """
 
 import gc
@@ -57,12 +57,13 @@ def state_record(folder: Path, writer: bool = False) -> SharedRecord:
 
 
 def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
-    """The process: says ("ready", names of the devices) or ("fault", DeviceFault), then serves until the pipe closes."""
+    """The process: says ("ready", names of devices) or ("fault", DeviceFault), then serves until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
         bus.connect()
         owner = _Owner(settings, folder, pipe, bus)
+        owner.tell(time.monotonic())
         pipe.send(("ready", bus.names))
         owner.serve()
     except DeviceFault as fault:
@@ -86,6 +87,7 @@ class _Owner:
         self._base = HOME_COUNT if homed else 0
         self._control = AxisControl(settings.axes, self._joints(), homed)
         self._enabled_at, self._new_counters = None, None
+        self._doubted = False  # the last look at the states found a fault
         self._number = 0  # of the last request
         self._open = True
 
@@ -107,9 +109,11 @@ class _Owner:
         gc.collect()
         gc.disable()  # a collection would come at the worst moment; a cycle leaves nothing to collect
         period, control = self._settings.period, self._control
-        last = self._good_at = time.monotonic()
-        due = last + period
-        while self._open or self._control.is_moving:
+        self._good_at = now = time.monotonic()
+        last, due = now, now + period
+        while self._open or (
+            control.is_moving and now - self._good_at < SILENCE_S
+        ):  # ends at rest, or without a bus
             wait = due - time.monotonic()
             if wait > 0:
                 time.sleep(wait)
@@ -120,7 +124,7 @@ class _Owner:
                 last = now
             if control.fault:
                 emergency_stop.stop(self._folder, str(control.fault))
-            self._tell(now)
+            self.tell(now)
 
     def _cycle(self, now: float, dt: float) -> bool:
         """One exchange; whether it was good."""
@@ -161,8 +165,11 @@ class _Owner:
                 control.stop(
                     drive.fault("does not switch its motor on", "check the motor's cable and supply")
                 )
-        if self._cycles % STATE_CYCLES == 0 and (fault := bus.check_states()):
-            control.stop(fault)
+        if self._cycles % STATE_CYCLES == 0:
+            fault = bus.check_states()
+            if fault and self._doubted:  # one lost frame is no fault
+                control.stop(fault)
+            self._doubted = fault is not None
 
     def _frames_lost(self) -> DeviceFault:
         what = f"no frame came back whole for {1e3 * SILENCE_S:.0f} ms"
@@ -219,13 +226,14 @@ class _Owner:
 
     # ---- telling
 
-    def _tell(self, now: float) -> None:
+    def tell(self, now: float) -> None:
+        """Writes the state."""
         control, axes = self._control, len(self._counters)
 
         def padded(values):
             return np.concatenate([values, np.zeros(MOST_AXES - axes)])
 
-        if self._cycles % STATE_CYCLES == 1:
+        if self._cycles % STATE_CYCLES == 0:
             self._p99 = self._lateness.quantile(0.99)
         self._record.write(
             t=now, joints=padded(control.joints), wanted=padded(control.wanted), counters=padded(self._counters),

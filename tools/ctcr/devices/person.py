@@ -1,6 +1,5 @@
 """The person at the bench: hangs weights, looks at the tubes. Beside the simulators nobody is needed."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 

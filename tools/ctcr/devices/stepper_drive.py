@@ -38,7 +38,7 @@ class DriveInputs:
 
 
 class StepperDrive:
-    """A terminal on the bus in PREOP; `slave` is that of pysoem. The layout of the process data is the terminal's own."""
+    """A terminal on the bus in PREOP; `slave` is that of pysoem. Its process data are laid out as it says itself."""
 
     def __init__(self, slave, position: int, settings: DriveSettings):
         self.slave, self.position, self.settings = slave, position, settings
@@ -75,10 +75,7 @@ class StepperDrive:
                 and (key not in (_COUNTER_VALUE, _COUNTER) or field.bits == 32)
             ]
             if not holders:
-                text = f"no process data with the value {key[0]:04X}:{key[1]:02X}"
-                raise self.fault(
-                    text, "this is no stepper terminal with an encoder: check the order of the bus"
-                )
+                raise self._not_a_drive()
             chosen.append(min(holders)[1])
         chosen = sorted(set(chosen))
         self._write(assignment, 0, "B", 0)
@@ -93,7 +90,7 @@ class StepperDrive:
         try:
             count = self._read(index, 0, "B")
             return [self._read(index, i, "I") for i in range(1, count + 1)]
-        except (pysoem.SdoError, pysoem.MailboxError, pysoem.PacketError, pysoem.WkcError):
+        except (pysoem.SdoError, *_silences()):
             return []
 
     # ---- process data
@@ -124,7 +121,7 @@ class StepperDrive:
 
         try:
             found = [i for i in DIAGNOSES if self._read(DIAGNOSIS, i, "B")]
-        except (pysoem.SdoError, pysoem.MailboxError, pysoem.PacketError, pysoem.WkcError):
+        except (pysoem.SdoError, *_silences()):
             found = []
         if not found:
             return self.fault("reports an error", "switch the terminals off and on")
@@ -137,6 +134,10 @@ class StepperDrive:
         code = self.slave.al_status
         what, remedy = status_text(code)
         return self.fault(f"is in {state_name(self.slave.state)}, {what} ({code:#06x})", remedy, code)
+
+    def _not_a_drive(self) -> DeviceFault:
+        remedy = "compare the terminals in the bench file with `ctcr devices`"
+        return self.fault("is no stepper terminal with an encoder, or does not answer", remedy)
 
     def fault(self, what: str, remedy: str, code: int | None = None) -> DeviceFault:
         return DeviceFault(self.name, what, remedy, code)
@@ -155,3 +156,12 @@ class StepperDrive:
         except pysoem.SdoError as error:
             what = f"refuses {value} for {index:04X}:{subindex:02X} ({error.desc})"
             raise self.fault(what, "check the `motors` section of the bench file", error.abort_code) from None
+        except _silences() as error:
+            raise self._not_a_drive() from error
+
+
+def _silences() -> tuple[type[Exception], ...]:
+    """How pysoem says that no answer came, or a damaged one."""
+    import pysoem
+
+    return pysoem.MailboxError, pysoem.PacketError, pysoem.WkcError

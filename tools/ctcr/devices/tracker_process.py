@@ -8,9 +8,11 @@ from multiprocessing.connection import Connection
 from ctcr.devices.aurora import Aurora
 from ctcr.devices.bench_file import TrackerPort
 from ctcr.devices.fault import DeviceFault
+from ctcr.devices.lateness import wish_real_time
 from ctcr.devices.ndi_protocol import system_troubles
 from ctcr.devices.ndi_replies import ToolReading
 
+PRIORITY = 50  # below that of the bus
 AGAIN_S = 0.5  # from a fault to the next connection
 PAUSE_S = 0.004  # between questions that brought no new frame
 
@@ -27,6 +29,7 @@ class TrackedFrame:
 def run(port: str, section: TrackerPort, pipe: Connection) -> None:
     """The process: sends ("connected", version), TrackedFrame and DeviceFault until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
+    wish_real_time(PRIORITY)
     aurora = Aurora(port, section.baud, section.replies)
     try:
         while not pipe.poll(0):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ctcr.devices import ndi_protocol as ndi
+from ctcr.devices.lateness import wish_real_time
 from ctcr.errors import InputError, Problem
 from ctcr.simulators.aurora_device import RATE_HZ, AuroraDevice, Sight
 from ctcr.simulators.control import ControlSocket
@@ -18,6 +19,7 @@ from ctcr.simulators.robot import SimulatedRobot
 from ctcr.simulators.serial_line import SerialLine
 
 NAME = "aurora"
+PRIORITY = 40
 SENSOR = 0x0A  # the handle of the coil at the robot's tip
 STILL = (np.array([0.05, 0.0, -0.2]), np.array([1.0, 0.0, 0.0, 0.0]))  # where the other coils lie
 RESET_S = 0.2  # from a break to the device's message
@@ -58,6 +60,7 @@ class AuroraSimulator:
 
     def run(self, until=lambda: False) -> None:
         """Serves until `until()` is true."""
+        wish_real_time(PRIORITY)  # the device answers whatever else the computer does
         while not until():
             self.step()
 
