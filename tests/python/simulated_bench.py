@@ -29,3 +29,17 @@ def running(*command):
         process.terminate()
         process.wait(10)
         process.stdout.close()
+
+
+def mended_bench() -> Path:
+    """The folder of the bench on which this program runs, with every fault of the simulators mended."""
+    from ctcr.devices import emergency_stop
+    from ctcr.devices.private_folder import private_folder
+    from ctcr.simulators import aurora, ethercat
+    from ctcr.simulators.control import request
+
+    folder = private_folder()
+    request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})
+    request(folder, "aurora", {"faults": dict(aurora.FAULTS), "force": [0, 0, 0]})
+    emergency_stop.release(folder)
+    return folder

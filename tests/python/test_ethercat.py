@@ -1,6 +1,7 @@
 """The bus: object dictionary and frames of the simulated terminals, and what needs a running bench (on_bench.py)."""
 
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from ctcr.simulators.stepper_terminal import Coupler, StepperTerminal
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_bench import ROBOT, ROOT, ctcr  # noqa: E402
 
-ON_BENCH = Path(__file__).parent / "on_bench.py"
+ON_BENCH = [Path(__file__).parent / name for name in ("on_bench_masters.py", "on_bench.py")]
 
 
 # ---- service data, with a client of its own
@@ -214,13 +215,17 @@ def test_too_much_current_burns_the_motor():
 # ---- on a bench
 
 
-def on_bench(tmp_path, *options):
+def skip_without_bench():
     if not network.is_permitted():
         pytest.skip(
             "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
         )
     for package in ("pysoem", "serial"):
         pytest.importorskip(package, reason=f"{package} is not installed")
+
+
+def on_bench(tmp_path, *options):
+    skip_without_bench()
     robot, bench = tmp_path / "robot.yaml", tmp_path / "bench.yaml"
     text = ROBOT.read_text()
     for far, near in (
@@ -234,7 +239,7 @@ def on_bench(tmp_path, *options):
     command = ctcr(
         "sim", "bench", robot, "--noise", "none", "--folder", tmp_path / "folder", "--",
         sys.executable, "-m", "pytest", "-q", "--durations=9", "-p", "no:cacheprovider", "-p", "no:xdist",
-        ON_BENCH, *options,
+        *ON_BENCH, *options,
     )  # fmt: skip
     environment = os.environ | {"ROBOT_FILE": str(robot), "BENCH_FILE": str(bench)}
     done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, timeout=900)
@@ -267,3 +272,18 @@ def test_on_the_simulated_bench(tmp_path):
 @pytest.mark.slow
 def test_more_on_the_simulated_bench(tmp_path):
     on_bench(tmp_path, "-m", "slow")
+
+
+@pytest.mark.slow
+def test_the_guide_shows_what_works(tmp_path):
+    """The first session of docs/hardware.md, as it is written there."""
+    skip_without_bench()
+    for name, target in (("examples", ROOT / "examples"), (".venv", Path(sys.prefix))):
+        (tmp_path / name).symlink_to(target)
+    command = re.search(r"```bash\n(.*?)\n```", (ROOT / "docs" / "hardware.md").read_text())[1]
+    environment = os.environ | {"CTCR_BENCH": str(tmp_path / "bench")}
+    done = subprocess.run(
+        ["sh", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "15 rows measured" in done.stdout and "The model is wrong by" in done.stdout

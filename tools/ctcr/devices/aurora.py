@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 
 from ctcr.devices import ndi_protocol as ndi
-from ctcr.devices.fault import DeviceFault
+from ctcr.devices.fault import DeviceFault, needed
 from ctcr.devices.ndi_replies import Garbled, ToolReading, parse_bx, parse_tx
 
 RESET_S = 5.0  # from the break to the device's message
@@ -96,8 +96,7 @@ class Aurora:
     # ---- steps of the connection
 
     def _open(self) -> None:
-        import serial
-
+        serial = needed("pyserial", "serial", f"tracker {self.port}")
         try:
             self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s)
         except serial.SerialException as error:

@@ -2,7 +2,7 @@
 
 import time
 
-from ctcr.devices.fault import DeviceFault
+from ctcr.devices.fault import DeviceFault, needed
 from ctcr.devices.stepper_drive import DriveInputs, DriveSettings, StepperDrive
 
 RETURN_US = (
@@ -25,8 +25,7 @@ class Bus:
 
     def connect(self) -> None:
         """Finds the terminals, configures them and brings all to OP, motors off."""
-        import pysoem
-
+        pysoem = needed("pysoem", "pysoem", f"bus {self.interface}")
         pysoem.settings.timeouts.ret = RETURN_US
         self.close()
         master = pysoem.Master()
