@@ -116,6 +116,8 @@ environment() {
   mapfile -t requirements < <(build_requirements)
   pip_install "${requirements[@]}"
   stamped extension_hash install_project -e '.[dev]'
+  # Programs of others that the simulated devices are tested with; the tests say what they skip without them.
+  pip_install ndicapi scikit-surgerynditracker kickcat >/dev/null 2>&1 || echo "not installed: ndicapi and others"
 }
 
 setup() {

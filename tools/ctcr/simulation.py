@@ -3,6 +3,7 @@
 They are no proof of the model: it made them itself.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -17,6 +18,7 @@ from ctcr.output import atomic_writer
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
+Field = Callable[[Array], Array]
 
 NOISES = ("none", "jitter", "realistic")
 OUTLIERS = 0.005  # share of readings that are off by 1 to 3 mm
@@ -36,9 +38,7 @@ def simulate(
     recorded.residual(np.empty(0))
     position, quaternion = recorded.predicted()
     if noise != "none":
-        position, quaternion = _noisy(
-            robot, position, quaternion, noise == "realistic", np.random.default_rng(seed)
-        )
+        position, quaternion = ReadingNoise(robot, noise, seed).added(position, quaternion)
     return replace(plan, position=position, quaternion=quaternion)
 
 
@@ -59,28 +59,43 @@ def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
         )
 
 
-def _noisy(robot: Robot, position: Array, quaternion: Array, realistic: bool, rng: np.random.Generator):
-    noise, shape = identify.noise_of(robot), position.shape
-    shift = noise.position_jitter * rng.standard_normal(shape)
-    turn = noise.rotation_jitter * rng.standard_normal(shape)
-    if realistic:
-        places = np.nan_to_num(position)
-        shift += noise.position_field * _field(places, noise.correlation_length, rng)
-        turn += noise.rotation_field * _field(places, noise.correlation_length, rng)
-        off = rng.random(len(position)) < OUTLIERS
-        direction = rng.standard_normal(shape)
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-        shift += np.where(off, rng.uniform(*OUTLIER_M, len(position)), 0.0)[:, None] * direction
-    turned = product(quaternion_from_rotation_vector(turn), quaternion)
-    turned *= np.where(turned[:, :1] < 0, -1.0, 1.0)
-    return position + shift, np.where(np.isfinite(quaternion), turned, nan)
+class ReadingNoise:
+    """What a tracker adds to poses: jitter, and for "realistic" the smooth error of its field and outliers.
+
+    One field stays as long as the object. Raises InputError where the robot file does not state the noise.
+    """
+
+    def __init__(self, robot: Robot, kind: str, seed: int):
+        self._noise, self._realistic = identify.noise_of(robot), kind == "realistic"
+        self._rng = np.random.default_rng(seed)
+        self._fields: tuple[Field, Field] | None = None
+
+    def added(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
+        """Poses (M, 3) [m], (M, 4) as read; NaN stays NaN."""
+        noise, rng, shape = self._noise, self._rng, position.shape
+        shift = noise.position_jitter * rng.standard_normal(shape)
+        turn = noise.rotation_jitter * rng.standard_normal(shape)
+        if self._realistic:
+            if not self._fields:
+                self._fields = tuple(_field(noise.correlation_length, rng) for _ in range(2))
+            places = np.nan_to_num(position)
+            shift += noise.position_field * self._fields[0](places)
+            turn += noise.rotation_field * self._fields[1](places)
+            off = rng.random(len(position)) < OUTLIERS
+            direction = rng.standard_normal(shape)
+            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+            shift += np.where(off, rng.uniform(*OUTLIER_M, len(position)), 0.0)[:, None] * direction
+        turned = product(quaternion_from_rotation_vector(turn), quaternion)
+        turned *= np.where(turned[:, :1] < 0, -1.0, 1.0)
+        return position + shift, np.where(np.isfinite(quaternion), turned, nan)
 
 
-def _field(places: Array, length: float, rng: np.random.Generator) -> Array:
-    """Three smooth random functions of the place (M, 3), variance 1, correlation exp(-d^2 / (2 length^2))."""
-    columns = []
-    for _ in range(3):
-        wave = rng.standard_normal((3, WAVES)) / length
-        phase = rng.uniform(0, 2 * np.pi, WAVES)
-        columns.append(np.sqrt(2 / WAVES) * np.cos(places @ wave + phase).sum(axis=1))
-    return np.stack(columns, axis=1)
+def _field(length: float, rng: np.random.Generator) -> Field:
+    """Three smooth random functions of places (M, 3), variance 1, correlation exp(-d^2 / (2 length^2))."""
+    waves = [(rng.standard_normal((3, WAVES)) / length, rng.uniform(0, 2 * np.pi, WAVES)) for _ in range(3)]
+
+    def value(places: Array) -> Array:
+        columns = [np.sqrt(2 / WAVES) * np.cos(places @ wave + phase).sum(axis=1) for wave, phase in waves]
+        return np.stack(columns, axis=1)
+
+    return value

@@ -1,0 +1,7 @@
+# What is done on the first day at a bench: look at the devices, find the joints, measure, compare.
+set -e
+robot=examples/data/demo/robot.yaml bench=examples/data/bench/bench.yaml
+.venv/bin/ctcr devices --bench $bench
+.venv/bin/ctcr move $robot --bench $bench --at-home
+.venv/bin/ctcr record $robot examples/data/bench/plan.csv --bench $bench -o build/session
+.venv/bin/ctcr compare $robot build/session/measurements.csv

@@ -1,0 +1,360 @@
+"""What is tested on the simulated bench, inside of `ctcr sim bench`: test_ethercat.py runs this file there.
+
+The simulated robot is that of the file whose name is in ROBOT_FILE, without noise.
+"""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import measurements, robot_file, simulation
+from ctcr.devices import bench_file, emergency_stop, homing
+from ctcr.devices.bus import Bus
+from ctcr.devices.fault import DeviceFault
+from ctcr.devices.health import health_of
+from ctcr.devices.motors import Motors
+from ctcr.devices.person import SimulatedPerson
+from ctcr.devices.private_folder import private_folder
+from ctcr.simulators import ethercat
+from ctcr.simulators.control import request
+from ctcr.simulators.network import MASTER
+
+sys.path.insert(0, str(Path(__file__).parent))
+from simulated_bench import ctcr, mended_bench  # noqa: E402
+
+ROBOT = os.environ["ROBOT_FILE"]
+BENCH = os.environ["BENCH_FILE"]
+OP = 8  # state of a terminal
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return bench_file.load(BENCH)
+
+
+@pytest.fixture
+def folder():
+    return mended_bench()
+
+
+@pytest.fixture(scope="class")
+def connected(robot, bench):
+    with Motors(bench, robot, private_folder()) as motors:
+        motors.connect()
+        if not motors.state["homed"]:
+            motors.set_joints(motors.settings.home)
+        yield motors
+
+
+@pytest.fixture
+def motors(connected, folder):
+    """Motors that stand at home."""
+    go(connected, np.zeros(6))
+    connected.wait()
+    return connected
+
+
+def go(motors, way, **options):
+    motors.move(motors.settings.home + np.array(way), **options)
+
+
+SMALL = [-2e-3, -1e-3, -1e-3, 0.2, -0.1, 0.1]
+
+
+# ---- driver
+
+
+def test_settings_come_before_enabling(bench, folder):
+    bus = Bus(MASTER, [1, 2], bench.drive_settings)
+    bus.connect()
+    try:
+        for drive in bus.drives:
+            assert struct.unpack("<H", drive.slave.sdo_read(0x8010, 1))[0] == 1000
+            assert drive.slave.sdo_read(0x8012, 8) == b"\0"  # feedback from the encoder
+            assert struct.unpack("<H", drive.slave.sdo_read(0x8010, 7))[0] == 4096
+        assert bus.exchange() is not None and bus.check_states() is None
+    finally:
+        bus.close()
+
+
+def test_wrong_terminal(bench, folder):
+    for positions, text in (([0, 1], "no stepper terminal"), ([1, 9], "none at position 9")):
+        bus = Bus(MASTER, positions, bench.drive_settings)
+        with pytest.raises(DeviceFault, match=text):
+            bus.connect()
+        bus.close()
+    with pytest.raises(DeviceFault, match="cannot be opened"):
+        Bus("nothing0", [1], bench.drive_settings).connect()
+
+
+class TestMotors:
+    """One connection for all: two masters cannot share the bus."""
+
+    def test_moves(self, motors, robot, folder):
+        n = robot.n_tubes
+        target = motors.settings.home + SMALL
+        motors.move(target)
+        motors.wait()
+        assert np.abs(motors.joints - target)[:n].max() < 1.1e-5
+        assert np.abs(motors.joints - target)[n:].max() < 2e-3
+        shafts = np.array(request(folder, "ethercat", {})["turns"])
+        expected = (target - motors.settings.home) / motors.settings.ratios
+        np.testing.assert_allclose(shafts, expected, atol=6e-3)
+        deployed = request(folder, "aurora", {})["deployed"]
+        np.testing.assert_allclose(deployed, target[:n] + [t.length for t in robot.tubes], atol=1.2e-5)
+
+    def test_forbidden_moves(self, motors):
+        start = motors.joints.copy()
+        for way, text in (
+            ([0, 0, -40e-3, 0, 0, 0], "may be"),
+            ([-10e-3, 0, 0, 0, 0, 0], "its tip must stand out"),
+            ([0, 0, 0, 9, 0, 0], "alpha1"),
+            ([np.nan, 0, 0, 0, 0, 0], "not a number"),
+        ):
+            with pytest.raises(DeviceFault, match=text):
+                go(motors, way)
+        assert not motors.state["moving"]
+        np.testing.assert_allclose(motors.joints, start, atol=1e-4)
+
+    def test_velocity_stops_by_itself_and_before_limits(self, motors, bench):
+        start = motors.joints.copy()
+        motors.velocity([2e-3, 2e-3, 2e-3, 0.1, 0, 0], 0.3)
+        motors.wait()
+        moved = motors.joints - start
+        assert moved[:3] == pytest.approx(0.3 * 2e-3, rel=0.5) and not motors.state["limited"]
+        motors.velocity([-10e-3, 0, 0, 0, 0, 0], 9.0)  # until its tip would be inside the next tube
+        motors.wait()
+        lengths = [463e-3, 330.5e-3]
+        gap = motors.joints[0] + lengths[0] - motors.joints[1] - lengths[1]
+        assert motors.state["limited"] and -1e-4 < gap < 5e-4
+
+    def test_lost_and_late_frames_are_survived(self, motors, folder):
+        request(folder, "ethercat", {"faults": {"lost_frames": 0.05, "late_frames": 0.05}})
+        go(motors, SMALL)
+        motors.wait()
+        assert motors.state["bad_cycles"] > 0 and not motors.state["stopped"]
+
+    def test_stop_is_not_released_by_itself(self, motors, folder):
+        """Another program's stop holds for this one; released, it may go on where it did not stop itself."""
+        emergency_stop.stop(folder, "a test")
+        with pytest.raises(DeviceFault, match="a test: .*ctcr stop --release"):
+            motors.move(motors.settings.home)
+
+
+def test_homing(robot, bench, folder):
+    """After a power cycle the counters say nothing; flush retraction finds the joints again."""
+    request(folder, "ethercat", {"faults": {"power_loss": True}})
+    request(folder, "ethercat", {"faults": {"power_loss": False}})
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        assert not motors.state["homed"]
+        with pytest.raises(DeviceFault, match="home first"):
+            go(motors, SMALL)
+        with pytest.raises(DeviceFault, match="at most"):
+            motors.jog([0.1, 0, 0, 0, 0, 0])
+        said = []
+        homing.home(motors, robot, SimulatedPerson(folder), said.append)
+        assert len(said) == 3 and motors.state["homed"]
+        deployed = np.array(request(folder, "aurora", {})["deployed"])
+        lengths = np.array([tube.length for tube in robot.tubes])
+        np.testing.assert_allclose(motors.joints[:3] + lengths, deployed, atol=1e-4)
+        go(motors, np.zeros(6))
+        motors.wait()
+    with Motors(bench, robot, folder) as again:  # the terminals have kept their counters
+        again.connect()
+        assert again.state["homed"]
+
+
+FAULTS = {  # fault: its value, what the message says
+    "stall": (2, "translation of tube 2: it does not follow"),
+    "unplugged": (True, "no frame came back|does not answer"),
+    "emergency stop": (None, "somebody stopped it"),
+}
+MORE_FAULTS = {
+    "missed_steps": (1, "translation of tube 1: it does not follow"),
+    "encoder_jump": (4, "rotation of tube 1: (its encoder jumped|it does not follow)"),
+    "over_current": (3, r"terminal 3 \(EL7041\): short circuit or over-current in coil A \(A010:06\)"),
+    "under_voltage": (5, "motor supply too low"),
+    "lost_after": (4, "does not answer|no frame"),
+    "power_loss": (True, "no frame came back|does not answer"),
+}
+
+
+def check_fault(robot, bench, folder, fault, value, says):
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        if not motors.state["homed"]:
+            motors.set_joints(motors.settings.home)
+        go(motors, np.zeros(6))
+        motors.wait()
+        go(motors, [-5e-3, -5e-3, -5e-3, 0.9, 0.9, 0.9], speed=0.3)
+        time.sleep(0.3)
+        if fault == "emergency stop":
+            emergency_stop.stop(folder, "somebody stopped it")
+        else:
+            request(folder, "ethercat", {"faults": {fault: value}})
+        with pytest.raises(DeviceFault, match=says):
+            motors.wait()
+        with pytest.raises(DeviceFault, match="ctcr stop --release"):
+            motors.move(motors.settings.home)
+    at_rest = request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})["turns"]
+    time.sleep(0.1)
+    np.testing.assert_allclose(request(folder, "ethercat", {})["turns"], at_rest, atol=1e-9)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault(robot, bench, folder, fault):
+    check_fault(robot, bench, folder, fault, *FAULTS[fault])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", MORE_FAULTS)
+def test_more_faults(robot, bench, folder, fault):
+    check_fault(robot, bench, folder, fault, *MORE_FAULTS[fault])
+    request(
+        folder, "ethercat", {"faults": {"power_loss": True}}
+    )  # counters and settings of this fault are gone
+    request(folder, "ethercat", {"faults": {"power_loss": False}})
+
+
+@pytest.mark.slow
+def test_forty_bring_ups(bench, folder):
+    for _ in range(40):
+        bus = Bus(MASTER, [1, 2, 3, 4, 5, 6], bench.drive_settings)
+        bus.connect()
+        bus.close()
+
+
+# ---- recording
+
+
+KILLS = 1  # here; row files are killed a hundred times in test_record.py
+
+
+def plan(path, rows, force=0.0):
+    """`rows` places around home; the second half under a weight."""
+    robot = robot_file.load(ROBOT)
+    home = np.array([*robot.actuation.home_translation_mm, 0, 0, 0]) * 1e-3
+    rng = np.random.default_rng(3)
+    lines = ["run,beta1_m,beta2_m,beta3_m,alpha1_rad,alpha2_rad,alpha3_rad,fx_N,fy_N,fz_N"]
+    for i in range(rows):
+        joints = home + np.concatenate([rng.uniform(-2e-3, 2e-3, 3), rng.uniform(-0.15, 0.15, 3)])
+        load = -force if i >= rows // 2 else 0.0
+        lines.append(",".join(f"{v:.9g}" for v in [i // 4, *joints, 0, load, 0]))
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def recorder(plan, target, *options):
+    return ctcr("record", ROBOT, plan, "--bench", BENCH, "-o", target, "--dwell", 0.05, *options)
+
+
+def record(plan, target, *options):
+    command = recorder(plan, target, *options)
+    return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120)
+
+
+def test_record(tmp_path, folder, robot):
+    """Poses are those of the model at the joints of the encoders, under the weight that was hung."""
+    path, target = plan(tmp_path / "plan.csv", 4, force=0.1), tmp_path / "out"
+    done = record(path, target, "--readings", 2, "--approach", "forward", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["rms_mm"] < 0.1  # of the homing
+    table = measurements.load(target / "measurements.csv", 3)
+    assert len(table) == 4 * 3 and (np.diff(table.t) > 0).all()
+    poses = table.position.reshape(4, 3, 3)
+    assert np.isnan(poses[:, 0]).all() and np.isfinite(poses[:, 1:]).all()  # way point, two readings
+    assert (table.alpha[0::3] < table.alpha[1::3]).all() and (table.beta[0::3] < table.beta[1::3]).all()
+    np.testing.assert_array_equal(table.force[6:], np.tile([0, -0.1, 0], (6, 1)))
+    wanted = measurements.load(path, 3)
+    np.testing.assert_allclose(table.beta[1::3], wanted.beta, atol=2e-5)
+    exact = simulation.simulate(robot, table, "none")
+    error = (table.position - exact.position)[np.isfinite(table.position[:, 0])]
+    assert np.abs(error - error.mean(axis=0)).max() < 3e-5
+    about = json.loads((target / "session.json").read_text())
+    assert about["sittings"][0]["ended"] == "finished" and about["sittings"][0]["tracker"]["missed"] == 0
+    assert about["versions"]["pysoem"] and (target / "robot.yaml").read_text() == Path(ROBOT).read_text()
+    other = record(path, target, "--readings", 3)
+    assert other.returncode == 1 and "holds a recording with readings 2, not 3; approach" in other.stderr
+
+
+def wait_for_rows(process, table, rows):
+    """Until the table holds so many rows below its header."""
+    while process.poll() is None and (not table.exists() or table.read_bytes().count(b"\n") < 1 + rows):
+        time.sleep(0.01)
+
+
+def test_killed_recorder(tmp_path, folder):
+    """Killed at a random moment the recorder loses nothing, the motors stop, and the same command goes on."""
+    path, target = plan(tmp_path / "plan.csv", 8), tmp_path / "out"
+    table, rng, kept = target / "measurements.csv", np.random.default_rng(1), b""
+    for _ in range(KILLS):
+        process = subprocess.Popen(
+            recorder(path, target), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        lines = kept.count(b"\n")
+        wait_for_rows(process, table, lines + 1)
+        time.sleep(rng.uniform(0, 0.3))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert table.read_bytes().startswith(kept)
+        kept = table.read_bytes()
+        end = time.monotonic() + 3
+        while max(request(folder, "ethercat", {})["states"][1:]) == OP and time.monotonic() < end:
+            time.sleep(0.02)
+        assert max(request(folder, "ethercat", {})["states"][1:]) < OP
+    done = record(path, target)
+    assert done.returncode == 0, done.stderr
+    assert "going on after" in done.stdout and table.read_bytes().startswith(kept)
+    read, wanted = measurements.load(table, 3), measurements.load(path, 3)
+    assert len(read) == len(wanted) and (np.diff(read.t) > 0).all()
+    np.testing.assert_allclose(read.alpha, wanted.alpha, atol=3e-3)
+
+
+def test_recording_survives_the_tracker(tmp_path, folder):
+    """Unplugged and back, a third of the frames missing, garbage: rows wait, and all are measured."""
+    path, target = plan(tmp_path / "plan.csv", 6), tmp_path / "out"
+    request(folder, "aurora", {"faults": {"missing": 0.3, "garbage": 0.02}})
+    process = subprocess.Popen(
+        recorder(path, target), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    wait_for_rows(process, target / "measurements.csv", 1)
+    request(folder, "aurora", {"faults": {"unplugged": True}})
+    time.sleep(1.0)
+    request(folder, "aurora", {"faults": {"unplugged": False}})
+    assert process.wait(60) == 0, process.stderr.read()
+    assert np.isfinite(measurements.load(target / "measurements.csv", 3).position).all()
+    tracker = json.loads((target / "session.json").read_text())["sittings"][0]["tracker"]
+    assert tracker["connections"] >= 2 and tracker["unseen"] > 0
+    assert any("port is gone" in fault["text"] for fault in tracker["faults"])
+
+
+@pytest.mark.slow
+def test_blind_tracker_stops_the_recording(tmp_path, folder):
+    request(folder, "aurora", {"faults": {"out_of_volume": True}})
+    done = record(plan(tmp_path / "plan.csv", 2), tmp_path / "out", "--patience", 0.5)
+    assert done.returncode == 1
+    assert "outside of the tracker's volume for 0.5 s" in done.stderr and "it goes on" in done.stderr
+
+
+def test_health(bench, folder):
+    found = health_of(bench, folder)
+    assert [device.name for device in found] == [
+        "tracker", "tool 0A", "tool 0B", "tool 0C", "EK1100", *["EL7041"] * 6
+    ]  # fmt: skip
+    assert all(device.is_well for device in found)
+    request(folder, "aurora", {"faults": {"unplugged": True}})
+    request(folder, "ethercat", {"faults": {"unplugged": True}})
+    assert [device.is_well for device in health_of(bench, folder)] == [False, False]

@@ -1,0 +1,45 @@
+"""Starts simulators as processes of their own, as a user does, and stops them again."""
+
+import os
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
+
+
+def ctcr(*arguments) -> list[str]:
+    return [sys.executable, "-m", "ctcr", *map(str, arguments)]
+
+
+@contextmanager
+def running(*command):
+    """A process that says on its standard output when it is ready; ended when the block ends."""
+    process = subprocess.Popen(
+        list(command), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | {"COLUMNS": "200"}
+    )  # fmt: skip
+    try:
+        first = process.stdout.readline()
+        if process.poll() is not None:
+            raise RuntimeError(first + process.stdout.read())
+        yield process
+    finally:
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+def mended_bench() -> Path:
+    """The folder of the bench on which this program runs, with every fault of the simulators mended."""
+    from ctcr.devices import emergency_stop
+    from ctcr.devices.private_folder import private_folder
+    from ctcr.simulators import aurora, ethercat
+    from ctcr.simulators.control import request
+
+    folder = private_folder()
+    request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})
+    request(folder, "aurora", {"faults": dict(aurora.FAULTS), "force": [0, 0, 0]})
+    emergency_stop.release(folder)
+    return folder

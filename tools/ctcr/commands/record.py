@@ -1,0 +1,111 @@
+"""`ctcr record`: measurements on the bench."""
+
+import click
+
+
+@click.command(name="record")
+@click.argument("robot")
+@click.argument("plan")
+@click.option(
+    "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; goes on with one there."
+)
+@click.option(
+    "--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits."
+)
+@click.option(
+    "--dwell", type=click.FloatRange(0), default=0.5, show_default=True, help="Rest before reading [s]."
+)
+@click.option(
+    "--readings", type=click.IntRange(1), default=1, show_default=True, help="Of each row of the plan."
+)
+@click.option(
+    "--speed", type=click.FloatRange(0.01, 1), default=1.0, show_default=True, help="Share of the highest."
+)
+@click.option(
+    "--approach", type=click.Choice(["planned", "forward", "backward"]), default="planned", show_default=True,
+    help="Come to each row as planned, or always with all joints moving up (forward) or down (backward).",
+)  # fmt: skip
+@click.option("--approach-mm", type=click.FloatRange(0), default=2.0, show_default=True, help="Its length.")
+@click.option("--approach-deg", type=click.FloatRange(0), default=5.0, show_default=True, help="Its length.")
+@click.option(
+    "--patience",
+    type=click.FloatRange(0.1),
+    default=30.0,
+    show_default=True,
+    help="With an unseen sensor [s].",
+)
+@click.option(
+    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
+)
+@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
+def command(
+    robot, plan, target, bench_path, dwell, readings, speed, approach, approach_mm, approach_deg, patience, own,
+    folder, json_target,
+) -> None:  # fmt: skip
+    """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
+
+    Every row is on the disk as soon as it is measured; the same command goes on where a recording was interrupted.
+    Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
+    first with `ctcr move --home`.
+    """
+    import numpy as np
+
+    from ctcr import measurements, output, robot_file, user_effects
+    from ctcr.devices import bench_file, person
+    from ctcr.devices.motors import Motors
+    from ctcr.devices.private_folder import private_folder
+    from ctcr.devices.tracker import Tracker
+    from ctcr.record.display import Display
+    from ctcr.record.folder import TABLE, Folder
+    from ctcr.record.plan import Approach, steps_of
+    from ctcr.record.session import Options, Session
+
+    user_effects.load_all(own)
+    loaded, place, bench = robot_file.load(robot), private_folder(folder), bench_file.load(bench_path)
+    table = measurements.load(plan, loaded.n_tubes)
+    way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
+    steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
+    options = Options(dwell, readings, speed, patience)
+    console = output.console(json_target)
+    recording = Folder(
+        target, {"robot": robot, "plan": plan, "bench": bench_path}, options, way, loaded.n_tubes
+    )
+    with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
+        motors.connect()
+        tracker.connect()
+        before = recording.rows.groups
+        if before:
+            console.print(f"going on after {before} of {len(steps)} rows", markup=False)
+        with Display() as display:
+            who = _Paused(person.person_of(bench, place), display)
+            session = Session(
+                loaded, motors, tracker, who, recording.rows, options, recording.clock, display.show
+            )
+            ended = "interrupted"
+            try:
+                done = session.run(steps)
+                ended = "finished"
+            except Exception as error:
+                ended = str(error)
+                raise
+            finally:
+                recording.note(motors, tracker, ended)
+    path = recording.path / TABLE
+    console.print(
+        f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",
+        markup=False,
+    )
+    if json_target:
+        output.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)}, json_target)
+
+
+class _Paused:
+    """A person who is asked while the display rests."""
+
+    def __init__(self, person, display):
+        self._person, self._display = person, display
+
+    def hang(self, force) -> None:
+        with self._display.pause():
+            self._person.hang(force)

@@ -1,0 +1,148 @@
+"""`ctcr sim`: simulated devices that any program can talk to."""
+
+import click
+
+NOISES = ["none", "jitter", "realistic"]
+
+folder_option = click.option(
+    "--folder",
+    metavar="FOLDER",
+    help="Where the processes of one bench meet (mode 0700); one of this user's.",
+)
+scenario_option = click.option(
+    "--scenario",
+    metavar="FILE.yaml",
+    help="Faults at set times: a list of `at_s` with the faults that change.",
+)
+hide_option = click.option(
+    "--hide", "hidden", multiple=True, metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
+    help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
+)  # fmt: skip
+noise_option = click.option(
+    "--noise", type=click.Choice(NOISES), default="jitter", show_default=True, help="As in ctcr simulate."
+)
+seed_option = click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
+
+
+@click.group(name="sim")
+def command() -> None:
+    """Simulated devices: a tracker on a serial line, stepper motors on EtherCAT, and the robot between them.
+
+    They speak the devices' own protocols, so that programs take them for the real ones.
+    """
+
+
+@command.command(name="aurora")
+@click.argument("robot")
+@folder_option
+@hide_option
+@noise_option
+@seed_option
+@scenario_option
+def aurora(robot, folder, hidden, noise, seed, scenario) -> None:
+    """Simulate an NDI Aurora tracker on a pseudo-terminal, looking at the tip of ROBOT.
+
+    The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
+    """
+    from ctcr.simulators.aurora import AuroraSimulator
+
+    simulator = AuroraSimulator(_robot(robot, hidden, noise, seed), _folder(folder), scenario, seed)
+    _serve(simulator, f"tracker: {simulator.line.link}")
+
+
+@command.command(name="ethercat")
+@click.option("--interface", metavar="NAME", help="Answer on this one, instead of making a virtual pair.")
+@click.option("--motors", type=click.IntRange(1, 8), default=6, show_default=True)
+@click.option(
+    "--variant", type=click.Choice(["EL7041", "EL7031"]), default="EL7041", show_default=True,
+    help="Type of the terminals.",
+)  # fmt: skip
+@folder_option
+@seed_option
+@scenario_option
+def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
+    """Simulate a coupler EK1100 and stepper terminals, which answer EtherCAT frames on a network interface.
+
+    Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
+    """
+    from ctcr.simulators import network
+    from ctcr.simulators.ethercat import EthercatSimulator
+
+    place = _folder(folder)
+    if not interface:
+        network.make_cable()
+    simulator = EthercatSimulator(interface or network.BUS, place, motors, variant, scenario, seed)
+    _serve(simulator, f"bus: drive it from {network.MASTER}" if not interface else f"bus on {interface}")
+
+
+@command.command(name="bench", context_settings={"ignore_unknown_options": True})
+@click.argument("robot")
+@click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
+@folder_option
+@hide_option
+@noise_option
+@seed_option
+@click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
+@click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
+def bench(robot, program, folder, hidden, noise, seed, tracker_scenario, bus_scenario) -> int:
+    """Simulate a whole bench around ROBOT while COMMAND runs (a shell without one); its motors move the tracked tip.
+
+    Needs no rights: bus and COMMAND get a network of their own.
+    """
+    from ctcr.simulators import bench as simulated
+
+    robots = _robot(robot, hidden, noise, seed)
+    return simulated.run(list(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed)
+
+
+@command.command(name="set")
+@click.argument("device", type=click.Choice(["aurora", "ethercat"]))
+@click.argument("settings", nargs=-1, metavar="[FAULT=VALUE]...")
+@click.option("--force", nargs=3, type=float, metavar="FX FY FZ", help="Hang a weight: force at the tip [N].")
+@click.option("--break", "line_break", is_flag=True, help="A break on the serial line: resets the tracker.")
+@folder_option
+def set_(device, settings, force, line_break, folder) -> None:
+    """Switch faults of a running simulator on and off; without any, show them."""
+    from ctcr import output, yaml_document
+    from ctcr.simulators.control import request
+
+    pairs = [text.partition("=")[::2] for text in settings]
+    message = {"faults": {name: yaml_document.parse(value, name).data for name, value in pairs}}
+    if force:
+        message["force"] = list(force)
+    if line_break:
+        message["break"] = True
+    state = request(_folder(folder), device, message)
+    rows = [[name, str(value).lower()] for name, value in state.pop("faults").items()]
+    rows += [[name, str(value)] for name, value in state.items()]
+    output.console().print(output.table(f"Simulator: {device}", ["", "value"], rows))
+
+
+def _serve(simulator, text) -> None:
+    import signal
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        click.echo(text)
+        simulator.run()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        simulator.close()
+
+
+def _robot(robot, hidden, noise, seed):
+    from ctcr import effect_fit, robot_file
+    from ctcr.effect_settings import settings
+    from ctcr.simulators.robot import SimulatedRobot
+
+    loaded = robot_file.load(robot)
+    values = settings(hidden, loaded)
+    names = list(dict.fromkeys(name.split(".")[1] for name in values))
+    return SimulatedRobot(effect_fit.with_values(loaded, names, values), noise, seed)
+
+
+def _folder(folder):
+    from ctcr.devices.private_folder import private_folder
+
+    return private_folder(folder)

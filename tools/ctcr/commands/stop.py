@@ -1,0 +1,24 @@
+"""`ctcr stop`: the emergency stop of the bench."""
+
+import click
+
+
+@click.command(name="stop")
+@click.option("--release", is_flag=True, help="Release the stop, after its cause has been mended.")
+@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+def command(release: bool, folder: str | None) -> None:
+    """Stop all motors of the bench at once; they stay stopped until `ctcr stop --release`.
+
+    This stops by software. The switch that cuts the motors' power is the emergency stop of the bench.
+    """
+    from ctcr.devices import emergency_stop
+    from ctcr.devices.private_folder import private_folder
+
+    place = private_folder(folder)
+    if not release:
+        emergency_stop.stop(place, "ctcr stop was called")
+        click.echo("stopped; release with `ctcr stop --release`")
+        return
+    reason = emergency_stop.reason(place)
+    emergency_stop.release(place)
+    click.echo(f"released; it was stopped because: {reason}" if reason else "nothing was stopped")

@@ -1,0 +1,1 @@
+"""Drivers of the bench: an NDI Aurora tracker on a serial port, stepper terminals on EtherCAT."""

@@ -1,0 +1,35 @@
+"""The folder where the processes of one bench meet: only its owner can look into it."""
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+from ctcr.errors import InputError, Problem
+
+VARIABLE = "CTCR_BENCH"
+
+
+def private_folder(path: str | Path | None = None) -> Path:
+    """The folder of the bench, made with mode 0700 where it does not exist.
+
+    Without `path` it is that of the environment variable CTCR_BENCH, or one of this user's. Raises InputError where
+    others own it or may look into it.
+    """
+    folder = Path(path or os.environ.get(VARIABLE) or _of_this_user())
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        status = folder.stat()
+    except OSError as error:
+        raise InputError(Problem(f"cannot make the folder: {error.strerror}", str(folder))) from None
+    if status.st_uid != os.getuid():
+        raise InputError(Problem("belongs to somebody else: name another folder", str(folder)))
+    if stat.S_IMODE(status.st_mode) & 0o077:
+        text = f"others may look into it, and so command the devices: chmod 700 {folder}"
+        raise InputError(Problem(text, str(folder)))
+    return folder
+
+
+def _of_this_user() -> Path:
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(runtime) / "ctcr" if runtime else Path(tempfile.gettempdir()) / f"ctcr-{os.getuid()}"

@@ -1,0 +1,69 @@
+"""The tracked sensor as a program uses it: asks the process that reads the tracker."""
+
+import multiprocessing
+import time
+from pathlib import Path
+
+from ctcr.devices import tracker_process
+from ctcr.devices.bench_file import Bench
+from ctcr.devices.fault import DeviceFault
+from ctcr.devices.places import port_of
+from ctcr.devices.tracker_process import TrackedFrame
+
+CONNECT_S = 20.0
+
+
+class Tracker:
+    """Starts the reader; ends it when closed. Not real-time safe."""
+
+    def __init__(self, bench: Bench, folder: Path):
+        self.port, self._section = port_of(bench, folder), bench.tracker
+        self.version = ""
+        self.frames = self.missed = self.unseen = self.connections = 0
+        self.faults: list[tuple[float, DeviceFault]] = []  # when, what
+        self._pipe = self._process = None
+
+    def connect(self) -> None:
+        """Waits until the tracker tracks. Raises DeviceFault where it cannot be reached."""
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        arguments = (self.port, self._section, other)
+        self._process = context.Process(target=tracker_process.run, args=arguments, name="tracker reader")
+        self._process.start()
+        other.close()
+        end = time.monotonic() + CONNECT_S
+        while not self.version and time.monotonic() < end:
+            self.next(0.1)
+            if self.faults:
+                raise self.faults[-1][1]
+
+    def close(self) -> None:
+        if self._process:
+            self._pipe.close()
+            self._process.join(CONNECT_S)
+        self._process = None
+
+    def __enter__(self) -> "Tracker":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    def next(self, seconds: float) -> TrackedFrame | None:
+        """The next frame not yet asked for; None where none came in time, or a fault did (see `faults`)."""
+        try:
+            if not self._pipe.poll(seconds):
+                return None
+            message = self._pipe.recv()
+        except (EOFError, OSError):
+            raise DeviceFault("tracker", "the process that reads it is not there", "connect again") from None
+        if isinstance(message, DeviceFault):
+            self.faults.append((time.monotonic(), message))
+            return None
+        if not isinstance(message, TrackedFrame):
+            self.version, self.connections = message[1], self.connections + 1
+            return None
+        self.frames += 1
+        self.missed += message.missed
+        self.unseen += message.reading.position is None
+        return message

@@ -1,0 +1,114 @@
+"""The folder of a recording: the table, and beside it what it was made with."""
+
+import json
+import time
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import ctcr
+from ctcr.devices.motors import Motors
+from ctcr.devices.tracker import Tracker
+from ctcr.errors import InputError, Problem, file_fault
+from ctcr.output import atomic_writer, write_json
+from ctcr.record.plan import Approach
+from ctcr.record.row_file import RowFile
+from ctcr.record.session import Options
+
+TABLE, ABOUT = "measurements.csv", "session.json"
+COPIES = {"robot": "robot.yaml", "plan": "plan.csv", "bench": "bench.yaml"}
+
+
+class Folder:
+    """Starts a recording, or goes on with the one that is there. Raises InputError where that was another one."""
+
+    def __init__(
+        self, path: str | Path, sources: dict[str, str], options: Options, approach: Approach, n_tubes: int
+    ):
+        """`sources` are the files named in COPIES."""
+        self.path = Path(path)
+        settings = asdict(options) | {"approach": asdict(approach)}
+        contents = {name: _read(source) for name, source in sources.items()}
+        self.is_new = not (self.path / ABOUT).exists()
+        if self.is_new:
+            self._start(contents, settings)
+        else:
+            self._check(contents, settings)
+        group = options.readings + approach.has_way_point
+        self.rows = RowFile(self.path / TABLE, n_tubes, group)
+        elapsed = max(time.time() - self._about["started_unix_s"], self.rows.last_t + 1e-3)
+        self._zero = time.monotonic() - (0.0 if self.is_new else elapsed)
+
+    def clock(self, t: float) -> float:
+        """t_s of the table [s] from a time of `time.monotonic`; it goes on through interruptions."""
+        return t - self._zero
+
+    def note(self, motors: Motors, tracker: Tracker, ended: str) -> None:
+        """How the devices did in this sitting, and how it ended."""
+        state = motors.state
+        self._about["sittings"].append({
+            "ended": ended, "rows_of_the_plan": self.rows.groups,
+            "tracker": {
+                "port": tracker.port, "version": tracker.version, "frames": tracker.frames, "missed": tracker.missed,
+                "unseen": tracker.unseen, "connections": tracker.connections,
+                "faults": [{"t_s": self.clock(t), "text": str(fault)} for t, fault in tracker.faults],
+            },
+            "bus": {
+                "interface": motors.settings.interface, "devices": motors.names, "cycles": int(state["cycles"]),
+                "bad_cycles": int(state["bad_cycles"]), "period_ms": 1e3 * motors.settings.period,
+                "p99_late_ms": 1e3 * float(state["p99_late"]), "worst_late_ms": 1e3 * float(state["worst_late"]),
+                "real_time_priority": bool(state["real_time"]),
+            },
+        })  # fmt: skip
+        write_json(self._about, str(self.path / ABOUT))
+
+    def _start(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise file_fault(error, self.path, "write") from None
+        if any(self.path.iterdir()):
+            raise InputError(
+                Problem("is not empty and holds no recording: choose another folder", str(self.path))
+            )
+        for name, content in contents.items():
+            with atomic_writer(self.path / COPIES[name], binary=True) as file:
+                file.write(content)
+        self._about = {
+            "started_unix_s": time.time(), "settings": settings, "versions": _versions(), "sittings": [],
+        }  # fmt: skip
+        write_json(self._about, str(self.path / ABOUT))
+
+    def _check(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
+        self._about = json.loads(_read(self.path / ABOUT))
+        differs = [
+            f"another {COPIES[name]}" for name, content in contents.items()
+            if _read(self.path / COPIES[name]) != content
+        ]  # fmt: skip
+        before = self._about["settings"]
+        differs += [
+            f"{name} {before[name]}, not {settings[name]}"
+            for name in settings
+            if before[name] != settings[name]
+        ]
+        if differs:
+            text = f"holds a recording with {'; '.join(differs)}: choose another folder"
+            raise InputError(Problem(text, str(self.path)))
+
+
+def _versions() -> dict[str, str]:
+    found = {"ctcr": ctcr.__version__}
+    for package in ("pyserial", "pysoem", "numpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            pass
+    return found
+
+
+def _read(path: str | Path) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
