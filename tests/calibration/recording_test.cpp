@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "ctcr/calibration/identify_readings.hpp"
-#include "support/catalogue.hpp"
+#include "support/catalogue_cases.hpp"
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
 
@@ -156,7 +156,8 @@ TEST(Recording, GivesTheSameByTheGeneralPath) {
     robot.gravity = gravity;
     system.model = Model<2>(robot);
     system.settings = {.tolerance = 1e-12, .steps = 8};
-    const System<2, Catalogue> general{system.transmission, Model<2, Catalogue>(robot), system.sensor, system.settings};
+    const System<2, Catalogue> general{system.transmission, Model<2, Catalogue>(robot, test::hardly_any_effects<2>()),
+                                       system.sensor, system.settings};
     const Table table = path(system, changed(system, P::index(Parameter::length), 1e-3), 9, random);
     Recording<2> fast(system, table.rows, table.measured, all, pool);
     Recording<2, Catalogue> slow(general, table.rows, table.measured, all, pool);
