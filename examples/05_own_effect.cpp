@@ -65,7 +65,7 @@ int main() {
     return ctcr::predict<N, Effects>(of, row, {}, workspace, prediction) == ctcr::Status::ok;
   };
   ctcr::Workspace<N> workspace;
-  ctcr::RecordedPrediction<N, Effects> here{{}, {}, system.model, {}, {}};
+  ctcr::RecordedPrediction<N, Effects> here{{}, {}, system.model};
   if (!read(system, workspace, here)) return 1;
   const ctcr::Vec3 p = here.reading.position;
   std::printf("the tip is at %.2f, %.2f, %.2f mm\n", 1e3 * p.x(), 1e3 * p.y(), 1e3 * p.z());
@@ -83,7 +83,7 @@ int main() {
       Eigen::VectorXd x = values;
       x[k] += side ? step : -step;
       ctcr::Workspace<N> fresh;
-      ctcr::RecordedPrediction<N, Effects> there{{}, {}, system.model, {}, {}};
+      ctcr::RecordedPrediction<N, Effects> there{{}, {}, system.model};
       if (!read(Parameters::with_values(system, x), fresh, there)) return 1;
       moved[side] = there.reading.position;
     }

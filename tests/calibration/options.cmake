@@ -1,3 +1,5 @@
+include(${CMAKE_CURRENT_LIST_DIR}/../support/solver.cmake)
+include(${CMAKE_CURRENT_LIST_DIR}/../support/catalogue.cmake)
 target_link_libraries(${program} PRIVATE ctcr::calibration)
 
 add_test(NAME calibration/consumer

@@ -183,13 +183,47 @@ TEST(TipDerivatives, StiffnessLoadAndWeightScaleTogether) {
   }
 }
 
+TEST(TipDerivatives, ByLoadsAreTheComplianceOfAnyTube) {
+  test::Random random(5);
+  const Settings settings{.tolerance = 1e-12};
+  for (const Acting acting : all)
+    for (int n = 0; n < 12; ++n) {
+      Solved<3> c = random_case<3>(acting, settings, true, random);
+      const Model<3> model(c.robot);
+      ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, c.ws, c.solution, settings), Status::ok);
+      const int tube = n % 3;
+      TipDerivatives<3> exact;
+      Mat6 compliance;
+      ASSERT_EQ(differentiate_tip(model, c.ws, tube, exact, compliance, settings), Status::ok);
+      if (tube == 0) {
+        EXPECT_LE((compliance - c.solution.compliance).norm(), 1e-9 * compliance.norm());
+        EXPECT_LE((exact.by_joints - c.solution.jacobian).rightCols<3>().norm(), 1e-9 * c.solution.jacobian.norm());
+      }
+      for (int j = 0; j < 6; ++j) {
+        const auto pose = [&](double x) {
+          TipLoad load = c.load;
+          (j < 3 ? load.force[j] : load.moment[j - 3]) += x;
+          Workspace<3> ws = c.ws;
+          Solution<3> solution;
+          EXPECT_EQ(solve<Derivatives::compliance>(model, c.q, load, ws, solution, settings), Status::ok);
+          return solution.tube_tips[std::size_t(tube)];
+        };
+        expect_column(compliance.col(j), test::slope(pose, j < 3 ? 1e-3 : 1e-4), 0.1, "load " + std::to_string(j));
+      }
+    }
+}
+
 TEST(TipDerivatives, AreZeroWithoutASolution) {
   const Model<3> model(test::paper_robot());
   Workspace<3> ws;
   TipDerivatives<3> d;
   d.by_joints.setOnes();
+  Mat6 compliance = Mat6::Ones();
   EXPECT_EQ(differentiate_tip(model, ws, 0, d), Status::not_converged);
   EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0));
+  d.by_joints.setOnes();
+  EXPECT_EQ(differentiate_tip(model, ws, 0, d, compliance), Status::not_converged);
+  EXPECT_TRUE(d.by_joints.isZero(0) && d.by_parameters.isZero(0) && compliance.isZero(0));
 }
 
 TEST(TipDerivatives, DoNotTouchTheHeap) {
@@ -198,8 +232,10 @@ TEST(TipDerivatives, DoNotTouchTheHeap) {
     const Solved<3> c = random_case<3>(acting, {}, true, random);
     const Model<3> model(c.robot);
     TipDerivatives<3> d;
+    Mat6 compliance;
     const test::HeapGuard guard;
     (void)differentiate_tip(model, c.ws, 1, d);
+    (void)differentiate_tip(model, c.ws, 1, d, compliance);
     EXPECT_EQ(guard.uses(), 0);
   }
 }

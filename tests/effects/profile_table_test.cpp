@@ -37,7 +37,7 @@ Profiles<1> linear(std::array<double, 2> curvature_at_tip) {
 Pose read(const System<1, Fx>& system, double force = 0) {
   const RecordedRow<1> row{{{VecN<1>(grasped)}, {VecN<1>(0)}}, {.force = {0, force, 0}}, {}};
   Workspace<1> workspace;
-  RecordedPrediction<1, Fx> prediction{{}, {}, system.model, {}, {}};
+  RecordedPrediction<1, Fx> prediction{{}, {}, system.model};
   EXPECT_EQ((predict<1, Fx>(system, row, {}, workspace, prediction)), Status::ok);
   return prediction.reading;
 }
@@ -74,7 +74,7 @@ TEST(ProfileTable, DerivativesFollowTheTable) {
   const System<1, Fx> system = straight_tube(&profiles);
   const RecordedRow<1> row{{{VecN<1>(grasped)}, {VecN<1>(0)}}, {.force = {0, -0.05, 0}}, {}};
   Workspace<1> workspace;
-  RecordedPrediction<1, Fx> here{{}, {}, system.model, {}, {}};
+  RecordedPrediction<1, Fx> here{{}, {}, system.model};
   ASSERT_EQ((predict<1, Fx>(system, row, {}, workspace, here)), Status::ok);
   for (const Parameter kind : {Parameter::length, Parameter::home_translation}) {
     const int places[] = {ParameterVector<1>::index(kind, 0)};

@@ -8,6 +8,7 @@
 
 #include "support/no_alloc.hpp"
 #include "support/random_robots.hpp"
+#include "support/solver.hpp"
 
 namespace {
 

@@ -7,6 +7,7 @@
 #include "support/cases.hpp"
 #include "support/no_alloc.hpp"
 #include "support/random_robots.hpp"
+#include "support/solver.hpp"
 
 namespace {
 

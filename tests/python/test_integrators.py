@@ -9,7 +9,7 @@ from ctcr import Model
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from test_model import make_robot, random_force, random_joints  # noqa: E402
+from model_bench import make_robot, random_force, random_joints  # noqa: E402
 
 
 @pytest.mark.parametrize(("integrator", "order"), [("ssprk3", 3), ("rk4", 4), ("rk8", 8)])

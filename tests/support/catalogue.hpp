@@ -21,10 +21,8 @@
   kind std::vector<Catalogue::On<N>::Memory> memories<N, Catalogue>(const System<N, Catalogue>&,                   \
                                                                     std::span<const RecordedRow<N>>);
 
-#ifndef CTCR_TEST_INSTANTIATE
 namespace ctcr {
 CTCR_TEST_CATALOGUE(extern template, 1)
 CTCR_TEST_CATALOGUE(extern template, 2)
 CTCR_TEST_CATALOGUE(extern template, 3)
 }  // namespace ctcr
-#endif

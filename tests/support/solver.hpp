@@ -2,22 +2,12 @@
 // The solver, compiled once for all tests: its instantiations are long, the tests of its laws are short.
 // Link ctcr_test_solver (solver.cmake), which holds what is declared here.
 #include "ctcr/ctcr.hpp"
+#include "ctcr/derivatives/parameters.hpp"
 
-namespace ctcr::test {
-
-/// evaluate() behind a call.
-template <Derivatives D, Loading L, class Stepper, int N>
-void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess, int steps,
-                Evaluation<N, L, D>& out) {
-  evaluate<D, L, Stepper>(c, q, load, guess, steps, out);
-}
-
-}  // namespace ctcr::test
-
-#define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                           \
-  kind void test::evaluation<Derivatives::D, Loading::L, Stepper, N>(const Coefficients<N>&, const Joints<N>&, \
-                                                                     const TipLoad&, const TipGuess<N>&, int,  \
-                                                                     Evaluation<N, Loading::L, Derivatives::D>&);
+#define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                                   \
+  kind void evaluate<Derivatives::D, Loading::L, Stepper, N>(const Coefficients<N>&, const Joints<N>&, const TipLoad&, \
+                                                             const TipGuess<N>&, int,                                  \
+                                                             Evaluation<N, Loading::L, Derivatives::D>&) noexcept;
 #define CTCR_TEST_LOADED_EVALUATIONS(kind, D, Stepper, N) \
   CTCR_TEST_EVALUATION(kind, D, force, Stepper, N)        \
   CTCR_TEST_EVALUATION(kind, D, wrench, Stepper, N)       \
@@ -37,12 +27,16 @@ void evaluation(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& loa
                                                  Solution<N>&, const Settings&) noexcept;                           \
   CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
 #define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
+#define CTCR_TEST_PARAMETERS(kind, D, N)                                                                            \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,        \
+                                              const Settings&) noexcept;                                            \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&, Mat6&, \
+                                              const Settings&) noexcept;
 
 #define CTCR_TEST_DECLARE(KIND, N)                                                          \
   CTCR_TEST_##KIND(extern template, none, N) CTCR_TEST_##KIND(extern template, jacobian, N) \
       CTCR_TEST_##KIND(extern template, compliance, N)
 
-#ifndef CTCR_TEST_INSTANTIATE
 namespace ctcr {
 CTCR_TEST_DECLARE(SOLVER, 1)
 CTCR_TEST_DECLARE(SOLVER, 2)
@@ -50,5 +44,7 @@ CTCR_TEST_DECLARE(SOLVER, 3)
 CTCR_TEST_DECLARE(SOLVER, 4)
 CTCR_TEST_DECLARE(DIRECT, 2)
 CTCR_TEST_DECLARE(DIRECT, 3)
+CTCR_TEST_PARAMETERS(extern template, all, 1)
+CTCR_TEST_PARAMETERS(extern template, all, 2)
+CTCR_TEST_PARAMETERS(extern template, all, 3)
 }  // namespace ctcr
-#endif

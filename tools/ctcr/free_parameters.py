@@ -79,9 +79,9 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     return [name for name in known if name in chosen]
 
 
-def values(robot: Robot) -> Array:
-    """The value of every parameter; at tracker.rotation the rotation vector of the tracker frame."""
-    return np.array([_value(robot, name) for name in names_of(robot.n_tubes)])
+def values(robot: Robot, names: Iterable[str] | None = None) -> Array:
+    """Values of parameters, all by default; at tracker.rotation the rotation vector of the tracker frame."""
+    return np.array([_value(robot, name) for name in (names_of(robot.n_tubes) if names is None else names)])
 
 
 def priors(

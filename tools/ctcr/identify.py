@@ -17,6 +17,7 @@ from ctcr import _core, free_parameters
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
+from ctcr.recording import recording_of
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -187,25 +188,12 @@ class Fit:
         return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
 
 
-def readings_of(
+def plain_recording_of(
     robot: Robot, measurements: Measurements, names: Sequence[str], *, steps: int = 1, threads: int = 0
 ) -> Any:
-    """The compiled residuals of a table as functions of the named parameters."""
-    known = free_parameters.names_of(robot.n_tubes)
-    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    missing = np.full((len(measurements), 4), nan)
-    return _core.Readings(
-        parameters=free_parameters.values(robot),
-        sensor_tube=robot.tracker.sensor_on_tube - 1,
-        beta=beta,
-        alpha=alpha,
-        force=measurements.force,
-        position=missing[:, :3] if measurements.position is None else measurements.position,
-        quaternion=missing if measurements.quaternion is None else measurements.quaternion,
-        free=[known.index(name) for name in names],
-        steps=steps,
-        threads=threads,
-    )
+    """The recording by the standard model, without the effects that the robot may have."""
+    plain = robot.model_copy(update={"effects": {}})
+    return recording_of(plain, measurements, names, steps=steps, threads=threads)
 
 
 def places_of(robot: Robot, measurements: Measurements) -> Array:
@@ -264,7 +252,7 @@ def fit(
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     warnings = ignored + list(_doubts(measurements, measured_rows(measurements) & chosen))
-    table = readings_of(robot, measurements, names, steps=steps, threads=threads)
+    table = plain_recording_of(robot, measurements, names, steps=steps, threads=threads)
     table.activate((measured_rows(measurements) & chosen).tolist())
     if starts is None:
         starts = 2 if len(measurements) > MANY_ROWS else 3
@@ -305,7 +293,7 @@ def identify_with(
     known: Sequence[tuple[str, Array]] = (),
     within: Sequence[tuple[str, Array, float]] = (),
 ) -> Fit:
-    """As `fit`, for any predictor: compiled Readings (whose active rows are fitted), or a function
+    """As `fit`, for any predictor: a Recording (whose active rows are fitted), or a function
     (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
     residual means not measured. Nominal is where x is `mean`. Raises InputError where no fit is possible."""
     began = perf_counter()

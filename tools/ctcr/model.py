@@ -1,11 +1,11 @@
 """The kinetostatic model of a robot: poses, derivatives and shapes from joints and tip loads."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core, effect_model
+from ctcr import _core, effect_model, free_parameters
 from ctcr.errors import InputError, Problem
 from ctcr.frames import product
 from ctcr.robot import Robot
@@ -29,7 +29,8 @@ class Prediction:
     status: NDArray[np.uint8]  # (M,), 0: solved; `status_text` says what the others mean
     stability: Array  # (M,), 1 without interaction between tubes, 0 where the robot snaps; NaN with effects
     jacobian: Array | None  # (M, 6, 2N), rows: velocity [m], turn [rad]; columns: beta [m], alpha [rad]
-    compliance: Array | None  # (M, 6, 6), rows as above; columns: tip force [N], tip moment [N m]
+    compliance: Array | None  # (M, 6, 6), rows as above; columns: force [N] and moment [N m] at the robot tip
+    by_parameters: Array | None = None  # (M, 6, P), rows as above; columns: `Model.parameters`, SI
 
     @property
     def solved(self) -> NDArray[np.bool_]:
@@ -94,21 +95,20 @@ class Model:
         moment: ArrayLike | None = None,
         *,
         derivatives: bool = False,
+        by_parameters: bool = False,
         threads: int = 0,
     ) -> Prediction:
         """Solves M configurations: `beta` and `alpha` (M, N); loads (M, 3), or (3,) for all, or None.
 
         Neighbouring rows that differ little (a path) are solved faster. The answers do not depend on `threads`
-        (0: all cores). `derivatives` adds the Jacobian and the compliance of the robot tip, exact.
+        (0: all cores). `derivatives` adds the Jacobian and the compliance of the pose; `by_parameters` these and the
+        derivatives by the `parameters`, for motors that stand still. All are exact derivatives of the poses returned.
         """
         n = self.robot.n_tubes
         beta, alpha = _rows("beta", beta, n), _rows("alpha", alpha, n)
         rows = len(beta)
-        sensor = self.robot.tracker.sensor_on_tube - 1
-        if derivatives and sensor != 0:
-            raise ValueError(
-                "derivatives are those of the innermost tube's tip, but the sensor is on another"
-            )
+        derivatives = derivatives or by_parameters
+        own = sum(name.startswith(("tubes.", "gravity.")) for name in self.parameters)
         answer = Prediction(
             position=np.empty((rows, 3)),
             quaternion=np.empty((rows, 4)),
@@ -116,6 +116,7 @@ class Model:
             stability=np.empty(rows),
             jacobian=np.empty((rows, 6, 2 * n)) if derivatives else None,
             compliance=np.empty((rows, 6, 6)) if derivatives else None,
+            by_parameters=np.empty((rows, 6, own)) if by_parameters else None,
         )
         if self._effects:
             if derivatives or moment is not None:
@@ -135,11 +136,29 @@ class Model:
             moment=_load("moment", moment, rows),
             integrator=INTEGRATORS[self.integrator],
             steps=self.steps,
-            tip_of=sensor,
+            tip_of=self.robot.tracker.sensor_on_tube - 1,
             threads=threads,
             **vars(answer),
         )
-        return answer
+        return (
+            replace(answer, by_parameters=self._with_motors(answer, beta, alpha)) if by_parameters else answer
+        )
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that the pose depends on, base frame: tubes, gravity and motors."""
+        names = free_parameters.names_of(self.robot.n_tubes)
+        return tuple(name for name in names if not name.startswith("tracker."))
+
+    def _with_motors(self, answer: Prediction, beta: Array, alpha: Array) -> Array:
+        """Derivatives by all parameters (M, 6, P): q = rho theta + Delta, and theta stays."""
+        columns = [answer.by_parameters]
+        motions = ("translation", beta), ("rotation", alpha)
+        for (kind, q), by in zip(motions, np.split(answer.jacobian, 2, axis=2), strict=True):
+            names = [f"actuation.home_{kind}.{i + 1}" for i in range(self.robot.n_tubes)]
+            *home, ratio = free_parameters.values(self.robot, [*names, f"actuation.{kind}_ratio"])
+            columns.append(np.einsum("mij,mj->mi", by, (q - home) / ratio)[:, :, None])
+        return np.concatenate([*columns, answer.jacobian], axis=2)
 
     def shape(
         self,

@@ -8,7 +8,7 @@
 
 namespace ctcr {
 
-/// Fits the active rows of a table such as Readings<N>: a Predictor with unsolved(), active() and activate().
+/// Fits the active rows of a table such as Recording: a Predictor with unsolved(), active() and activate().
 ///
 /// Rows that cannot be solved at the start are left out of the whole fit. So are, once a descent gets stuck for their
 /// sake, those that cannot be solved where it wants to go, if they are few; it then goes on without them.

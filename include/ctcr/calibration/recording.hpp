@@ -1,5 +1,5 @@
 #pragma once
-// A table of readings beside what a system with effects would have read: as readings.hpp, with the path behind each row.
+// A table of readings beside what a system with other parameters would have read.
 #include <algorithm>
 #include <limits>
 #include <span>
@@ -17,7 +17,8 @@ namespace ctcr {
 /// nominal one about the tracker's axes, as one rotation vector [rad]. Rows stand in the order in which they were
 /// recorded. Each row starts from its own last solution. Answers do not depend on the number of threads. Not for several
 /// callers at once. Real time: no.
-template <int N, class Fx>
+/// @tparam Fx  the effects of the system
+template <int N, class Fx = Standard>
 class Recording {
   using P = SystemParameters<N, Fx>;
   using MemoryOfRow = typename Fx::template On<N>::Memory;
@@ -127,8 +128,7 @@ private:
   bool differentiate_row(const System<N, Fx>& system, std::size_t i, const Mat3& turning, Worker& w,
                          Eigen::MatrixXd& jacobian) noexcept {
     w.slopes.resize(6, Eigen::Index(columns_.size()));
-    if (differentiate<N, Fx>(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes) != Status::ok)
-      return false;
+    if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes) != Status::ok) return false;
     const Mat6 by_reading = residual_by_prediction(ctcr::residual(measured_[i], w.prediction.reading));
     constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
     Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();

@@ -21,15 +21,15 @@ struct TipDerivatives {
 
 namespace detail {
 
-/// All derivatives of a tube's tip by the first `variables` variables, the unknowns eliminated.
-template <int N, bool Loaded, bool Gravity, class Stepper>
+/// Derivatives of a tube's tip by the variables before `end`, the unknowns eliminated.
+template <int N, bool Loaded, class Stepper>
 class TipSystem {
 public:
-  using V = TipVariables<N, Loaded, Gravity>;
+  using V = TipVariables<N, Loaded>;
 
-  TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int variables = V::count) noexcept {
-    for (int pass = 0; pass < V::passes(variables); ++pass)
-      rotation_ = TipPass<N, Loaded, Gravity, Stepper>(robot, at, tube, steps, pass * V::pass_lanes).write(row_);
+  TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int end) noexcept {
+    for (int pass = 0; pass < V::passes(end); ++pass)
+      rotation_ = TipPass<N, Loaded, Stepper>(robot, at, tube, steps, pass * V::pass_lanes).write(row_);
     constexpr auto lane = [](int j) constexpr { return j; };
     det_ = eliminate<V::unknowns>(row_, lane);
     if constexpr (Loaded) det_ = -det_;  // three rows carry the opposite sign
@@ -77,27 +77,56 @@ void put_tube(const System& system, const Tube& t, int i, TipDerivatives<N>& out
   }
 }
 
-template <bool Loaded, bool Gravity, class Stepper, int N>
-Status differentiate_tip(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps,
-                         TipDerivatives<N>& out) noexcept {
-  constexpr int gravity = ParameterVector<N>::index(Parameter::gravity);
-  const TipSystem<N, Loaded, Gravity, Stepper> system(robot, at, tube, steps);
-  using V = typename decltype(system)::V;
+/// By joints and tubes.
+template <int N, class System>
+void put_columns(const System& system, const Robot<N>& robot, TipDerivatives<N>& out) noexcept {
+  using V = typename System::V;
   for (int i = 0; i < N; ++i) {
     out.by_joints.col(i) = system.by(V::beta + i);
     out.by_joints.col(N + i) = system.by(V::alpha + i);
     put_tube(system, robot.tubes[std::size_t(i)], i, out);
   }
-  if constexpr (Gravity) {
-    for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = system.by(V::gravity + j);
-  } else {
-    using General = TipVariables<N, true, true>;
-    Workspace<N> found = at;
-    found.guess.rotation = system.rotation();  // a guess may leave turns open that only weight makes felt
-    const TipSystem<N, true, true, Stepper> weighed(robot, found, tube, steps, General::beta);
-    for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = weighed.by(General::gravity + j);
-  }
-  return system.det() < singular_det ? Status::singular : Status::ok;
+}
+
+template <int N, class Stepper>
+void put_gravity(const TipSystem<N, true, Stepper>& system, TipDerivatives<N>& out) noexcept {
+  constexpr int gravity = ParameterVector<N>::index(Parameter::gravity);
+  for (int j = 0; j < 3; ++j) out.by_parameters.col(gravity + j) = system.by(TipVariables<N, true>::gravity + j);
+}
+
+/// The workspace with the tip frame as it is: its guess may leave turns open that only other loads make felt.
+template <class Stepper, int N>
+Workspace<N> with_tip_frame(const Robot<N>& robot, const Workspace<N>& ws, int steps) noexcept {
+  Workspace<N> found = ws;
+  typename TipVariables<N, true>::Row unused[TipVariables<N, true>::rows];
+  if (robot.gravity.isZero(0.0)) found.guess.rotation = TipPass<N, true, Stepper>(robot, ws, 0, steps, 0).write(unused);
+  return found;
+}
+
+inline Status status_of(double det) noexcept { return det < singular_det ? Status::singular : Status::ok; }
+
+template <class Stepper, int N>
+Status differentiate_unloaded(const Robot<N>& robot, const Workspace<N>& ws, int tube, int steps,
+                              TipDerivatives<N>& out) noexcept {
+  const TipSystem<N, false, Stepper> system(robot, ws, tube, steps, TipVariables<N, false>::count);
+  put_columns(system, robot, out);
+  Workspace<N> found = ws;
+  found.guess.rotation = system.rotation();
+  put_gravity(TipSystem<N, true, Stepper>(robot, found, tube, steps, TipVariables<N, true>::beta), out);
+  return status_of(system.det());
+}
+
+template <class Stepper, int N>
+Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int tube, int steps, TipDerivatives<N>& out,
+                            Mat6* compliance) noexcept {
+  using V = TipVariables<N, true>;
+  const TipSystem<N, true, Stepper> system(robot, with_tip_frame<Stepper>(robot, ws, steps), tube, steps,
+                                           compliance ? V::count : V::load);
+  put_columns(system, robot, out);
+  put_gravity(system, out);
+  if (compliance)
+    for (int j = 0; j < 6; ++j) compliance->col(j) = system.by(V::load + j);
+  return status_of(system.det());
 }
 
 }  // namespace detail
@@ -113,24 +142,35 @@ Status differentiate_tip(const Robot<N>& robot, const Workspace<N>& at, int tube
 /// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
 ///         last two leave zeros. Real time: yes, about N + 1 integrations with eight columns each.
 template <class Stepper = MagnusRk4, int N>
-Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
-                         const Settings& settings = {}) noexcept {
-  const auto run = [&](auto loaded, auto gravity) noexcept {
-    return detail::differentiate_tip<loaded, gravity, Stepper>(model.robot(), ws, tube, settings.steps, out);
-  };
+CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
+                                       const Settings& settings = {}) noexcept {
   Status status = Status::not_converged;
-  if (!ws.warm) {
+  const bool loaded = !model.robot().gravity.isZero(0.0) || !ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0);
+  if (!ws.warm)
     out = {};
-  } else if (!model.robot().gravity.isZero(0.0)) {
-    status = run(std::true_type{}, std::true_type{});
-  } else if (!ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0)) {
-    status = run(std::true_type{}, std::false_type{});
-  } else {
-    status = run(std::false_type{}, std::false_type{});
-  }
+  else if (loaded)
+    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, settings.steps, out, nullptr);
+  else
+    status = detail::differentiate_unloaded<Stepper>(model.robot(), ws, tube, settings.steps, out);
   if (out.by_joints.allFinite() && out.by_parameters.allFinite()) return status;
   out = {};
   return Status::not_finite;
+}
+
+/// As above, and by force [N] and moment [N m] at the robot tip, base axes: the compliance of the tube's tip. By the
+/// equations with load, which solve<Derivatives::compliance>() integrates too, whether or not there is one.
+template <class Stepper = MagnusRk4, int N>
+CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
+                                       Mat6& compliance, const Settings& settings = {}) noexcept {
+  Status status = Status::not_converged;
+  if (ws.warm) {
+    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, settings.steps, out, &compliance);
+    if (out.by_joints.allFinite() && out.by_parameters.allFinite() && compliance.allFinite()) return status;
+    status = Status::not_finite;
+  }
+  out = {};
+  compliance.setZero();
+  return status;
 }
 
 }  // namespace ctcr

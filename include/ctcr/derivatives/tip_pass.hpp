@@ -5,19 +5,21 @@
 
 namespace ctcr::detail {
 
-/// Where the variables stand: unknowns first, those that only weight makes felt (gravity) next, tube masses last.
-template <int N, bool Loaded, bool Gravity>
+/// Where the variables stand: unknowns first, then gravity; the load at the robot tip last.
+/// @tparam Loaded  by the equations with load and weight, whether or not there are any
+template <int N, bool Loaded>
 struct TipVariables {
   static constexpr int turn = 0;              ///< of the tip (3), its own axes
   static constexpr int psi = Loaded ? 3 : 0;  ///< of tube 2
   static constexpr int unknowns = psi + N - 1;
   static constexpr int gravity = unknowns;
-  static constexpr int beta = gravity + (Gravity ? 3 : 0);
+  static constexpr int beta = gravity + (Loaded ? 3 : 0);
   static constexpr int k = beta + N;  ///< then the others of TubeParameters, N of each
   static constexpr int kz = k + N, kappa = kz + N, length = kappa + N, curved_length = length + N;
   static constexpr int mass = curved_length + N;
-  static constexpr int alpha = mass + (Gravity ? N : 0);
-  static constexpr int count = alpha + N;
+  static constexpr int alpha = mass + (Loaded ? N : 0);
+  static constexpr int load = alpha + N;  ///< force (3), moment (3), base axes
+  static constexpr int count = load + (Loaded ? 6 : 0);
 
   static constexpr int pass_groups = 2;  ///< groups of four variables that one pass carries
   static constexpr int pass_lanes = pass_groups * lane_count;
@@ -29,15 +31,15 @@ struct TipVariables {
 };
 
 /// One integration that differentiates along pass_lanes of the variables.
-template <int N, bool Loaded, bool Gravity, class Stepper>
+template <int N, bool Loaded, class Stepper>
 class TipPass {
-  using V = TipVariables<N, Loaded, Gravity>;
+  using V = TipVariables<N, Loaded>;
   static constexpr int G = V::pass_groups;
   using S = Dual<G>;
   struct WholeFrame {
     static constexpr bool jacobian = true;
   };
-  using Rod = Shooting<N, S, S, S, Loaded, Gravity, Stepper, WholeFrame>;
+  using Rod = Shooting<N, S, S, S, Loaded, Loaded, Stepper, WholeFrame>;
 
 public:
   /// @param first  the variables first..first + pass_lanes - 1 are differentiated along
@@ -118,7 +120,7 @@ private:
                                variable(t.curvature, V::kappa + i),
                                variable(t.length, V::length + i),
                                variable(t.curved_length, V::curved_length + i),
-                               Gravity ? variable(t.mass_per_length(), V::mass + i) : S(0.0)};
+                               Loaded ? variable(t.mass_per_length(), V::mass + i) : S(0.0)};
     }
     Coefficients<N, S> c = make_coefficients<N, S>(tubes, robot.gravity);
     // A curvature that is zero still has derivatives by it.
@@ -145,14 +147,15 @@ private:
       y.w[std::size_t(i)] = 0.0;
     }
     if constexpr (Loaded) {
-      const Vec3 &f = at.load.force, &l = at.load.moment, &g = robot.gravity;
-      y.n = seen_from_tip(at.guess.rotation, {f[0], f[1], f[2]});
-      const std::array<S, 3> moment = seen_from_tip(at.guess.rotation, {l[0], l[1], l[2]});
+      const auto seen = [&](const Vec3& v, int column) noexcept {
+        return seen_from_tip(at.guess.rotation,
+                             {variable(v[0], column), variable(v[1], column + 1), variable(v[2], column + 2)});
+      };
+      y.n = seen(at.load.force, V::load);
+      const std::array<S, 3> moment = seen(at.load.moment, V::load + 3);
       y.m = {moment[0], moment[1]};
       y.w[0] = moment[2] * inverse(c.kz[0]);
-      if constexpr (Gravity)
-        y.g = seen_from_tip(at.guess.rotation, {variable(g[0], V::gravity), variable(g[1], V::gravity + 1),
-                                                variable(g[2], V::gravity + 2)});
+      y.g = seen(robot.gravity, V::gravity);
     }
     return y;
   }

@@ -340,8 +340,8 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// Real time: yes; at most about 70 * max_iterations evaluations, 1 to 3 from a warm start.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
-Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
-             const Settings& settings = {}) noexcept {
+CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                           Solution<N>& out, const Settings& settings = {}) noexcept {
   return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
     return detail::solve_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
@@ -353,8 +353,8 @@ Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
 /// prediction and the corrected pose.
 /// Real time: yes, one evaluation.
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
-Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws, Solution<N>& out,
-            const Settings& settings = {}) noexcept {
+CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                          Solution<N>& out, const Settings& settings = {}) noexcept {
   return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
     constexpr Loading L = decltype(loading)::value;
     const auto evaluate_at = [&](const TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {

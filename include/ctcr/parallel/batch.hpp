@@ -2,6 +2,8 @@
 // Many configurations over the threads of a pool.
 #include <algorithm>
 #include <cstddef>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "ctcr/mechanics/solve.hpp"
@@ -37,7 +39,8 @@ bool nearby(const Workspace<N>& ws, const Configuration<N>& next) noexcept {
 ///
 /// The answers are bit for bit the same for any number of threads. Memory: one workspace and one solution a thread.
 /// @param input   input(i) -> Configuration<N> for i in [0, count)
-/// @param output  output(i, const Solution<N>&), called once for each i in any order; out.status tells what came of it
+/// @param output  output(i, const Solution<N>&) or output(i, const Solution<N>&, const Workspace<N>&), called once for each
+///                i in any order; status tells what came of it
 /// Both are called by several threads at once and must not throw.
 /// Real time: no (allocates the workspaces). @throws std::bad_alloc
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Input, class Output>
@@ -57,7 +60,10 @@ void solve_batch(const Model<N>& model, std::ptrdiff_t count, const Input& input
       const Configuration<N> configuration = input(i);
       if (ws.warm && !detail::nearby(ws, configuration)) ws.reset();
       (void)solve<D, Stepper>(model, configuration.joints, configuration.load, ws, solution, settings);
-      output(i, static_cast<const Solution<N>&>(solution));
+      if constexpr (std::is_invocable_v<Output, std::ptrdiff_t, const Solution<N>&, const Workspace<N>&>)
+        output(i, std::as_const(solution), std::as_const(ws));
+      else
+        output(i, std::as_const(solution));
     }
   });
 }

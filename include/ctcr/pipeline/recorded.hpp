@@ -82,7 +82,7 @@ std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& s
   if (time.size() < rows.size()) time.clear();
   const auto& list = system.model.effects().list;
   [&]<std::size_t... I>(std::index_sequence<I...>) {
-    const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
+    [[maybe_unused]] const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
       if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty())
         detail::remember<N>(std::get<J>(list), system.transmission, rows, time,
                             [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); });
@@ -92,14 +92,11 @@ std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& s
   return memory;
 }
 
-/// Every station of a row's way.
+/// Every station of a row's way; q are the joints that the tubes have.
 template <int N, class Fx>
-struct RecordedPrediction {
-  Joints<N> q;                     ///< that the tubes have
+struct RecordedPrediction : Prediction<N> {
   TipLoad load;                    ///< with what the surroundings add
-  Model<N, Fx> model{Robot<N>{}};  ///< with the past of this row
-  Solution<N> solution;
-  Pose reading;  ///< T_tracker_sensor
+  Model<N, Fx> model{Robot<N>{}};  ///< with the past of this row; without effects a row has none, and this is not set
 };
 
 namespace detail {
@@ -177,9 +174,10 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
 /// @return as solve(), not_finite where a parameter of an effect is not a number, not_converged where the tip and its
 ///         surroundings find no balance. Real time: yes.
 template <int N, class Fx>
-Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
-               const typename Fx::template On<N>::Memory& memory, Workspace<N>& ws,
-               RecordedPrediction<N, Fx>& out) noexcept {
+  requires(!Fx::none)
+CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
+                             const typename Fx::template On<N>::Memory& memory, Workspace<N>& ws,
+                             RecordedPrediction<N, Fx>& out) noexcept {
   auto effects = system.model.effects();
   effects.remember(memory);
   std::array<double, N> beta, alpha;
@@ -211,9 +209,10 @@ Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
 /// @param out        6 x variables.size()
 /// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for sixteen variables.
 template <int N, class Fx>
-Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
-                     const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
+  requires(!Fx::none)
+CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
+                                   const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
+                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
   using P = SystemParameters<N, Fx>;
   using V = ParameterVector<N>;
   using Window = detail::Window<4>;
@@ -357,6 +356,25 @@ Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, con
   if (out.allFinite()) return status;
   out.setZero();
   return Status::not_finite;
+}
+
+/// As above without effects, by the faster way of predict.hpp.
+template <int N, class Fx>
+  requires(Fx::none)
+Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typename Fx::template On<N>::Memory&,
+               Workspace<N>& ws, RecordedPrediction<N, Fx>& out) noexcept {
+  out.load = row.load;
+  return predict(system, row.theta, row.load, ws, out);
+}
+template <int N, class Fx>
+  requires(Fx::none)
+Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
+                     const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
+                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
+  PredictionDerivatives<N> all;
+  const Status status = differentiate(system, row.theta, ws, prediction, all);
+  for (std::size_t j = 0; j < variables.size(); ++j) out.col(Eigen::Index(j)) = all.by_parameters.col(variables[j]);
+  return status;
 }
 
 }  // namespace ctcr

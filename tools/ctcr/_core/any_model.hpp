@@ -25,9 +25,10 @@ struct Answers {
   double* position;    ///< (count, 3) [m], base frame
   double* quaternion;  ///< (count, 4), w first and not negative
   std::uint8_t* status;
-  double* stability;   ///< (count,)
-  double* jacobian;    ///< (count, 6, 2N); null: neither derivative
-  double* compliance;  ///< (count, 6, 6)
+  double* stability;      ///< (count,)
+  double* jacobian;       ///< (count, 6, 2N); null: no derivative
+  double* compliance;     ///< (count, 6, 6)
+  double* by_parameters;  ///< (count, 6, parameters of tubes and gravity); null: not those
 };
 
 enum class Integrator : std::uint8_t { standard, ssp_rk3, classical_rk4, prince_dormand8 };

@@ -1,23 +1,60 @@
 #pragma once
-// A recording of a robot with effects whose number of tubes is known at run time.
-#include "any_readings.hpp"
+// A recording of a robot whose number of tubes is known at run time.
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace ctcr::python {
 
-/// A table of readings with what effects need besides. `free` holds places in SystemParameters<N, Catalogue>.
-struct RecordedTable : Table {
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// What Recording<N, Fx> is made of; NaN where not measured.
+struct Table {
+  Eigen::VectorXd
+      parameters;           ///< the nominal system, as ParameterVector<N>; tracker.rotation: rotation vector of T_ref
   Eigen::VectorXd effects;  ///< values of all parameters of the catalogue
+  int sensor_tube;          ///< from 0
+  RowMajor beta, alpha;     ///< (rows, N) as recorded [m], [rad]
+  RowMajor force;           ///< (rows, 3) [N], base frame
+  RowMajor position;        ///< (rows, 3) [m], tracker frame
+  RowMajor quaternion;      ///< (rows, 4) w first, tracker frame
   Eigen::VectorXd time;     ///< (rows) [s], NaN: unknown
+  Eigen::VectorXd part;     ///< (rows) of the session's duration, 0 to 1
   Eigen::VectorXi run;      ///< (rows)
   Eigen::Vector3d centre;   ///< of all measured positions, tracker frame [m]
-  Eigen::VectorXd part;     ///< (rows) of the session's duration, 0 to 1
-  RowMajor profiles;        ///< (nodes, 3 N) of each tube: curvature x, y added [1/m], relative change of EI; or empty
+  std::vector<int> free;    ///< places in SystemParameters<N, Catalogue>
+  int steps, threads;
+  RowMajor profiles;  ///< (nodes, 3 N) of each tube: curvature x, y added [1/m], relative change of EI; or empty
 };
 
-class AnyRecording : public AnyReadings {
+/// Recording<N, Fx> for some N, with or without effects.
+class AnyRecording {
 public:
+  virtual ~AnyRecording() = default;
+  virtual bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) = 0;
+  [[nodiscard]] virtual Eigen::VectorXd nominal() const = 0;
+  [[nodiscard]] virtual const std::vector<int>& unsolved() const = 0;
+  [[nodiscard]] virtual const std::vector<bool>& active() const = 0;
+  virtual void activate(const std::vector<bool>& rows) = 0;
   /// T_tracker_sensor as predicted at the last call: (rows, 3) [m], (rows, 4) w first; NaN where not solved.
   virtual void predicted(RowMajor& position, RowMajor& quaternion) const = 0;
+};
+
+/// What Python holds.
+class BoundRecording {
+public:
+  explicit BoundRecording(std::unique_ptr<AnyRecording> recording) : recording_(std::move(recording)) {}
+  AnyRecording& operator*() const { return *recording_; }
+
+private:
+  std::unique_ptr<AnyRecording> recording_;
+};
+
+/// Names and units of ParameterVector<N>.
+struct ParameterNames {
+  std::vector<std::string> names, units;
 };
 
 /// Values of a parameter of an effect.
@@ -33,12 +70,13 @@ struct CatalogueEntry {
   bool order, time, orientation, loads, gravity;
 };
 
-/// Defined for N = 1..4.
+/// Defined for N = 1..4. The standard model where no effect is at work, free or a profile.
+/// @throws std::invalid_argument unless the arrays fit together
 template <int N>
-std::unique_ptr<AnyRecording> make_recording(const RecordedTable& table);
+std::unique_ptr<AnyRecording> make_recording(const Table& table);
+template <int N>
+ParameterNames parameter_names();
 template <int N>
 std::vector<CatalogueParameter> catalogue_parameters();
-template <int N>
-std::vector<std::string> system_parameter_names();
 
 }  // namespace ctcr::python

@@ -1,4 +1,4 @@
-// Joint identification: tables of readings and fits of their parameters. Use ctcr.identify, which converts and names.
+// Joint identification: parameters fitted to a recording. Use ctcr.identify, which converts and names.
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -11,48 +11,13 @@
 #include <ctcr/calibration/row_report.hpp>
 #include <tuple>
 
-#include "any_readings.hpp"
+#include "any_recording.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace ctcr::python {
 namespace {
-
-std::unique_ptr<AnyReadings> make_any_readings(const Table& table) {
-  switch (table.beta.cols()) {
-    case 1: return make_readings<1>(table);
-    case 2: return make_readings<2>(table);
-    case 3: return make_readings<3>(table);
-    case 4: return make_readings<4>(table);
-  }
-  throw std::invalid_argument("a robot has 1 to 4 tubes");
-}
-
-ParameterNames any_parameter_names(int tubes) {
-  switch (tubes) {
-    case 1: return parameter_names<1>();
-    case 2: return parameter_names<2>();
-    case 3: return parameter_names<3>();
-    case 4: return parameter_names<4>();
-  }
-  throw std::invalid_argument("a robot has 1 to 4 tubes");
-}
-
-/// @throws std::invalid_argument unless the arrays fit together
-std::unique_ptr<AnyReadings> make_checked_readings(const Table& table) {
-  const Eigen::Index rows = table.beta.rows();
-  const auto places = Eigen::Index(any_parameter_names(int(table.beta.cols())).names.size());
-  const bool fits = table.alpha.rows() == rows && table.alpha.cols() == table.beta.cols() &&
-                    table.force.rows() == rows && table.force.cols() == 3 && table.position.rows() == rows &&
-                    table.position.cols() == 3 && table.quaternion.rows() == rows && table.quaternion.cols() == 4 &&
-                    table.parameters.size() == places && table.sensor_tube >= 0 &&
-                    table.sensor_tube < table.beta.cols() && table.steps >= 1;
-  bool known = true;
-  for (const int place : table.free) known = known && place >= 0 && place < places;
-  if (!fits || !known) throw std::invalid_argument("the arrays of a table of readings do not fit together");
-  return make_any_readings(table);
-}
 
 /// A Python function x -> (residual, jacobian), or None where the prediction fails, as a Predictor.
 Predictor predictor_of(nb::callable function) {
@@ -102,19 +67,19 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
     options.known.push_back({text, change});
   }
   for (const auto& [text, change, least] : within) options.within.push_back({text, change, least});
-  if (nb::isinstance<BoundReadings>(predict)) {
-    AnyReadings& readings = **nb::cast<BoundReadings*>(predict);
+  if (nb::isinstance<BoundRecording>(predict)) {
+    AnyRecording& recording = **nb::cast<BoundRecording*>(predict);
     const nb::gil_scoped_release released;
-    return identify_readings(readings, parameters, noise, places, options, excluded);
+    return identify_readings(recording, parameters, noise, places, options, excluded);
   }
   return identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, places, options);
 }
 
 RowReport report_any(const Identification& fit, const nb::object& predict) {
-  if (nb::isinstance<BoundReadings>(predict)) {
-    AnyReadings& readings = **nb::cast<BoundReadings*>(predict);
+  if (nb::isinstance<BoundRecording>(predict)) {
+    AnyRecording& recording = **nb::cast<BoundRecording*>(predict);
     const nb::gil_scoped_release released;
-    return report_rows(fit, std::ref(readings));
+    return report_rows(fit, std::ref(recording));
   }
   return report_rows(fit, predictor_of(nb::cast<nb::callable>(predict)));
 }
@@ -122,54 +87,6 @@ RowReport report_any(const Identification& fit, const nb::object& predict) {
 }  // namespace
 
 void bind_identify(nb::module_& m) {
-  m.def(
-      "parameter_names",
-      [](int tubes) {
-        const ParameterNames p = any_parameter_names(tubes);
-        return std::pair(p.names, p.units);
-      },
-      "tubes"_a, "Names and units of all parameters of a robot.");
-
-  nb::class_<BoundReadings>(m, "Readings", "Residuals of a table as functions of chosen parameters.")
-      .def(
-          "__init__",
-          [](BoundReadings* self, const Eigen::VectorXd& parameters, int sensor_tube, const RowMajor& beta,
-             const RowMajor& alpha, const RowMajor& force, const RowMajor& position, const RowMajor& quaternion,
-             const std::vector<int>& free, int steps, int threads) {
-            new (self) BoundReadings(make_checked_readings(
-                {parameters, sensor_tube, beta, alpha, force, position, quaternion, free, steps, threads}));
-          },
-          nb::kw_only(), "parameters"_a, "sensor_tube"_a, "beta"_a, "alpha"_a, "force"_a, "position"_a, "quaternion"_a,
-          "free"_a, "steps"_a = 1, "threads"_a = 0)
-      .def(
-          "nominal", [](const BoundReadings& self) { return (*self).nominal(); }, "Values of the free parameters.")
-      .def(
-          "activate",
-          [](const BoundReadings& self, const std::vector<bool>& rows) {
-            if (rows.size() != (*self).active().size()) throw std::invalid_argument("activate needs one flag a row");
-            (*self).activate(rows);
-          },
-          "rows"_a, "Rows to solve from now on.")
-      .def("active", [](const BoundReadings& self) { return (*self).active(); })
-      .def(
-          "unsolved", [](const BoundReadings& self) { return (*self).unsolved(); },
-          "Rows that could not be solved at the last call.")
-      .def(
-          "residual",
-          [](const BoundReadings& self, const Eigen::VectorXd& x, bool derivatives) {
-            if (x.size() != (*self).nominal().size()) throw std::invalid_argument("x needs one value a free parameter");
-            Eigen::VectorXd residual;
-            Eigen::MatrixXd jacobian;
-            bool solved;
-            {
-              const nb::gil_scoped_release released;
-              solved = (*self)(x, residual, derivatives ? &jacobian : nullptr);
-            }
-            return std::tuple(std::move(residual), std::move(jacobian), solved);
-          },
-          "x"_a, "derivatives"_a = false,
-          "(residual (6 rows,), jacobian (6 rows, n) or empty, whether all rows were solved)");
-
   nb::class_<Noise>(m, "Noise", "Sd per axis of the jitter and of the smooth field error [m], [rad].")
       .def(
           "__init__",
@@ -256,9 +173,9 @@ void bind_identify(nb::module_& m) {
       },
       nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a, "places"_a,
       "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
-      "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50, "known"_a = Known{},
-      "within"_a = Within{},
-      "Fits Readings, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
+      "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50,
+      "known"_a = Known{}, "within"_a = Within{},
+      "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
       "rows.");
 }
 

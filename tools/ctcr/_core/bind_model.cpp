@@ -5,11 +5,13 @@
 #include <nanobind/stl/pair.h>
 
 #include <ctcr/core/status.hpp>
+#include <ctcr/robot/parameters.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "any_model.hpp"
+#include "with_tubes.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -25,19 +27,10 @@ using Triple = Array<const double, nb::shape<3>>;
 using Triples = Array<const double, nb::shape<-1, 3>>;
 
 constexpr int max_tubes = 4;
+constexpr std::size_t tube_parameters = ParameterVector<2>::robot_count - ParameterVector<1>::robot_count;
 
 void require(bool condition, const std::string& message) {
   if (!condition) throw nb::value_error(message.c_str());
-}
-
-std::unique_ptr<AnyModel> make_any_model(const std::vector<Tube>& tubes, const Vec3& gravity) {
-  switch (tubes.size()) {
-    case 1: return make_model<1>(tubes, gravity);
-    case 2: return make_model<2>(tubes, gravity);
-    case 3: return make_model<3>(tubes, gravity);
-    case 4: return make_model<4>(tubes, gravity);
-  }
-  throw nb::value_error("a robot has 1 to 4 tubes");
 }
 
 /// The model with the number of tubes that the arrays must have.
@@ -62,7 +55,8 @@ public:
                        .curved_length = curved_length(i),
                        .curvature = curvature(i),
                        .bending_stiffness = bending_stiffness(i)});
-    model_ = make_any_model(tubes, Vec3(gravity(0), gravity(1), gravity(2)));
+    model_ = with_tubes(std::ptrdiff_t(tubes_),
+                        [&](auto n) { return make_model<n>(tubes, Vec3(gravity(0), gravity(1), gravity(2))); });
   }
 
   void predict(const Matrix& beta, const Matrix& alpha, const std::optional<Triples>& force,
@@ -70,17 +64,21 @@ public:
                const Array<double, nb::shape<-1, 4>>& quaternion, const Array<std::uint8_t, nb::ndim<1>>& status,
                const Array<double, nb::ndim<1>>& stability,
                const std::optional<Array<double, nb::shape<-1, 6, -1>>>& jacobian,
-               const std::optional<Array<double, nb::shape<-1, 6, 6>>>& compliance, Integrator integrator, int steps,
-               int tip_of, int threads) const {
+               const std::optional<Array<double, nb::shape<-1, 6, 6>>>& compliance,
+               const std::optional<Array<double, nb::shape<-1, 6, -1>>>& by_parameters, Integrator integrator,
+               int steps, int tip_of, int threads) const {
     const std::size_t count = beta.shape(0);
     require(beta.shape(1) == tubes_ && alpha.shape(1) == tubes_, "beta and alpha need one column a tube");
     require(!jacobian || jacobian->shape(2) == 2 * tubes_, "jacobian needs two columns a tube");
     require(jacobian.has_value() == compliance.has_value(), "jacobian and compliance come together");
+    require(!by_parameters || jacobian, "by_parameters comes with jacobian and compliance");
+    require(!by_parameters || by_parameters->shape(2) == tubes_ * tube_parameters + 3,
+            "by_parameters needs a column for each parameter of the tubes and of gravity");
     require(!jacobian || integrator == Integrator::standard, "derivatives need the default integrator");
     require(alpha.shape(0) == count && (!force || force->shape(0) == count) && (!moment || moment->shape(0) == count) &&
                 position.shape(0) == count && quaternion.shape(0) == count && status.shape(0) == count &&
                 stability.shape(0) == count && (!jacobian || jacobian->shape(0) == count) &&
-                (!compliance || compliance->shape(0) == count),
+                (!compliance || compliance->shape(0) == count) && (!by_parameters || by_parameters->shape(0) == count),
             "all arrays need the same number of rows");
     require(tip_of >= 0 && std::size_t(tip_of) < tubes_, "tip_of is the number of a tube, from 0");
     require(steps >= 1, "steps must be at least 1");
@@ -91,7 +89,8 @@ public:
                           status.data(),
                           stability.data(),
                           jacobian ? jacobian->data() : nullptr,
-                          compliance ? compliance->data() : nullptr};
+                          compliance ? compliance->data() : nullptr,
+                          by_parameters ? by_parameters->data() : nullptr};
     const nb::gil_scoped_release released;
     model_->predict(rows, answers, {.integrator = integrator, .steps = steps, .tip_of = tip_of, .threads = threads});
   }
@@ -130,6 +129,7 @@ void bind_calibration(nb::module_& m);
 void bind_identify(nb::module_& m);
 void bind_effects(nb::module_& m);
 void bind_control(nb::module_& m);
+void bind_recording(nb::module_& m);
 }  // namespace ctcr::python
 
 NB_MODULE(_core, m) {
@@ -165,8 +165,9 @@ NB_MODULE(_core, m) {
       .def("predict", &BoundModel::predict, nb::kw_only(), "beta"_a.noconvert(), "alpha"_a.noconvert(),
            "force"_a.noconvert().none(), "moment"_a.noconvert().none(), "position"_a.noconvert(),
            "quaternion"_a.noconvert(), "status"_a.noconvert(), "stability"_a.noconvert(),
-           "jacobian"_a.noconvert().none(), "compliance"_a.noconvert().none(), "integrator"_a = Integrator::standard,
-           "steps"_a = 1, "tip_of"_a = 0, "threads"_a = 0,
+           "jacobian"_a.noconvert().none(), "compliance"_a.noconvert().none(),
+           "by_parameters"_a.noconvert().none() = nb::none(), "integrator"_a = Integrator::standard, "steps"_a = 1,
+           "tip_of"_a = 0, "threads"_a = 0,
            "Solves all rows and writes the answers into the given arrays. Releases the GIL.")
       .def("shape", &BoundModel::shape, nb::kw_only(), "beta"_a.noconvert(), "alpha"_a.noconvert(),
            "force"_a.noconvert(), "moment"_a.noconvert(), "points"_a, "steps"_a, "arc_length"_a.noconvert(),
@@ -176,6 +177,7 @@ NB_MODULE(_core, m) {
            "Writes the shape into the given arrays; returns the status and the number of places written.");
   ctcr::python::bind_calibration(m);
   ctcr::python::bind_identify(m);
+  ctcr::python::bind_recording(m);
   ctcr::python::bind_effects(m);
   ctcr::python::bind_control(m);
 }

@@ -95,7 +95,9 @@ private:
   template <Derivatives D, class Stepper>
   void predict_by(const Rows& rows, const Answers& answers, const Options& options) const {
     const auto input = [&rows](std::ptrdiff_t i) { return configuration(rows, i); };
-    const auto output = [&answers, tip_of = std::size_t(options.tip_of)](std::ptrdiff_t i, const Solution<N>& s) {
+    const Settings settings{.steps = options.steps};
+    const auto output = [&, tip_of = std::size_t(options.tip_of)](std::ptrdiff_t i, const Solution<N>& s,
+                                                                  const Workspace<N>& ws) {
       const bool solved = s.status == Status::ok || s.status == Status::singular;
       const double scale = solved ? 1.0 : nan;
       put(answers.position, i, Vec3(s.tube_tips[tip_of].position * scale));
@@ -103,12 +105,19 @@ private:
       answers.status[i] = std::uint8_t(s.status);
       answers.stability[i] = s.stability * scale;
       if constexpr (D == Derivatives::compliance) {
-        put(answers.jacobian, i, Eigen::Matrix<double, 6, 2 * N>(s.jacobian * scale));
-        put(answers.compliance, i, Mat6(s.compliance * scale));
+        TipDerivatives<N> by{s.jacobian};
+        Mat6 by_load = s.compliance;
+        if (tip_of > 0 || answers.by_parameters != nullptr)
+          (void)differentiate_tip(model_, ws, int(tip_of), by, by_load, settings);
+        put(answers.jacobian, i, Eigen::Matrix<double, 6, 2 * N>(by.by_joints * scale));
+        put(answers.compliance, i, Mat6(by_load * scale));
+        if (answers.by_parameters != nullptr)
+          put(answers.by_parameters, i,
+              Eigen::Matrix<double, 6, ParameterVector<N>::robot_count>(by.by_parameters * scale));
       }
     };
     ThreadPool pool(rows.count <= batch_chunk ? 1 : options.threads);
-    solve_batch<D, Stepper>(model_, rows.count, input, output, pool, Settings{.steps = options.steps});
+    solve_batch<D, Stepper>(model_, rows.count, input, output, pool, settings);
   }
 
   Model<N> model_;

@@ -1,11 +1,12 @@
 #pragma once
 // Recordings of a robot of N tubes behind AnyRecording. Each N is compiled in a file of its own.
+#include <algorithm>
 #include <ctcr/calibration/recording.hpp>
 #include <ctcr/effects/catalogue.hpp>
 #include <ctcr/effects/profile_table.hpp>
+#include <stdexcept>
 
 #include "any_recording.hpp"
-#include "readings_of.hpp"
 
 namespace ctcr::python {
 
@@ -16,16 +17,61 @@ template <template <int, class> class... E>
 struct WithProfiles<EffectList<E...>> {
   using type = EffectList<E..., ProfileTable>;
 };
+using AllEffects = WithProfiles<Catalogue>::type;
 
 template <int N>
-class RecordingOf final : public AnyRecording {
-  using Fx = WithProfiles<Catalogue>::type;
+System<N> plain_system(const Table& table) {
+  using P = ParameterVector<N>;
+  const auto value = [&](Parameter kind, int i = 0) { return table.parameters[P::index(kind, i)]; };
+  Robot<N> robot;
+  Transmission<N> transmission{value(Parameter::translation_ratio), value(Parameter::rotation_ratio), {}, {}};
+  PoseSensor sensor{{}, table.sensor_tube};
+  Vec3 turn;
+  for (int i = 0; i < N; ++i) {
+    for (int k = 0; k < int(parameter_kinds.size()); ++k)
+      if (const auto field = P::info(Parameter(k)).field) robot.tubes[std::size_t(i)].*field = value(Parameter(k), i);
+    transmission.home_translation[i] = value(Parameter::home_translation, i);
+    transmission.home_rotation[i] = value(Parameter::home_rotation, i);
+  }
+  for (int i = 0; i < 3; ++i) {
+    robot.gravity[i] = value(Parameter::gravity, i);
+    sensor.T_tracker_base.position[i] = value(Parameter::tracker_position, i);
+    turn[i] = value(Parameter::tracker_rotation, i);
+  }
+  sensor.T_tracker_base.rotation = rotation_matrix(turn);
+  return {transmission, Model<N>(robot), sensor, Settings{.steps = table.steps}};
+}
 
+template <int N>
+std::vector<RecordedRow<N>> rows_of(const Table& table) {
+  const Transmission<N> transmission = plain_system<N>(table).transmission;
+  std::vector<RecordedRow<N>> rows(std::size_t(table.beta.rows()));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto k = Eigen::Index(i);
+    rows[i].theta = motor_angles(transmission, {table.beta.row(k).transpose(), table.alpha.row(k).transpose()});
+    rows[i].load.force = table.force.row(k).transpose();
+    rows[i].at = {table.time[k], table.part[k], table.run[k], table.centre};
+  }
+  return rows;
+}
+
+inline std::vector<Pose> measured_of(const Table& table) {
+  std::vector<Pose> poses(std::size_t(table.position.rows()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto q = table.quaternion.row(Eigen::Index(i));
+    poses[i].position = table.position.row(Eigen::Index(i)).transpose();
+    poses[i].rotation = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).toRotationMatrix();
+  }
+  return poses;
+}
+
+template <int N, class Fx>
+class RecordingOf final : public AnyRecording {
 public:
-  explicit RecordingOf(const RecordedTable& table)
+  explicit RecordingOf(const Table& table)
     : pool_(table.threads),
       profiles_(profiles(table)),
-      recording_(system(table, profiles_), rows(table), measured(table), table.free, pool_) {}
+      recording_(system(table, profiles_), rows_of<N>(table), measured_of(table), table.free, pool_) {}
 
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) override {
     return recording_(x, residual, jacobian);
@@ -56,9 +102,9 @@ private:
     quaternion.row(i).setConstant(nan);
   }
 
-  static Profiles<N> profiles(const RecordedTable& table) {
+  static Profiles<N> profiles(const Table& table) {
     Profiles<N> out;
-    const auto tubes = system_of<N>(table).model.robot().tubes;
+    const auto tubes = plain_system<N>(table).model.robot().tubes;
     for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
       out.length[i] = tubes[i].length;
       for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {
@@ -68,31 +114,14 @@ private:
     }
     return out;
   }
-  static System<N, Fx> system(const RecordedTable& table, const Profiles<N>& profiles) {
-    const System<N> plain = system_of<N>(table);
-    typename Fx::On<N> effects;
+  static System<N, Fx> system(const Table& table, const Profiles<N>& profiles) {
+    const System<N> plain = plain_system<N>(table);
+    typename Fx::template On<N> effects;
     effects.for_each([&](auto& effect, int first) {
       for (std::size_t k = 0; k < effect.values.size(); ++k) effect.values[k] = table.effects[first + Eigen::Index(k)];
       if constexpr (requires { effect.profiles; }) effect.profiles = &profiles;
     });
     return {plain.transmission, Model<N, Fx>(plain.model.robot(), effects), plain.sensor, plain.settings};
-  }
-  static std::vector<RecordedRow<N>> rows(const RecordedTable& table) {
-    const std::vector<Reading<N>> plain = rows_of<N>(table);
-    const Transmission<N> transmission = system_of<N>(table).transmission;
-    std::vector<RecordedRow<N>> rows(plain.size());
-    for (std::size_t i = 0; i < plain.size(); ++i) {
-      const auto k = Eigen::Index(i);
-      rows[i] = {motor_angles(transmission, plain[i].q),
-                 plain[i].load,
-                 {table.time[k], table.part[k], table.run[k], table.centre}};
-    }
-    return rows;
-  }
-  static std::vector<Pose> measured(const RecordedTable& table) {
-    std::vector<Pose> poses;
-    for (const Reading<N>& reading : rows_of<N>(table)) poses.push_back(reading.measured);
-    return poses;
   }
 
   ThreadPool pool_;
@@ -101,8 +130,48 @@ private:
 };
 
 template <int N>
-std::unique_ptr<AnyRecording> make_recording(const RecordedTable& table) {
-  return std::make_unique<RecordingOf<N>>(table);
+void check(const Table& table) {
+  constexpr int places = SystemParameters<N, Catalogue>::count;
+  const Eigen::Index rows = table.beta.rows();
+  const auto is = [](const auto& matrix, Eigen::Index height, Eigen::Index width) {
+    return matrix.rows() == height && matrix.cols() == width;
+  };
+  const bool fits =
+      is(table.beta, rows, N) && is(table.alpha, rows, N) && is(table.force, rows, 3) && is(table.position, rows, 3) &&
+      is(table.quaternion, rows, 4) && table.time.size() == rows && table.part.size() == rows &&
+      table.run.size() == rows && table.parameters.size() == ParameterVector<N>::count &&
+      table.effects.size() == Catalogue::On<N>::count && table.sensor_tube >= 0 && table.sensor_tube < N &&
+      table.steps >= 1 && (table.profiles.size() == 0 || table.profiles.cols() == 3 * N);
+  const bool known = std::ranges::all_of(table.free, [](int place) { return place >= 0 && place < places; });
+  if (!fits || !known) throw std::invalid_argument("the arrays of a recording do not fit together");
+}
+
+/// Whether nothing but the standard model is asked for.
+template <int N>
+bool is_standard(const Table& table) {
+  bool neutral = table.profiles.size() == 0;
+  typename Catalogue::On<N>{}.for_each([&](const auto& effect, int first) {
+    for (std::size_t k = 0; k < effect.values.size(); ++k)
+      neutral = neutral && table.effects[first + Eigen::Index(k)] == effect.values[k];
+  });
+  return neutral && std::ranges::all_of(table.free, [](int place) { return place < ParameterVector<N>::count; });
+}
+
+template <int N>
+std::unique_ptr<AnyRecording> make_recording(const Table& table) {
+  check<N>(table);
+  if (is_standard<N>(table)) return std::make_unique<RecordingOf<N, Standard>>(table);
+  return std::make_unique<RecordingOf<N, AllEffects>>(table);
+}
+
+template <int N>
+ParameterNames parameter_names() {
+  ParameterNames out;
+  for (int i = 0; i < ParameterVector<N>::count; ++i) {
+    out.names.emplace_back(std::string_view(ParameterVector<N>::name(i)));
+    out.units.emplace_back(ParameterVector<N>::info(ParameterVector<N>::entry(i).kind).unit);
+  }
+  return out;
 }
 
 template <int N>
@@ -119,18 +188,9 @@ std::vector<CatalogueParameter> catalogue_parameters() {
   return out;
 }
 
-template <int N>
-std::vector<std::string> system_parameter_names() {
-  using P = SystemParameters<N, Catalogue>;
-  std::vector<std::string> names;
-  for (int i = 0; i < P::count; ++i) names.push_back(P::name(i));
-  return names;
-}
-
 }  // namespace ctcr::python
 
-#define CTCR_RECORDING_OF(N)                                                                      \
-  template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(           \
-      const ctcr::python::RecordedTable&);                                                        \
-  template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>(); \
-  template std::vector<std::string> ctcr::python::system_parameter_names<N>();
+#define CTCR_RECORDING_OF(N)                                                                                        \
+  template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(const ctcr::python::Table&); \
+  template ctcr::python::ParameterNames ctcr::python::parameter_names<N>();                                         \
+  template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>();

@@ -209,7 +209,7 @@ class _Framed:
             quaternion = product(conjugate(quaternion_from_rotation_vector(turn.as_rotvec())), quaternion)
         seen = replace(self.readings, position=position, quaternion=quaternion)
         self.seen_position = position
-        self.table = identify.readings_of(self.robot, seen, self.names)
+        self.table = identify.plain_recording_of(self.robot, seen, self.names)
 
     def _frame_part(self, residual: Array, columns: Array) -> tuple[Array, Array]:
         """What the frames take of columns (6 M, k), and the frames' moves (R, 6) for the first column."""

@@ -1,11 +1,13 @@
-#include "ctcr/calibration/readings.hpp"
+#include "ctcr/calibration/recording.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
 #include "ctcr/calibration/identify_readings.hpp"
+#include "support/catalogue_cases.hpp"
 #include "support/random_robots.hpp"
+#include "support/solver.hpp"
 
 namespace {
 
@@ -22,10 +24,14 @@ System<2> bench() {
   return {transmission, Model<2>(robot), {{rotation_matrix(Vec3(2, 0.3, -0.4)), Vec3(-0.05, 0.01, 0.02)}, 0}, {}};
 }
 
+struct Table {
+  std::vector<RecordedRow<2>> rows;
+  std::vector<Pose> measured;
+};
+
 /// A path through joint space, and what a system reads along it.
-std::vector<Reading<2>> path(const System<2>& nominal, const System<2>& truth, int rows, test::Random& random,
-                             double max_force = 0.1) {
-  std::vector<Reading<2>> table;
+Table path(const System<2>& nominal, const System<2>& truth, int rows, test::Random& random, double max_force = 0.1) {
+  Table table;
   Workspace<2> ws;
   Prediction<2> prediction;
   const auto anywhere = [&] {
@@ -33,31 +39,36 @@ std::vector<Reading<2>> path(const System<2>& nominal, const System<2>& truth, i
                      VecN<2>(test::uniform(random, -3, 3), test::uniform(random, -3, 3))};
   };
   Joints<2> q = anywhere(), next = anywhere();
-  for (int step = 0; int(table.size()) < rows; ++step) {
+  for (int step = 0; int(table.rows.size()) < rows; ++step) {
     const double part = double(step % 8) / 8;
     if (part == 0) q = std::exchange(next, anywhere());
-    Reading<2> row{{q.beta + part * (next.beta - q.beta), q.alpha + part * (next.alpha - q.alpha)}, {}, {}};
-    row.load.force = test::random_vector(random, max_force);
+    const Joints<2> here{q.beta + part * (next.beta - q.beta), q.alpha + part * (next.alpha - q.alpha)};
+    const RecordedRow<2> row{
+        motor_angles(nominal.transmission, here), {.force = test::random_vector(random, max_force)}, {}};
     ws.reset();
-    const Status status = predict(truth, motor_angles(nominal.transmission, row.q), row.load, ws, prediction);
+    const Status status = predict(truth, row.theta, row.load, ws, prediction);
     if (status != Status::ok || prediction.solution.stability < 0.1) continue;  // about to snap
-    row.measured = prediction.reading;
-    table.push_back(row);
+    table.rows.push_back(row);
+    table.measured.push_back(prediction.reading);
   }
   return table;
 }
 
-void add_noise(std::vector<Reading<2>>& table, const Noise& n, test::Random& random) {
+Eigen::MatrixX3d places(const Table& table) {
+  Eigen::MatrixX3d places(Eigen::Index(table.measured.size()), 3);
+  for (std::size_t i = 0; i < table.measured.size(); ++i) places.row(Eigen::Index(i)) = table.measured[i].position;
+  return places;
+}
+
+void add_noise(Table& table, const Noise& n, test::Random& random) {
   std::normal_distribution<double> normal;
-  const auto rows = Eigen::Index(table.size());
-  Eigen::MatrixX3d places(rows, 3);
-  for (Eigen::Index i = 0; i < rows; ++i) places.row(i) = table[std::size_t(i)].measured.position;
-  const Eigen::MatrixXd factor = smooth_field(places, n.correlation_length, 1e-6).factor;
+  const auto rows = Eigen::Index(table.rows.size());
+  const Eigen::MatrixXd factor = smooth_field(places(table), n.correlation_length, 1e-6).factor;
   Eigen::MatrixXd cause(factor.cols(), 6);
   for (double& c : cause.reshaped()) c = normal(random);
   const Eigen::MatrixXd smooth = factor * cause;
   for (Eigen::Index i = 0; i < rows; ++i) {
-    Pose& pose = table[std::size_t(i)].measured;
+    Pose& pose = table.measured[std::size_t(i)];
     Vec6 e;
     for (int a = 0; a < 6; ++a)
       e[a] = (a < 3 ? n.position_field : n.rotation_field) * smooth(i, a) +
@@ -65,12 +76,6 @@ void add_noise(std::vector<Reading<2>>& table, const Noise& n, test::Random& ran
     pose.position += e.head<3>();
     pose.rotation = rotation_matrix(e.tail<3>()) * pose.rotation;
   }
-}
-
-Eigen::MatrixX3d places(const std::vector<Reading<2>>& table) {
-  Eigen::MatrixX3d places(Eigen::Index(table.size()), 3);
-  for (std::size_t i = 0; i < table.size(); ++i) places.row(Eigen::Index(i)) = table[i].measured.position;
-  return places;
 }
 
 /// What a calibration usually frees, and how uncertain it is before.
@@ -102,21 +107,23 @@ std::vector<int> usual_parameters() {
   return index;
 }
 
-TEST(Readings, AreZeroAtTheSystemThatMadeThem) {
+TEST(Recording, IsZeroAtTheSystemThatMadeIt) {
   test::Random random(1);
   ThreadPool pool(1);
-  Readings<2> readings(bench(), path(bench(), bench(), 20, random), usual_parameters(), pool);
+  const Table table = path(bench(), bench(), 20, random);
+  Recording<2> readings(bench(), table.rows, table.measured, usual_parameters(), pool);
   Eigen::VectorXd residual;
   ASSERT_TRUE(readings(readings.nominal(), residual, nullptr));
   EXPECT_LE(residual.cwiseAbs().maxCoeff(), 1e-8);
 }
 
-TEST(Readings, HaveTheSlopesOfTheirDifferences) {
+TEST(Recording, HasTheSlopesOfItsDifferences) {
   test::Random random(2);
   ThreadPool pool(1);
   std::vector<int> all(P::count);
   std::iota(all.begin(), all.end(), 0);
-  Readings<2> readings(bench(), path(bench(), bench(), 9, random), all, pool);
+  const Table table = path(bench(), bench(), 9, random);
+  Recording<2> readings(bench(), table.rows, table.measured, all, pool);
   Eigen::VectorXd x = readings.nominal();
   x.segment<3>(P::index(Parameter::tracker_rotation)) << 0.3, -0.2, 0.5;  // a turn that is not small
   x[P::index(Parameter::length)] += 1e-3;
@@ -138,14 +145,41 @@ TEST(Readings, HaveTheSlopesOfTheirDifferences) {
   }
 }
 
-TEST(Readings, DoNotDependOnTheThreads) {
+TEST(Recording, GivesTheSameByTheGeneralPath) {
+  test::Random random(7);
+  ThreadPool pool(1);
+  std::vector<int> all(P::count);
+  std::iota(all.begin(), all.end(), 0);
+  for (const Vec3& gravity : {Vec3(0, 0, 0), Vec3(1, -9, 3)}) {
+    System<2> system = bench();
+    Robot<2> robot = system.model.robot();
+    robot.gravity = gravity;
+    system.model = Model<2>(robot);
+    system.settings = {.tolerance = 1e-12, .steps = 8};
+    const System<2, Catalogue> general{system.transmission, Model<2, Catalogue>(robot, test::hardly_any_effects<2>()),
+                                       system.sensor, system.settings};
+    const Table table = path(system, changed(system, P::index(Parameter::length), 1e-3), 9, random);
+    Recording<2> fast(system, table.rows, table.measured, all, pool);
+    Recording<2, Catalogue> slow(general, table.rows, table.measured, all, pool);
+    Eigen::VectorXd residual[2];
+    Eigen::MatrixXd jacobian[2];
+    ASSERT_TRUE(fast(fast.nominal(), residual[0], &jacobian[0]));
+    ASSERT_TRUE(slow(slow.nominal(), residual[1], &jacobian[1]));
+    EXPECT_LE((residual[0] - residual[1]).cwiseAbs().maxCoeff(), 1e-8);
+    for (int k = 0; k < P::count; ++k)
+      EXPECT_LE((jacobian[0].col(k) - jacobian[1].col(k)).norm(), 1e-4 * jacobian[1].col(k).norm())
+          << std::string_view(P::name(k));
+  }
+}
+
+TEST(Recording, DoesNotDependOnTheThreads) {
   test::Random random(3);
   const auto table = path(bench(), bench(), 150, random);
   Eigen::VectorXd residual[2];
   Eigen::MatrixXd jacobian[2];
   for (int k = 0; k < 2; ++k) {
     ThreadPool pool(1 + 2 * k);
-    Readings<2> readings(bench(), table, usual_parameters(), pool);
+    Recording<2> readings(bench(), table.rows, table.measured, usual_parameters(), pool);
     Eigen::VectorXd x = readings.nominal();
     ASSERT_TRUE(readings(x, residual[k], nullptr));
     x[0] *= 1.05;
@@ -155,13 +189,13 @@ TEST(Readings, DoNotDependOnTheThreads) {
   EXPECT_EQ(jacobian[0], jacobian[1]);
 }
 
-TEST(Readings, TellWhichRowsCannotBeSolvedAndLeaveOutWhatIsAsked) {
+TEST(Recording, TellsWhichRowsCannotBeSolvedAndLeavesOutWhatIsAsked) {
   test::Random random(4);
   auto table = path(bench(), bench(), 6, random);
-  table[2].q.beta[0] = 0.01;                             // in front of the plate
-  table[3].measured.position.setConstant(std::nan(""));  // not measured
+  table.rows[2].theta = motor_angles(bench().transmission, {VecN<2>(0.01, -0.2), VecN<2>(0, 0)});  // before the plate
+  table.measured[3].position.setConstant(std::nan(""));                                            // not measured
   ThreadPool pool(1);
-  Readings<2> readings(bench(), table, usual_parameters(), pool);
+  Recording<2> readings(bench(), table.rows, table.measured, usual_parameters(), pool);
   Eigen::VectorXd residual;
   Eigen::MatrixXd jacobian;
   EXPECT_FALSE(readings(readings.nominal(), residual, &jacobian));
@@ -183,14 +217,14 @@ TEST(IdentifyReadings, FindsTheRobotThatWasMeasured) {
   for (int seed = 0; seed < seeds; ++seed) {
     test::Random random{std::uint64_t(1000 + seed)};
     std::normal_distribution<double> normal;
-    Readings<2> any(nominal, {}, usual_parameters(), pool);
+    Recording<2> any(nominal, {}, {}, usual_parameters(), pool);
     const Free free = free_parameters(any.nominal(), usual_parameters());
     Eigen::VectorXd truth = any.nominal();
     for (Eigen::Index k = 0; k < truth.size(); ++k)
       truth[k] += 0.7 * free.parameters[std::size_t(k)].sd * normal(random);
     auto table = path(nominal, any.system(truth), 48, random);
     add_noise(table, noise, random);
-    Readings<2> readings(nominal, table, free.index, pool);
+    Recording<2> readings(nominal, table.rows, table.measured, free.index, pool);
     std::vector<int> excluded;
     const Identification fit =
         identify_readings(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
@@ -214,7 +248,7 @@ TEST(IdentifyReadings, NamesTheGaugesOfARobot) {
   const System<2> nominal = bench();
   auto table = path(nominal, nominal, 40, random, 0);
   add_noise(table, noise, random);
-  Readings<2> readings(nominal, table, usual_parameters(), pool);
+  Recording<2> readings(nominal, table.rows, table.measured, usual_parameters(), pool);
   const Free free = free_parameters(readings.nominal(), usual_parameters());
   const auto at = [&](Parameter kind, int i) {
     return std::find(free.index.begin(), free.index.end(), P::index(kind, i)) - free.index.begin();
@@ -238,13 +272,15 @@ TEST(IdentifyReadings, LeavesOutRowsThatStandInTheWay) {
   const System<2> nominal = bench();
   auto table = path(nominal, changed(nominal, P::index(Parameter::home_translation, 1), 1e-3), 40, random);
   add_noise(table, {.position_jitter = 5e-5, .rotation_jitter = 5e-4}, random);
+  const auto record = [&](std::size_t row, const VecN<2>& beta) {
+    table.rows[row].theta.translation = motor_angles(nominal.transmission, {beta, VecN<2>(0, 0)}).translation;
+  };
   // At the plate as recorded; the true home puts it behind, which the nominal one allows by far less than the fit finds.
-  table[7].q.beta[1] = -2e-4;
-  table[9].q.beta = {0.02, 0.01};
-  Readings<2> readings(nominal, table,
-                       {P::index(Parameter::home_translation, 0), P::index(Parameter::home_translation, 1)}, pool);
-  const Free free = free_parameters(
-      readings.nominal(), {P::index(Parameter::home_translation, 0), P::index(Parameter::home_translation, 1)});
+  record(7, {joints(nominal.transmission, table.rows[7].theta).beta[0], -2e-4});
+  record(9, {0.02, 0.01});
+  const std::vector<int> homes{P::index(Parameter::home_translation, 0), P::index(Parameter::home_translation, 1)};
+  Recording<2> readings(nominal, table.rows, table.measured, homes, pool);
+  const Free free = free_parameters(readings.nominal(), homes);
   std::vector<int> excluded;
   const Identification fit = identify_readings(readings, free.parameters, noise, places(table), {}, excluded);
   EXPECT_TRUE(fit.converged) << fit.status;

@@ -1,3 +1,0 @@
-#include "readings_of.hpp"
-
-CTCR_READINGS_OF(1)
