@@ -50,9 +50,9 @@ Joints<2> at(double alpha_1, double alpha_2, double beta_1 = -0.35, double beta_
   return q;
 }
 
-Catalogue::On<2> with_friction(double coefficient, double insertion = 0) {
+Catalogue::On<2> with_friction(double coefficient, double insertion = 0, double law = 0) {
   Catalogue::On<2> effects;
-  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0.3, insertion};
+  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0.3, insertion, law};
   return effects;
 }
 
@@ -109,8 +109,8 @@ TEST(Friction, LagsAndNeverLeads) {
 }
 
 TEST(Friction, DoesNotDependOnSpeedNorOnHowAMoveIsDivided) {
-  for (const double insertion : {0.0, 0.7}) {
-    Walk<2> once(two_tubes(), with_friction(0.03, insertion)), slowly = once, divided = once;
+  for (const auto& [insertion, law] : {std::pair(0.0, 0.0), {0.7, 0.0}, {0.0, 1.0}, {0.7, 1.0}}) {
+    Walk<2> once(two_tubes(), with_friction(0.03, insertion, law)), slowly = once, divided = once;
     once.to(at(0, 0)).to(at(0.5, -0.1), 1).to(at(0.2, 0.3, -0.34, -0.24), 2);
     slowly.to(at(0, 0)).to(at(0.5, -0.1), 100).to(at(0.2, 0.3, -0.34, -0.24), 300);
     divided.to(at(0, 0)).to(at(0.5, -0.1), 1);
@@ -125,8 +125,8 @@ TEST(Friction, DoesNotDependOnSpeedNorOnHowAMoveIsDivided) {
 }
 
 TEST(Friction, IsTakenOffByInsertion) {
-  const auto h = [](double insertion) {
-    return Walk<2>(two_tubes(), with_friction(0.03, insertion))
+  const auto h = [](double insertion, double law = 0) {
+    return Walk<2>(two_tubes(), with_friction(0.03, insertion, law))
         .to(at(0, 0))
         .to(at(5, 0))
         .to(at(5, 0, -0.3499))
@@ -134,6 +134,18 @@ TEST(Friction, IsTakenOffByInsertion) {
   };
   EXPECT_NEAR(h(0), 1, 1e-6);
   EXPECT_NEAR(h(1), std::exp(-(1e-4 / 0.8e-3) / 0.3), 1e-6);
+  EXPECT_NEAR(h(0, 1), 1, 1e-12);
+  EXPECT_NEAR(h(1, 1), 1 / std::cosh((1e-4 / 0.8e-3) / 0.3), 1e-9);  // round the circle of the limit
+}
+
+TEST(Friction, OfAContactIsElasticUntilItSlips) {
+  Walk<2> walk(two_tubes(), with_friction(0.03, 1, 1));
+  walk.to(at(0, 0)).to(at(0.12, 0));
+  EXPECT_NEAR(walk.remembered<Friction>()[0], 0.4, 1e-12);
+  walk.to(at(0, 0));
+  EXPECT_NEAR(walk.remembered<Friction>()[0], 0, 1e-12);
+  walk.to(at(0.5, 0)).to(at(0.44, 0));
+  EXPECT_NEAR(walk.remembered<Friction>()[0], 0.8, 1e-12);
 }
 
 TEST(Backlash, IsAPlayOperator) {

@@ -54,7 +54,7 @@ TEST(ShapeWithEffects, CarriesTheLoadFromTheTipToTheBase) {
     const auto c = test::smooth_case<N>(random, 0.1, 0.002, Vec3::Zero());
     auto effects = test::random_effects<N>(random);
     auto& friction = test::effect<Friction, N>(effects);
-    friction.past.state = {0.7, -0.5};
+    friction.past.state = {0.7, -0.5, 0, 0};
     Solution<N> tip;
     const auto points = shape_of(Model<N, Catalogue>(c.robot, effects), c, tip);
     const auto& extra = test::effect<TipWeight, N>(effects).values;

@@ -19,7 +19,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """A parameter of an effect: an amplitude changes nothing at its neutral value, a shape only says of what form."""
+    """A parameter of an effect.
+
+    Its kind: a strength changes nothing at its neutral value, a shape only says of what form, a choice which of several
+    forms; a choice is never fitted.
+    """
 
     name: str
     unit: str
@@ -29,7 +33,7 @@ class EffectParameter:
     soft: tuple[float, float]  # beyond: hardly this physics
     hard: tuple[float, float]  # beyond: impossible
     per_tube: bool
-    is_shape: bool
+    kind: str  # strength, shape, choice
     full_names: tuple[str, ...]  # one, or one a tube
 
 
@@ -53,11 +57,11 @@ class Effect:
 
     @property
     def amplitudes(self) -> list[str]:
-        return [name for p in self.parameters if not p.is_shape for name in p.full_names]
+        return [name for p in self.parameters if p.kind == "strength" for name in p.full_names]
 
     @property
     def shapes(self) -> list[str]:
-        return [name for p in self.parameters if p.is_shape for name in p.full_names]
+        return [name for p in self.parameters if p.kind == "shape" for name in p.full_names]
 
 
 @cache
@@ -69,7 +73,7 @@ def catalogue(n_tubes: int) -> dict[str, Effect]:
         parameters.setdefault(p.effect, []).append(
             EffectParameter(
                 p.name, p.unit, p.meaning, p.neutral, p.sigma, (p.soft_low, p.soft_high),
-                (p.hard_low, p.hard_high), p.per_tube, p.shape,
+                (p.hard_low, p.hard_high), p.per_tube, p.kind,
                 tuple(f"{stem}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem,),
             )
         )  # fmt: skip

@@ -126,7 +126,7 @@ class Effect:
             tuple(
                 effects.EffectParameter(
                     p.name, p.unit, p.meaning, float(p.neutral), float(p.sigma), usual(p), p.bounds, p.per_tube,
-                    p.shape, full(p),
+                    "shape" if p.shape else "strength", full(p),
                 )
                 for p in self.parameters
             ),

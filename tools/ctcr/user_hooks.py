@@ -94,7 +94,7 @@ class Hooks:
             neutral = dict(values) | {
                 name: p.neutral
                 for p in effect.described(self.robot.n_tubes).parameters
-                if not p.is_shape
+                if p.kind == "strength"
                 for name in p.full_names
             }
             profiles = alone.profiles(neutral)

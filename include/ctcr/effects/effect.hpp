@@ -12,8 +12,9 @@
 
 namespace ctcr {
 
-/// Whether a parameter says how strong an effect is, or only of what shape.
-enum class Role { amplitude, shape };
+/// Whether a parameter says how strong an effect is, only of what shape, or which of several forms it has: a choice has no
+/// derivatives and is never fitted.
+enum class Role { amplitude, shape, choice };
 
 /// One named parameter of an effect.
 struct EffectParameter {

@@ -25,7 +25,7 @@ inline constexpr auto parameters = [] {
                            .soft_high = 1,
                            .hard_low = 0,
                            .hard_high = 1,
-                           .role = Role::shape,
+                           .role = Role::choice,
                            .meaning = "part of the session after which it jumped"};
   return all;
 }();

@@ -15,7 +15,9 @@ inline constexpr EffectInfo info{
         "bending moments and lasts until the motion reverses.",
     .measure = "Visit the same joints from both directions, each time after turning by at least 40 degrees.",
     .look_alikes = "backlash_rotation delay",
-    .reference = "Lock & Dupont 2011; Ha, Fagogenis & Dupont 2019; bristle: Dahl 1968",
+    .reference =
+        "Lock & Dupont 2011; Ha, Fagogenis & Dupont 2019; bristle: Dahl 1968; contact: as plasticity with one "
+        "circular yield surface, Simo & Hughes 1998",
     .needs = {.order = true},
 };
 inline constexpr std::array parameters{
@@ -28,8 +30,8 @@ inline constexpr std::array parameters{
                     .hard_low = 0,
                     .hard_high = 0.3,
                     .per_tube = true,
-                    .meaning = "friction torque per jump of the bending moment, of a tube in the next outer one (of "
-                               "the outermost: in the front plate)"},
+                    .meaning = "friction torque per jump of the bending moment of all tubes inside the contact, of a "
+                               "tube in the next outer one (of the outermost: in the front plate)"},
     EffectParameter{.name = "slip_angle",
                     .unit = "rad",
                     .neutral = 20 * 0.017453292519943295,
@@ -51,21 +53,36 @@ inline constexpr std::array parameters{
                     .role = Role::shape,
                     .meaning = "share of the sliding by insertion that turns friction away from rotation: 0 none, 1 "
                                "as much as sliding by rotation on a contact radius of 0.8 mm"},
+    EffectParameter{.name = "law",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 1,
+                    .soft_low = 0,
+                    .soft_high = 1,
+                    .hard_low = 0,
+                    .hard_high = 1,
+                    .role = Role::choice,
+                    .meaning =
+                        "0: a bristle that bends ever less; 1: an elastic contact that slips at once, rotation and "
+                        "insertion sharing one limit"},
 };
 }  // namespace friction
 
-/// Torque exchanged where a tube's bending moment jumps: C |jump| h. h in [-1, 1] follows the tube's rotation against the
-/// next outer one (the guide, for the outermost) as a bristle does, so that the tube lags its base.
+/// Torque exchanged where the bending moment of the tubes inside a contact jumps: C |jump| h. h in [-1, 1] follows the
+/// tube's rotation against the next outer one (the guide, for the outermost), so that the tube lags its base.
+/// State: h of each tube, then with the second law the share of the limit that insertion takes.
 template <int N, class P = double>
-struct Friction : EffectValues<friction::parameters, N, P, N> {
+struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = friction::info;
 
   void station(Station<P, N>& s) const noexcept {
+    P dx = 0.0, dy = 0.0;
     for (int j = 0; j < s.near; ++j) {
       const auto i = std::size_t(j);
+      dx = dx + (s.far_moment[i][0] - s.near_moment[i][0]);
+      dy = dy + (s.far_moment[i][1] - s.near_moment[i][1]);
       // Both tubes must be there; the outermost rubs on the front plate alone.
       if (j + 1 < N ? j + 1 >= s.near : s.kind != Station<P, N>::Kind::plate) continue;
-      const P dx = s.far_moment[i][0] - s.near_moment[i][0], dy = s.far_moment[i][1] - s.near_moment[i][1];
       constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
       const P torque = this->template get<0>(j) * this->past.state[i] * square_root(dx * dx + dy * dy + smooth);
       s.torque[i] = s.torque[i] - torque;
@@ -73,20 +90,54 @@ struct Friction : EffectValues<friction::parameters, N, P, N> {
     }
   }
 
-  /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip, exactly along each straight move.
+  /// Exactly along each straight move.
   void remember(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
     const auto &from = path.q[row - 1], &to = path.q[row];
-    constexpr double per_radius = 1 / 0.8e-3, rest = 1e-12;  // rest [rad]: no division by 0 where nothing moves
+    constexpr double per_radius = 1 / 0.8e-3;
     for (std::size_t i = 0; i < N; ++i) {
       const auto against_next = [&](const std::array<P, N>& v) -> P { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
       const P turn = against_next(to.alpha) - against_next(from.alpha);
       const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
-      const P travel = magnitude(turn) + this->template get<2>() * magnitude(slide) + rest;
-      P& h = this->past.state[i];
-      const P target = turn * inverse(travel);
-      h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<1>())));
+      P &h = this->past.state[i], &k = this->past.state[N + i];
+      if (value(this->template get<3>()) < 0.5)
+        bend(turn, slide, h);
+      else
+        slip(turn, slide, h, k);
     }
+  }
+
+private:
+  static constexpr double rest = 1e-12;  // [rad]: no division by 0 where nothing moves
+
+  /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip.
+  void bend(const P& turn, const P& slide, P& h) const noexcept {
+    const P travel = magnitude(turn) + this->template get<2>() * magnitude(slide) + rest;
+    const P target = turn * inverse(travel);
+    h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<1>())));
+  }
+
+  /// (h, k)' = (turn', share slide') / slip within the unit circle; on it the part that points out is slip. There the angle
+  /// to the motion falls as tan(angle / 2)' = -tan(angle / 2) / slip.
+  void slip(const P& turn, const P& slide, P& h, P& k) const noexcept {
+    const P shared = this->template get<2>() * slide, square = turn * turn + shared * shared;
+    if (!(value(square) > rest * rest)) return;
+    const P travel = square_root(square), c = turn * inverse(travel), s = shared * inverse(travel);
+    P far = travel * inverse(this->template get<1>()), along = h * c + k * s, across = k * c - h * s;
+    const P room = 1.0 - across * across;  // the circle is met where along^2 is that
+    const P edge = value(room) > 1e-12 ? square_root(room) : P(0.0);
+    if (value(along + far) < value(edge)) {
+      along = along + far;
+    } else {
+      // tan(angle / 2) = sin / (1 + cos), the angle that of (along, across) on the circle.
+      far = far - (edge - along);
+      const P half = across * inverse(1.0 + edge) * exponential_of(-far);
+      const P norm = inverse(1.0 + half * half);
+      along = (1.0 - half * half) * norm;
+      across = 2.0 * half * norm;
+    }
+    h = along * c - across * s;
+    k = along * s + across * c;
   }
 };
 

@@ -61,8 +61,9 @@ struct ParameterNames {
 struct CatalogueParameter {
   std::string effect, name, unit, meaning;
   double neutral, sigma, soft_low, soft_high, hard_low, hard_high;
-  bool per_tube, shape;
-  int first;  ///< place of its first value among those of the catalogue
+  bool per_tube;
+  std::string kind;  ///< strength, shape or choice
+  int first;         ///< place of its first value among those of the catalogue
 };
 /// An effect in words.
 struct CatalogueEntry {

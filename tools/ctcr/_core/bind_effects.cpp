@@ -53,7 +53,7 @@ void bind_effects(nb::module_& m) {
       .def_ro("hard_low", &CatalogueParameter::hard_low)
       .def_ro("hard_high", &CatalogueParameter::hard_high)
       .def_ro("per_tube", &CatalogueParameter::per_tube)
-      .def_ro("shape", &CatalogueParameter::shape)
+      .def_ro("kind", &CatalogueParameter::kind)
       .def_ro("first", &CatalogueParameter::first);
   m.def("effect_catalogue", &catalogue, "All effects in words.");
   m.def(

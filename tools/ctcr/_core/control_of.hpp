@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "any_control.hpp"
-#include "readings_of.hpp"
+#include "plain_system.hpp"
 
 namespace ctcr::python {
 
@@ -70,19 +70,10 @@ AllTasks<N> tasks_of(const TaskValues& v) {
            Posture<N>{weight(5), {v.posture_beta, v.posture_alpha}, v.posture_rate}}};
 }
 
-template <int N>
-System<N> plain_system(const SystemValues& values) {
-  Table table;
-  table.parameters = values.parameters;
-  table.sensor_tube = 0;
-  table.steps = values.steps;
-  return system_of<N>(table);
-}
-
 /// Calls f with the system, of the standard model or with the catalogue of effects.
 template <int N, class F>
 auto with_system(const SystemValues& values, const F& f) {
-  const System<N> plain = plain_system<N>(values);
+  const System<N> plain = plain_system<N>(values.parameters, 0, values.steps);
   if (!values.has_effects) return f(plain);
   typename Catalogue::On<N> effects;
   effects.for_each([&](auto& effect, int first) {
@@ -102,7 +93,8 @@ LoopResult closed_loop(const LoopRequest& r) {
 
   return with_system<N>(r.controller, [&]<class Fx>(const System<N, Fx>& system) {
     // The path and the obstacle stand in space: a controller with another T_ref sees them elsewhere.
-    const Pose T_base_world = system.sensor.T_tracker_base.inverse() * plain_system<N>(r.plant).sensor.T_tracker_base;
+    const Pose T_base_world = system.sensor.T_tracker_base.inverse() *
+                              plain_system<N>(r.plant.parameters, 0, r.plant.steps).sensor.T_tracker_base;
     std::vector<Vec3> points;
     for (Eigen::Index i = 0; i < r.points.rows(); ++i)
       points.push_back((T_base_world * Pose{Mat3::Identity(), r.points.row(i).transpose()}).position);
@@ -176,7 +168,7 @@ LoopResult closed_loop(const LoopRequest& r) {
 template <int N>
 SensitivityResult sensitivity(const SensitivityRequest& r) {
   const auto system = [&](const Eigen::VectorXd& parameters) {
-    return plain_system<N>({parameters, {}, false, r.nominal.steps});
+    return plain_system<N>(parameters, 0, r.nominal.steps);
   };
   Variations<N> v{system(r.nominal.parameters), {}, r.low, r.high, r.most_force};
   for (Eigen::Index i = 0; i < r.varied.rows(); ++i) v.systems.push_back(system(r.varied.row(i).transpose()));

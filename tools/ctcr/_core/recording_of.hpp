@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "any_recording.hpp"
+#include "plain_system.hpp"
 
 namespace ctcr::python {
 
@@ -20,31 +21,8 @@ struct WithProfiles<EffectList<E...>> {
 using AllEffects = WithProfiles<Catalogue>::type;
 
 template <int N>
-System<N> plain_system(const Table& table) {
-  using P = ParameterVector<N>;
-  const auto value = [&](Parameter kind, int i = 0) { return table.parameters[P::index(kind, i)]; };
-  Robot<N> robot;
-  Transmission<N> transmission{value(Parameter::translation_ratio), value(Parameter::rotation_ratio), {}, {}};
-  PoseSensor sensor{{}, table.sensor_tube};
-  Vec3 turn;
-  for (int i = 0; i < N; ++i) {
-    for (int k = 0; k < int(parameter_kinds.size()); ++k)
-      if (const auto field = P::info(Parameter(k)).field) robot.tubes[std::size_t(i)].*field = value(Parameter(k), i);
-    transmission.home_translation[i] = value(Parameter::home_translation, i);
-    transmission.home_rotation[i] = value(Parameter::home_rotation, i);
-  }
-  for (int i = 0; i < 3; ++i) {
-    robot.gravity[i] = value(Parameter::gravity, i);
-    sensor.T_tracker_base.position[i] = value(Parameter::tracker_position, i);
-    turn[i] = value(Parameter::tracker_rotation, i);
-  }
-  sensor.T_tracker_base.rotation = rotation_matrix(turn);
-  return {transmission, Model<N>(robot), sensor, Settings{.steps = table.steps}};
-}
-
-template <int N>
 std::vector<RecordedRow<N>> rows_of(const Table& table) {
-  const Transmission<N> transmission = plain_system<N>(table).transmission;
+  const Transmission<N> transmission = plain_system<N>(table.parameters, table.sensor_tube, table.steps).transmission;
   std::vector<RecordedRow<N>> rows(std::size_t(table.beta.rows()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto k = Eigen::Index(i);
@@ -104,7 +82,7 @@ private:
 
   static Profiles<N> profiles(const Table& table) {
     Profiles<N> out;
-    const auto tubes = plain_system<N>(table).model.robot().tubes;
+    const auto tubes = plain_system<N>(table.parameters, table.sensor_tube, table.steps).model.robot().tubes;
     for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
       out.length[i] = tubes[i].length;
       for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {
@@ -115,7 +93,7 @@ private:
     return out;
   }
   static System<N, Fx> system(const Table& table, const Profiles<N>& profiles) {
-    const System<N> plain = plain_system<N>(table);
+    const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
     typename Fx::template On<N> effects;
     effects.for_each([&](auto& effect, int first) {
       for (std::size_t k = 0; k < effect.values.size(); ++k) effect.values[k] = table.effects[first + Eigen::Index(k)];
@@ -176,13 +154,14 @@ ParameterNames parameter_names() {
 
 template <int N>
 std::vector<CatalogueParameter> catalogue_parameters() {
+  constexpr std::array kinds{"strength", "shape", "choice"};  // as Role
   std::vector<CatalogueParameter> out;
   typename Catalogue::On<N>{}.for_each([&](const auto& effect, int first) {
     for (int k = 0; k < int(effect.parameters.size()); ++k) {
       const EffectParameter& p = effect.parameters[std::size_t(k)];
       out.push_back({std::string(effect.info.id), std::string(p.name), std::string(p.unit), std::string(p.meaning),
                      p.neutral, p.sigma, p.soft_low, p.soft_high, p.hard_low, p.hard_high, p.per_tube,
-                     p.role == Role::shape, first + effect.place(k)});
+                     kinds[std::size_t(p.role)], first + effect.place(k)});
     }
   });
   return out;

@@ -80,7 +80,7 @@ def _tell(console, effect) -> None:
             facts.add_row(title, text)
     console.print(facts)
     rows = [
-        [_shown_name(p), p.unit or "-", "shape" if p.is_shape else "strength", f"{p.neutral:.4g}", f"{p.sigma:.3g}",
+        [_shown_name(p), p.unit or "-", p.kind, f"{p.neutral:.4g}", f"{p.sigma:.3g}",
          _interval(p.soft), _interval(p.hard)]
         for p in effect.parameters
     ]  # fmt: skip
@@ -119,7 +119,7 @@ def _as_data(effect) -> dict:
                 "name": p.name,
                 "full_names": p.full_names,
                 "unit": p.unit,
-                "kind": "shape" if p.is_shape else "strength",
+                "kind": p.kind,
                 "neutral": p.neutral,
                 "sd": p.sigma,
                 "usual": p.soft,

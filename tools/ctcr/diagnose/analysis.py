@@ -72,9 +72,9 @@ class Diagnosis:
         }
 
     def parameters(self, accepted: Accepted) -> dict[str, float]:
-        """Fitted values by name, without the id."""
+        """Fitted values, and those of its choices, by name without the id."""
         stem = f"effects.{accepted.entry.id}."
-        values = values_of(self.final)
+        values = dict(accepted.entry.candidate.shape) | values_of(self.final)
         return {name.removeprefix(stem): value for name, value in values.items() if name.startswith(stem)}
 
     def as_json(self) -> dict[str, Any]:
@@ -171,7 +171,7 @@ def _with_shapes(
     """Frees the shape parameters of the last accepted effect where that helps: its form may be another one."""
     last = accepted[-1].entry
     effect = effects.get(last.id, engine.robot.n_tubes)
-    shapes = [name for name in effect.shapes if name not in last.candidate.names and name != racing.jump.WHEN]
+    shapes = [name for name in effect.shapes if name not in last.candidate.names]
     if not shapes:
         return fit
     progress(f"freeing the shape of {last.id}")
@@ -179,7 +179,7 @@ def _with_shapes(
     names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
     freed = engine.fit(
         names,
-        start=values_of(fit),
+        start=dict(last.candidate.shape) | values_of(fit),
         fixed=fixed,
         noise=fit.noise,
         weights=fit.weights,

@@ -23,6 +23,8 @@ VARIANTS = {
     "sensor_offset": (("x", "y", "z"), ("x", "y", "z", "turn_x", "turn_y", "turn_z")),
     "field_distortion": (("scale",), None),
 }  # None: all amplitudes
+# Values of choices and shapes with which an effect enters the race besides its usual ones.
+FORMS = {"friction": ({"law": 1.0, "insertion": 1.0},)}
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,9 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        return f"{self.id} ({', '.join(dict.fromkeys(name.split('.')[2] for name in self.names))})"
+        own = dict.fromkeys(name.split(".")[2] for name in self.names)
+        held = (f"{name.split('.')[2]} {value:g}" for name, value in self.shape if name not in self.names)
+        return f"{self.id} ({', '.join([*own, *held])})"
 
 
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
@@ -56,7 +60,9 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
                 and any(name.startswith("turn") for name in variant)
             ):
                 continue
-            found.append(Candidate(effect.id, tuple(names)))
+            for form in ({}, *FORMS.get(effect.id, ())):
+                shape = tuple((f"effects.{effect.id}.{name}", value) for name, value in form.items())
+                found.append(Candidate(effect.id, tuple(names), shape))
     return found, left_out
 
 

@@ -118,7 +118,10 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
 def directions(figure, d: "Diagnosis") -> None:
     """The course of the error over the session, before and after."""
     axes = figure.subplots()
-    for fit, colour, label in ((d.calibrated, OUT, "calibrated"), (d.final, BACK, "with the effects found")):
+    for fit, colour, label in (
+        (d.calibrated, OUT, "calibrated"),
+        (d.with_effects, BACK, "with the effects found"),
+    ):
         size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
         axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
     first = np.flatnonzero(np.diff(d.locked.astype(int)) != 0) + 1

@@ -128,9 +128,8 @@ def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> float:
     fold = split.groups(engine.measurements) % split.FOLDS  # one of them is locked away
     plain, squares = fit.weights[:, 0] > OUTLIER, []
     for out in (engine.rows & (fold == k) for k in np.unique(fold[engine.rows])):
-        trial = engine.linear_fit(
-            fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=fit.inflation
-        )
+        inflation = fit.inflation if noise is None else None  # another noise has its own
+        trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=inflation)
         squares.append(np.nan_to_num(trial.rms_mm(out & plain)) ** 2)
     return float(np.mean(squares))
 
@@ -201,6 +200,8 @@ def screen(
     entries = []
     for candidate in candidates:
         own = slopes[:, :, [place[name] for name in candidate.names]]
+        if candidate.shape:
+            own = engine.slopes(before, candidate.names, fixed | dict(candidate.shape))
         if candidate.id == "frame_jump":
             options = jump.moments(engine, candidate, own)
         elif candidate.id == "contact":
