@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "any_readings.hpp"
+#include "any_recording.hpp"
 
 namespace ctcr::python {
 
