@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from ctcr.model import Model
 from ctcr.reproduce import control, model
 from ctcr.reproduce.claim import Claim
@@ -12,7 +11,7 @@ from ctcr.reproduce.robot import paper_robot, random_design, random_rows
 def test_a_claim_has_a_ratio_where_the_paper_is_not_zero():
     assert Claim("I", "x", 2.0, 3.0, "mm").ratio == 1.5
     assert Claim("I", "x", 0.0, 3.0, "mm").ratio is None
-    assert Claim("I", "x", 2.0, 3.0, "mm", "because").row() == ["I", "x", "2 mm", "3 mm", "1.5", "because"]
+    assert Claim("I", "x", 2.0, 3.0, "mm", "because").row() == ["I", "x", "because", "2 mm", "3 mm", "1.5"]
 
 
 def test_random_rows_are_in_order():

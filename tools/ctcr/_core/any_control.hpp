@@ -1,9 +1,6 @@
 #pragma once
 // Closed loops of robots whose number of tubes is known at run time.
-#include <Eigen/Core>
 #include <cstdint>
-#include <string>
-#include <vector>
 
 #include "any_recording.hpp"
 

@@ -5,27 +5,15 @@
 #include <nanobind/stl/vector.h>
 
 #include <stdexcept>
-#include <type_traits>
 
 #include "any_control.hpp"
+#include "with_tubes.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace ctcr::python {
 namespace {
-
-/// Calls f with N as a constant. @throws std::invalid_argument for other numbers of tubes
-template <class F>
-auto with_tubes(Eigen::Index tubes, const F& f) {
-  switch (tubes) {
-    case 1: return f(std::integral_constant<int, 1>{});
-    case 2: return f(std::integral_constant<int, 2>{});
-    case 3: return f(std::integral_constant<int, 3>{});
-    case 4: return f(std::integral_constant<int, 4>{});
-  }
-  throw std::invalid_argument("a robot has 1 to 4 tubes");
-}
 
 LoopResult any_closed_loop(const LoopRequest& r) {
   const Eigen::Index n = r.beta.size();

@@ -20,14 +20,8 @@ class Claim:
 
     def row(self) -> list[str]:
         ratio = "" if self.ratio is None else f"{self.ratio:.3g}"
-        return [
-            self.where,
-            self.what,
-            f"{self.paper:.4g} {self.unit}",
-            f"{self.ours:.4g} {self.unit}",
-            ratio,
-            self.why,
-        ]
+        values = [f"{value:.4g} {self.unit}".strip() for value in (self.paper, self.ours)]
+        return [self.where, self.what, self.why, *values, ratio]
 
 
-COLUMNS = ["where", "what", "paper", "ours", "ratio", "why"]
+COLUMNS = ["where", "what", "why ours differs", "paper", "ours", "ratio"]

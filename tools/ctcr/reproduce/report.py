@@ -36,7 +36,7 @@ def write(
         '<p class="lead">Boyer et al., On High Performance Control of Concentric Tube Continuum Robots through '
         "Parsimonious Calibration, RA-L 2024.</p>",
         cards([("good", str(len(claims)), "values of the paper beside ours"), ("noise", made, shown)]),
-        table("Values", COLUMNS, [claim.row() for claim in claims], 2),
+        table("Values", COLUMNS, [claim.row() for claim in claims], 3),
         "<h2>Table II: the robot</h2>" + _robot(robot),
         '<h2>Figure 3a: the path</h2><div id="view"></div>',
         "<h2>Figures 2 to 6</h2>",
