@@ -82,11 +82,6 @@ class Aurora:
     def __exit__(self, *_) -> None:
         self.close()
 
-    def stop(self) -> None:
-        """Ends tracking, and leaves the device as a next client expects it."""
-        self._ask("TSTOP", "")
-        self.close()
-
     # ---- frames
 
     def read(self) -> Frame:
