@@ -89,6 +89,26 @@ def test_settings_come_before_enabling(bench, folder):
         bus.close()
 
 
+@pytest.mark.slow
+def test_interrupted_move(robot, bench, folder):
+    """Ctrl+C brings the joints to rest on their way."""
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        if not motors.state["homed"]:
+            motors.set_joints(motors.settings.home)
+    start = np.array(request(folder, "ethercat", {})["turns"])
+    command = ctcr("move", ROBOT, "--bench", BENCH, "--alpha=300,300,300", "--speed", 0.2)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 20
+    while np.abs(request(folder, "ethercat", {})["turns"] - start).max() < 0.02 and time.monotonic() < end:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 1 and "stopped" in process.stderr.read()
+    moved = np.abs(np.array(request(folder, "ethercat", {})["turns"]) - start)
+    assert 0.02 <= moved.max() < 0.5
+    assert request(folder, "ethercat", {})["states"][1] < OP
+
+
 def test_wrong_terminal(bench, folder):
     for positions, text in (([0, 1], "no stepper terminal"), ([1, 9], "none at position 9")):
         bus = Bus(MASTER, positions, bench.drive_settings)
