@@ -89,6 +89,26 @@ def test_settings_come_before_enabling(bench, folder):
         bus.close()
 
 
+@pytest.mark.slow
+def test_interrupted_move(robot, bench, folder):
+    """Ctrl+C brings the joints to rest on their way."""
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        if not motors.state["homed"]:
+            motors.set_joints(motors.settings.home)
+    start = np.array(request(folder, "ethercat", {})["turns"])
+    command = ctcr("move", ROBOT, "--bench", BENCH, "--alpha=300,300,300", "--speed", 0.2)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 20
+    while np.abs(request(folder, "ethercat", {})["turns"] - start).max() < 0.02 and time.monotonic() < end:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 1 and "stopped" in process.stderr.read()
+    moved = np.abs(np.array(request(folder, "ethercat", {})["turns"]) - start)
+    assert 0.02 <= moved.max() < 0.5
+    assert request(folder, "ethercat", {})["states"][1] < OP
+
+
 def test_wrong_terminal(bench, folder):
     for positions, text in (([0, 1], "no stepper terminal"), ([1, 9], "none at position 9")):
         bus = Bus(MASTER, positions, bench.drive_settings)
@@ -146,6 +166,14 @@ class TestMotors:
         motors.wait()
         assert motors.state["bad_cycles"] > 0 and not motors.state["stopped"]
 
+    def test_missed_steps_are_made_up_for(self, motors, folder):
+        """The loop around the position runs on the encoder."""
+        request(folder, "ethercat", {"faults": {"missed_steps": 1}})
+        go(motors, SMALL)
+        motors.wait()
+        time.sleep(0.1)
+        assert abs(motors.joints[0] - motors.settings.home[0] - SMALL[0]) < 1.1e-5
+
     def test_stop_is_not_released_by_itself(self, motors, folder):
         """Another program's stop holds for this one; released, it may go on where it did not stop itself."""
         emergency_stop.stop(folder, "a test")
@@ -183,7 +211,6 @@ FAULTS = {  # fault: its value, what the message says
     "emergency stop": (None, "somebody stopped it"),
 }
 MORE_FAULTS = {
-    "missed_steps": (1, "translation of tube 1: it does not follow"),
     "encoder_jump": (4, "rotation of tube 1: (its encoder jumped|it does not follow)"),
     "over_current": (3, r"terminal 3 \(EL7041\): short circuit or over-current in coil A \(A010:06\)"),
     "under_voltage": (5, "motor supply too low"),
@@ -209,6 +236,7 @@ def check_fault(robot, bench, folder, fault, value, says):
             motors.wait()
         with pytest.raises(DeviceFault, match="ctcr stop --release"):
             motors.move(motors.settings.home)
+    time.sleep(0.15)  # terminals that were cut off stop by their own watchdog
     at_rest = request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})["turns"]
     time.sleep(0.1)
     np.testing.assert_allclose(request(folder, "ethercat", {})["turns"], at_rest, atol=1e-9)
@@ -342,7 +370,10 @@ def test_recording_survives_the_tracker(tmp_path, folder):
 
 
 @pytest.mark.slow
-def test_blind_tracker_stops_the_recording(tmp_path, folder):
+def test_blind_tracker_stops_the_recording(tmp_path, robot, bench, folder):
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        motors.set_joints(motors.settings.home)
     request(folder, "aurora", {"faults": {"out_of_volume": True}})
     done = record(plan(tmp_path / "plan.csv", 2), tmp_path / "out", "--patience", 0.5)
     assert done.returncode == 1

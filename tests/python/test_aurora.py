@@ -218,6 +218,14 @@ def test_back_after_a_fault(port, folder, fault, says):
         assert aurora.read().readings[0].position is not None
 
 
+def test_connects_through_a_bad_line(port, folder):
+    set_faults(folder, garbage=0.1)
+    with tracker(port, answer_s=0.1, tries=20) as aurora:
+        for _ in range(4):
+            aurora.connect()
+        assert aurora.damaged_answers > 0
+
+
 def test_no_device(tmp_path):
     pytest.importorskip("serial", reason="pyserial is not installed")
     with pytest.raises(DeviceFault, match="cannot open the port .*dialout"):

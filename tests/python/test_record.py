@@ -1,5 +1,6 @@
 """Recordings without hardware: what is written stays through kills and power cuts, plans are checked before moves."""
 
+import io
 import multiprocessing
 import os
 import random
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from ctcr import cli, measurements, robot_file
 from ctcr.devices import bench_file
+from ctcr.devices.person import PersonPresent
 from ctcr.errors import InputError
 from ctcr.record.display import picture
 from ctcr.record.plan import Approach, steps_of
@@ -140,6 +142,18 @@ def test_forbidden_rows_are_said_before_anything_moves(tmp_path, capfd):
     ])  # fmt: skip
     assert code == 1 and "row 3: beta3 = -50.00 mm: may be" in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
+    answers = io.StringIO("\n\n12.5\n")
+    monkeypatch.setattr("sys.stdin", answers)
+    person = PersonPresent()
+    person.hang(np.array([0.0, -0.0980665, 0.0]))
+    person.hang(np.zeros(3))
+    assert person.deployed(1) == pytest.approx(12.5e-3)
+    said = capfd.readouterr().err
+    assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
+    assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
 
 
 def test_live_picture():

@@ -90,7 +90,7 @@ def command(
                 ended = str(error)
                 raise
             finally:
-                recording.note(motors, tracker, ended)
+                recording.note(motors, tracker, session.lateness, ended)
     path = recording.path / TABLE
     console.print(
         f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",

@@ -52,6 +52,16 @@ class Aurora:
 
     def connect(self) -> None:
         """Resets the device, raises the baud rate, initialises and enables every tool, starts tracking."""
+        for left in reversed(range(self._tries)):
+            damaged = self.damaged_answers
+            try:
+                self._set_up()
+                return
+            except DeviceFault:  # a command asked twice is refused where only the first answer was damaged
+                if not left or self.damaged_answers == damaged:
+                    raise
+
+    def _set_up(self) -> None:
         self.close()
         self._open()
         self._reset()
@@ -70,11 +80,6 @@ class Aurora:
         return self
 
     def __exit__(self, *_) -> None:
-        self.close()
-
-    def stop(self) -> None:
-        """Ends tracking, and leaves the device as a next client expects it."""
-        self._ask("TSTOP", "")
         self.close()
 
     # ---- frames

@@ -121,7 +121,7 @@ class AxisControl:
                     self._axis_fault(jump, "its encoder jumped", "check the encoder's cable, then home again")
                 )
             elif lag.any():
-                remedy = "something blocks it, or the motor lost steps: look, then move slower"
+                remedy = "something blocks it, or its motor is too weak: look, then move slower"
                 self.stop(self._axis_fault(lag, "it does not follow", remedy))
             elif self.homed and (problem := settings.limits.problem(joints, SLACK_M, SLACK_RAD)):
                 self.stop(_fault(problem, "move back by `ctcr move` after releasing the stop"))

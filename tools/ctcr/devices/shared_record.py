@@ -45,6 +45,3 @@ class SharedRecord:
             if zlib.crc32(data[_CHECK:]) == int.from_bytes(data[:_CHECK], "little"):
                 return np.frombuffer(data, self._fields, offset=_CHECK)[0] if any(data[:_CHECK]) else None
         return None
-
-    def close(self) -> None:
-        self._memory.close()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import ctcr
+from ctcr.devices.lateness import Lateness
 from ctcr.devices.motors import Motors
 from ctcr.devices.tracker import Tracker
 from ctcr.errors import InputError, Problem, file_fault
@@ -44,7 +45,7 @@ class Folder:
         """t_s of the table [s] from a time of `time.monotonic`; it goes on through interruptions."""
         return t - self._zero
 
-    def note(self, motors: Motors, tracker: Tracker, ended: str) -> None:
+    def note(self, motors: Motors, tracker: Tracker, lateness: Lateness, ended: str) -> None:
         """How the devices did in this sitting, and how it ended."""
         state = motors.state
         self._about["sittings"].append({
@@ -54,6 +55,7 @@ class Folder:
                 "unseen": tracker.unseen, "connections": tracker.connections,
                 "faults": [{"t_s": self.clock(t), "text": str(fault)} for t, fault in tracker.faults],
             },
+            "frames_late": lateness.as_dict(),
             "bus": {
                 "interface": motors.settings.interface, "devices": motors.names, "cycles": int(state["cycles"]),
                 "bad_cycles": int(state["bad_cycles"]), "period_ms": 1e3 * motors.settings.period,

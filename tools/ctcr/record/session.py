@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.devices.fault import DeviceFault
+from ctcr.devices.lateness import Lateness
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import Person
 from ctcr.devices.tracker import Tracker
@@ -68,6 +69,7 @@ class Session:
         self._model = MovingModel(robot)
         self._force = np.full(3, np.nan)
         self._last_frame: TrackedFrame | None = None
+        self.lateness = Lateness()  # of frames, from the tracker's answer to here
 
     def run(self, steps: list[Step]) -> Progress:
         """Raises DeviceFault or InputError where it cannot go on; what has been measured is in the file."""
@@ -142,9 +144,10 @@ class Session:
     def _follow(self) -> TrackedFrame | None:
         """Waits for the next frame, for one and a half of its periods at most, and lets the model follow the joints."""
         frame = self._tracker.next(1.5 / 40)
+        now = time.monotonic()
         if frame:
             self._last_frame = frame
-        now = time.monotonic()
+            self.lateness.add(now - frame.t)
         n, joints = self._robot.n_tubes, self._motors.joints
         self._model.move(now, joints[:n], joints[n:], self._force)
         last = self._last_frame
