@@ -188,7 +188,7 @@ TEST(TipDerivatives, ByLoadsAreTheComplianceOfAnyTube) {
   const Settings settings{.tolerance = 1e-12};
   for (const Acting acting : all)
     for (int n = 0; n < 12; ++n) {
-      Solved<3> c = random_case<3>(acting, settings, true, random);
+      Solved<3> c = random_case<3>(acting, settings, false, random);
       const Model<3> model(c.robot);
       ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, c.ws, c.solution, settings), Status::ok);
       const int tube = n % 3;
@@ -208,7 +208,8 @@ TEST(TipDerivatives, ByLoadsAreTheComplianceOfAnyTube) {
           EXPECT_EQ(solve<Derivatives::compliance>(model, c.q, load, ws, solution, settings), Status::ok);
           return solution.tube_tips[std::size_t(tube)];
         };
-        expect_column(compliance.col(j), test::slope(pose, j < 3 ? 1e-3 : 1e-4), 0.1, "load " + std::to_string(j));
+        expect_column(compliance.col(j), test::slope(pose, j < 3 ? 1e-3 : 1e-4), 0.1,
+                      "load " + std::to_string(j) + ", tip of tube " + std::to_string(tube + 1));
       }
     }
 }

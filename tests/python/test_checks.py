@@ -1,6 +1,7 @@
 """The checks of tools/ find what is planted, and nothing else; the benchmark comparison computes what it says."""
 
 import importlib.util
+import json
 from pathlib import Path
 
 import pytest
@@ -8,8 +9,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def load(name: str):
-    spec = importlib.util.spec_from_file_location(name, ROOT / "tools" / f"{name}.py")
+def load(name: str, folder: str = "tools"):
+    spec = importlib.util.spec_from_file_location(name, ROOT / folder / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -18,6 +19,7 @@ def load(name: str):
 layers = load("check_layers")
 text = load("check_text")
 bench = load("bench_against")
+counting = load("count_instructions", "bench")
 
 
 def plant(root: Path, path: str, content: str) -> Path:
@@ -94,3 +96,29 @@ def test_benchmark_report_gives_nanoseconds_and_no_failed_run():
         ]
     }
     assert bench.cpu_times(report) == {"a": 2000.0}
+
+
+@pytest.mark.parametrize(
+    ("growth", "left_out", "compiler", "code"),
+    [
+        (1.029, None, "g++ 1", 0),
+        (1.031, None, "g++ 1", 1),
+        (1.0, "effects", "g++ 1", 1),
+        (2.0, None, "g++ 2", 0),
+    ],
+)
+def test_more_instructions_than_recorded_are_refused(
+    tmp_path, monkeypatch, capsys, growth, left_out, compiler, code
+):
+    recorded = {case: 1000 for case in counting.CASES if case != left_out}
+    baseline = tmp_path / "instructions.json"
+    baseline.write_text(json.dumps({"compiler": "g++ 1", "instructions_per_step": recorded}))
+    monkeypatch.setattr(counting, "BASELINE", baseline)
+    monkeypatch.setattr(counting, "run", lambda command: compiler)
+    monkeypatch.setattr(
+        counting, "per_step", lambda driver, case: round(1000 * (growth if case == "loaded" else 1.0))
+    )
+    monkeypatch.setattr("sys.argv", ["count_instructions", "--driver", "x"])
+    assert counting.main() == code
+    named = left_out or ("loaded" if code else None)
+    assert named is None or f"\n{named}: " in capsys.readouterr().out

@@ -135,8 +135,9 @@ Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int t
 /// and gravity, at the configuration that `ws` was last solved for.
 ///
 /// bending_stiffness replaces Young's modulus and the diameters where it is given: those of the two that have no effect
-/// get zero columns. Where two breakpoints coincide the derivatives are one-sided. Those by gravity at zero gravity are
-/// of the model with weight, integrated in as many steps.
+/// get zero columns. Where two breakpoints coincide the derivatives are one-sided. A tube of no curvature counts as
+/// curved, for its derivatives by curvature: its curve then starts at a breakpoint that solve() does not have. Those by
+/// gravity at zero gravity are of the model with weight, integrated in as many steps.
 /// @param ws        as solve() or step() left it for this model
 /// @param tube      whose tip, 0 is the innermost   @param settings  as given to solve(); its steps are used
 /// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
