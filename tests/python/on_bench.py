@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import measurements, robot_file, simulation
-from ctcr.devices import bench_file, emergency_stop, homing
+from ctcr.devices import bench_file, bus_lock, emergency_stop, homing
 from ctcr.devices.bus import Bus
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.health import health_of
@@ -107,6 +107,15 @@ def test_interrupted_move(robot, bench, folder):
     moved = np.abs(np.array(request(folder, "ethercat", {})["turns"]) - start)
     assert 0.02 <= moved.max() < 0.5
     assert request(folder, "ethercat", {})["states"][1] < OP
+
+
+def test_one_program_at_a_time(robot, bench, folder, monkeypatch):
+    monkeypatch.setattr(bus_lock, "PATIENCE_S", 0.2)
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        tracker, *_, bus = health_of(bench, folder)
+        assert tracker.is_well and not bus.is_well and "another program drives it" in bus.about
+        assert motors.state["cycles"] > 0 and not motors.state["stopped"]
 
 
 def test_wrong_terminal(bench, folder):

@@ -226,6 +226,14 @@ def test_connects_through_a_bad_line(port, folder):
         assert aurora.damaged_answers > 0
 
 
+def test_one_program_at_a_time(port):
+    with tracker(port) as aurora:
+        aurora.connect()
+        with pytest.raises(DeviceFault, match="cannot open the port"):
+            tracker(port).connect()
+        aurora.read()
+
+
 def test_no_device(tmp_path):
     pytest.importorskip("serial", reason="pyserial is not installed")
     with pytest.raises(DeviceFault, match="cannot open the port .*dialout"):

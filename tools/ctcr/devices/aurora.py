@@ -10,7 +10,7 @@ from ctcr.devices.fault import DeviceFault, needed
 from ctcr.devices.ndi_replies import Garbled, ToolReading, parse_bx, parse_tx
 
 RESET_S = 5.0  # from the break to the device's message
-PROBE_S = 0.2  # longest silence, waiting for an answer, while looking for the baud rate
+PROBES_S = (0.2, 0.6)  # longest silences, in two rounds of looking for the baud rate
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class Aurora:
     def _open(self) -> None:
         serial = needed("pyserial", "serial", f"tracker {self.port}")
         try:
-            self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s)
+            self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s, exclusive=True)
         except serial.SerialException as error:
             reason = os.strerror(error.errno) if error.errno else str(error)
             remedy = (
@@ -124,14 +124,15 @@ class Aurora:
             if message == ndi.RESET_MESSAGE[:-1]:
                 self._ask("INIT", "")
                 return
-        for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
-            if self._answers_at(baud):
-                return
+        for patience in PROBES_S:
+            for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
+                if self._answers_at(baud, patience):
+                    return
         remedy = "switch it off and on; is this the tracker's port, and the cable whole?"
         raise self._fault("no answer at any baud rate", remedy)
 
-    def _answers_at(self, baud: int) -> bool:
-        self._line.baudrate, self._line.timeout = baud, PROBE_S
+    def _answers_at(self, baud: int, patience: float) -> bool:
+        self._line.baudrate, self._line.timeout = baud, patience
         self._line.reset_input_buffer()
         try:
             for name in ("TSTOP", "INIT"):  # a device left tracking would refuse what follows

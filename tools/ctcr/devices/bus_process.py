@@ -17,6 +17,7 @@ import numpy as np
 from ctcr.devices import emergency_stop
 from ctcr.devices.axis_control import AxisControl, AxisSettings
 from ctcr.devices.bus import Bus
+from ctcr.devices.bus_lock import BusLock
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.lateness import Lateness, wish_real_time
 from ctcr.devices.shared_record import SharedRecord
@@ -61,18 +62,20 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
-        bus.connect()
-        owner = _Owner(settings, folder, pipe, bus)
-        owner.tell(time.monotonic())
-        pipe.send(("ready", bus.names))
-        owner.serve()
+        with BusLock(folder):
+            try:
+                bus.connect()
+                owner = _Owner(settings, folder, pipe, bus)
+                owner.tell(time.monotonic())
+                pipe.send(("ready", bus.names))
+                owner.serve()
+            finally:
+                bus.close()
     except DeviceFault as fault:
         try:
             pipe.send(("fault", fault))
         except OSError:
             pass
-    finally:
-        bus.close()
 
 
 class _Owner:

@@ -7,6 +7,7 @@ from pathlib import Path
 from ctcr.devices.aurora import Aurora
 from ctcr.devices.bench_file import Bench
 from ctcr.devices.bus import Bus
+from ctcr.devices.bus_lock import BusLock
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.places import interface_of, port_of
 
@@ -23,7 +24,12 @@ class Health:
 
 def health_of(bench: Bench, folder: Path) -> list[Health]:
     """Connects to every device in turn; motors stay off."""
-    return [*_tracker(bench, folder), *_bus(bench)]
+    try:
+        with BusLock(folder):
+            bus = list(_bus(bench))
+    except DeviceFault as fault:
+        bus = [Health(fault.device, interface_of(bench), False, f"{fault.what}: {fault.remedy}")]
+    return [*_tracker(bench, folder), *bus]
 
 
 def _tracker(bench: Bench, folder: Path) -> Iterator[Health]:

@@ -46,7 +46,6 @@ class Motors:
             "spawn"
         )  # a fork would keep the pipe open after this process has died
         self._pipe, other = context.Pipe()
-        self._state = bus_process.state_record(self._folder, writer=True)
         target = bus_process.run
         self._process = context.Process(
             target=target, args=(self.settings, self._folder, other), name="bus owner"
@@ -54,6 +53,7 @@ class Motors:
         self._process.start()
         other.close()
         self.names = self._answer(CONNECT_S)
+        self._state = bus_process.state_record(self._folder)
 
     def close(self) -> None:
         """Stops the motors and lets go of the bus."""

@@ -11,6 +11,7 @@ from ctcr.devices.places import port_of
 from ctcr.devices.tracker_process import TrackedFrame
 
 CONNECT_S = 20.0
+PATIENCE_S = 3.0  # with faults, while the reader tries again
 
 
 class Tracker:
@@ -31,11 +32,14 @@ class Tracker:
         self._process = context.Process(target=tracker_process.run, args=arguments, name="tracker reader")
         self._process.start()
         other.close()
-        end = time.monotonic() + CONNECT_S
-        while not self.version and time.monotonic() < end:
+        start = time.monotonic()
+        while not self.version and (waited := time.monotonic() - start) < CONNECT_S:
             self.next(0.1)
-            if self.faults:
+            if self.faults and waited > PATIENCE_S:
                 raise self.faults[-1][1]
+        if not self.version:
+            text = f"does not track after {CONNECT_S:g} s"
+            raise DeviceFault(f"tracker {self.port}", text, "switch it off and on")
 
     def close(self) -> None:
         if self._process:
