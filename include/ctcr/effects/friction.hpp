@@ -44,7 +44,7 @@ inline constexpr std::array parameters{
                     .meaning = "rotation after which friction has turned round to 63 %"},
     EffectParameter{.name = "insertion",
                     .unit = "",
-                    .neutral = 0,
+                    .neutral = 1,
                     .sigma = 0.5,
                     .soft_low = 0,
                     .soft_high = 1.5,

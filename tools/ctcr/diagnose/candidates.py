@@ -24,7 +24,7 @@ VARIANTS = {
     "field_distortion": (("scale",), None),
 }  # None: all amplitudes
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
-FORMS = {"friction": ({"law": 1.0, "insertion": 1.0},)}
+FORMS = {"friction": ({"law": 1.0}, {"insertion": 0.0})}
 
 
 @dataclass(frozen=True)
