@@ -11,6 +11,7 @@
 
 #include "any_control.hpp"
 #include "plain_system.hpp"
+#include "solver_of.hpp"
 
 namespace ctcr::python {
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "any_model.hpp"
+#include "solver_of.hpp"
 
 namespace ctcr::python {
 

@@ -8,6 +8,7 @@
 
 #include "any_recording.hpp"
 #include "plain_system.hpp"
+#include "solver_of.hpp"
 
 namespace ctcr::python {
 
