@@ -2,76 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include "calibration/toy.hpp"
 #include "ctcr/calibration/row_report.hpp"
-#include "support/random_robots.hpp"
 
 namespace {
 
 using namespace ctcr;
-
-constexpr Noise noise{.position_jitter = 3e-5, .rotation_jitter = 5e-4, .position_field = 3e-4, .rotation_field = 3e-3};
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-Eigen::VectorXd normals(Eigen::Index count, test::Random& random) {
-  std::normal_distribution<double> normal;
-  Eigen::VectorXd v(count);
-  for (double& x : v) x = normal(random);
-  return v;
-}
-
-/// A table whose readings depend on few parameters in a known, mildly curved way, with noise of the given kind.
-struct Toy {
-  Eigen::MatrixX3d places;
-  Eigen::MatrixXd slope;  ///< (6 rows, parameters)
-  double bend = 0;        ///< how curved
-  Eigen::VectorXd truth, y;
-
-  Toy(Eigen::Index rows, Eigen::Index parameters, double curved, test::Random& random) : bend(curved) {
-    places.resize(rows, 3);
-    for (double& x : places.reshaped()) x = test::uniform(random, 0, 0.15);
-    slope.resize(6 * rows, parameters);
-    for (Eigen::Index k = 0; k < parameters; ++k) slope.col(k) = normals(6 * rows, random);
-    for (Eigen::Index i = 0; i < 6 * rows; ++i) slope.row(i) *= i % 6 < 3 ? 1e-4 : 2e-3;
-    truth = 0.7 * normals(parameters, random);
-    y = model(truth);
-  }
-
-  Eigen::VectorXd model(const Eigen::VectorXd& x) const { return slope * (x + bend * x.cwiseAbs2()); }
-
-  void add_noise(const Noise& n, test::Random& random) {
-    const Eigen::MatrixXd factor = smooth_field(places, n.correlation_length, 1e-8).factor;
-    for (int a = 0; a < 6; ++a)
-      y(Eigen::seq(a, Eigen::last, 6)) +=
-          (a < 3 ? n.position_field : n.rotation_field) * (factor * normals(factor.cols(), random)) +
-          (a < 3 ? n.position_jitter : n.rotation_jitter) * normals(places.rows(), random);
-  }
-
-  Predictor predictor() const {
-    return [this](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-      residual = y - model(x);
-      if (jacobian) *jacobian = -slope * (Eigen::VectorXd::Ones(x.size()) + 2 * bend * x).asDiagonal();
-      return true;
-    };
-  }
-  std::vector<FreeParameter> parameters(double sd = 1) const {
-    std::vector<FreeParameter> p;
-    for (Eigen::Index k = 0; k < slope.cols(); ++k) p.push_back({"p" + std::to_string(k + 1), 0, sd});
-    return p;
-  }
-  /// Covariance of the noise, all of it.
-  Eigen::MatrixXd covariance(const Noise& n) const {
-    const SmoothField field = smooth_field(places, n.correlation_length, 1e-12);
-    const Eigen::MatrixXd K = field.factor * field.factor.transpose();
-    Eigen::MatrixXd S = Eigen::MatrixXd::Zero(y.size(), y.size());
-    for (int a = 0; a < 6; ++a) {
-      const double sd = a < 3 ? n.position_field : n.rotation_field,
-                   jitter = a < 3 ? n.position_jitter : n.rotation_jitter;
-      S(Eigen::seq(a, Eigen::last, 6), Eigen::seq(a, Eigen::last, 6)) = sd * sd * K;
-      for (Eigen::Index i = a; i < S.rows(); i += 6) S(i, i) += jitter * jitter;
-    }
-    return S;
-  }
-};
+using test::infinity;
+using test::noise;
+using test::normals;
+using test::Toy;
 
 TEST(Identify, IsTheExactPosteriorOfALinearModel) {
   test::Random random(1);
@@ -258,35 +198,6 @@ TEST(Identify, ComparesStartsAndKeepsTheBest) {
   EXPECT_EQ(many.observations, 3);
 }
 
-TEST(Identify, StaysWithinBoundsAndSaysSo) {
-  test::Random random(6);
-  Toy toy(30, 2, 0, random);
-  toy.truth << 1, 0.5;
-  toy.y = toy.model(toy.truth);
-  toy.add_noise(noise, random);
-  auto parameters = toy.parameters();
-  parameters[0].high = 0.2;
-  const Identification fit = identify(toy.predictor(), parameters, noise, toy.places);
-  EXPECT_NEAR(fit.values[0], 0.2, 1e-9);
-  ASSERT_FALSE(fit.warnings.empty());
-  EXPECT_NE(fit.warnings[0].find("stopped at its bound"), std::string::npos);
-}
-
-TEST(Identify, ShortensAStepThatCannotBePredicted) {
-  test::Random random(7);
-  Toy toy(30, 2, 0, random);
-  toy.truth << 1, -1;
-  toy.y = toy.model(toy.truth);
-  const Predictor inner = toy.predictor();
-  const Predictor walled = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-    return x[0] < 0.5 && inner(x, residual, jacobian);
-  };
-  const Identification fit = identify(walled, toy.parameters(), noise, toy.places);
-  EXPECT_FALSE(fit.converged);
-  EXPECT_LT(fit.values[0], 0.5);
-  EXPECT_NE(fit.status.find("not converged"), std::string::npos);
-}
-
 void expect_refusal(const std::string& part, const std::function<void()>& call) {
   try {
     call();
@@ -309,6 +220,11 @@ TEST(Identify, RefusesInWords) {
   expect_refusal("p2: its prior standard deviation is 0", with([](auto& p) { p[1].sd = 0; }));
   expect_refusal("p1: its prior mean is not finite", with([](auto& p) { p[0].mean = std::nan(""); }));
   expect_refusal("outside its bounds", with([](auto& p) { p[0].low = 1; }));
+  expect_refusal("a bound of a sum of parameters (order)", [&] {
+    IdentifyOptions options;
+    options.within = {{"order", Eigen::VectorXd::Ones(2), 0.1}};
+    (void)identify(predict, toy.parameters(), noise, toy.places, options);
+  });
   expect_refusal("do not fit together",
                  [&] { (void)identify(predict, toy.parameters(), noise, toy.places.topRows(9)); });
   expect_refusal("jitter", [&] { (void)identify(predict, toy.parameters(), Noise{}, toy.places); });

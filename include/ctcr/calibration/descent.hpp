@@ -1,82 +1,79 @@
 #pragma once
-// From a starting point down to the nearest minimum of minus the log of a posterior, with Ceres.
-#include <ceres/ceres.h>
-
+// From a starting point down to the nearest minimum of minus the log of a posterior.
+#include "ctcr/calibration/bounds.hpp"
 #include "ctcr/calibration/identification.hpp"
 
 namespace ctcr {
 namespace detail {
 
+/// Minus the log of a posterior near a point z, up to a constant: chi_square / 2 + prior . z^2 / 2 and its derivatives.
+struct Linearised {
+  double chi_square = 0, cost = 0;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd information;  ///< J^T J of the whitened residual; with the prior the Gauss-Newton Hessian
+};
+
 /// A posterior in scaled parameters z, x = origin + scale z.
-class Objective final : public ceres::CostFunction {
+class Objective {
 public:
-  Objective(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::VectorXd scale,
-            Eigen::Index rows)
+  Objective(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::VectorXd scale)
     : predict_(predict), scale_(std::move(scale)), origin_(scale_.size()), prior_(scale_.size()) {
     for (Eigen::Index k = 0; k < scale_.size(); ++k) {
       const FreeParameter& p = parameters[std::size_t(k)];
       origin_[k] = p.mean;
       prior_[k] = std::isfinite(p.sd);
     }
-    set_num_residuals(int(6 * rows + scale_.size()));
-    mutable_parameter_block_sizes()->push_back(int(scale_.size()));
   }
 
   Eigen::VectorXd x(const Eigen::VectorXd& z) const { return origin_ + scale_.cwiseProduct(z); }
   Eigen::VectorXd z(const Eigen::VectorXd& x) const { return (x - origin_).cwiseQuotient(scale_); }
-  const Eigen::VectorXd& scale() const { return scale_; }
-  const Eigen::VectorXd& prior() const { return prior_; }
+  const Eigen::VectorXd& prior() const { return prior_; }  ///< precision, 1 or 0
   int evaluations() const { return evaluations_; }
 
   void set_whitening(const Whitening& whitening) { whitening_ = &whitening; }
 
   /// Residual as predicted.
-  bool predict(const Eigen::VectorXd& z, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) const {
+  bool predict(const Eigen::VectorXd& z, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     ++evaluations_;
     return predict_(x(z), residual, jacobian);
   }
-
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const Eigen::Index n = scale_.size(), count = num_residuals() - n;
-    const Eigen::VectorXd z = Eigen::Map<const Eigen::VectorXd>(parameters[0], n);
-    Eigen::MatrixXd* jacobian = jacobians && jacobians[0] ? &jacobian_ : nullptr;
-    if (!predict(z, residual_, jacobian)) return false;
+  /// Infinite where the prediction fails.
+  double cost(const Eigen::VectorXd& z) {
+    if (!predict(z, residual_, nullptr)) return std::numeric_limits<double>::infinity();
     whitening_->apply(residual_);
-    Eigen::Map<Eigen::VectorXd> out(residuals, num_residuals());
-    out.head(count) = residual_;
-    out.tail(n) = prior_.cwiseProduct(z);
-    if (jacobian) {
-      whitening_->apply(jacobian_);
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      Eigen::Map<RowMajor> J(jacobians[0], num_residuals(), n);
-      J.topRows(count).noalias() = jacobian_ * scale_.asDiagonal();
-      J.bottomRows(n) = prior_.asDiagonal();
-    }
-    return out.allFinite();
+    const double cost = 0.5 * (residual_.squaredNorm() + prior_.dot(z.cwiseAbs2()));
+    return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
+  }
+  bool linearise(const Eigen::VectorXd& z, Linearised& out) {
+    if (!predict(z, residual_, &jacobian_)) return false;
+    whitening_->apply(residual_);
+    whitening_->apply(jacobian_);
+    jacobian_ *= scale_.asDiagonal();
+    out.chi_square = residual_.squaredNorm();
+    out.cost = 0.5 * (out.chi_square + prior_.dot(z.cwiseAbs2()));
+    out.gradient = jacobian_.transpose() * residual_ + prior_.cwiseProduct(z);
+    out.information.setZero(z.size(), z.size());
+    out.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian_.transpose());
+    out.information = out.information.selfadjointView<Eigen::Lower>();
+    return std::isfinite(out.cost) && out.information.allFinite();
   }
 
 private:
   const Predictor& predict_;
   Eigen::VectorXd scale_, origin_, prior_;
   const Whitening* whitening_ = nullptr;
-  mutable Eigen::VectorXd residual_;
-  mutable Eigen::MatrixXd jacobian_;
-  mutable int evaluations_ = 0;
+  Eigen::VectorXd residual_;
+  Eigen::MatrixXd jacobian_;
+  int evaluations_ = 0;
 };
 
-/// Ends a descent that is about to arrive where another one has been.
-class Arrival final : public ceres::IterationCallback {
-public:
-  Arrival(const Eigen::VectorXd& z, const Eigen::VectorXd& goal, const Eigen::MatrixXd& precision)
-    : z_(z), goal_(goal), precision_(precision) {}
-  double distance() const { return std::sqrt(std::max(0.0, (z_ - goal_).dot(precision_ * (z_ - goal_)))); }
-  ceres::CallbackReturnType operator()(const ceres::IterationSummary&) override {
-    return distance() < 0.1 ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+/// Where another descent has been, and how far is far from there.
+struct Goal {
+  Eigen::VectorXd z;
+  Eigen::MatrixXd precision;
+  [[nodiscard]] double distance(const Eigen::VectorXd& from) const {
+    return std::sqrt(std::max(0.0, (from - z).dot(precision * (from - z))));
   }
-
-private:
-  const Eigen::VectorXd &z_, &goal_;
-  const Eigen::MatrixXd& precision_;
 };
 
 struct Descent {
@@ -85,53 +82,39 @@ struct Descent {
   int iterations = 0;
 };
 
-/// Bounds in scaled parameters.
-struct Bounds {
-  Eigen::VectorXd low, high;
-  [[nodiscard]] bool hold(const Eigen::VectorXd& z) const {
-    return (z.array() >= low.array()).all() && (z.array() <= high.array()).all();
-  }
-};
-
-/// Goes down from z to the nearest minimum.
-inline Descent descend_within(Objective& objective, const Bounds* bounds, int max_iterations, Eigen::VectorXd& z,
-                              ceres::IterationCallback* callback) {
-  ceres::Problem::Options ownership;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ceres::Problem problem(ownership);
-  problem.AddResidualBlock(&objective, nullptr, z.data());
-  for (Eigen::Index k = 0; bounds && k < z.size(); ++k) {
-    if (std::isfinite(bounds->low[k])) problem.SetParameterLowerBound(z.data(), int(k), bounds->low[k]);
-    if (std::isfinite(bounds->high[k])) problem.SetParameterUpperBound(z.data(), int(k), bounds->high[k]);
-  }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = max_iterations;
-  options.gradient_tolerance = 1e-3;  // of a parameter in prior sd: a thousandth of the posterior sd at most
-  options.function_tolerance = 1e-7;
-  options.parameter_tolerance = 1e-8;
-  options.max_num_consecutive_invalid_steps = 10;
-  options.logging_type = ceres::SILENT;
-  options.update_state_every_iteration = callback != nullptr;
-  if (callback) options.callbacks.push_back(callback);
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  return {summary.final_cost,
-          summary.termination_type == ceres::CONVERGENCE || summary.termination_type == ceres::USER_SUCCESS,
-          int(summary.iterations.size())};
-}
-
-/// As above; bounds cost evaluations, so far ones are imposed only where the descent without them ends beyond.
+/// Goes down from z to the nearest minimum within bounds: Levenberg-Marquardt, each step the exact minimum of its model
+/// within the bounds (Ceres projects its steps onto them instead, which stalls where parameters go together).
+/// @param goal  ends the descent where it is about to arrive there; or null
+/// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999.
 inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, Eigen::VectorXd& z,
-                       ceres::IterationCallback* callback = nullptr) {
-  constexpr double far = 6;  // prior sd
-  if (bounds.low.maxCoeff() > -far || bounds.high.minCoeff() < far)
-    return descend_within(objective, &bounds, max_iterations, z, callback);
-  const Eigen::VectorXd start = z;
-  const Descent free = descend_within(objective, nullptr, max_iterations, z, callback);
-  if (bounds.hold(z)) return free;
-  z = start;
-  return descend_within(objective, &bounds, max_iterations, z, callback);
+                       const Goal* goal = nullptr) {
+  constexpr double arrived = 0.1, settled = 0.003;  // posterior sd
+  constexpr double most_damping = 1e10;
+  Descent out;
+  z = bounds.clamped(z);
+  Linearised here;
+  if (!objective.linearise(z, here)) return out;
+  double damping = 1e-4;
+  for (bool moved = true; moved && out.iterations < max_iterations; ++out.iterations) {
+    moved = false;
+    const Eigen::MatrixXd H = here.information + Eigen::MatrixXd(objective.prior().asDiagonal());
+    out.converged = bounds.step_left(z, here.gradient, H) < settled || (goal && goal->distance(z) < arrived);
+    if (out.converged) break;
+    for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
+      Eigen::MatrixXd damped = H;
+      damped.diagonal() += damping * H.diagonal();
+      const Eigen::VectorXd step = bounds.step(z, here.gradient, damped);
+      const double foreseen = -step.dot(here.gradient + 0.5 * (H * step));
+      const double gain = (here.cost - objective.cost(z + step)) / foreseen;
+      if (!(gain > 1e-3)) continue;
+      z += step;
+      damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
+      if (!objective.linearise(z, here)) return out;
+      moved = true;
+    }
+  }
+  out.cost = here.cost;
+  return out;
 }
 
 }  // namespace detail

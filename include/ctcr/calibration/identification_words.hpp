@@ -42,11 +42,17 @@ inline void check(const std::vector<FreeParameter>& parameters, const Noise& noi
           "the inflation of the jitter must be above 0");
   require(!options.start || options.start->size() == Eigen::Index(parameters.size()),
           "the start must hold one value for each parameter");
+  for (const LinearBound& bound : options.within)
+    require(bound.change.size() == Eigen::Index(parameters.size()) && bound.change.allFinite() && bound.low <= 0,
+            "a bound of a sum of parameters (" + bound.text +
+                ") needs one number a parameter, and to hold at the prior "
+                "means");
   if (!faults.empty()) throw std::invalid_argument(faults);
 }
 
 inline void add_warnings(const std::vector<FreeParameter>& parameters, const Posterior& posterior,
-                         const Eigen::VectorXd& information, const RowWeights& use, Identification& out) {
+                         const Eigen::VectorXd& information, const std::vector<std::string>& reached,
+                         const RowWeights& use, Identification& out) {
   const auto warn = [&](const std::string& text) { out.warnings.push_back(text); };
   const auto n = Eigen::Index(parameters.size());
   if (out.observations < n)
@@ -65,6 +71,7 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
     if (out.values[k] <= p.low + margin || out.values[k] >= p.high - margin)
       warn(p.name + " stopped at its bound " + number(out.values[k]));
   }
+  for (const std::string& text : reached) warn("the fit stopped where " + text);
   if (posterior.singular() && out.sd.allFinite()) warn("some combination of the parameters is not determined");
   for (int kind = 0; kind < 2; ++kind)
     if (out.inflation[kind] > 1)

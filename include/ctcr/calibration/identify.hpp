@@ -79,14 +79,9 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   out.whitening.apply(jacobian);
   for (Eigen::Index k = 0; k < n; ++k)
     if (!std::isfinite(sd[k])) sd[k] = jacobian.col(k).norm() > 0 ? 1 / jacobian.col(k).norm() : 1.0;
-  detail::Objective objective(predict, parameters, sd, places.rows());
+  detail::Objective objective(predict, parameters, sd);
   objective.set_whitening(out.whitening);
-  detail::Bounds bounds{Eigen::VectorXd(n), Eigen::VectorXd(n)};
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const FreeParameter& p = parameters[std::size_t(k)];
-    bounds.low[k] = (p.low - p.mean) / sd[k];
-    bounds.high[k] = (p.high - p.mean) / sd[k];
-  }
+  const detail::Bounds bounds(parameters, options.within, sd);
 
   Eigen::VectorXd z = objective.z(x);
   detail::Descent best;
@@ -122,16 +117,10 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   // The first descent takes all that is wrong at the start for noise: far from the truth, details mislead.
   if (finds_inflation) inflate();
   set_whitening();
-  Eigen::MatrixXd information;
+  detail::Linearised here;
   const auto linearise = [&] {
-    if (!objective.predict(z, residual, &jacobian))
+    if (!objective.linearise(z, here))
       throw std::invalid_argument("the readings cannot be predicted at the fitted values");
-    out.whitening.apply(residual);
-    out.whitening.apply(jacobian);
-    jacobian *= sd.asDiagonal();
-    information = Eigen::MatrixXd::Zero(n, n);
-    information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
-    information = information.selfadjointView<Eigen::Lower>();
   };
   descend_robustly();
   linearise();
@@ -145,6 +134,7 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
       const double drawn = normal(random);
       if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn, p.low, p.high) - p.mean) / p.sd;
     }
+    other = bounds.clamped(other);
     Eigen::VectorXd unused;
     bool solved = objective.predict(other, unused, nullptr);
     for (int halving = 0; halving < 5 && !solved; ++halving) {
@@ -152,12 +142,11 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
       solved = objective.predict(other, unused, nullptr);
     }
     if (!solved) continue;
-    const Eigen::MatrixXd precision = information + Eigen::MatrixXd(objective.prior().asDiagonal());
-    detail::Arrival arrival(other, z, precision);
-    const detail::Descent there = detail::descend(objective, bounds, options.max_iterations, other, &arrival);
+    const detail::Goal goal{z, here.information + Eigen::MatrixXd(objective.prior().asDiagonal())};
+    const detail::Descent there = detail::descend(objective, bounds, options.max_iterations, other, &goal);
     out.iterations += there.iterations;
-    out.starts.push_back({there.cost, arrival.distance(), there.converged});
-    if (there.cost < best.cost - 0.5 && arrival.distance() > 0.5) {
+    out.starts.push_back({there.cost, goal.distance(other), there.converged});
+    if (there.cost < best.cost - 0.5 && goal.distance(other) > 0.5) {
       out.warnings.push_back("a start drawn from the prior led to a better place than the first one");
       z = other;
       descend_robustly();
@@ -165,7 +154,7 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
     }
   }
 
-  const Posterior posterior(information, objective.prior());
+  const Posterior posterior(here.information, objective.prior());
   out.values = objective.x(z);
   out.sd = sd.cwiseProduct(posterior.sd());
   out.covariance = sd.asDiagonal() * posterior.covariance() * sd.asDiagonal();
@@ -182,8 +171,6 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   });
   out.directions = undetermined_directions(posterior, parameters, options.known);
 
-  const Eigen::VectorXd gradient = jacobian.transpose() * residual + objective.prior().cwiseProduct(z);
-  const double fitted_chi_square = residual.squaredNorm();
   (void)objective.predict(z, residual, nullptr);
   Whitening(noise, field, out.weights).apply(residual);
   out.chi_square = residual.squaredNorm();
@@ -193,25 +180,18 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   out.bulk_observations = 3 * (detail::bulk_rows(out.weights, 0) + detail::bulk_rows(out.weights, 1));
   out.reduced_chi_square = out.chi_square / (out.bulk_observations - out.effective_parameters);
   out.log_evidence =
-      -0.5 * (fitted_chi_square + out.shift_square + posterior.log_determinant() + out.whitening.log_determinant() +
+      -0.5 * (here.chi_square + out.shift_square + posterior.log_determinant() + out.whitening.log_determinant() +
               double(out.observations) * std::log(2 * std::numbers::pi));
   if ((objective.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
 
-  // The length of the step still to be done, in posterior sd, where no bound stops it.
-  Eigen::VectorXd downhill = -gradient;
-  for (Eigen::Index k = 0; k < n; ++k)
-    if ((z[k] <= bounds.low[k] + 1e-6 && downhill[k] < 0) || (z[k] >= bounds.high[k] - 1e-6 && downhill[k] > 0))
-      downhill[k] = 0;
-  const double left = std::sqrt(std::max(0.0, downhill.dot(posterior.covariance() * downhill)));
-  const bool at_kink = best.converged && left >= 0.05 && left < 1;
-  out.converged = left < 0.05 || at_kink;
+  const double left =
+      bounds.step_left(z, here.gradient, here.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
+  out.converged = left < 0.05;
   out.evaluations = objective.evaluations() + 1;
-  out.status = out.converged
-                   ? (at_kink ? "converged to " + detail::number(left) + " standard deviations: at a kink of the model"
-                              : "converged")
-                   : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
-                         detail::number(left) + " standard deviations is left";
-  detail::add_warnings(parameters, posterior, information.diagonal(), use, out);
+  out.status = out.converged ? "converged"
+                             : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
+                                   detail::number(left) + " standard deviations is left";
+  detail::add_warnings(parameters, posterior, here.information.diagonal(), bounds.reached(z), use, out);
   return out;
 }
 

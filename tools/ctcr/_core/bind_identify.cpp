@@ -79,6 +79,7 @@ std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names
 }
 
 using Known = std::vector<std::pair<std::string, Eigen::VectorXd>>;
+using Within = std::vector<std::tuple<std::string, Eigen::VectorXd, double>>;
 
 Identification identify_any(const nb::object& predict, const std::vector<std::string>& names,
                             const Eigen::VectorXd& mean, const Eigen::VectorXd& sd, const Eigen::VectorXd& low,
@@ -86,7 +87,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
                             bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
                             const std::optional<Eigen::Vector2d>& inflation,
                             const std::optional<Eigen::VectorXd>& start, int starts, const Known& known,
-                            std::vector<int>& excluded) {
+                            const Within& within, std::vector<int>& excluded) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
   options.robust = robust;
@@ -99,6 +100,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
     if (change.size() != mean.size()) throw std::invalid_argument("a known direction needs one number a parameter");
     options.known.push_back({text, change});
   }
+  for (const auto& [text, change, least] : within) options.within.push_back({text, change, least});
   if (nb::isinstance<BoundReadings>(predict)) {
     AnyReadings& readings = **nb::cast<BoundReadings*>(predict);
     const nb::gil_scoped_release released;
@@ -244,15 +246,16 @@ void bind_identify(nb::module_& m) {
          const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
          const Eigen::MatrixX3d& places, bool robust, bool admit_model_error,
          const std::optional<Eigen::MatrixX2d>& weights, const std::optional<Eigen::Vector2d>& inflation,
-         const std::optional<Eigen::VectorXd>& start, int starts, const Known& known) {
+         const std::optional<Eigen::VectorXd>& start, int starts, const Known& known, const Within& within) {
         std::vector<int> excluded;
         Identification fit = identify_any(predict, names, mean, sd, low, high, noise, places, robust, admit_model_error,
-                                          weights, inflation, start, starts, known, excluded);
+                                          weights, inflation, start, starts, known, within, excluded);
         return std::pair(std::move(fit), std::move(excluded));
       },
       nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a, "places"_a,
       "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
       "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "starts"_a = 3, "known"_a = Known{},
+      "within"_a = Within{},
       "Fits Readings, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
       "rows.");
 }
