@@ -12,7 +12,7 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core
+from ctcr import _core, effects
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot import Robot
@@ -51,14 +51,22 @@ def units_of(n_tubes: int) -> tuple[str, ...]:
     return tuple(_core.parameter_names(n_tubes)[1])
 
 
+def units_with_effects(robot: Robot) -> dict[str, str]:
+    """SI unit by name, those of the robot's effects included."""
+    units = dict(zip(names_of(robot.n_tubes), units_of(robot.n_tubes), strict=True))
+    known = effects.parameter_of(robot.n_tubes)
+    return units | {name: known[name].unit for name in of_effects(robot)}
+
+
 def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     """The parameters that names stand for, each once, in the library's order.
 
     A name may hold `*` (tubes.*.youngs_modulus), may be a group (tracker.frame, homes), and may be several separated by
     commas. `standard` is the calibration of the paper: tracker frame, homes, and stiffness, curvature, curved length
-    and length of each tube (of a straight tube: stiffness and length). Raises InputError for names that do not exist.
+    and length of each tube (of a straight tube: stiffness and length). Effects that the robot has are named as in
+    effects.friction.coefficient.1 (effects.friction.*). Raises InputError for names that do not exist.
     """
-    known = names_of(robot.n_tubes)
+    known = [*names_of(robot.n_tubes), *of_effects(robot)]
     wanted = [
         name.strip() for item in ([free] if isinstance(free, str) else free) for name in item.split(",")
     ]
@@ -79,6 +87,11 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     return [name for name in known if name in chosen]
 
 
+def of_effects(robot: Robot) -> list[str]:
+    """The parameters of the effects that a robot has."""
+    return [name for identity in robot.effects for name in effects.get(identity, robot.n_tubes).names()]
+
+
 def values(robot: Robot) -> Array:
     """The value of every parameter; at tracker.rotation the rotation vector of the tracker frame."""
     return np.array([_value(robot, name) for name in names_of(robot.n_tubes)])
@@ -89,13 +102,18 @@ def priors(
 ) -> tuple[Array, Array, Array, Array]:
     """Mean, standard deviation, lowest and highest value of each parameter.
 
-    Standard deviations are those of the file's `uncertainty`; `sd` {name: number in SI, or math.inf} comes before it,
-    and its names may be patterns. Raises InputError for all parameters of which neither says anything, or 0.
+    Standard deviations are those of the file's `uncertainty`; of effects those of the catalogue, about no effect. `sd`
+    {name: number in SI, or math.inf} comes before them, and its names may be patterns. Raises InputError for all
+    parameters of which none says anything, or 0.
     """
     names = list(names)
     given = {name: float(value) for item, value in (sd or {}).items() for name in expand(item, robot)}
-    mean = [0.0 if name.startswith("tracker.rotation.") else _value(robot, name) for name in names]
-    width = [given.get(name, _stated_sd(robot, name)) for name in names]
+    own = [name for name in names if name.startswith("effects.")]
+    of_own = dict(zip(own, zip(*effects.priors(robot, own), strict=True), strict=True))
+    mean = [of_own[name][0] if name in of_own else _mean(robot, name) for name in names]
+    width = [
+        given.get(name, of_own[name][1] if name in of_own else _stated_sd(robot, name)) for name in names
+    ]
     problems = [
         Problem(
             f"{name}: its prior standard deviation is {value:g}, but must be above 0; leave a parameter that is known "
@@ -108,17 +126,22 @@ def priors(
     ]
     if problems:
         raise InputError(problems)
-    low, high = np.transpose([_bounds(name, value) for name, value in zip(names, mean, strict=True)])
+    low, high = np.transpose([
+        of_own[name][2:] if name in of_own else _bounds(name, value)
+        for name, value in zip(names, mean, strict=True)
+    ])  # fmt: skip
     return np.array(mean), np.array(width), low, high
 
 
 def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
     """A copy of the robot with other values. New homes leave the old ones as those of the tables."""
-    changed = robot.model_copy(deep=True)
+    changed, values = robot.model_copy(deep=True), dict(zip(names, map(float, fitted), strict=True))
+    own = {name: values.pop(name) for name in [*values] if name.startswith("effects.")}
+    if own:
+        changed.effects = effects.as_section(own.keys(), own.values(), robot)
     actuation, turn = changed.actuation, np.zeros(3)
-    for name, value in zip(names, fitted, strict=True):
+    for name, value in values.items():
         group, *rest = name.split(".")
-        value = float(value)
         if group == "tubes":
             field, unit = _FIELDS[rest[1]]
             setattr(changed.tubes[int(rest[0]) - 1], field, value / unit)
@@ -177,6 +200,41 @@ def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
     ]
 
 
+def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, Array, float]]:
+    """What must stay true of the named parameters for joints beta (M, N) [m] of a table to be possible.
+
+    Each with words for where it just is, and as the least value of a sum of changes of the parameters: tubes are
+    grasped behind the plate and one behind the other, tips are in front of it and one before the other, and no tube is
+    longer curved than it is long. Nine rows in ten stay possible; where fewer are, none more become impossible.
+    """
+    beta = beta + robot.actuation.translation_correction
+    tip, tubes = beta + [tube.length for tube in robot.tubes], range(1, robot.n_tubes + 1)
+    home, length, curved = "actuation.home_translation.{}", "tubes.{}.length", "tubes.{}.curved_length"
+    last = robot.n_tubes
+    found = [
+        (f"tube {last} is grasped at the plate", {home: {last: -1}}, -beta[:, -1]),
+        (f"the tip of tube {last} is flush with the plate", {home: {last: 1}, length: {last: 1}}, tip[:, -1]),
+    ]
+    for i in tubes[:-1]:
+        apart = {i: 1, i + 1: -1}
+        found += [
+            (f"tubes {i} and {i + 1} are grasped at one place", {home: {i: -1, i + 1: 1}}, beta[:, i] - beta[:, i - 1]),
+            (f"the tips of tubes {i} and {i + 1} are flush", {home: apart, length: apart}, tip[:, i - 1] - tip[:, i]),
+        ]  # fmt: skip
+    found += [
+        (f"tube {i} is curved over all its length", {length: {i: 1}, curved: {i: -1}},
+         np.array([robot.tubes[i - 1].length - robot.tubes[i - 1].curved_length]))
+        for i in tubes
+    ]  # fmt: skip
+    limits = []
+    for text, parts, room in found:
+        change = {kind.format(i): float(sign) for kind, signs in parts.items() for i, sign in signs.items()}
+        row = np.array([change.get(name, 0.0) for name in names])
+        if row.any() and len(room):
+            limits.append((text, row, -max(0.0, float(np.quantile(room, 0.1)))))
+    return limits
+
+
 def _stands_for(pattern: str, name: str) -> bool:
     return name == pattern or ("*" in pattern and fnmatchcase(name, pattern))
 
@@ -194,6 +252,10 @@ def _standard(robot: Robot) -> list[str]:
         own = _STANDARD_TUBE if curved else ("stiffness", "length")
         found += [f"tubes.{i}.{stiffness if name == 'stiffness' else name}" for name in own]
     return found
+
+
+def _mean(robot: Robot, name: str) -> float:
+    return 0.0 if name.startswith("tracker.rotation.") else _value(robot, name)
 
 
 def _value(robot: Robot, name: str) -> float:

@@ -6,7 +6,7 @@ Positions in m, rotations in rad, tracker axes. Residuals are measured - predict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, nan
+from math import nan
 from time import perf_counter
 from typing import Any
 
@@ -157,7 +157,11 @@ class Fit:
 def readings_of(
     robot: Robot, measurements: Measurements, names: Sequence[str], *, steps: int = 1, threads: int = 0
 ) -> Any:
-    """The compiled residuals of a table as functions of the named parameters."""
+    """The compiled residuals of a table as functions of the named parameters, with the effects that the robot has."""
+    if robot.effects:
+        from ctcr import user_effects
+
+        return user_effects.recording_of(robot, measurements, names, threads=threads)
     known = free_parameters.names_of(robot.n_tubes)
     beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
     missing = np.full((len(measurements), 4), nan)
@@ -187,7 +191,7 @@ def places_of(robot: Robot, measurements: Measurements) -> Array:
         from ctcr.model import Model
 
         beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
-        tips = Model(robot).predict(beta, alpha, measurements.force[missing])
+        tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
         places[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
     return places
 
@@ -231,7 +235,6 @@ def fit(
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     warnings = ignored + list(_doubts(measurements, _measured(measurements) & chosen))
-    high = np.minimum(high, _home_limits(robot, measurements.beta[chosen], names))
     table = readings_of(robot, measurements, names, steps=steps, threads=threads)
     table.activate((_measured(measurements) & chosen).tolist())
     if starts is None:
@@ -239,14 +242,16 @@ def fit(
     fitted = identify_with(
         table, names, mean, width, low, high, noise, places_of(robot, measurements),
         robust=robust, admit_model_error=admit_model_error, weights=weights, inflation=inflation, starts=starts,
-        known=free_parameters.known_directions(robot, names),
+        start=np.clip(table.nominal(), low, high), known=free_parameters.known_directions(robot, names),
+        within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
-    all_units = dict(
-        zip(parameter_names(robot.n_tubes), free_parameters.units_of(robot.n_tubes), strict=True)
-    )
+    units = free_parameters.units_with_effects(robot)
     return replace(
         fitted,
-        units=[all_units[name] for name in names],
+        units=[units[name] for name in names],
+        nominal_residual=table.residual(table.nominal())[0].reshape(-1, 6)
+        if robot.effects
+        else fitted.nominal_residual,
         warnings=warnings + fitted.warnings,
         seconds=perf_counter() - began,
     )
@@ -269,6 +274,7 @@ def identify_with(
     start: Array | None = None,
     starts: int = 3,
     known: Sequence[tuple[str, Array]] = (),
+    within: Sequence[tuple[str, Array, float]] = (),
 ) -> Fit:
     """As `fit`, for any predictor: compiled Readings (whose active rows are fitted), or a function
     (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
@@ -281,7 +287,7 @@ def identify_with(
             places=np.asarray(places, dtype=float), robust=robust,
             admit_model_error=admit_model_error, weights=weights,
             inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
-            known=list(known),
+            known=list(known), within=list(within),
         )  # fmt: skip
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
@@ -330,16 +336,6 @@ def _measured(measurements: Measurements) -> Mask:
 def _is_measured(measurements: Measurements, kind: str) -> bool:
     values = measurements.position if kind == "position" else measurements.quaternion
     return values is not None and bool(np.isfinite(values).all(axis=1).any())
-
-
-def _home_limits(robot: Robot, beta: Array, names: Sequence[str]) -> Array:
-    """Highest values that leave nine readings in ten behind the plate; only the outermost tube's home has one."""
-    limits = np.full(len(names), inf)
-    outermost = f"actuation.home_translation.{robot.n_tubes}"
-    if outermost in names and len(beta):
-        room = -np.quantile(beta[:, -1] + robot.actuation.translation_correction[-1], 0.9)
-        limits[names.index(outermost)] = 1e-3 * robot.actuation.home_translation_mm[-1] + max(0.0, room)
-    return limits
 
 
 def _doubts(measurements: Measurements, rows: Mask) -> Iterable[str]:

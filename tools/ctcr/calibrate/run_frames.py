@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ctcr import free_parameters
 from ctcr.errors import InputError, Problem
 from ctcr.frames import conjugate, product, quaternion_from_rotation_vector
 from ctcr.measurements import Measurements
@@ -114,6 +115,7 @@ def fit_with_frames(
         fit = identify.identify_with(
             framed, names, *priors, noise, identify.places_of(robot, readings), start=start,
             starts=starts or 2 if round_ == ROUNDS - 1 else 1, inflation=inflation,
+            within=free_parameters.admissible(robot, readings.beta[rows], names),
         )  # fmt: skip
         start = fit.values
         framed.align(start)
