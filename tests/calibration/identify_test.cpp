@@ -2,76 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include "calibration/toy.hpp"
 #include "ctcr/calibration/row_report.hpp"
-#include "support/random_robots.hpp"
 
 namespace {
 
 using namespace ctcr;
-
-constexpr Noise noise{.position_jitter = 3e-5, .rotation_jitter = 5e-4, .position_field = 3e-4, .rotation_field = 3e-3};
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-Eigen::VectorXd normals(Eigen::Index count, test::Random& random) {
-  std::normal_distribution<double> normal;
-  Eigen::VectorXd v(count);
-  for (double& x : v) x = normal(random);
-  return v;
-}
-
-/// A table whose readings depend on few parameters in a known, mildly curved way, with noise of the given kind.
-struct Toy {
-  Eigen::MatrixX3d places;
-  Eigen::MatrixXd slope;  ///< (6 rows, parameters)
-  double bend = 0;        ///< how curved
-  Eigen::VectorXd truth, y;
-
-  Toy(Eigen::Index rows, Eigen::Index parameters, double curved, test::Random& random) : bend(curved) {
-    places.resize(rows, 3);
-    for (double& x : places.reshaped()) x = test::uniform(random, 0, 0.15);
-    slope.resize(6 * rows, parameters);
-    for (Eigen::Index k = 0; k < parameters; ++k) slope.col(k) = normals(6 * rows, random);
-    for (Eigen::Index i = 0; i < 6 * rows; ++i) slope.row(i) *= i % 6 < 3 ? 1e-4 : 2e-3;
-    truth = 0.7 * normals(parameters, random);
-    y = model(truth);
-  }
-
-  Eigen::VectorXd model(const Eigen::VectorXd& x) const { return slope * (x + bend * x.cwiseAbs2()); }
-
-  void add_noise(const Noise& n, test::Random& random) {
-    const Eigen::MatrixXd factor = smooth_field(places, n.correlation_length, 1e-8).factor;
-    for (int a = 0; a < 6; ++a)
-      y(Eigen::seq(a, Eigen::last, 6)) +=
-          (a < 3 ? n.position_field : n.rotation_field) * (factor * normals(factor.cols(), random)) +
-          (a < 3 ? n.position_jitter : n.rotation_jitter) * normals(places.rows(), random);
-  }
-
-  Predictor predictor() const {
-    return [this](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-      residual = y - model(x);
-      if (jacobian) *jacobian = -slope * (Eigen::VectorXd::Ones(x.size()) + 2 * bend * x).asDiagonal();
-      return true;
-    };
-  }
-  std::vector<FreeParameter> parameters(double sd = 1) const {
-    std::vector<FreeParameter> p;
-    for (Eigen::Index k = 0; k < slope.cols(); ++k) p.push_back({"p" + std::to_string(k + 1), 0, sd});
-    return p;
-  }
-  /// Covariance of the noise, all of it.
-  Eigen::MatrixXd covariance(const Noise& n) const {
-    const SmoothField field = smooth_field(places, n.correlation_length, 1e-12);
-    const Eigen::MatrixXd K = field.factor * field.factor.transpose();
-    Eigen::MatrixXd S = Eigen::MatrixXd::Zero(y.size(), y.size());
-    for (int a = 0; a < 6; ++a) {
-      const double sd = a < 3 ? n.position_field : n.rotation_field,
-                   jitter = a < 3 ? n.position_jitter : n.rotation_jitter;
-      S(Eigen::seq(a, Eigen::last, 6), Eigen::seq(a, Eigen::last, 6)) = sd * sd * K;
-      for (Eigen::Index i = a; i < S.rows(); i += 6) S(i, i) += jitter * jitter;
-    }
-    return S;
-  }
-};
+using test::infinity;
+using test::noise;
+using test::normals;
+using test::Toy;
 
 TEST(Identify, IsTheExactPosteriorOfALinearModel) {
   test::Random random(1);
@@ -256,133 +196,6 @@ TEST(Identify, ComparesStartsAndKeepsTheBest) {
   EXPECT_NEAR(one.values[0], -1, 0.2);
   EXPECT_NEAR(many.values[0], 1, 0.2);
   EXPECT_EQ(many.observations, 3);
-}
-
-TEST(Identify, StaysWithinBoundsAndSaysSo) {
-  test::Random random(6);
-  Toy toy(30, 2, 0, random);
-  toy.truth << 1, 0.5;
-  toy.y = toy.model(toy.truth);
-  toy.add_noise(noise, random);
-  auto parameters = toy.parameters();
-  parameters[0].high = 0.2;
-  const Identification fit = identify(toy.predictor(), parameters, noise, toy.places);
-  EXPECT_NEAR(fit.values[0], 0.2, 1e-9);
-  ASSERT_FALSE(fit.warnings.empty());
-  EXPECT_NE(fit.warnings[0].find("stopped at its bound"), std::string::npos);
-}
-
-/// The minimum of |y - slope x|^2_W + |x|^2 where change . x >= low of every bound, by trying all sets of bounds that hold
-/// it back.
-Eigen::VectorXd minimum_within(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
-                               const std::vector<LinearBound>& within) {
-  const Eigen::Index n = g.size();
-  Eigen::VectorXd best;
-  double least = infinity;
-  for (unsigned set = 0; set < 1u << within.size(); ++set) {
-    Eigen::MatrixXd KKT = H;
-    Eigen::VectorXd right = g;
-    for (std::size_t k = 0; k < within.size(); ++k) {
-      if (!(set >> k & 1u)) continue;
-      const Eigen::Index m = KKT.rows();
-      KKT.conservativeResizeLike(Eigen::MatrixXd::Zero(m + 1, m + 1));
-      KKT.col(m).head(n) = within[k].change;
-      KKT.row(m).head(n) = within[k].change.transpose();
-      right.conservativeResize(m + 1);
-      right[m] = within[k].low;
-    }
-    const Eigen::VectorXd x = KKT.fullPivLu().solve(right).head(n);
-    bool inside = true;
-    for (const LinearBound& bound : within) inside = inside && bound.change.dot(x) >= bound.low - 1e-9;
-    const double cost = 0.5 * x.dot(H * x) - g.dot(x);
-    if (inside && cost < least) least = cost, best = x;
-  }
-  return best;
-}
-
-TEST(Identify, KeepsSumsOfParametersWithinBounds) {
-  int stopped = 0;
-  for (int seed = 0; seed < 60; ++seed) {
-    test::Random random{std::uint64_t(seed)};
-    Toy toy(20, 5, 0, random);
-    toy.slope.col(1) = toy.slope.col(0) + 0.1 * toy.slope.col(1);  // a projected step would lead astray
-    toy.y = toy.model(toy.truth);
-    toy.add_noise(noise, random);
-    std::vector<LinearBound> within;
-    for (int k = 0; k < 3; ++k) within.push_back({"bound", normals(5, random), -test::uniform(random, 0, 0.5)});
-    IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1, .within = within};
-    const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
-    const Eigen::LLT<Eigen::MatrixXd> inverse(toy.covariance(noise));
-    const Eigen::MatrixXd H = toy.slope.transpose() * inverse.solve(toy.slope) + Eigen::MatrixXd::Identity(5, 5);
-    const Eigen::VectorXd x = minimum_within(H, toy.slope.transpose() * inverse.solve(toy.y), within);
-    EXPECT_TRUE(fit.converged) << fit.status;
-    EXPECT_LT(std::sqrt((fit.values - x).dot(H * (fit.values - x))), 0.02) << seed;
-    stopped += int(!fit.warnings.empty());
-  }
-  EXPECT_GT(stopped, 20);
-}
-
-TEST(Identify, KeepsTheNearerOfBoundsThatDepend) {
-  test::Random random(9);
-  Toy toy(20, 1, 0, random);
-  toy.truth << 2;
-  toy.y = toy.model(toy.truth);
-  IdentifyOptions options;
-  options.within = {{"far", Eigen::VectorXd::Constant(1, -2), -3}, {"near", Eigen::VectorXd::Constant(1, -1), -1}};
-  const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
-  EXPECT_NEAR(fit.values[0], 1, 1e-9);
-  EXPECT_NE(fit.warnings.front().find("stopped where near"), std::string::npos) << fit.warnings.front();
-}
-
-TEST(Identify, FindsAMinimumOnAKinkAndTheWayAlongIt) {
-  // One row bends up where a sum of parameters changes sign, the others pull there: the minimum is that of the others on
-  // the plane of the kink.
-  for (int seed = 0; seed < 40; ++seed) {
-    test::Random random{std::uint64_t(seed)};
-    Toy toy(20, 6, 0, random);
-    toy.add_noise(noise, random);
-    const Eigen::VectorXd across = normals(6, random).normalized();
-    const double pull = 1e-3, bend = 1e-3;
-    const Predictor inner = toy.predictor();
-    const Predictor kinked = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-      (void)inner(x, residual, jacobian);
-      const double beyond = across.dot(x - toy.truth) + 0.5;  // the truth is on the side that costs
-      residual[0] = pull + (beyond > 0 ? bend * beyond : 0);
-      if (jacobian) jacobian->row(0) = (beyond > 0 ? bend : 0) * across.transpose();
-      return true;
-    };
-    const Noise jitter{.position_jitter = 2e-4, .rotation_jitter = 4e-3};
-    IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1};
-    const Identification fit = identify(kinked, toy.parameters(), jitter, toy.places, options);
-    EXPECT_TRUE(fit.converged) << seed << fit.status;
-
-    const Predictor without = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-      (void)inner(x, residual, jacobian);
-      residual[0] = 0;
-      if (jacobian) jacobian->row(0).setZero();
-      return true;
-    };
-    options.within = {{"the kink", -across, 0.5 - across.dot(toy.truth)}};
-    if (!(options.within[0].low <= 0)) continue;
-    const Identification on_it = identify(without, toy.parameters(), jitter, toy.places, options);
-    const Eigen::VectorXd apart = fit.values - on_it.values;
-    EXPECT_LT(std::sqrt(apart.dot(fit.covariance.llt().solve(apart))), 0.1) << seed;
-  }
-}
-
-TEST(Identify, ShortensAStepThatCannotBePredicted) {
-  test::Random random(7);
-  Toy toy(30, 2, 0, random);
-  toy.truth << 1, -1;
-  toy.y = toy.model(toy.truth);
-  const Predictor inner = toy.predictor();
-  const Predictor walled = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
-    return x[0] < 0.5 && inner(x, residual, jacobian);
-  };
-  const Identification fit = identify(walled, toy.parameters(), noise, toy.places);
-  EXPECT_FALSE(fit.converged);
-  EXPECT_LT(fit.values[0], 0.5);
-  EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
 void expect_refusal(const std::string& part, const std::function<void()>& call) {

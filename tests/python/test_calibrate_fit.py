@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import cli, frames, measurements, robot_file
+from ctcr import cli, effect_model, frames, measurements, robot_file
 from ctcr.calibrate import joint_fit, parameters, report, splits, terminal
 from ctcr.errors import InputError
 from ctcr.model import Model
@@ -187,10 +187,27 @@ def test_a_frame_that_is_metres_off_is_refused(robot, readings):
         outcome(robot, replace(readings, position=readings.position + [2.0, 0, 0]))
 
 
-def test_a_robot_with_effects_is_refused(robot, readings):
-    with_effects = robot.model_copy(update={"effects": {"friction": {"coefficient": 0.1}}})
-    with pytest.raises(InputError, match=r"the robot has effects beyond the standard model \(friction\)"):
-        outcome(with_effects, readings)
+def test_effects_that_the_robot_has_take_part_fixed_or_freed(robot, readings, tmp_path):
+    beside = robot.model_copy(update={"effects": {"sensor_offset": {"x": 2e-3}}})
+    beside._source = robot._source
+    seen = effect_model.readings(beside, readings)
+    position, quaternion = frames.base_to_tracker(robot.tracker, seen.position, seen.quaternion)
+    noise = np.random.default_rng(1).normal(0, 3.5e-5, position.shape)
+    made = replace(readings, position=position + noise, quaternion=quaternion)
+
+    fixed = outcome(beside, made, noise="jitter")
+    assert fixed.stages[0].rms_mm < 0.1 and np.max(np.abs(fixed.fit.shift)) < 1
+    assert outcome(robot, made, noise="jitter").stages[-1].rms_mm > 0.5
+
+    neutral = beside.model_copy(update={"effects": {"sensor_offset": {"x": 0.0}}})
+    freed = outcome(neutral, made, [*FEW, "effects.sensor_offset.x"], noise="jitter")
+    (found,) = [item for item in freed.fitted if item.name.startswith("effects.")]
+    assert found.unit == "m" and abs(found.value - 2e-3) < 4 * found.sd < 1e-3
+    assert freed.stages[0].rms_mm > 1 > 0.1 > freed.stages[-1].rms_mm
+    joint_fit.write_robot(freed, tmp_path / "new.yaml", TABLE)
+    assert robot_file.load(tmp_path / "new.yaml").effects["sensor_offset"]["x"] == pytest.approx(found.value)
+    with pytest.raises(InputError, match=r"effects.friction.coefficient.1"):
+        outcome(beside, made, ["effects.friction.coefficient.1"])
 
 
 def test_nothing_measured_is_refused(robot, readings):

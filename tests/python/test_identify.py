@@ -179,6 +179,39 @@ def test_outliers_count_for_little():
     assert (np.abs(fit.values - clean.values) < clean.sd).all()
 
 
+def test_joints_that_a_table_holds_stay_possible():
+    """Tips that are recorded flush, grasped points at the plate, tubes curved over all their length."""
+    bench = robot()
+    bench.tubes[1].curved_length_mm = 300.0
+    readings = table(bench)
+    flush = np.column_stack([np.full(80, -0.1), np.zeros(80)])
+    names = identify.expand("standard", bench)
+    limits = {text: (dict(zip(names, row, strict=True)), low)
+              for text, row, low in free_parameters.admissible(bench, flush, names)}  # fmt: skip
+    assert limits["the tips of tubes 1 and 2 are flush"][1] == pytest.approx(0, abs=1e-12)
+    assert limits["tube 2 is grasped at the plate"][1] == 0
+    assert limits["tube 2 is curved over all its length"][1] == 0
+    assert limits["tubes 1 and 2 are grasped at one place"][1] == pytest.approx(-0.1)
+    row = {name: part for name, part in limits["the tips of tubes 1 and 2 are flush"][0].items() if part}
+    assert row == {"tubes.1.length": 1, "tubes.2.length": -1,
+                   "actuation.home_translation.1": 1, "actuation.home_translation.2": -1}  # fmt: skip
+
+    angles = np.linspace(-3, 3, 80)
+    tips = Model(bench).predict(flush, np.column_stack([angles, 0.3 * angles]))
+    position, quaternion = base_to_tracker(bench.tracker, tips.position, tips.quaternion)
+    readings = replace(
+        readings, beta=flush, alpha=np.column_stack([angles, 0.3 * angles]), quaternion=quaternion,
+        position=position + 4e-4 * np.random.default_rng(1).standard_normal((80, 3)),
+    )  # fmt: skip
+    fit = identify.fit(bench, readings, "standard", noise=NOISE)
+    assert fit.converged and not fit.excluded
+    after = fit.apply(bench)
+    beta = after.joints_of_table(flush, readings.alpha)[0]
+    tip = beta + [tube.length for tube in after.tubes]
+    assert (tip[:, 0] > tip[:, 1] - 1e-9).all() and (beta[:, 1] <= 1e-9).all()
+    assert after.tubes[1].curved_length <= after.tubes[1].length + 1e-9
+
+
 def test_missing_and_unsolved_rows_are_left_out():
     bench = robot()
     readings = table(bench)

@@ -12,7 +12,7 @@ from math import inf, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core
+from ctcr import _core, effects
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot import Robot
@@ -51,14 +51,22 @@ def units_of(n_tubes: int) -> tuple[str, ...]:
     return tuple(_core.parameter_names(n_tubes)[1])
 
 
+def units_with_effects(robot: Robot) -> dict[str, str]:
+    """SI unit by name, those of the robot's effects included."""
+    units = dict(zip(names_of(robot.n_tubes), units_of(robot.n_tubes), strict=True))
+    known = effects.parameter_of(robot.n_tubes)
+    return units | {name: known[name].unit for name in of_effects(robot)}
+
+
 def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     """The parameters that names stand for, each once, in the library's order.
 
     A name may hold `*` (tubes.*.youngs_modulus), may be a group (tracker.frame, homes), and may be several separated by
     commas. `standard` is the calibration of the paper: tracker frame, homes, and stiffness, curvature, curved length
-    and length of each tube (of a straight tube: stiffness and length). Raises InputError for names that do not exist.
+    and length of each tube (of a straight tube: stiffness and length). Effects that the robot has are named as in
+    effects.friction.coefficient.1 (effects.friction.*). Raises InputError for names that do not exist.
     """
-    known = names_of(robot.n_tubes)
+    known = [*names_of(robot.n_tubes), *of_effects(robot)]
     wanted = [
         name.strip() for item in ([free] if isinstance(free, str) else free) for name in item.split(",")
     ]
@@ -79,6 +87,11 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     return [name for name in known if name in chosen]
 
 
+def of_effects(robot: Robot) -> list[str]:
+    """The parameters of the effects that a robot has."""
+    return [name for identity in robot.effects for name in effects.get(identity, robot.n_tubes).names()]
+
+
 def values(robot: Robot, names: Iterable[str] | None = None) -> Array:
     """Values of parameters, all by default; at tracker.rotation the rotation vector of the tracker frame."""
     return np.array([_value(robot, name) for name in (names_of(robot.n_tubes) if names is None else names)])
@@ -89,13 +102,18 @@ def priors(
 ) -> tuple[Array, Array, Array, Array]:
     """Mean, standard deviation, lowest and highest value of each parameter.
 
-    Standard deviations are those of the file's `uncertainty`; `sd` {name: number in SI, or math.inf} comes before it,
-    and its names may be patterns. Raises InputError for all parameters of which neither says anything, or 0.
+    Standard deviations are those of the file's `uncertainty`; of effects those of the catalogue, about no effect. `sd`
+    {name: number in SI, or math.inf} comes before them, and its names may be patterns. Raises InputError for all
+    parameters of which none says anything, or 0.
     """
     names = list(names)
     given = {name: float(value) for item, value in (sd or {}).items() for name in expand(item, robot)}
-    mean = [0.0 if name.startswith("tracker.rotation.") else _value(robot, name) for name in names]
-    width = [given.get(name, _stated_sd(robot, name)) for name in names]
+    own = [name for name in names if name.startswith("effects.")]
+    of_own = dict(zip(own, zip(*effects.priors(robot, own), strict=True), strict=True))
+    mean = [of_own[name][0] if name in of_own else _mean(robot, name) for name in names]
+    width = [
+        given.get(name, of_own[name][1] if name in of_own else _stated_sd(robot, name)) for name in names
+    ]
     problems = [
         Problem(
             f"{name}: its prior standard deviation is {value:g}, but must be above 0; leave a parameter that is known "
@@ -108,17 +126,22 @@ def priors(
     ]
     if problems:
         raise InputError(problems)
-    low, high = np.transpose([_bounds(name, value) for name, value in zip(names, mean, strict=True)])
+    low, high = np.transpose([
+        of_own[name][2:] if name in of_own else _bounds(name, value)
+        for name, value in zip(names, mean, strict=True)
+    ])  # fmt: skip
     return np.array(mean), np.array(width), low, high
 
 
 def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
     """A copy of the robot with other values. New homes leave the old ones as those of the tables."""
-    changed = robot.model_copy(deep=True)
+    changed, values = robot.model_copy(deep=True), dict(zip(names, map(float, fitted), strict=True))
+    own = {name: values.pop(name) for name in [*values] if name.startswith("effects.")}
+    if own:
+        changed.effects = effects.as_section(own.keys(), own.values(), robot)
     actuation, turn = changed.actuation, np.zeros(3)
-    for name, value in zip(names, fitted, strict=True):
+    for name, value in values.items():
         group, *rest = name.split(".")
-        value = float(value)
         if group == "tubes":
             field, unit = _FIELDS[rest[1]]
             setattr(changed.tubes[int(rest[0]) - 1], field, value / unit)
@@ -229,6 +252,10 @@ def _standard(robot: Robot) -> list[str]:
         own = _STANDARD_TUBE if curved else ("stiffness", "length")
         found += [f"tubes.{i}.{stiffness if name == 'stiffness' else name}" for name in own]
     return found
+
+
+def _mean(robot: Robot, name: str) -> float:
+    return 0.0 if name.startswith("tracker.rotation.") else _value(robot, name)
 
 
 def _value(robot: Robot, name: str) -> float:

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core, free_parameters
+from ctcr import _core, free_parameters, user_effects
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
-from ctcr.recording import recording_of
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -188,14 +187,6 @@ class Fit:
         return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
 
 
-def plain_recording_of(
-    robot: Robot, measurements: Measurements, names: Sequence[str], *, steps: int = 1, threads: int = 0
-) -> Any:
-    """The recording by the standard model, without the effects that the robot may have."""
-    plain = robot.model_copy(update={"effects": {}})
-    return recording_of(plain, measurements, names, steps=steps, threads=threads)
-
-
 def places_of(robot: Robot, measurements: Measurements) -> Array:
     """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
     places = (
@@ -208,7 +199,7 @@ def places_of(robot: Robot, measurements: Measurements) -> Array:
         from ctcr.model import Model
 
         beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
-        tips = Model(robot).predict(beta, alpha, measurements.force[missing])
+        tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
         places[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
     return places
 
@@ -252,22 +243,23 @@ def fit(
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     warnings = ignored + list(_doubts(measurements, measured_rows(measurements) & chosen))
-    table = plain_recording_of(robot, measurements, names, steps=steps, threads=threads)
+    table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
     table.activate((measured_rows(measurements) & chosen).tolist())
     if starts is None:
         starts = 2 if len(measurements) > MANY_ROWS else 3
     fitted = identify_with(
         table, names, mean, width, low, high, noise, places_of(robot, measurements),
         robust=robust, admit_model_error=admit_model_error, weights=weights, inflation=inflation, starts=starts,
-        known=free_parameters.known_directions(robot, names),
+        start=np.clip(table.nominal(), low, high), known=free_parameters.known_directions(robot, names),
         within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
-    all_units = dict(
-        zip(parameter_names(robot.n_tubes), free_parameters.units_of(robot.n_tubes), strict=True)
-    )
+    units = free_parameters.units_with_effects(robot)
     return replace(
         fitted,
-        units=[all_units[name] for name in names],
+        units=[units[name] for name in names],
+        nominal_residual=table.residual(table.nominal())[0].reshape(-1, 6)
+        if robot.effects
+        else fitted.nominal_residual,
         warnings=warnings + fitted.warnings,
         seconds=perf_counter() - began,
     )

@@ -216,6 +216,11 @@ class Robot(Section):
         return len(self.tubes)
 
     @property
+    def standard(self) -> "Robot":
+        """The same without its effects beyond the standard model."""
+        return self.model_copy(update={"effects": {}})
+
+    @property
     def gravity_vector(self) -> Array:
         """Gravity (3,) [m/s^2], base frame; zero where the file does not know it."""
         return np.array(self.gravity or (0.0, 0.0, 0.0))

@@ -95,70 +95,37 @@ struct Descent {
   int iterations = 0;
 };
 
-/// The mean of gradients, with the weights that make the step it asks for shortest.
-inline Eigen::VectorXd shortest(const std::vector<Eigen::VectorXd>& gradients, const Eigen::MatrixXd& H) {
-  constexpr int sweeps = 20;
-  Eigen::VectorXd mean = gradients.front();
-  if (gradients.size() == 1) return mean;
-  const Eigen::LLT<Eigen::MatrixXd> inverse(H);
-  for (int sweep = 0; sweep < sweeps; ++sweep)
-    for (const Eigen::VectorXd& gradient : gradients) {
-      const Eigen::VectorXd apart = gradient - mean, across = inverse.solve(apart);
-      const double square = apart.dot(across);
-      if (square > 0) mean += std::clamp(-mean.dot(across) / square, 0.0, 1.0) * apart;
-    }
-  return mean;
-}
-
 /// Goes down from z to the nearest minimum within bounds: Levenberg-Marquardt, each step the exact minimum of its model
 /// within the bounds (Ceres projects its steps onto them instead, which stalls where parameters go together).
-///
-/// The model has kinks: where a curve starts at the plate, where play is taken up. A minimum may lie on one, and the way
-/// to it along one. Where even a short step leads up, the slope beyond the kink is therefore taken in: the mean of the
-/// slopes that asks for the shortest step leads along the kink, and vanishes at a minimum on it.
 /// @param goal  ends the descent where it is about to arrive there; or null
-/// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999; slopes as in bundle methods, Kiwiel,
-/// "Methods of Descent for Nondifferentiable Optimization", 1985, sect. 2.
+/// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999.
 inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, Eigen::VectorXd& z,
                        const Goal* goal = nullptr) {
-  constexpr double arrived = 0.1, settled = 0.003, is_short = 0.3;  // posterior sd
+  constexpr double arrived = 0.1, settled = 0.003;  // posterior sd
   constexpr double most_damping = 1e10;
-  constexpr std::size_t most_slopes = 8;  // of one step
   Descent out;
   z = bounds.clamped(z);
-  Linearised here, beyond;
+  Linearised here;
   if (!objective.linearise(z, here)) return out;
   double damping = 1e-4;
   for (bool moved = true; moved && out.iterations < max_iterations; ++out.iterations) {
     moved = false;
     const Eigen::MatrixXd H = here.information + Eigen::MatrixXd(objective.prior().asDiagonal());
-    std::vector<Eigen::VectorXd> slopes{here.gradient};
-    const double first_damping = damping;
-    for (double growth = 2; damping < most_damping && !moved;) {
-      out.left = bounds.step_left(z, shortest(slopes, H), H);
-      out.converged = out.left < settled || (goal && goal->distance(z) < arrived);
-      if (out.converged) break;
+    out.converged = bounds.step_left(z, here.gradient, H) < settled || (goal && goal->distance(z) < arrived);
+    if (out.converged) break;
+    for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
       Eigen::MatrixXd damped = H;
       damped.diagonal() += damping * H.diagonal();
-      const Eigen::VectorXd slope = shortest(slopes, damped), step = bounds.step(z, slope, damped);
-      const double foreseen = -step.dot(slope + 0.5 * (H * step));
+      const Eigen::VectorXd step = bounds.step(z, here.gradient, damped);
+      const double foreseen = -step.dot(here.gradient + 0.5 * (H * step));
       const double gain = (here.cost - objective.cost(z + step)) / foreseen;
-      if (gain > 1e-3) {
-        z += step;
-        damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
-        if (!objective.linearise(z, here)) return out;
-        moved = true;
-      } else if (slopes.size() < most_slopes && step.dot(H * step) < is_short * is_short &&
-                 objective.linearise(z + step, beyond)) {
-        slopes.push_back(beyond.gradient - H * step);
-        damping = first_damping, growth = 2;
-      } else {
-        damping *= growth, growth *= 2;
-      }
+      if (!(gain > 1e-3)) continue;
+      z += step;
+      damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
+      if (!objective.linearise(z, here)) return out;
+      moved = true;
     }
   }
-  if (!out.converged && out.iterations == max_iterations)
-    out.left = bounds.step_left(z, here.gradient, here.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
   out.cost = here.cost;
   return out;
 }

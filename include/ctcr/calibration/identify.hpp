@@ -196,11 +196,12 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
               double(out.observations) * std::log(2 * std::numbers::pi));
   if ((objective.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
 
-  out.converged = best.left < 0.05;
+  const double left = bounds.step_left(z, here.gradient, precision());
+  out.converged = left < 0.05;
   out.evaluations = objective.evaluations() + 1;
   out.status = out.converged ? "converged"
                              : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
-                                   detail::number(best.left) + " standard deviations is left";
+                                   detail::number(left) + " standard deviations is left";
   detail::add_warnings(parameters, posterior, here.information.diagonal(), bounds.reached(z), use, out);
   return out;
 }

@@ -26,15 +26,10 @@ def start(robot: Robot, readings: Measurements) -> float:
     """
     from ctcr.model import Model
 
-    if robot.effects:
-        raise InputError(Problem(
-            f"the robot has effects beyond the standard model ({', '.join(robot.effects)}), which this fit does not "
-            f"know: `ctcr add` fits a robot with its effects"
-        ))  # fmt: skip
     if readings.position is None or not np.isfinite(readings.position).any():
         raise InputError(Problem("no position is measured: columns x_m, y_m, z_m are missing or empty"))
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    answer = Model(robot).predict(beta, alpha, readings.force)
+    answer = Model(robot.standard).predict(beta, alpha, readings.force)
     if not answer.solved.any():
         raise InputError(Problem("the model solves no row of the table: are these the joints of this robot?"))
     tip, _ = base_to_tracker(robot.tracker, answer.position, answer.quaternion)
@@ -111,7 +106,7 @@ def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
         text = f"The runs do not share one frame: a frame for each leaves {wording.mm(after_mm)} of the "
         return [f"{text}{wording.mm(before_mm)} RMS error. --frame-per-run fits them."]
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    sample = take_sample(robot, readings, Model(robot).predict(beta, alpha, readings.force))
+    sample = take_sample(robot, readings, Model(robot.standard).predict(beta, alpha, readings.force))
     found = find_run_offsets(sample, find_revisits(find_stops(sample), sample.lever), RUN_LEVEL)
     if not found.found:
         return []

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from ctcr import effect_model
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
 from ctcr.model import Model
@@ -67,6 +68,9 @@ def compare_halves(robot: Robot, readings: Measurements, first, second, kind: st
 
 def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Array:
     """Predicted tips (K, 3), tracker frame; NaN where not solved."""
+    if robot.effects:  # they may depend on the whole path
+        seen = effect_model.readings(robot, readings)
+        return base_to_tracker(robot.tracker, seen.position[rows], seen.quaternion[rows])[0]
     beta, alpha = robot.joints_of_table(readings.beta[rows], readings.alpha[rows])
     answer = Model(robot).predict(beta, alpha, readings.force[rows])
     return base_to_tracker(robot.tracker, answer.position, answer.quaternion)[0]

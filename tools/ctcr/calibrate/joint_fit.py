@@ -195,8 +195,9 @@ def write_robot(
         "ctcr calibrate fit", [measurements], figures, " ".join(parameters.doubts(c.fitted))
     )
     return robot_update.write(
-        c.before, target, parameters.changes(c.fit, c.before, c.after), entry, in_place=in_place
-    )
+        c.before, target, parameters.changes(c.fit, c.before, c.after), entry,
+        effects=c.after.effects if c.after.effects != c.before.effects else None, in_place=in_place,
+    )  # fmt: skip
 
 
 def _engine(

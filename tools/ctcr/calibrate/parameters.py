@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, pi
 
-from ctcr.robot import Robot, Tube
+from ctcr.robot import MAX_TUBES, Robot, Tube
 from ctcr.robot_update import Change
 from ctcr.yaml_document import FieldPath
 
@@ -101,7 +101,14 @@ def field_of(name: str) -> Field:
         return Field(("tracker", "position_mm", "xyz".index(rest[1])), "mm", 1e3)
     if name.startswith("tracker.rotation."):
         return Field(None, "deg", 180 / pi)
-    return Field(None, "", 1.0)
+    return Field(None, _effect_unit(name), 1.0)
+
+
+def _effect_unit(name: str) -> str:
+    from ctcr import effects
+
+    known = effects.parameter_of(MAX_TUBES)
+    return known[name].unit if name in known else ""
 
 
 def value_at(robot: Robot, path: FieldPath) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ctcr import free_parameters
+from ctcr import free_parameters, user_effects
 from ctcr.errors import InputError, Problem
 from ctcr.frames import conjugate, product, quaternion_from_rotation_vector
 from ctcr.measurements import Measurements
@@ -200,7 +200,6 @@ class _Framed:
 
     def _read(self) -> None:
         """The table as seen from each run's own frame."""
-        from ctcr import identify
 
         origin, turn = self.robot.tracker.position, Rotation.from_rotvec(self.turn[self.index])
         position = origin + turn.inv().apply(self.readings.position - self.shift[self.index] - origin)
@@ -209,7 +208,7 @@ class _Framed:
             quaternion = product(conjugate(quaternion_from_rotation_vector(turn.as_rotvec())), quaternion)
         seen = replace(self.readings, position=position, quaternion=quaternion)
         self.seen_position = position
-        self.table = identify.plain_recording_of(self.robot, seen, self.names)
+        self.table = user_effects.recording_of(self.robot, seen, self.names)
 
     def _frame_part(self, residual: Array, columns: Array) -> tuple[Array, Array]:
         """What the frames take of columns (6 M, k), and the frames' moves (R, 6) for the first column."""

@@ -1,0 +1,105 @@
+// Where identification goes: within bounds, and not where nothing can be predicted.
+#include <gtest/gtest.h>
+
+#include "calibration/toy.hpp"
+
+namespace {
+
+using namespace ctcr;
+using test::infinity;
+using test::noise;
+using test::normals;
+using test::Toy;
+
+TEST(Descent, StaysWithinBoundsAndSaysSo) {
+  test::Random random(6);
+  Toy toy(30, 2, 0, random);
+  toy.truth << 1, 0.5;
+  toy.y = toy.model(toy.truth);
+  toy.add_noise(noise, random);
+  auto parameters = toy.parameters();
+  parameters[0].high = 0.2;
+  const Identification fit = identify(toy.predictor(), parameters, noise, toy.places);
+  EXPECT_NEAR(fit.values[0], 0.2, 1e-9);
+  ASSERT_FALSE(fit.warnings.empty());
+  EXPECT_NE(fit.warnings[0].find("stopped at its bound"), std::string::npos);
+}
+
+/// The minimum of |y - slope x|^2_W + |x|^2 where change . x >= low of every bound, by trying all sets of bounds that hold
+/// it back.
+Eigen::VectorXd minimum_within(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                               const std::vector<LinearBound>& within) {
+  const Eigen::Index n = g.size();
+  Eigen::VectorXd best;
+  double least = infinity;
+  for (unsigned set = 0; set < 1u << within.size(); ++set) {
+    Eigen::MatrixXd KKT = H;
+    Eigen::VectorXd right = g;
+    for (std::size_t k = 0; k < within.size(); ++k) {
+      if (!(set >> k & 1u)) continue;
+      const Eigen::Index m = KKT.rows();
+      KKT.conservativeResizeLike(Eigen::MatrixXd::Zero(m + 1, m + 1));
+      KKT.col(m).head(n) = within[k].change;
+      KKT.row(m).head(n) = within[k].change.transpose();
+      right.conservativeResize(m + 1);
+      right[m] = within[k].low;
+    }
+    const Eigen::VectorXd x = KKT.fullPivLu().solve(right).head(n);
+    bool inside = true;
+    for (const LinearBound& bound : within) inside = inside && bound.change.dot(x) >= bound.low - 1e-9;
+    const double cost = 0.5 * x.dot(H * x) - g.dot(x);
+    if (inside && cost < least) least = cost, best = x;
+  }
+  return best;
+}
+
+TEST(Descent, KeepsSumsOfParametersWithinBounds) {
+  int stopped = 0;
+  for (int seed = 0; seed < 60; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    Toy toy(20, 5, 0, random);
+    toy.slope.col(1) = toy.slope.col(0) + 0.1 * toy.slope.col(1);  // a projected step would lead astray
+    toy.y = toy.model(toy.truth);
+    toy.add_noise(noise, random);
+    std::vector<LinearBound> within;
+    for (int k = 0; k < 3; ++k) within.push_back({"bound", normals(5, random), -test::uniform(random, 0, 0.5)});
+    IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1, .within = within};
+    const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
+    const Eigen::LLT<Eigen::MatrixXd> inverse(toy.covariance(noise));
+    const Eigen::MatrixXd H = toy.slope.transpose() * inverse.solve(toy.slope) + Eigen::MatrixXd::Identity(5, 5);
+    const Eigen::VectorXd x = minimum_within(H, toy.slope.transpose() * inverse.solve(toy.y), within);
+    EXPECT_TRUE(fit.converged) << fit.status;
+    EXPECT_LT(std::sqrt((fit.values - x).dot(H * (fit.values - x))), 0.02) << seed;
+    stopped += int(!fit.warnings.empty());
+  }
+  EXPECT_GT(stopped, 20);
+}
+
+TEST(Descent, KeepsTheNearerOfBoundsThatDepend) {
+  test::Random random(9);
+  Toy toy(20, 1, 0, random);
+  toy.truth << 2;
+  toy.y = toy.model(toy.truth);
+  IdentifyOptions options;
+  options.within = {{"far", Eigen::VectorXd::Constant(1, -2), -3}, {"near", Eigen::VectorXd::Constant(1, -1), -1}};
+  const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
+  EXPECT_NEAR(fit.values[0], 1, 1e-9);
+  EXPECT_NE(fit.warnings.front().find("stopped where near"), std::string::npos) << fit.warnings.front();
+}
+
+TEST(Descent, ShortensAStepThatCannotBePredicted) {
+  test::Random random(7);
+  Toy toy(30, 2, 0, random);
+  toy.truth << 1, -1;
+  toy.y = toy.model(toy.truth);
+  const Predictor inner = toy.predictor();
+  const Predictor walled = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+    return x[0] < 0.5 && inner(x, residual, jacobian);
+  };
+  const Identification fit = identify(walled, toy.parameters(), noise, toy.places);
+  EXPECT_FALSE(fit.converged);
+  EXPECT_LT(fit.values[0], 0.5);
+  EXPECT_NE(fit.status.find("not converged"), std::string::npos);
+}
+
+}  // namespace
