@@ -44,7 +44,8 @@ class Diagnosis:
     calibrated: identify.Fit  # without effects, for prediction
     with_effects: identify.Fit  # for prediction
     final: identify.Fit  # with effects, under the noise of the most evidence: its values are those to quote
-    noise_floor_mm: float  # of the locked rows
+    # RMS that the tracker's noise leaves of a right model, its field error as far as the data show it
+    noise_floor_mm: float
     rounds: list[Round]
     accepted: list[Accepted]
     leftover: Leftover
@@ -160,9 +161,13 @@ def _diagnose(
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
-        robot, measurements, locked, unseen, before, after, fit, fit.floor_mm(locked), rounds, accepted, leftover,
+        robot, measurements, locked, unseen, before, after, fit, _floor_mm(fit), rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
+
+
+def _floor_mm(fit: identify.Fit) -> float:
+    return 1e3 * float(np.sqrt(3 * (fit.noise.position_jitter**2 + fit.noise.position_field**2)))
 
 
 def _with_shapes(

@@ -51,7 +51,7 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
                 i, max(value, 0.3), color=GOOD if accepted else FAINT, edgecolor=INK if accepted else "none",
                 linewidth=1.5,
             )  # fmt: skip
-            axes.text(max(value, 0.3), i, f" {value:.3g}", va="center", fontsize=9)
+            axes.text(max(value, 0.3), i, f" {value:.1f}", va="center", fontsize=9)
         axes.set_yticks(range(len(shown)), [identity.replace("_", " ") for identity, _ in shown])
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
@@ -102,6 +102,7 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
         return False
     share = np.array([[imitated(of, by) for by in best.values()] for of in best.values()])
     axes = figure.subplots()
+    axes.grid(False)
     picture = axes.imshow(share, vmin=0, vmax=1, cmap="Blues")
     for i, j in np.ndindex(share.shape):
         axes.text(

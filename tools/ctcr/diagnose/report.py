@@ -99,13 +99,13 @@ def _candidates(d: "Diagnosis") -> str:
         "tell from it.", True,
     )  # fmt: skip
     apart = figure(
-        figures.overlap, d, 7.2, 4.6,
+        figures.overlap, d, 5.2, 4.2,
         "How much of one candidate's signal another one can imitate together with calibration: near 1 both ways, these "
         "data cannot tell the two apart.",
     )  # fmt: skip
     reason = next((r.reason for r in reversed(d.rounds) if r.reason), "")
     why = f"<p>{html.escape(reason.capitalize())}.</p>" if reason else ""
-    return f"<h2>All candidates</h2>{drawn}{apart}{why}" if drawn else ""
+    return f'<h2>All candidates</h2>{drawn}<div class="pair">{apart}<div>{why}</div></div>' if drawn else ""
 
 
 def _next(d: "Diagnosis") -> str:
