@@ -225,7 +225,8 @@ def test_add_without_measurements(run, tmp_path, robot):
     target = tmp_path / "new.yaml"
     code, out, _ = run("add", ROBOT, "softening", "--set", "gamma.2=0.01", "-o", target)
     assert code == 0 and "not fitted" in out
-    assert robot_file.load(target).effects == {"softening": {"gamma": [0, 0.01, 0]}}
+    written = robot_file.load(target).effects
+    assert written == {"softening": {"gamma": [0, 0.01, 0], "plateau": 0.25, "sharpness": 2}}
 
 
 @pytest.mark.parametrize(

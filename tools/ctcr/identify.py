@@ -135,8 +135,10 @@ class Fit:
     @cached_property
     def nominal_residual(self) -> Array:
         """(M, 6) at the robot file's values."""
-        predict = getattr(self._every_row, "residual", self.predict)
-        return np.asarray(predict(self.prior_mean, False)[0]).reshape(-1, 6)
+        every = self._every_row
+        if not hasattr(every, "nominal"):
+            return np.asarray(every(self.prior_mean, False)[0]).reshape(-1, 6)
+        return np.asarray(every.residual(every.nominal())[0]).reshape(-1, 6)
 
     @cached_property
     def p_value(self) -> float:
@@ -257,9 +259,6 @@ def fit(
     return replace(
         fitted,
         units=[units[name] for name in names],
-        nominal_residual=table.residual(table.nominal())[0].reshape(-1, 6)
-        if robot.effects
-        else fitted.nominal_residual,
         warnings=warnings + fitted.warnings,
         seconds=perf_counter() - began,
     )

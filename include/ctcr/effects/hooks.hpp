@@ -246,8 +246,8 @@ struct EffectList {
                      const Transmission& transmission) noexcept {
       constexpr auto count_ = std::size_t(From::count);
       for (std::size_t k = 0; k < count_; ++k) to.values[k] = value(from.values[k], first + int(k));
-      to.active = acts(to);
       if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
+      to.active = acts(to);
       for (std::size_t i = 0; i < from.past.state.size(); ++i) {
         auto& state = to.past.state[i] = from.past.state[i];
         const auto& slope = from.past.slope[i];

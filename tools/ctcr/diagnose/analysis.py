@@ -44,7 +44,7 @@ class Diagnosis:
     calibrated: identify.Fit  # without effects, for prediction
     with_effects: identify.Fit  # for prediction
     final: identify.Fit  # with effects, under the noise of the most evidence: its values are those to quote
-    # RMS that the tracker's noise leaves of a right model, its field error as far as the data show it
+    # RMS that noise as stated leaves of a right model on the locked rows, its uncertain parameters included
     noise_floor_mm: float
     rounds: list[Round]
     accepted: list[Accepted]
@@ -158,16 +158,14 @@ def _diagnose(
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
+    as_stated = engine.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
+    floor = as_stated.floor_mm(locked)
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
-        robot, measurements, locked, unseen, before, after, fit, _floor_mm(fit), rounds, accepted, leftover,
+        robot, measurements, locked, unseen, before, after, fit, floor, rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
-
-
-def _floor_mm(fit: identify.Fit) -> float:
-    return 1e3 * float(np.sqrt(3 * (fit.noise.position_jitter**2 + fit.noise.position_field**2)))
 
 
 def _with_shapes(

@@ -31,6 +31,8 @@ MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
 # Another noise must predict other runs so much better to be preferred to that of the most evidence.
 BETTER = 0.95
+MUCH_BETTER = 0.6  # where the model explains the readings as it is
+SOUND = 1.05  # inflation of the noise up to which it does
 OUTLIER = 0.3  # weight below which a reading is taken for one
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
@@ -143,7 +145,8 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
     errors = {part: held_out(engine, fit, engine.noise_with(part)) for part in FIELDS}
     part = min(errors, key=lambda part: errors[part])
     usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
-    if errors[part] > BETTER**2 * errors[usual]:
+    needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
+    if errors[part] > needed**2 * errors[usual]:
         return fit
     names, fixed = parameters(accepted)
     return engine.fit(
