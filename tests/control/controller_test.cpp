@@ -110,8 +110,12 @@ TEST(Controller, DoesNotAllocateNorThrow) {
   SimulatedRobot<3> robot(loop.system, loop.start, {}, {35e-6, 1e-3});
   Measurement<3> measured;
   MotorAngles<3> v;
-  static_assert(noexcept(controller.advance(measured, {}, {}, v)) && noexcept(robot.move(v, period)) &&
-                noexcept(robot.measure(measured)) && Device<SimulatedRobot<3>, 3>);
+  const Reference still;
+  const TipLoad none;
+  static_assert(noexcept(controller.advance(measured, still, none, v)));
+  static_assert(noexcept(robot.move(v, period)));
+  static_assert(noexcept(robot.measure(measured)));
+  static_assert(Device<SimulatedRobot<3>, 3>);
   for (const auto what : {TipForce::unknown, TipForce::estimated})
     for (const auto at_limits : {AtLimits::hold, AtLimits::redistribute}) {
       controller.tip_force = what;
