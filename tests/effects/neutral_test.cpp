@@ -93,8 +93,8 @@ TYPED_TEST(NeutralEffects, TakeTheFastPathWhereNoEffectChangesTheRod) {
   Solution<N> general, plain;
   ASSERT_EQ(solve(model, c.q, c.load, ws, general), Status::ok);
   ASSERT_EQ(solve(Model<N>(c.robot), c.q, c.load, plain_ws, plain), Status::ok);
-  EXPECT_EQ(general.position, plain.position);
-  EXPECT_EQ(general.rotation, plain.rotation);
+  EXPECT_LE((general.position - plain.position).norm(), 1e-12);
+  EXPECT_LE((general.rotation - plain.rotation).norm(), 1e-11);
 }
 
 TYPED_TEST(NeutralEffects, HaveExactDerivativesByJointsAndLoad) {

@@ -19,7 +19,8 @@ Catalogue::On<N> random_effects(Random& random, double sigmas = 1) {
     for (int k = 0; k < int(effect.parameters.size()); ++k)
       for (int i = 0; i < effect.size(k); ++i) {
         const EffectParameter& p = effect.parameters[std::size_t(k)];
-        const double reach = sigmas * p.sigma;
+        // Differences need functions that are smooth over their steps: forms stay near the usual ones.
+        const double reach = (p.role == Role::amplitude ? 1 : 0.3) * sigmas * p.sigma;
         effect.values[std::size_t(effect.place(k, i))] =
             uniform(random, std::max(p.neutral - reach, p.soft_low), std::min(p.neutral + reach, p.soft_high));
       }
