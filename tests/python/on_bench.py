@@ -1,5 +1,4 @@
 """What is tested on the simulated bench, inside of `ctcr sim bench`: test_ethercat.py runs this file there.
-
 The simulated robot is that of the file whose name is in ROBOT_FILE, without noise.
 """
 
