@@ -1,6 +1,5 @@
 """What is tested on the simulated bench, inside of `ctcr sim bench`: test_ethercat.py runs this file there.
-The simulated robot is that of the file whose name is in ROBOT_FILE, without noise.
-"""
+The simulated robot is that of the file whose name is in ROBOT_FILE, without noise."""
 
 import json
 import os
