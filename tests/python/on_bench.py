@@ -1,5 +1,4 @@
-"""What is tested on the simulated bench, inside of `ctcr sim bench`: test_ethercat.py runs this file there.
-The simulated robot is that of the file whose name is in ROBOT_FILE, without noise."""
+"""Tests on the simulated bench, of ROBOT_FILE without noise: test_ethercat.py runs them in `ctcr sim bench`."""
 
 import json
 import os
@@ -301,6 +300,7 @@ def record(plan, target, *options):
     return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=120)
 
 
+@pytest.mark.slow
 def test_record(tmp_path, folder, robot):
     """Poses are those of the model at the joints of the encoders, under the weight that was hung."""
     path, target = plan(tmp_path / "plan.csv", 4, force=0.1), tmp_path / "out"

@@ -152,6 +152,7 @@ def test_driver_reads_the_pose_of_the_model(port, folder, replies):
     (folder / "motors").unlink()
 
 
+@pytest.mark.slow  # asks that nothing else keeps the machine busy
 def test_every_frame_is_read_once(port):
     with tracker(port) as aurora:
         aurora.connect()
@@ -183,6 +184,7 @@ def test_unseen_tools(port, folder):
         assert reading.out_of_volume and reading.position is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["garbage", "wrong_crc"])
 @pytest.mark.parametrize("replies", ["BX", "TX"])
 def test_damaged_answers_are_asked_again(port, folder, fault, replies):
