@@ -164,6 +164,7 @@ def test_every_frame_is_read_once(port):
     assert len(numbers) >= 0.9 * (numbers[-1] - numbers[0] + 1)
 
 
+@pytest.mark.slow
 def test_answers_take_the_time_of_the_line(port):
     with tracker(port, baud=9600, replies="TX") as aurora:
         aurora.connect()
@@ -220,6 +221,7 @@ def test_back_after_a_fault(port, folder, fault, says):
         assert aurora.read().readings[0].position is not None
 
 
+@pytest.mark.slow
 def test_connects_through_a_bad_line(port, folder):
     set_faults(folder, garbage=0.1)
     with tracker(port, answer_s=0.1, tries=20) as aurora:

@@ -170,8 +170,13 @@ class Aurora:
             raise self._fault("no tool is plugged in", "plug the sensor into the device and connect again")
 
     def _handles(self, kind: str) -> list[int]:
-        text = self._ask("PHSR", kind)
-        return [int(text[2 + 5 * i : 4 + 5 * i], 16) for i in range(int(text[:2], 16))]
+        for _ in range(self._tries):
+            text = self._ask("PHSR", kind)
+            try:
+                return [int(text[2 + 5 * i : 4 + 5 * i], 16) for i in range(int(text[:2], 16))]
+            except ValueError:  # the late answer to an earlier command
+                self.damaged_answers += 1
+        raise self._fault("its answers belong to other commands", "connect again")
 
     # ---- questions and answers
 
