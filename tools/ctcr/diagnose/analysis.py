@@ -153,7 +153,7 @@ def _diagnose(
             fit = _with_shapes(engine, accepted, round_.before, fit, progress)
             if accepted[0].share < EXPLAINED:
                 break  # no effect is stacked on one that hardly explains anything
-        pool = [c for c in pool if c.id != entry.id]
+        pool = [c for c in pool if c.id not in round_.ids]
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
