@@ -150,7 +150,7 @@ def _diagnose(
         accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, entry.share))
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(entry.fit), progress)
         if racing.is_rejected(engine, fit):
-            fit = _with_shapes(engine, accepted, round_.before, fit, progress)
+            fit = _with_shapes(engine, accepted, fit, progress)
             if accepted[0].share < EXPLAINED:
                 break  # no effect is stacked on one that hardly explains anything
         pool = [c for c in pool if c.id not in round_.ids]
@@ -158,8 +158,7 @@ def _diagnose(
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
-    as_stated = engine.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
-    floor = as_stated.floor_mm(locked)
+    floor = engine.as_stated(fit).floor_mm(locked)
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
@@ -169,7 +168,7 @@ def _diagnose(
 
 
 def _with_shapes(
-    engine: Engine, accepted: list[Accepted], before: identify.Fit, fit: identify.Fit, progress: Progress
+    engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress: Progress
 ) -> identify.Fit:
     """Frees the shape parameters of the last accepted effect where that helps: its form may be another one."""
     last = accepted[-1].entry

@@ -144,6 +144,10 @@ class Engine:
             start=at.values, starts=1,
         )  # fmt: skip
 
+    def as_stated(self, fit: identify.Fit) -> identify.Fit:
+        """The linearised fit under the noise as stated, whatever model error had to be admitted."""
+        return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
+
     def linear(self, fit: identify.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)

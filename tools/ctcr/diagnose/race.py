@@ -102,7 +102,7 @@ def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
     """Whether noise alone, as stated, does not explain what is left."""
     if np.max(fit.inflation) > 1.2:
         return True
-    return engine.linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value < SIGNIFICANCE
+    return engine.as_stated(fit).p_value < SIGNIFICANCE
 
 
 def parameters(entries: Iterable[Entry]) -> tuple[list[str], dict[str, float]]:

@@ -29,6 +29,7 @@ CUBE_TOUR = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
 TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stability margin", "posture")
 MOST_BYTES = 1 << 18
 
+Lengths = Annotated[list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")]
 Weight = Annotated[
     list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)
 ]
@@ -75,9 +76,7 @@ class Tasks(Section):
     limit_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 1e4), least=0)] = 100.0
     obstacle_strength_m3_s: Annotated[float, Quantity("m^3/s", usual=(1e-6, 100), least=0)] = 0.1
     stability_wanted: Annotated[float, Quantity("", usual=(0.01, 1), least=0)] = 0.3
-    posture_beta_mm: Annotated[
-        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
-    ] = None
+    posture_beta_mm: Lengths = None
     posture_alpha_deg: Annotated[
         list[float] | None, Quantity("deg", usual=(0, 720), count="one number a tube,")
     ] = None
@@ -91,12 +90,8 @@ class Limits(Section):
     tip_gap_mm: Annotated[float, Quantity("mm", usual=(0.1, 300), least=0)] = 2.0
     translation_mm_s: Annotated[float, Quantity("mm/s", usual=(1, 1000), above=0)] = 100.0
     rotation_deg_s: Annotated[float, Quantity("deg/s", usual=(5, 5000), above=0)] = 570.0
-    beta_low_mm: Annotated[
-        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
-    ] = None
-    beta_high_mm: Annotated[
-        list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")
-    ] = None
+    beta_low_mm: Lengths = None
+    beta_high_mm: Lengths = None
     at_limits: Literal["hold", "redistribute"] = Field("hold", description="hold or redistribute")
 
 
