@@ -14,6 +14,7 @@ nanobind_add_module(_core NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
 file(GLOB control CONFIGURE_DEPENDS tools/ctcr/_core/control_of_*.cpp)
 set_source_files_properties(${control} PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
 target_link_libraries(_core PRIVATE ctcr::calibration ctcr_flags)
+target_precompile_headers(_core PRIVATE <Eigen/Dense>)
 target_compile_definitions(_core PRIVATE CTCR_VERSION="${PROJECT_VERSION}")
 nanobind_add_stub(core_stub MODULE _core OUTPUT _core.pyi MARKER_FILE py.typed
                   PYTHON_PATH $<TARGET_FILE_DIR:_core> DEPENDS _core)

@@ -26,8 +26,8 @@ using Kinds = testing::Types<
     Equations<2, Loading::none, Derivatives::none>, Equations<3, Loading::none, Derivatives::jacobian>,
     Equations<4, Loading::none, Derivatives::none>, Equations<1, Loading::force, Derivatives::none>,
     Equations<2, Loading::force, Derivatives::jacobian>, Equations<3, Loading::force, Derivatives::none>,
-    Equations<3, Loading::force, Derivatives::compliance>, Equations<4, Loading::wrench, Derivatives::none>,
-    Equations<3, Loading::wrench, Derivatives::jacobian>, Equations<2, Loading::wrench, Derivatives::compliance>,
+    Equations<3, Loading::force, Derivatives::compliance>, Equations<4, Loading::weight, Derivatives::none>,
+    Equations<3, Loading::weight, Derivatives::jacobian>, Equations<2, Loading::weight, Derivatives::compliance>,
     Equations<1, Loading::weight, Derivatives::compliance>, Equations<3, Loading::weight, Derivatives::none>,
     Equations<4, Loading::weight, Derivatives::jacobian>, Equations<3, Loading::weight, Derivatives::compliance>>;
 TYPED_TEST_SUITE(Newton, Kinds);
@@ -92,9 +92,9 @@ private:
 
 template <class K>
 test::Case<K::N> random_case(Random& random) {
-  const bool moment = K::L == Loading::wrench || K::L == Loading::weight;
-  return test::smooth_case<K::N>(random, K::L == Loading::none ? 0 : 0.3, moment ? 0.01 : 0,
-                                 K::L == Loading::weight ? test::tilted_gravity : Vec3(0, 0, 0));
+  const bool any_load = K::L == Loading::weight;
+  return test::smooth_case<K::N>(random, K::L == Loading::none ? 0 : 0.3, any_load ? 0.01 : 0,
+                                 any_load ? test::tilted_gravity : Vec3(0, 0, 0));
 }
 
 TYPED_TEST(Newton, BuEqualsDifferencesOfTheDiscreteMap) {

@@ -229,9 +229,38 @@ def test_add_without_measurements(run, tmp_path, robot):
     assert written == {"softening": {"gamma": [0, 0.01, 0], "plateau": 0.25, "sharpness": 2}}
 
 
+def test_add_what_a_diagnosis_found(run, tmp_path, robot):
+    answer, target = tmp_path / "diagnosis.json", tmp_path / "new.yaml"
+    found = [
+        {"class": ["friction", "backlash_rotation"], "parameters": {"law": 1.0, "coefficient.1": 0.3}},
+        {"class": ["frame_jump"], "parameters": {"when": 0.25}},
+    ]
+    answer.write_text(json.dumps({"effects": found}))
+    code, _, err = run("add", ROBOT, "--diagnosis", answer, "--set", "delay=0.1", "delay", "-o", target)
+    assert code == 0, err
+    written = robot_file.load(target).effects
+    assert list(written) == ["delay", "friction", "frame_jump"]
+    assert written["friction"]["law"] == 1 and written["frame_jump"]["when"] == 0.25
+    assert not any(written["friction"]["coefficient"])  # a strength is fitted, not taken over
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [(None, "cannot be read"), ("[]", "is not what ctcr diagnose writes"), ("{", "is not what"),
+     ('{"effects": []}', "nothing was found to add")],
+)  # fmt: skip
+def test_faults_of_a_diagnosis(text, message, run, tmp_path):
+    answer = tmp_path / "diagnosis.json"
+    if text:
+        answer.write_text(text)
+    code, _, err = run("add", ROBOT, "--diagnosis", answer, "-o", tmp_path / "x.yaml")
+    assert code == 1 and message in err and str(answer) in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["-o", "x.yaml"], "name an effect"),
         (["softening"], "give -o"),
         (["softening", "-o", ROBOT], "is the input"),
         (["soften", "-o", "x.yaml"], "did you mean softening?"),

@@ -10,7 +10,6 @@
                                                              Evaluation<N, Loading::L, Derivatives::D>&) noexcept;
 #define CTCR_TEST_LOADED_EVALUATIONS(kind, D, Stepper, N) \
   CTCR_TEST_EVALUATION(kind, D, force, Stepper, N)        \
-  CTCR_TEST_EVALUATION(kind, D, wrench, Stepper, N)       \
   CTCR_TEST_EVALUATION(kind, D, weight, Stepper, N)
 #define CTCR_TEST_EVALUATIONS_none(kind, Stepper, N) \
   CTCR_TEST_EVALUATION(kind, none, none, Stepper, N) \

@@ -1,7 +1,9 @@
 """Values of effects' parameters as the command line gives them: friction.coefficient.1=0.02, delay=0.05."""
 
+import json
 from collections.abc import Iterable, Sequence
 from math import isfinite
+from pathlib import Path
 
 from ctcr import effects
 from ctcr.errors import InputError, Problem, did_you_mean
@@ -24,6 +26,28 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
     if problems:
         raise InputError(problems)
     return found
+
+
+def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float]]:
+    """The effects that `ctcr diagnose --json` found, the first of each class, and the values of their choices.
+
+    Raises InputError where the file is not such an answer.
+    """
+    try:
+        answer = json.loads(Path(path).read_text(encoding="utf-8"))
+        found = [(entry["class"][0], dict(entry["parameters"])) for entry in answer["effects"]]
+    except OSError as error:
+        raise InputError(Problem(f"cannot be read: {error.strerror}", path)) from None
+    except (ValueError, LookupError, TypeError):
+        raise InputError(Problem("is not what ctcr diagnose writes with --json", path)) from None
+    ids, values = [], {}
+    for identity, parameters in found:
+        effect = effects.get(identity, robot.n_tubes)
+        ids.append(effect.id)
+        for parameter in effect.parameters:
+            if parameter.kind == "choice" and parameter.name in parameters:
+                values |= dict.fromkeys(parameter.full_names, float(parameters[parameter.name]))
+    return ids, values
 
 
 def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:

@@ -20,11 +20,6 @@ S exponential_of(const S& x) noexcept {
   return mapped(x, e, e);
 }
 
-template <class S>
-S logarithm_of(const S& x) noexcept {
-  return mapped(x, std::log(value(x)), 1 / value(x));
-}
-
 /// |x|.
 template <class S>
 S magnitude(const S& x) noexcept {

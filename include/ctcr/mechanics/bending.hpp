@@ -1,9 +1,11 @@
 #pragma once
 // The law by which one tube resists bending: that of Material. T is the scalar of the answers, S or double (its value).
+#include <array>
+#include <cmath>
 #include <type_traits>
 
 #include "ctcr/effects/hooks.hpp"
-#include "ctcr/math/functions.hpp"
+#include "ctcr/math/dual.hpp"
 
 namespace ctcr::bending {
 
@@ -22,30 +24,72 @@ std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept 
   return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
 }
 
-/// f, what softening leaves of a stiffness where d A d = z.
-template <class T, class S>
-T stiffness_left(const Material<S>& m, const T& z) noexcept {
-  const T c = as<T>(m.softening);
-  if (!(value(c) * value(z) > 1e-12)) return 1.0 - c * z;  // there the same, with the derivatives of p = 2
-  const T r = as<T>(m.plateau), p = as<T>(m.sharpness), rest = 1.0 - r;
-  const T t = exponential_of(T(0.5 * p * logarithm_of(T(2.0 * c * z * inverse(rest)))));
-  return r + rest * exponential_of(T(-(logarithm_of(T(1.0 + t)) * inverse(p))));
-}
-/// df/dz.
-template <class S>
-double loss_slope(const Material<S>& m, double z) noexcept {
-  const double c = value(m.softening), p = value(m.sharpness), rest = 1 - value(m.plateau);
-  if (!(c * z > 1e-12)) return -c;
-  const double t = std::pow(2 * c * z / rest, p / 2);
-  return -rest / (2 * z) * t * std::pow(1 + t, -1 / p - 1);
+/// f, what softening leaves of a stiffness where d A d = z, and its slopes.
+struct Left {
+  double f, by_z, by_softening, by_plateau, by_sharpness;
+};
+
+/// f = r + (1 - r) (1 + t)^(-1/p), t = (2 c z / (1 - r))^(p/2), with the softening c, the plateau r, the sharpness p.
+inline Left stiffness_left(double z, double c, double r, double p) noexcept {
+  if (!(c * z > 1e-12)) return {1 - c * z, -c, -z, 0, 0};  // there the same, with the derivatives of p = 2
+  const double rest = 1 - r, power = std::log(2 * c * z / rest), t = std::exp(0.5 * p * power);
+  const double fall = std::log(1 + t) / p, left = rest * std::exp(-fall), part = t / (1 + t);
+  const double by_power = -0.5 * left * part;
+  return {r + left, by_power / z, by_power / c, (rest - left + by_power) / rest,
+          left * (fall - 0.5 * part * power) / p};
 }
 
-/// Bending moment of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [N m].
+/// A symmetric 2 x 2 matrix.
+struct Slope {
+  double xx = 0, xy = 0, yy = 0;
+
+  template <class T>
+  std::array<T, 2> operator*(const std::array<T, 2>& v) const noexcept {
+    return {xx * v[0] + xy * v[1], xy * v[0] + yy * v[1]};
+  }
+  Slope& operator+=(const Slope& o) noexcept {
+    xx += o.xx, xy += o.xy, yy += o.yy;
+    return *this;
+  }
+  [[nodiscard]] Slope inverted() const noexcept {
+    const double det = 1.0 / (xx * yy - xy * xy);
+    return {yy * det, -xy * det, xx * det};
+  }
+  /// R (this) R^T, R the turn by the angle of this sine and cosine.
+  [[nodiscard]] Slope turned(double sine, double cosine) const noexcept {
+    const double ss = sine * sine, sc = sine * cosine, cc = cosine * cosine;
+    return {cc * xx - 2 * sc * xy + ss * yy, sc * (xx - yy) + (cc - ss) * xy, ss * xx + 2 * sc * xy + cc * yy};
+  }
+};
+
+/// f EI A, the slope of the moment where softening leaves f and takes no more.
+template <class S>
+Slope stiffness(const Material<S>& m, double f) noexcept {
+  const double k = f * value(m.bending_stiffness), a = value(m.anisotropy[0]);
+  return {k * (1 + a), k * value(m.anisotropy[1]), k * (1 - a)};
+}
+
+/// How a tube resists, its own axes.
+template <class T>
+struct Response {
+  std::array<T, 2> moment;  ///< [N m]
+  Slope slope;              ///< of the moment by the curvature [N m^2]
+};
+
+/// Response of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [1/m].
 template <class T, class S>
-std::array<T, 2> moment(const Material<S>& m, const T& dx, const T& dy) noexcept {
+Response<T> response(const Material<S>& m, const T& dx, const T& dy) noexcept {
   const std::array<T, 2> e = weighed(m, dx, dy);
-  const T k = as<T>(m.bending_stiffness) * stiffness_left(m, T(dx * e[0] + dy * e[1]));
-  return {k * e[0], k * e[1]};
+  T k = as<T>(m.bending_stiffness);
+  if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
+  const T z = dx * e[0] + dy * e[1];
+  const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness));
+  const double loss = 2 * value(m.bending_stiffness) * left.by_z, x = value(e[0]), y = value(e[1]);
+  Slope slope = stiffness(m, left.f);
+  slope += {loss * x * x, loss * x * y, loss * y * y};
+  k = k * (mapped(z, left.f, left.by_z) + mapped(as<T>(m.softening), 0, left.by_softening) +
+           mapped(as<T>(m.plateau), 0, left.by_plateau) + mapped(as<T>(m.sharpness), 0, left.by_sharpness));
+  return {{k * e[0], k * e[1]}, slope};
 }
 
 }  // namespace ctcr::bending

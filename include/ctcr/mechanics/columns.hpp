@@ -8,8 +8,7 @@ namespace ctcr {
 enum class Loading {
   none,    ///< moments inside the tubes only
   force,   ///< tip force: turning the tip about it changes nothing, two unknown turns are left
-  wrench,  ///< tip force and moment: three unknown turns of the tip
-  weight,  ///< the tubes' own weight besides
+  weight,  ///< tip force and moment and the tubes' own weight, any of them: three unknown turns of the tip
 };
 
 /// Where each direction of differentiation stands in the lanes of a pass and of the linear system behind it.

@@ -105,37 +105,42 @@ public:
   [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
     Bend b;
     std::array<Material<S>, N> material;
-    Slope slope{};
+    bending::Slope slope;
     std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
     bool linear = true;
     for (int j = 0; j < place.present; ++j) {
       const auto i = std::size_t(j);
-      Material<S>& m = material[i] = material_of(place, j);
+      const Material<S>& m = material[i] = material_of(place, j);
       sincos(y.psi(j), b.sine[i], b.cosine[i]);
       b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
-      add_stiffness(m, b, i, 1.0, slope);
-      const auto e = bending::weighed(m, value(m.curvature[0]), value(m.curvature[1]));
-      const double k = value(m.bending_stiffness);
-      moment[0] += k * (value(b.cosine[i]) * e[0] - value(b.sine[i]) * e[1]);
-      moment[1] += k * (value(b.sine[i]) * e[0] + value(b.cosine[i]) * e[1]);
+      const bending::Slope unsoftened = bending::stiffness(m, 1.0);
+      const auto q = unsoftened * std::array{value(m.curvature[0]), value(m.curvature[1])};
+      const double s = value(b.sine[i]), c = value(b.cosine[i]);
+      moment[0] += c * q[0] - s * q[1];
+      moment[1] += s * q[0] + c * q[1];
+      slope += unsoftened.turned(s, c);
       linear = linear && value(m.softening) == 0;
     }
-    // The value by Newton's method; one more step of it with derivatives then makes them exact.
-    slope = inverted(slope);
-    std::array<double, 2> u = slope * moment;
-    if (!linear) {
-      double left = 1;  // (relative change)^2
-      for (int k = 0; k < softening_iterations && left > 1e-16; ++k) {
-        slope = inverted(tangent(place, material, b, u));
-        const auto change = slope * unbalanced<double>(place, y, material, b, u, nullptr);
-        u = {u[0] + change[0], u[1] + change[1]};
-        left = (change[0] * change[0] + change[1] * change[1]) / (1 + u[0] * u[0] + u[1] * u[1]);
-      }
-      slope = inverted(tangent(place, material, b, u));
+    // The value by Newton's method; one more step of it with derivatives then makes both exact to rounding.
+    std::array<double, 2> u = slope.inverted() * moment;
+    double left = linear ? 0 : 1;  // (relative change)^2
+    for (int k = 0; k < softening_iterations && left > 1e-10; ++k) {
+      Tubes<double> ignored;
+      const auto change = newton_step(place, y, material, b, u, ignored);
+      u = {u[0] + change[0], u[1] + change[1]};
+      left = (change[0] * change[0] + change[1] * change[1]) / (1 + u[0] * u[0] + u[1] * u[1]);
     }
-    const auto change = slope * unbalanced<S>(place, y, material, b, {S(u[0]), S(u[1])}, nullptr);
+    Tubes<S> tubes;
+    const std::array<S, 2> change = newton_step(place, y, material, b, {S(u[0]), S(u[1])}, tubes);
     b.u = {u[0] + change[0], u[1] + change[1]};
-    (void)unbalanced<S>(place, y, material, b, b.u, &b);
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
+      const std::array<S, 2> more = seen_by_tube(b, i, change);
+      const std::array<S, 2> moment_more = tubes[i].slope * more;
+      for (std::size_t k = 0; k < 2; ++k) {
+        b.curvature[i][k] = b.curvature[i][k] + more[k];
+        b.moment[i][k] = tubes[i].moment[k] + moment_more[k];
+      }
+    }
     return b;
   }
 
@@ -166,18 +171,8 @@ public:
 private:
   static constexpr int softening_iterations = 12;  ///< convex and quadratic: 3 are usual
 
-  /// A symmetric 2 x 2 matrix.
-  struct Slope {
-    double xx = 0, xy = 0, yy = 0;
-    template <class T>
-    std::array<T, 2> operator*(const std::array<T, 2>& v) const noexcept {
-      return {xx * v[0] + xy * v[1], xy * v[0] + yy * v[1]};
-    }
-  };
-  static Slope inverted(const Slope& a) noexcept {
-    const double det = 1.0 / (a.xx * a.yy - a.xy * a.xy);
-    return {a.yy * det, -a.xy * det, a.xx * det};
-  }
+  template <class T>
+  using Tubes = std::array<bending::Response<T>, N>;
 
   [[nodiscard]] bool has_curve(int i) const noexcept { return value(in_.tubes[std::size_t(i)].curved_length) > 0; }
 
@@ -207,57 +202,31 @@ private:
     return m;
   }
 
-  /// Adds f R K R^T.
-  static void add_stiffness(const Material<S>& m, const Bend& b, std::size_t i, double f, Slope& slope) noexcept {
-    const double s = value(b.sine[i]), c = value(b.cosine[i]), k = f * value(m.bending_stiffness);
-    const double a = value(m.anisotropy[0]), o = value(m.anisotropy[1]);
-    const double xx = k * (1 + a), yy = k * (1 - a), xy = k * o;
-    slope.xx += c * c * xx - 2 * s * c * xy + s * s * yy;
-    slope.xy += s * c * (xx - yy) + (c * c - s * s) * xy;
-    slope.yy += s * s * xx + 2 * s * c * xy + c * c * yy;
+  /// A vector of the Bishop frame in the axes of a tube.
+  template <class T>
+  static std::array<T, 2> seen_by_tube(const Bend& b, std::size_t i, const std::array<T, 2>& v) noexcept {
+    const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
+    return {c * v[0] + s * v[1], c * v[1] - s * v[0]};
   }
 
-  /// Slope of the tubes' moment by u, softening included.
-  static Slope tangent(const Place& place, const std::array<Material<S>, N>& material, const Bend& b,
-                       const std::array<double, 2>& u) noexcept {
-    Slope slope;
+  /// By how much curvature u must change so that the tubes balance the moment, and how each of them answers to u.
+  template <class T>
+  static std::array<T, 2> newton_step(const Place& place, const State& y, const std::array<Material<S>, N>& material,
+                                      Bend& b, const std::array<T, 2>& u, Tubes<T>& tubes) noexcept {
+    bending::Slope slope;
+    std::array<T, 2> rest{bending::as<T>(y.m(0)), bending::as<T>(y.m(1))};
     for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
       const Material<S>& m = material[i];
-      const double s = value(b.sine[i]), c = value(b.cosine[i]);
-      const double dx = c * u[0] + s * u[1] - value(m.curvature[0]), dy = c * u[1] - s * u[0] - value(m.curvature[1]);
-      const auto e = bending::weighed(m, dx, dy);
-      const double z = dx * e[0] + dy * e[1];
-      add_stiffness(m, b, i, bending::stiffness_left(m, z), slope);
-      const double loss = 2 * value(m.bending_stiffness) * bending::loss_slope(m, z);
-      const double x = c * e[0] - s * e[1], y = s * e[0] + c * e[1];
-      slope.xx += loss * x * x;
-      slope.xy += loss * x * y;
-      slope.yy += loss * y * y;
-    }
-    return slope;
-  }
-
-  /// The moment that is not balanced by the tubes bent with u; keeps each tube's curvature and moment in `keep`.
-  template <class T>
-  static std::array<T, 2> unbalanced(const Place& place, const State& y, const std::array<Material<S>, N>& material,
-                                     const Bend& b, const std::array<T, 2>& u, Bend* keep) noexcept {
-    T rx = bending::as<T>(y.m(0)), ry = bending::as<T>(y.m(1));
-    for (int j = 0; j < place.present; ++j) {
-      const auto i = std::size_t(j);
-      const Material<S>& m = material[i];
       const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
-      const T ux = c * u[0] + s * u[1], uy = c * u[1] - s * u[0];
-      const std::array<T, 2> q =
-          bending::moment(m, T(ux - bending::as<T>(m.curvature[0])), T(uy - bending::as<T>(m.curvature[1])));
-      rx = rx - (c * q[0] - s * q[1]);
-      ry = ry - (s * q[0] + c * q[1]);
-      if constexpr (std::is_same_v<T, S>)
-        if (keep != nullptr) {
-          keep->curvature[i] = {ux, uy};
-          keep->moment[i] = q;
-        }
+      const std::array<T, 2> w = seen_by_tube(b, i, u);
+      tubes[i] =
+          bending::response(m, T(w[0] - bending::as<T>(m.curvature[0])), T(w[1] - bending::as<T>(m.curvature[1])));
+      const std::array<T, 2>& q = tubes[i].moment;
+      rest = {rest[0] - (c * q[0] - s * q[1]), rest[1] - (s * q[0] + c * q[1])};
+      slope += tubes[i].slope.turned(value(s), value(c));
+      if constexpr (std::is_same_v<T, S>) b.curvature[i] = w;
     }
-    return {rx, ry};
+    return slope.inverted() * rest;
   }
 
   State rates(const Place& place, const State& y, std::array<S, 2>& u) const noexcept {
@@ -330,7 +299,7 @@ private:
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       const Material<S> mat = material_of(place, j);
-      const std::array<S, 2> q = bending::moment(mat, mat.curvature[0], mat.curvature[1]);
+      const std::array<S, 2> q = bending::response(mat, mat.curvature[0], mat.curvature[1]).moment;
       S s, c;
       sincos(y.psi(j), s, c);
       m[i] = {s * q[1] - c * q[0], -(s * q[0] + c * q[1])};

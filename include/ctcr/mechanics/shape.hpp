@@ -278,10 +278,8 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
   if (!(status == Status::ok || status == Status::singular || status == Status::not_converged)) return status;
   if constexpr (!Fx::none)
     detail::fill_shape_with_effects(model, q, load, ws.guess, settings.steps, points);
-  else if (!model.coefficients().gravity.isZero(0.0))
+  else if (!model.coefficients().gravity.isZero(0.0) || !load.force.isZero(0.0) || !load.moment.isZero(0.0))
     detail::fill_shape<Loading::weight>(model, q, load, ws.guess, settings.steps, points);
-  else if (!load.force.isZero(0.0) || !load.moment.isZero(0.0))
-    detail::fill_shape<Loading::wrench>(model, q, load, ws.guess, settings.steps, points);
   else
     detail::fill_shape<Loading::none>(model, q, load, ws.guess, settings.steps, points);
   return status;

@@ -317,10 +317,9 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   using enum Loading;
   if constexpr (!Fx::none || requires { Stepper::general_equations; })
     out.status = run(std::integral_constant<Loading, weight>{});
-  else if (!model.coefficients().gravity.isZero(0.0))
+  else if (!model.coefficients().gravity.isZero(0.0) || !load.moment.isZero(0.0) ||
+           (D == Derivatives::compliance && load.force.isZero(0.0)))
     out.status = run(std::integral_constant<Loading, weight>{});
-  else if (!load.moment.isZero(0.0) || (D == Derivatives::compliance && load.force.isZero(0.0)))
-    out.status = run(std::integral_constant<Loading, wrench>{});
   else if (D == Derivatives::compliance || !load.force.isZero(0.0))
     out.status = run(std::integral_constant<Loading, force>{});
   else if constexpr (D != Derivatives::compliance)

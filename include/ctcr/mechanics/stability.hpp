@@ -105,16 +105,14 @@ private:
   Frame<S> frame_{};
 };
 
-/// Calls f with the BaseProblem that fits the loads. A tip force alone is treated as a wrench.
+/// Calls f with the BaseProblem that fits the loads. A tip force alone is treated as any load.
 template <class F, int N>
 inline auto with_base_problem(const Model<N>& model, const Joints<N>& q, const TipLoad& load, const Settings& settings,
                               const F& f) noexcept {
-  if (!model.coefficients().gravity.isZero(0.0))
+  if (!model.coefficients().gravity.isZero(0.0) || !load.force.isZero(0.0) || !load.moment.isZero(0.0))
     return f(BaseProblem<Loading::weight, N>(model, q, load, settings.steps));
-  if (!load.force.isZero(0.0) || !load.moment.isZero(0.0))
-    return f(BaseProblem<Loading::wrench, N>(model, q, load, settings.steps));
   if constexpr (N > 1) return f(BaseProblem<Loading::none, N>(model, q, load, settings.steps));
-  return decltype(f(BaseProblem<Loading::wrench, N>(model, q, load, settings.steps))){};
+  return decltype(f(BaseProblem<Loading::weight, N>(model, q, load, settings.steps))){};
 }
 
 /// The equilibria along which the base of one tube is turned: a curve in the unknowns and the turn.

@@ -6,7 +6,7 @@ function(run)
 endfunction()
 
 run(${CMAKE_COMMAND} --install ${library} --prefix ${build}/installed)
-run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build}/build -G ${generator} -D example=${example}
+run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build}/build -G ${generator}
     -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_PREFIX_PATH=${build}/installed)
 run(${CMAKE_COMMAND} --build ${build}/build)
 run(${build}/build/consumer)

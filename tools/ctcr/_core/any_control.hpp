@@ -9,8 +9,7 @@ namespace ctcr::python {
 /// A system as its parameters, in the order of SystemParameters<N, Catalogue>.
 struct SystemValues {
   Eigen::VectorXd parameters;  ///< as Table::parameters
-  Eigen::VectorXd effects;     ///< as Table::effects
-  bool has_effects = false;    ///< false: the standard model
+  Eigen::VectorXd effects;     ///< as Table::effects; empty: the standard model
   int steps = 1;               ///< integration steps per segment
 };
 

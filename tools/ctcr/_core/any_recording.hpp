@@ -71,7 +71,7 @@ struct CatalogueEntry {
   bool order, time, orientation, loads, gravity;
 };
 
-/// Defined for N = 1..4. The standard model where no effect is at work, free or a profile.
+/// Defined for N = 1..4.
 /// @throws std::invalid_argument unless the arrays fit together
 template <int N>
 std::unique_ptr<AnyRecording> make_recording(const Table& table);

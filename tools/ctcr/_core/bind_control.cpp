@@ -39,8 +39,8 @@ SensitivityResult any_sensitivity(Eigen::Index tubes, const SensitivityRequest& 
 
 void bind_control(nb::module_& m) {
   nb::class_<SystemValues>(m, "SystemValues", "A robot as its parameters; see ctcr.recording.values.")
-      .def(nb::init<const Eigen::VectorXd&, const Eigen::VectorXd&, bool, int>(), nb::kw_only(), "parameters"_a,
-           "effects"_a, "has_effects"_a, "steps"_a = 1);
+      .def(nb::init<const Eigen::VectorXd&, const Eigen::VectorXd&, int>(), nb::kw_only(), "parameters"_a, "effects"_a,
+           "steps"_a = 1);
   nb::class_<TaskValues>(m, "TaskValues", "Weights (6, 2) and settings of the tasks; SI units.")
       .def(nb::init<const RowMajor&, double, double, double, double, double, double, double, const Eigen::Vector3d&,
                     double, double, double, double, double, const Eigen::VectorXd&, const Eigen::VectorXd&, double>(),

@@ -2,44 +2,18 @@
 // Closed loops of a robot of N tubes. Each N is compiled in a file of its own.
 #include <ctcr/control/closed_loop.hpp>
 #include <ctcr/control/path.hpp>
-#include <ctcr/effects/catalogue.hpp>
 #include <ctcr/parallel/thread_pool.hpp>
 #include <ctcr/simulation/sensitivity.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>
-#include <memory>
 #include <variant>
 
+#include "all_effects.hpp"
 #include "any_control.hpp"
-#include "plain_system.hpp"
-#include "solver_of.hpp"
 
 namespace ctcr::python {
 
 template <int N>
 using AllTasks = TaskList<Tracking, Damping, LimitAvoidance, ObstacleAvoidance, StabilityMargin, Posture<N>>;
-
-/// A device whose effects are known at run time.
-template <int N>
-class AnyPlant {
-public:
-  virtual ~AnyPlant() = default;
-  virtual Status move(const MotorAngles<N>& velocity, double period) noexcept = 0;
-  virtual Status measure(Measurement<N>& out) noexcept = 0;
-  [[nodiscard]] virtual Pose exact_reading() const noexcept = 0;
-};
-
-template <int N, class Fx>
-class PlantOf final : public AnyPlant<N> {
-public:
-  template <class... Arguments>
-  explicit PlantOf(const Arguments&... arguments) : robot_(arguments...) {}
-  Status move(const MotorAngles<N>& velocity, double period) noexcept override { return robot_.move(velocity, period); }
-  Status measure(Measurement<N>& out) noexcept override { return robot_.measure(out); }
-  [[nodiscard]] Pose exact_reading() const noexcept override { return robot_.exact_reading(); }
-
-private:
-  SimulatedRobot<N, Fx> robot_;
-};
 
 /// Rests at a point.
 struct StillPath {
@@ -71,18 +45,13 @@ AllTasks<N> tasks_of(const TaskValues& v) {
            Posture<N>{weight(5), {v.posture_beta, v.posture_alpha}, v.posture_rate}}};
 }
 
-/// Calls f with the system, of the standard model or with the catalogue of effects.
-template <int N, class F>
-auto with_system(const SystemValues& values, const F& f) {
-  const System<N> plain = plain_system<N>(values.parameters, 0, values.steps);
-  if (!values.has_effects) return f(plain);
-  typename Catalogue::On<N> effects;
-  effects.for_each([&](auto& effect, int first) {
-    for (std::size_t k = 0; k < effect.values.size(); ++k) effect.values[k] = values.effects[first + Eigen::Index(k)];
-  });
-  effects = effects.template seeded<double>([](double x, int) { return x; });  // switches off what does not act
-  return f(System<N, Catalogue>{plain.transmission, Model<N, Catalogue>(plain.model.robot(), effects), plain.sensor,
-                                plain.settings});
+template <int N>
+System<N, AllEffects> system_of(const SystemValues& values) {
+  System<N, AllEffects> system = with_effects<N>(plain_system<N>(values.parameters, 0, values.steps), values.effects);
+  // Switches off what does not act.
+  const auto acting = system.model.effects().template seeded<double>([](double x, int) { return x; });
+  system.model = Model<N, AllEffects>(system.model.robot(), acting);
+  return system;
 }
 
 template <int N>
@@ -92,78 +61,72 @@ LoopResult closed_loop(const LoopRequest& r) {
                          r.limits.rotation_speed, r.limits.beta_low, r.limits.beta_high};
   const TipLoad load{r.force, Vec3::Zero()};
 
-  return with_system<N>(r.controller, [&]<class Fx>(const System<N, Fx>& system) {
-    // The path and the obstacle stand in space: a controller with another T_ref sees them elsewhere.
-    const Pose T_base_world = system.sensor.T_tracker_base.inverse() *
-                              plain_system<N>(r.plant.parameters, 0, r.plant.steps).sensor.T_tracker_base;
-    std::vector<Vec3> points;
-    for (Eigen::Index i = 0; i < r.points.rows(); ++i)
-      points.push_back((T_base_world * Pose{Mat3::Identity(), r.points.row(i).transpose()}).position);
-    const AnyPath path = r.spline ? AnyPath{SplinePath(points, r.speed, r.acceleration)}
-                                  : AnyPath{Polyline(points, r.speed, r.acceleration)};
-    const AnyPath start{StillPath{path.at(0), r.settle}};
-    TaskValues seen = r.tasks;
-    seen.obstacle = (T_base_world * Pose{Mat3::Identity(), seen.obstacle}).position;
+  const System<N, AllEffects> system = system_of<N>(r.controller), real = system_of<N>(r.plant);
+  // The path and the obstacle stand in space: a controller with another T_ref sees them elsewhere.
+  const Pose T_base_world = system.sensor.T_tracker_base.inverse() * real.sensor.T_tracker_base;
+  std::vector<Vec3> points;
+  for (Eigen::Index i = 0; i < r.points.rows(); ++i)
+    points.push_back((T_base_world * Pose{Mat3::Identity(), r.points.row(i).transpose()}).position);
+  const AnyPath path = r.spline ? AnyPath{SplinePath(points, r.speed, r.acceleration)}
+                                : AnyPath{Polyline(points, r.speed, r.acceleration)};
+  const AnyPath start{StillPath{path.at(0), r.settle}};
+  TaskValues seen = r.tasks;
+  seen.obstacle = (T_base_world * Pose{Mat3::Identity(), seen.obstacle}).position;
 
-    const MotorAngles<N> home = motor_angles(system.transmission, Joints<N>{r.beta, r.alpha});
-    Controller<N, AllTasks<N>, Fx> controller(system, limits, r.period, tasks_of<N>(seen));
-    controller.at_limits = r.limits.redistribute ? AtLimits::redistribute : AtLimits::hold;
-    controller.tip_force = r.tip_force == "known"       ? TipForce::known
-                           : r.tip_force == "estimated" ? TipForce::estimated
-                                                        : TipForce::unknown;
-    if (const Status status = controller.check_start(home); status != Status::ok) {
-      out.status = to_string(status);
-      return out;
-    }
-    const auto plant =
-        with_system<N>(r.plant, [&]<class Px>(const System<N, Px>& real) -> std::unique_ptr<AnyPlant<N>> {
-          return std::make_unique<PlantOf<N, Px>>(real, home, load, TrackerNoise{r.noise_position, r.noise_rotation},
-                                                  r.seed);
-        });
-    const Pose T_world_base = T_base_world.inverse();
-    const Pose T_world_tracker = T_world_base * system.sensor.T_tracker_base.inverse();
-    const auto tip = [&] { return (T_world_tracker * plant->exact_reading()).position; };
-    const auto wanted = [&](const Reference& reference) { return (T_world_base * reference.pose).position; };
-    Status status = run(controller, *plant, start, r.period, load, [](const auto&) { return true; });
-    out.settled = (tip() - wanted(path.at(0))).norm();
-    out.started = status == Status::ok;
-
-    const auto rows = Eigen::Index(path.duration() / r.period + 0.5) + 1;
-    out.time.setZero(rows);
-    out.joints.setZero(rows, 2 * N);
-    out.tip.setZero(rows, 3);
-    out.wanted.setZero(rows, 3);
-    out.shortfall.setZero(rows, AllTasks<N>::size);
-    out.held.setZero(rows, 4);
-    out.force.setZero(rows, 3);
-    out.stability.setZero(rows);
-    out.model_status.setZero(rows);
-    Eigen::Index k = 0;
-    if (status == Status::ok)
-      status = run(controller, *plant, path, r.period, load, [&](const auto& row) {
-        const Joints<N> q = joints(system.transmission, row.measured.theta);
-        out.time[k] = row.time;
-        out.joints.row(k) << q.beta.transpose(), q.alpha.transpose();
-        out.tip.row(k) = tip().transpose();
-        out.wanted.row(k) = wanted(row.reference).transpose();
-        for (int t = 0; t < AllTasks<N>::size; ++t) out.shortfall(k, t) = row.report.shortfall[std::size_t(t)];
-        const LimitReport& held = row.report.limits;
-        out.held.row(k) << held.base_gaps, held.tip_gaps, held.travel, held.speed;
-        out.force.row(k) = row.report.force.transpose();
-        out.stability[k] = row.report.stability;
-        out.model_status[k] = int(row.report.status);
-        ++k;
-        return true;
-      });
+  const MotorAngles<N> home = motor_angles(system.transmission, Joints<N>{r.beta, r.alpha});
+  Controller<N, AllTasks<N>, AllEffects> controller(system, limits, r.period, tasks_of<N>(seen));
+  controller.at_limits = r.limits.redistribute ? AtLimits::redistribute : AtLimits::hold;
+  controller.tip_force = r.tip_force == "known"       ? TipForce::known
+                         : r.tip_force == "estimated" ? TipForce::estimated
+                                                      : TipForce::unknown;
+  if (const Status status = controller.check_start(home); status != Status::ok) {
     out.status = to_string(status);
-    for (auto* m : {&out.joints, &out.tip, &out.wanted, &out.shortfall, &out.force})
-      m->conservativeResize(k, Eigen::NoChange);
-    out.held.conservativeResize(k, Eigen::NoChange);
-    out.time.conservativeResize(k);
-    out.stability.conservativeResize(k);
-    out.model_status.conservativeResize(k);
     return out;
-  });
+  }
+  SimulatedRobot<N, AllEffects> plant(real, home, load, TrackerNoise{r.noise_position, r.noise_rotation}, r.seed);
+  const Pose T_world_base = T_base_world.inverse();
+  const Pose T_world_tracker = T_world_base * system.sensor.T_tracker_base.inverse();
+  const auto tip = [&] { return (T_world_tracker * plant.exact_reading()).position; };
+  const auto wanted = [&](const Reference& reference) { return (T_world_base * reference.pose).position; };
+  Status status = run(controller, plant, start, r.period, load, [](const auto&) { return true; });
+  out.settled = (tip() - wanted(path.at(0))).norm();
+  out.started = status == Status::ok;
+
+  const auto rows = Eigen::Index(path.duration() / r.period + 0.5) + 1;
+  out.time.setZero(rows);
+  out.joints.setZero(rows, 2 * N);
+  out.tip.setZero(rows, 3);
+  out.wanted.setZero(rows, 3);
+  out.shortfall.setZero(rows, AllTasks<N>::size);
+  out.held.setZero(rows, 4);
+  out.force.setZero(rows, 3);
+  out.stability.setZero(rows);
+  out.model_status.setZero(rows);
+  Eigen::Index k = 0;
+  if (status == Status::ok)
+    status = run(controller, plant, path, r.period, load, [&](const auto& row) {
+      const Joints<N> q = joints(system.transmission, row.measured.theta);
+      out.time[k] = row.time;
+      out.joints.row(k) << q.beta.transpose(), q.alpha.transpose();
+      out.tip.block<1, 3>(k, 0) = tip().transpose();
+      out.wanted.block<1, 3>(k, 0) = wanted(row.reference).transpose();
+      for (int t = 0; t < AllTasks<N>::size; ++t) out.shortfall(k, t) = row.report.shortfall[std::size_t(t)];
+      const LimitReport& held = row.report.limits;
+      out.held.row(k) << held.base_gaps, held.tip_gaps, held.travel, held.speed;
+      out.force.row(k) = row.report.force.transpose();
+      out.stability[k] = row.report.stability;
+      out.model_status[k] = int(row.report.status);
+      ++k;
+      return true;
+    });
+  out.status = to_string(status);
+  for (auto* m : {&out.joints, &out.tip, &out.wanted, &out.shortfall, &out.force})
+    m->conservativeResize(k, Eigen::NoChange);
+  out.held.conservativeResize(k, Eigen::NoChange);
+  out.time.conservativeResize(k);
+  out.stability.conservativeResize(k);
+  out.model_status.conservativeResize(k);
+  return out;
 }
 
 template <int N>

@@ -2,24 +2,12 @@
 // Recordings of a robot of N tubes behind AnyRecording. Each N is compiled in a file of its own.
 #include <algorithm>
 #include <ctcr/calibration/recording.hpp>
-#include <ctcr/effects/catalogue.hpp>
-#include <ctcr/effects/profile_table.hpp>
 #include <stdexcept>
 
+#include "all_effects.hpp"
 #include "any_recording.hpp"
-#include "plain_system.hpp"
-#include "solver_of.hpp"
 
 namespace ctcr::python {
-
-/// The catalogue, and what effects that are written in Python do along the tubes.
-template <class>
-struct WithProfiles;
-template <template <int, class> class... E>
-struct WithProfiles<EffectList<E...>> {
-  using type = EffectList<E..., ProfileTable>;
-};
-using AllEffects = WithProfiles<Catalogue>::type;
 
 template <int N>
 std::vector<RecordedRow<N>> rows_of(const Table& table) {
@@ -44,7 +32,7 @@ inline std::vector<Pose> measured_of(const Table& table) {
   return poses;
 }
 
-template <int N, class Fx>
+template <int N>
 class RecordingOf final : public AnyRecording {
 public:
   explicit RecordingOf(const Table& table)
@@ -93,19 +81,13 @@ private:
     }
     return out;
   }
-  static System<N, Fx> system(const Table& table, const Profiles<N>& profiles) {
-    const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
-    typename Fx::template On<N> effects;
-    effects.for_each([&](auto& effect, int first) {
-      for (std::size_t k = 0; k < effect.values.size(); ++k) effect.values[k] = table.effects[first + Eigen::Index(k)];
-      if constexpr (requires { effect.profiles; }) effect.profiles = &profiles;
-    });
-    return {plain.transmission, Model<N, Fx>(plain.model.robot(), effects), plain.sensor, plain.settings};
+  static System<N, AllEffects> system(const Table& table, const Profiles<N>& profiles) {
+    return with_effects<N>(plain_system<N>(table.parameters, table.sensor_tube, table.steps), table.effects, &profiles);
   }
 
   ThreadPool pool_;
   Profiles<N> profiles_;
-  Recording<N, Fx> recording_;
+  Recording<N, AllEffects> recording_;
 };
 
 template <int N>
@@ -125,22 +107,10 @@ void check(const Table& table) {
   if (!fits || !known) throw std::invalid_argument("the arrays of a recording do not fit together");
 }
 
-/// Whether nothing but the standard model is asked for.
-template <int N>
-bool is_standard(const Table& table) {
-  bool neutral = table.profiles.size() == 0;
-  typename Catalogue::On<N>{}.for_each([&](const auto& effect, int first) {
-    for (std::size_t k = 0; k < effect.values.size(); ++k)
-      neutral = neutral && table.effects[first + Eigen::Index(k)] == effect.values[k];
-  });
-  return neutral && std::ranges::all_of(table.free, [](int place) { return place < ParameterVector<N>::count; });
-}
-
 template <int N>
 std::unique_ptr<AnyRecording> make_recording(const Table& table) {
   check<N>(table);
-  if (is_standard<N>(table)) return std::make_unique<RecordingOf<N, Standard>>(table);
-  return std::make_unique<RecordingOf<N, AllEffects>>(table);
+  return std::make_unique<RecordingOf<N>>(table);
 }
 
 template <int N>
@@ -171,6 +141,9 @@ std::vector<CatalogueParameter> catalogue_parameters() {
 }  // namespace ctcr::python
 
 #define CTCR_RECORDING_OF(N)                                                                                        \
+  namespace ctcr {                                                                                                  \
+  CTCR_EFFECT_EVALUATIONS(template, N)                                                                              \
+  }                                                                                                                 \
   template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(const ctcr::python::Table&); \
   template ctcr::python::ParameterNames ctcr::python::parameter_names<N>();                                         \
   template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>();

@@ -7,7 +7,14 @@
 #define CTCR_SOLVE(kind, function, D, N)                                                                               \
   kind Status function<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
                                                      Solution<N>&, const Settings&) noexcept;
+#define CTCR_EVALUATION(kind, D, N)                                                      \
+  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                     \
+      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, int, \
+      Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;
 #define CTCR_SOLVER_OF(kind, N)                                                                                     \
+  CTCR_EVALUATION(kind, none, N)                                                                                    \
+  CTCR_EVALUATION(kind, jacobian, N)                                                                                \
+  CTCR_EVALUATION(kind, compliance, N)                                                                              \
   CTCR_SOLVE(kind, solve, none, N)                                                                                  \
   CTCR_SOLVE(kind, solve, jacobian, N)                                                                              \
   CTCR_SOLVE(kind, solve, compliance, N)                                                                            \

@@ -5,7 +5,12 @@ import click
 
 @click.command(name="add")
 @click.argument("robot")
-@click.argument("names", nargs=-1, required=True, metavar="EFFECT..")
+@click.argument("names", nargs=-1, metavar="[EFFECT..]")
+@click.option(
+    "--diagnosis",
+    metavar="FILE.json",
+    help="Add what ctcr diagnose --json found, in the form in which it was found.",
+)
 @click.option("--fit", "measurements", metavar="MEASUREMENTS", help="Fit the effects to this table.")
 @click.option(
     "--set", "given", multiple=True, metavar="NAME=VALUE",
@@ -19,7 +24,7 @@ import click
 @click.option("-o", "--output", "target", metavar="NEW", help="The robot file to write.")
 @click.option("--in-place", is_flag=True, help="Change the robot file itself.")
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-def command(robot, names, measurements, given, free, own, target, in_place, json_target) -> None:
+def command(robot, names, diagnosis, measurements, given, free, own, target, in_place, json_target) -> None:
     """Add physical effects to ROBOT (see ctcr effects), so that every command uses them.
 
     With --fit they are fitted together with the calibration; the error is judged on runs that the fit has not seen.
@@ -28,7 +33,7 @@ def command(robot, names, measurements, given, free, own, target, in_place, json
     from ctcr import effect_fit, effects, output, robot_file, user_effects
     from ctcr import measurements as table
     from ctcr.calibrate import outcome
-    from ctcr.effect_settings import settings
+    from ctcr.effect_settings import diagnosed, settings
     from ctcr.errors import InputError, Problem
 
     user_effects.load_all(own)
@@ -36,8 +41,15 @@ def command(robot, names, measurements, given, free, own, target, in_place, json
     target = outcome.check_target(loaded, target, in_place)
     if not target:
         raise InputError(Problem("give -o: the robot file to write"))
-    ids = list(dict.fromkeys(effects.get(name, loaded.n_tubes).id for name in names))
-    fixed = settings(given, loaded, ids)
+    found, choices = diagnosed(diagnosis, loaded) if diagnosis else ([], {})
+    ids = list(dict.fromkeys(effects.get(name, loaded.n_tubes).id for name in [*names, *found]))
+    if not ids:
+        raise InputError(
+            Problem("nothing was found to add", diagnosis)
+            if diagnosis
+            else Problem("name an effect: see ctcr effects")
+        )
+    fixed = choices | settings(given, loaded, ids)
     console = output.console(json_target)
     if not measurements:
         after = effect_fit.with_values(loaded, ids, fixed)

@@ -49,5 +49,10 @@ def command(
     terminal.show(console, result)
     for warning in readings.warnings:
         console.print(f"{warning}", markup=False)
+    if result.accepted:
+        found = "FILE" if json_target in (None, "-") else json_target
+        way = f"ctcr add {robot} --diagnosis {found} --fit {measurements} -o NEW.yaml"
+        hint = " (FILE: that of --json)" if found == "FILE" else ""
+        console.print(f"To add: {way}{hint}", markup=False, soft_wrap=True)
     if report:
         console.print(f"Report: {report}", markup=False)

@@ -44,8 +44,7 @@ class Diagnosis:
     calibrated: identify.Fit  # without effects, for prediction
     with_effects: identify.Fit  # for prediction
     final: identify.Fit  # with effects, under the noise of the most evidence: its values are those to quote
-    # RMS that noise as stated leaves of a right model on the locked rows, its uncertain parameters included
-    noise_floor_mm: float
+    noise_floor_mm: float  # RMS that the tracker's noise leaves of a right model
     rounds: list[Round]
     accepted: list[Accepted]
     leftover: Leftover
@@ -158,11 +157,11 @@ def _diagnose(
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
-    floor = engine.as_stated(fit).floor_mm(locked)
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
-        robot, measurements, locked, unseen, before, after, fit, floor, rounds, accepted, leftover,
+        robot, measurements, locked, unseen, before, after, fit,
+        engine.noise_floor_mm(after, fit.noise), rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
 

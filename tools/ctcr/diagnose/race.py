@@ -35,7 +35,7 @@ MUCH_BETTER = 0.6  # where the model explains the readings as it is
 SOUND = 1.05  # inflation of the noise up to which it does
 OUTLIER = 0.3  # weight below which a reading is taken for one
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
-FIELDS = (1.0, 0.3, 0.0)  # parts of the tracker's stated field error that are tried
+FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
 
 
 @dataclass(frozen=True)

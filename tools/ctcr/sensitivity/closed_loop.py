@@ -62,7 +62,6 @@ class Job:
     controller: Array
     plant: Array
     effects: Array
-    has_effects: bool
 
 
 def work(job: Job) -> tuple[float, float]:
@@ -70,7 +69,7 @@ def work(job: Job) -> tuple[float, float]:
     scenario = Scenario.model_validate_json(job.scenario)
 
     def values(parameters: Array) -> _core.SystemValues:
-        return _core.SystemValues(parameters=parameters, effects=job.effects, has_effects=job.has_effects)
+        return _core.SystemValues(parameters=parameters, effects=job.effects)
 
     runs = [
         run_once(scenario, values(job.controller), values(job.plant), mass) for mass in scenario.load.mass_g
@@ -97,7 +96,7 @@ def study(
     nominal = free_parameters.values(robot)
     cases = [nominal] + [one.at(fraction) for one in varied for fraction in fractions]
     text, own = scenario.model_dump_json(), effects.values(robot)
-    jobs = [Job(text, case, nominal, own, bool(robot.effects)) for case in cases]
+    jobs = [Job(text, case, nominal, own) for case in cases]
     settings = {"study": "closed loop", "scenario": text, "cases": [case.tolist() for case in cases]}
     kept = ProgressFile(keep, settings)
     found = kept.load() or []

@@ -107,7 +107,7 @@ def work(job: Job) -> dict[str, Any]:
     clock = time.thread_time if job.threads == 1 else time.process_time
     result = _core.sensitivity(
         job.tubes,
-        nominal=_core.SystemValues(parameters=job.nominal, effects=np.empty(0), has_effects=False),
+        nominal=_core.SystemValues(parameters=job.nominal, effects=np.empty(0)),
         varied=job.varied, low=job.low, high=job.high, most_force=job.most_force, seed=job.seed,
         first_block=job.first_block, blocks=job.blocks, configurations=job.configurations, threads=job.threads,
     )  # fmt: skip

@@ -107,9 +107,8 @@ def _limit(kind: int, tube: int, n: int) -> str:
 def system_values(robot: Robot, steps: int = 1) -> _core.SystemValues:
     """The robot with its effects as the compiled library takes it."""
     return _core.SystemValues(
-        parameters=free_parameters.values(robot), effects=effects.values(robot),
-        has_effects=bool(robot.effects), steps=steps,
-    )  # fmt: skip
+        parameters=free_parameters.values(robot), effects=effects.values(robot), steps=steps
+    )
 
 
 def run_once(
