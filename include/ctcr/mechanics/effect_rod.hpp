@@ -53,7 +53,8 @@ public:
   struct Place {
     int present = 0;  ///< tubes 1..present
     std::array<bool, N> curved{};
-    std::array<S, N> along;  ///< arc length of each present tube here [m]
+    std::array<S, N> along;               ///< arc length of each present tube here [m]
+    std::array<Material<S>, N> material;  ///< of each present tube here
   };
 
   explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {}
@@ -80,6 +81,7 @@ public:
       } else {
         near.curved[std::size_t(id - N)] = false;
       }
+      locate(near);
       if (place.present > 0) {
         using Kind = typename Station<S, N>::Kind;
         stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
@@ -104,13 +106,12 @@ public:
   /// How the tubes bend under the moment of a state.
   [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
     Bend b;
-    std::array<Material<S>, N> material;
     bending::Slope slope;
     std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
     bool linear = true;
     for (int j = 0; j < place.present; ++j) {
       const auto i = std::size_t(j);
-      const Material<S>& m = material[i] = material_of(place, j);
+      const Material<S>& m = place.material[i];
       sincos(y.psi(j), b.sine[i], b.cosine[i]);
       b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
       const bending::Slope unsoftened = bending::stiffness(m, 1.0);
@@ -126,15 +127,17 @@ public:
     double left = linear ? 0 : 1;  // (relative change)^2
     for (int k = 0; k < softening_iterations && left > 1e-10; ++k) {
       Tubes<double> ignored;
-      const auto change = newton_step(place, y, material, b, u, ignored);
+      const auto change = newton_step(place, y, b, u, ignored);
       u = {u[0] + change[0], u[1] + change[1]};
       left = (change[0] * change[0] + change[1] * change[1]) / (1 + u[0] * u[0] + u[1] * u[1]);
     }
     Tubes<S> tubes;
-    const std::array<S, 2> change = newton_step(place, y, material, b, {S(u[0]), S(u[1])}, tubes);
+    const std::array<S, 2> change = newton_step(place, y, b, {S(u[0]), S(u[1])}, tubes);
     b.u = {u[0] + change[0], u[1] + change[1]};
     for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const std::array<S, 2> more = seen_by_tube(b, i, change);
+      // The value of the change is rounding: the angles' derivatives times it are nothing.
+      const double s = value(b.sine[i]), c = value(b.cosine[i]);
+      const std::array<S, 2> more{c * change[0] + s * change[1], c * change[1] - s * change[0]};
       const std::array<S, 2> moment_more = tubes[i].slope * more;
       for (std::size_t k = 0; k < 2; ++k) {
         b.curvature[i][k] = b.curvature[i][k] + more[k];
@@ -154,6 +157,7 @@ public:
     };
     const auto advance = [&] {
       for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
+      locate(place);
     };
     std::array<S, 2> u1, u2, u3, u4;
     const State k1 = rates(place, y, u1);
@@ -189,6 +193,9 @@ private:
           frame.rotation_twist[i][g] = frame.translation_twist[i][g] = Lanes{};
   }
 
+  void locate(Place& place) const noexcept {
+    for (int j = 0; j < place.present; ++j) place.material[std::size_t(j)] = material_of(place, j);
+  }
   [[nodiscard]] Material<S> material_of(const Place& place, int j) const noexcept {
     const auto i = std::size_t(j);
     const TubeParameters<S>& t = in_.tubes[i];
@@ -211,12 +218,12 @@ private:
 
   /// By how much curvature u must change so that the tubes balance the moment, and how each of them answers to u.
   template <class T>
-  static std::array<T, 2> newton_step(const Place& place, const State& y, const std::array<Material<S>, N>& material,
-                                      Bend& b, const std::array<T, 2>& u, Tubes<T>& tubes) noexcept {
+  static std::array<T, 2> newton_step(const Place& place, const State& y, Bend& b, const std::array<T, 2>& u,
+                                      Tubes<T>& tubes) noexcept {
     bending::Slope slope;
     std::array<T, 2> rest{bending::as<T>(y.m(0)), bending::as<T>(y.m(1))};
     for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = material[i];
+      const Material<S>& m = place.material[i];
       const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
       const std::array<T, 2> w = seen_by_tube(b, i, u);
       tubes[i] =
