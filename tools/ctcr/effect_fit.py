@@ -101,7 +101,7 @@ def add(
             start |= dict(zip(fit.names, fit.values, strict=True))
             fit = stage(fitted, fitted, np.ones(len(readings), bool), start)
         progress.advance(1)
-    stages.append(Stage("noise_floor", fit.floor_mm(judged), fit.floor_deg(judged)))
+    stages.append(Stage("noise_floor", *identify.noise_floor(fit, stage.noise, stage.places)))
     return Added(
         _applied(robot, fit),
         list(ids),
@@ -242,6 +242,7 @@ class _Fitter:
         fit = identify.identify_with(
             recorded, names, mean, sd, low, high, self.noise, self.places, start=first, starts=1,
             known=free_parameters.known_directions(self.robot, names),
+            within=free_parameters.admissible(self.robot, self.readings.beta[rows], names),
         )  # fmt: skip
         return replace(fit, units=[parameters.field_of(name).unit for name in names])
 

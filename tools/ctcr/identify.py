@@ -189,6 +189,26 @@ class Fit:
         return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
 
 
+def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
+    """RMS of position [mm] and rotation [deg] that the tracker's noise leaves of a right model.
+
+    The jitter as stated, and what the tracker's smooth error may be of the residual of the fitted readings, at
+    `places` (M, 3) [m], tracker frame.
+    """
+    used = np.repeat((fit.weights > 0) & np.isfinite(fit.residual[:, ::3]), 3, axis=1)
+    residual = np.where(used, fit.residual, nan).ravel()
+    nothing, one = np.zeros((residual.size, 1)), np.ones(1)
+    field = identify_with(
+        lambda _x, _derivatives: (residual, nothing), ["nothing"], 0 * one, one, -one, one, noise, places,
+        robust=False, weights=fit.weights, admit_model_error=False, inflation=np.ones(2), start=0 * one, starts=1,
+    ).field  # fmt: skip
+    smooth = [_rms(np.where(used, field, nan)[:, kind : kind + 3], None) for kind in (0, 3)]
+    floors = np.hypot(
+        np.sqrt(3) * np.array([noise.position_jitter, noise.rotation_jitter]), np.nan_to_num(smooth)
+    )
+    return 1e3 * float(floors[0]), float(np.rad2deg(floors[1])) if used[:, 3:].any() else nan
+
+
 def places_of(robot: Robot, measurements: Measurements) -> Array:
     """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
     places = (

@@ -71,6 +71,14 @@ class Diagnosis:
             "noise_floor": self.noise_floor_mm,
         }
 
+    @property
+    def expected_mm(self) -> float:
+        """RMS to be expected on the locked rows of a right model: noise, and what the parameters leave open.
+
+        Far above the noise floor where these rows are unlike those that were fitted.
+        """
+        return self.with_effects.floor_mm(self.locked)
+
     def parameters(self, accepted: Accepted) -> dict[str, float]:
         """Fitted values, and those of its choices, by name without the id."""
         stem = f"effects.{accepted.entry.id}."
@@ -161,7 +169,7 @@ def _diagnose(
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
         robot, measurements, locked, unseen, before, after, fit,
-        engine.noise_floor_mm(after, fit.noise), rounds, accepted, leftover,
+        identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
 

@@ -148,19 +148,6 @@ class Engine:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
-    def noise_floor_mm(self, fit: identify.Fit, noise: Any) -> float:
-        """RMS of the position noise: jitter, and what the tracker's smooth error may be of the residual of a fit."""
-        residual = np.where(self.rows[:, None], fit.residual, np.nan)
-        nothing = np.zeros((residual.size, 1))
-        one = np.ones(1)
-        field = identify.identify_with(
-            lambda _x, _: (residual.ravel(), nothing), ["nothing"], 0 * one, one, -one, one, noise, self.places,
-            robust=False, weights=fit.weights, admit_model_error=False, inflation=np.ones(2), start=0 * one, starts=1,
-        ).field  # fmt: skip
-        used = (fit.weights[:, 0] > 0) & np.isfinite(residual[:, 0])
-        smooth = np.sum(field[used, :3] ** 2, axis=1).mean() if used.any() else 0.0
-        return float(1e3 * np.sqrt(3 * noise.position_jitter**2 + smooth))
-
     def linear(self, fit: identify.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)

@@ -26,7 +26,9 @@ def waterfall(figure, d: "Diagnosis") -> None:
         axes.bar(i, value, color=colour, width=0.62)
         axes.text(i, value, f" {value:.3g} mm", ha="center", va="bottom", weight="bold")
     axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
-    axes.text(-0.45, rms["noise_floor"], f"noise floor {rms['noise_floor']:.2g} mm", color=NOISE, va="bottom")
+    last = len(bars) - 0.6
+    axes.text(last, rms["noise_floor"], f"noise floor\n{rms['noise_floor']:.2g} mm", color=NOISE, va="bottom")
+    axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", " ") for name, _, _ in bars])
     axes.set_ylabel("RMS error on locked runs, mm")
     axes.set_yscale("log")

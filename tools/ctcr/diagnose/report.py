@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr import effects, html_page
+from ctcr import effects, free_parameters, html_page
 from ctcr.diagnose import figures
 from ctcr.html_page import cards, figure, table
 from ctcr.output import atomic_writer
@@ -56,7 +56,8 @@ def _opening(d: "Diagnosis", title: str) -> str:
         f"<h1>{html.escape(title)}</h1>"
         f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
         f"{cards(numbers)}"
-        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw.</p>'
+        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw; noise and uncertain '
+        f"parameters of a right model would leave {d.expected_mm:.2g} mm there.</p>"
     )
 
 
@@ -122,9 +123,10 @@ def _next(d: "Diagnosis") -> str:
 
 def _parameters(d: "Diagnosis") -> str:
     known, rows = effects.parameter_of(d.robot.n_tubes), []
+    units = free_parameters.units_with_effects(d.robot)
     for name, value, sd, shift in zip(d.final.names, d.final.values, d.final.sd, d.final.shift, strict=True):
         p = known.get(name)
-        unit, meaning = (p.unit, p.meaning) if p else ("SI", "")
+        unit, meaning = (p.unit, p.meaning) if p else (units[name], "")
         rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
     columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]

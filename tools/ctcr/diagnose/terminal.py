@@ -53,6 +53,7 @@ def _errors(result: "Diagnosis") -> Any:
     }
     runs = len(set(result.measurements.run[result.locked].tolist()))
     rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
+    rows.append(["to be expected there: noise and uncertain parameters", f"{result.expected_mm:.3f}"])
     title = f"Position error (RMS) on {result.locked.sum()} readings of {runs} run(s) that no fit saw"
     return output.table(title, ["model", "mm"], rows)
 
@@ -66,12 +67,20 @@ def _candidates(number: int, round_: Any) -> Any:
             f"{entry.linear:.1f}",
             f"{entry.refit:.1f}" if refitted else "",
             f"{entry.share:.0%}" if refitted else "",
-            "accepted" if entry is round_.accepted else "cannot be told from it" if entry.id in round_.ids else "",
+            _remark(entry, round_),
         ])  # fmt: skip
     columns = ["effect", "log evidence by slopes", "after refit", "excess removed", ""]
     return output.table(
         f"Round {number}: candidates, each fitted together with the calibration", columns, rows
     )
+
+
+def _remark(entry: Any, round_: Any) -> str:
+    if entry is round_.accepted:
+        return "accepted"
+    if round_.accepted and entry.id == round_.accepted.id:
+        return "another form of it"
+    return "cannot be told from it" if entry.id in round_.ids else ""
 
 
 def _parameters(result: "Diagnosis") -> Any:
