@@ -1,0 +1,43 @@
+"""The study behind docs/control_effects.md."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import measurements, robot_file, simulation
+from ctcr.track import scenario
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def study():
+    spec = importlib.util.spec_from_file_location("control_study", ROOT / "tools/control_study.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROOT / "examples/robots/table2.yaml")
+
+
+@pytest.fixture(scope="module")
+def path(robot):
+    return scenario.load(ROOT / "examples/data/scenarios/S2.yaml", robot.n_tubes)
+
+
+def test_open_loop_of_a_known_robot_stays_on_the_path(study, robot, path):
+    assert study.open_loop(path, robot, robot).mean() < 0.05
+
+
+@pytest.mark.slow
+def test_the_effect_found_brings_the_tip_nearer(study, robot, path):
+    plant = study.hidden_robot(robot, "softening", np.random.default_rng(study.SEED))
+    joints = measurements.load(ROOT / "examples/data/plan.csv", robot.n_tubes)
+    known, verdict = study.candidates(robot, simulation.simulate(plant, joints, "realistic", study.SEED))
+    assert "softening" in verdict
+    errors = [study.open_loop(path, controller, plant).mean() for controller in known.values()]
+    assert errors == sorted(errors, reverse=True)

@@ -1,0 +1,123 @@
+"""Writes docs/control_effects.md: what a missing effect costs in control, and what adding it brings.
+
+A simulated robot differs from its file in every calibrated parameter, within the file's uncertainty, and in one effect.
+It is measured (examples/data/plan.csv, realistic noise), calibrated and diagnosed; then controllers with the file, with
+the calibration and with the effects that the diagnosis found drive it along the path of scenario S2.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from ctcr import effect_fit, effects, free_parameters, identify, measurements, robot_file, simulation
+from ctcr.diagnose import diagnose
+from ctcr.frames import base_to_tracker, tracker_to_base
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+from ctcr.track import runs, scenario
+
+ROOT = Path(__file__).parents[1]
+TARGET = ROOT / "docs" / "control_effects.md"
+HIDDEN = ("friction", "softening", "clearance")
+SIZE = 2.0  # of the hidden effect, in standard deviations of its prior
+SEED = 7
+ABOUT = """A simulated robot differs from its file (Table II) in every calibrated parameter, drawn with half the file's
+uncertainty, and in one hidden effect of two prior standard deviations. It was measured along `examples/data/plan.csv`
+with realistic noise, calibrated, diagnosed, and then driven along the path of scenario S2. *Open loop*: the robot
+replays the joints that the controller planned on what it knows. *Closed loop*: the tracker corrects at 40 Hz. Distances
+of the tip from the path; what lies near the obstacle is left out. What friction remembers from before the start of the
+path is unknown to all. Written by `tools/control_study.py`."""
+
+
+def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot:
+    names = free_parameters.expand("standard", robot)
+    mean, sd, low, high = free_parameters.priors(robot, names)
+    drawn = np.clip(mean + 0.5 * sd * rng.standard_normal(len(mean)), low, high)
+    effect = effects.get(identity, robot.n_tubes)
+    strengths = [p for p in effect.parameters if p.kind == "strength"]
+    values = {name: p.neutral + SIZE * p.sigma for p in strengths for name in p.full_names}
+    return effect_fit.with_values(free_parameters.applied(robot, names, drawn), [identity], values)
+
+
+def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], str]:
+    """What the controller may know of the robot, and what the diagnosis said."""
+    known = {"robot file": robot, "calibrated": identify.fit(robot, session).apply(robot)}
+    result = diagnose(robot, session)
+    if result.accepted:
+        ids = [a.entry.id for a in result.accepted]
+        fixed = {n: v for a in result.accepted for n, v in a.entry.candidate.shape}
+        known["with the effects found"] = effect_fit.add(robot, session, ids, fixed=fixed).robot
+    return known, f"{result.verdict.word}: {' + '.join(a.entry.id for a in result.accepted) or 'nothing'}"
+
+
+def upright(points: np.ndarray) -> np.ndarray:
+    return np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+
+
+def in_tracker(robot: Robot, points: np.ndarray) -> np.ndarray:
+    return base_to_tracker(robot.tracker, points, upright(points))[0]
+
+
+def closed_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.ndarray:
+    """Distances of the tip from the path [mm], the corner near the obstacle left out."""
+    run = runs.run_once(plan, runs.system_values(controller), runs.system_values(plant), 0.0)
+    return 1e3 * np.linalg.norm(run.tip - run.wanted, axis=1)[run.far]
+
+
+def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.ndarray:
+    """The same where the robot replays the joints that the controller planned on its own model."""
+    path, obstacle = plan.trajectory, plan.obstacle
+
+    def seen(points_mm):  # by a controller whose T_ref is another one
+        there = in_tracker(plant, 1e-3 * np.atleast_2d(points_mm))
+        return (1e3 * tracker_to_base(controller.tracker, there, upright(there))[0]).tolist()
+
+    own = plan.model_copy(
+        update={
+            "trajectory": path.model_copy(
+                update={"kind": "polyline", "points_mm": seen(1e3 * path.points), "corner_mm": None}
+            ),
+            "obstacle": obstacle.model_copy(update={"centre_mm": seen(obstacle.centre_mm)[0]}),
+            "noise_mm": 0.0,
+        }
+    )
+    values = runs.system_values(controller)
+    run = runs.run_once(own, values, values, 0.0)
+    n, count, drive = plant.n_tubes, len(run.time), controller.actuation
+    replay = Measurements(
+        t=run.time, run=np.zeros(count, int), beta=run.joints[:, :n] - drive.translation_correction,
+        alpha=run.joints[:, n:] - drive.rotation_correction,
+        force=np.zeros((count, 3)), position=None, quaternion=None, row=np.arange(count) + 2,
+    )  # fmt: skip
+    read = simulation.simulate(plant, replay, "none")
+    return 1e3 * np.linalg.norm(read.position - in_tracker(controller, run.wanted), axis=1)[run.far]
+
+
+def row(name: str, open_: np.ndarray, closed: np.ndarray) -> str:
+    cells = [f"{np.nanmean(e):.3f} | {np.nanmax(e):.3f}" if len(e) else "failed | " for e in (open_, closed)]
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    robot = robot_file.load(ROOT / "examples/robots/table2.yaml")
+    plan = scenario.load(ROOT / "examples/data/scenarios/S2.yaml", robot.n_tubes)
+    joints = measurements.load(ROOT / "examples/data/plan.csv", robot.n_tubes)
+    lines = []
+    for identity in HIDDEN:
+        plant = hidden_robot(robot, identity, np.random.default_rng(SEED))
+        known, verdict = candidates(robot, simulation.simulate(plant, joints, "realistic", SEED))
+        known["the truth"] = plant
+        lines += ["", f"## Hidden: {identity}; diagnosed: {verdict}", ""]
+        lines += [
+            "| the controller knows | open loop, mean mm | max | closed loop, mean mm | max |",
+            "|---|---|---|---|---|",
+        ]
+        for name, controller in known.items():
+            lines.append(row(name, open_loop(plan, controller, plant), closed_loop(plan, controller, plant)))
+            print(identity, lines[-1], flush=True)
+    TARGET.write_text(
+        f"# Control with a missing effect\n\n{ABOUT}\n" + "\n".join(lines) + "\n", encoding="utf-8"
+    )
+
+
+if __name__ == "__main__":
+    main()
