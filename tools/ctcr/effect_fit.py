@@ -80,6 +80,7 @@ def add(
     """
     base, fixed = identify.expand(list(free), robot), dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], fixed)
+    readings, ignored = identify.usable(robot, readings)
     held = locked_rows(readings)
     fitted = [*robot_before(robot, ids).effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
@@ -108,7 +109,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        _notices(robot, fit, ids),
+        [*ignored, *_notices(robot, fit, ids)],
     )
 
 

@@ -209,6 +209,15 @@ def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
     return 1e3 * float(floors[0]), float(np.rad2deg(floors[1])) if used[:, 3:].any() else nan
 
 
+def usable(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """The readings that say something of the robot, and in words what was left out."""
+    if robot.tracker.sensor_roll == "unknown" and measurements.quaternion is not None:
+        return replace(measurements, quaternion=None), [
+            "the sensor's roll is unknown: orientations are not used"
+        ]
+    return measurements, []
+
+
 def places_of(robot: Robot, measurements: Measurements) -> Array:
     """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
     places = (
@@ -256,15 +265,11 @@ def fit(
     began = perf_counter()
     names = expand(free, robot)
     mean, width, low, high = priors(robot, names, sd)
-    if robot.tracker.sensor_roll == "unknown" and measurements.quaternion is not None:
-        measurements = replace(measurements, quaternion=None)
-        ignored = ["the sensor's roll is unknown: orientations are not used"]
-    else:
-        ignored = []
+    measurements, ignored = usable(robot, measurements)
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    warnings = ignored + list(_doubts(measurements, measured_rows(measurements) & chosen))
+    warnings = [*ignored, *_doubts(measurements, measured_rows(measurements) & chosen)]
     table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
     table.activate((measured_rows(measurements) & chosen).tolist())
     if starts is None:

@@ -49,6 +49,7 @@ class Diagnosis:
     accepted: list[Accepted]
     leftover: Leftover
     verdict: Verdict
+    notices: list[str]
     seconds: float = 0.0
 
     @property
@@ -111,6 +112,7 @@ def diagnose(
     has errors which the others do not, it changes places with another one, and all begins anew.
     """
     began = perf_counter()
+    measurements, notices = identify.usable(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(measurements, turn)
         result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
@@ -120,6 +122,7 @@ def diagnose(
             result = max(result, other, key=lambda r: r.explained)
         if result.accepted or not _surprises(result):
             break
+    result.notices = notices
     result.seconds = perf_counter() - began
     return result
 
@@ -170,7 +173,7 @@ def _diagnose(
     return Diagnosis(
         robot, measurements, locked, unseen, before, after, fit,
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
-        judge(before, after, accepted, rounds, leftover, locked),
+        judge(before, after, accepted, rounds, leftover, locked), [],
     )  # fmt: skip
 
 

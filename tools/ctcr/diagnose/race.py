@@ -82,12 +82,17 @@ def excess(fit: identify.Fit) -> float:
     position, rotation = fit.inflation
     used = (fit.weights > 0) & np.isfinite(fit.residual[:, ::3])
     explained = 3 * (used[:, 0].sum() / position**2 + used[:, 1].sum() / rotation**2)
-    return fit.chi_square + fit.shift_square - explained
+    return misfit(fit) - explained
+
+
+def misfit(fit: identify.Fit) -> float:
+    """Chi-square of residual and prior, in units of the fit's inflated noise."""
+    return float(np.sum(fit.whiten(fit.residual) ** 2)) + fit.shift_square
 
 
 def share_of(before: identify.Fit, after: identify.Fit, added: int) -> float:
     """Part of the excess that `added` parameters remove, at the same weights and noise."""
-    removed = before.chi_square + before.shift_square - after.chi_square - after.shift_square - added
+    removed = misfit(before) - misfit(after) - added
     spread = np.sqrt(2 * before.observations)
     return float(removed / max(excess(before), spread, removed, 1.0))
 

@@ -134,7 +134,7 @@ def _parameters(d: "Diagnosis") -> str:
 
 
 def _limits(d: "Diagnosis") -> str:
-    lines = [f"{identity}: {reason}" for identity, reason in d.unseen.items()]
+    lines = [*d.notices, *(f"{identity}: {reason}" for identity, reason in d.unseen.items())]
     if not d.leftover.structured:
         lines.insert(0, "What is left is noise.")
     else:

@@ -40,6 +40,8 @@ def show(console: Any, result: "Diagnosis") -> None:
     if result.accepted:
         console.print(_parameters(result))
     _leftover(console, result)
+    for notice in result.notices:
+        console.print(f"{notice}.", markup=False)
     for identity, reason in result.unseen.items():
         console.print(f"Not looked for: {identity}: {reason}.", markup=False)
 
