@@ -8,7 +8,16 @@ the calibration and with the effects that the diagnosis found drive it along the
 from pathlib import Path
 
 import numpy as np
-from ctcr import effect_fit, effects, free_parameters, identify, measurements, robot_file, simulation
+from ctcr import (
+    effect_fit,
+    effect_settings,
+    effects,
+    free_parameters,
+    identify,
+    measurements,
+    robot_file,
+    simulation,
+)
 from ctcr.diagnose import diagnose
 from ctcr.frames import base_to_tracker, tracker_to_base
 from ctcr.measurements import Measurements
@@ -43,8 +52,7 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     known = {"robot file": robot, "calibrated": identify.fit(robot, session).apply(robot)}
     result = diagnose(robot, session)
     if result.accepted:
-        ids = [a.entry.id for a in result.accepted]
-        fixed = {n: v for a in result.accepted for n, v in a.entry.candidate.shape}
+        ids, fixed = effect_settings.found(result.as_json(), robot)
         known["with the effects found"] = effect_fit.add(robot, session, ids, fixed=fixed).robot
     return known, f"{result.verdict.word}: {' + '.join(a.entry.id for a in result.accepted) or 'nothing'}"
 

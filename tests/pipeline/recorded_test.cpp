@@ -127,8 +127,8 @@ void expect_slopes(int cases) {
 
 TEST(RecordedDerivatives, AreSlopesByEveryParameterWithHistoryLoadsAndContact) {
   expect_slopes<1>(test::cases(2));
-  expect_slopes<2>(test::cases(2));
-  expect_slopes<3>(test::cases(2));
+  expect_slopes<2>(test::cases(4));
+  expect_slopes<3>(test::cases(4));
 }
 
 TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from ctcr import effects
 from ctcr.errors import InputError, Problem, did_you_mean
@@ -29,19 +30,20 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
 
 
 def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float]]:
-    """The effects that `ctcr diagnose --json` found, the first of each class, and the values of their choices.
-
-    Raises InputError where the file is not such an answer.
-    """
+    """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
     try:
-        answer = json.loads(Path(path).read_text(encoding="utf-8"))
-        found = [(entry["class"][0], dict(entry["parameters"])) for entry in answer["effects"]]
+        return found(json.loads(Path(path).read_text(encoding="utf-8")), robot)
     except OSError as error:
         raise InputError(Problem(f"cannot be read: {error.strerror}", path)) from None
     except (ValueError, LookupError, TypeError):
         raise InputError(Problem("is not what ctcr diagnose writes with --json", path)) from None
+
+
+def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float]]:
+    """The effects of a diagnosis (its as_json()), the first of each class, and the values of their choices."""
     ids, values = [], {}
-    for identity, parameters in found:
+    for entry in answer["effects"]:
+        identity, parameters = entry["class"][0], dict(entry["parameters"])
         effect = effects.get(identity, robot.n_tubes)
         ids.append(effect.id)
         for parameter in effect.parameters:

@@ -1,6 +1,6 @@
 """All steps of a diagnosis, in their order."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -49,7 +49,7 @@ class Diagnosis:
     accepted: list[Accepted]
     leftover: Leftover
     verdict: Verdict
-    notices: list[str]
+    notices: list[str] = field(default_factory=list)
     seconds: float = 0.0
 
     @property
@@ -173,7 +173,7 @@ def _diagnose(
     return Diagnosis(
         robot, measurements, locked, unseen, before, after, fit,
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
-        judge(before, after, accepted, rounds, leftover, locked), [],
+        judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
 
 

@@ -77,24 +77,24 @@ class Round:
     reason: str = ""  # why nothing was accepted
 
 
-def excess(fit: identify.Fit) -> float:
-    """Chi-square beyond what noise explains, in units of the fit's inflated noise."""
-    position, rotation = fit.inflation
-    used = (fit.weights > 0) & np.isfinite(fit.residual[:, ::3])
-    explained = 3 * (used[:, 0].sum() / position**2 + used[:, 1].sum() / rotation**2)
-    return misfit(fit) - explained
-
-
 def misfit(fit: identify.Fit) -> float:
     """Chi-square of residual and prior, in units of the fit's inflated noise."""
     return float(np.sum(fit.whiten(fit.residual) ** 2)) + fit.shift_square
 
 
+def explained(fit: identify.Fit) -> float:
+    """Chi-square that the noise as stated explains, in the units of misfit()."""
+    position, rotation = fit.inflation
+    used = (fit.weights > 0) & np.isfinite(fit.residual[:, ::3])
+    return float(3 * (used[:, 0].sum() / position**2 + used[:, 1].sum() / rotation**2))
+
+
 def share_of(before: identify.Fit, after: identify.Fit, added: int) -> float:
     """Part of the excess that `added` parameters remove, at the same weights and noise."""
-    removed = misfit(before) - misfit(after) - added
+    whole = misfit(before)
+    removed = whole - misfit(after) - added
     spread = np.sqrt(2 * before.observations)
-    return float(removed / max(excess(before), spread, removed, 1.0))
+    return float(removed / max(whole - explained(before), spread, removed, 1.0))
 
 
 def outliers(fit: identify.Fit) -> float:
