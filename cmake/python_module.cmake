@@ -13,6 +13,15 @@ nanobind_add_module(_core NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
 # Half the compile time of -O3, nearly its speed.
 file(GLOB control CONFIGURE_DEPENDS tools/ctcr/_core/control_of_*.cpp)
 set_source_files_properties(${control} PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
+# Two numbers of tubes as one file to the compiler: a quarter less time.
+set_target_properties(_core PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+foreach(part control model recording)
+  foreach(tubes 1 2)
+    math(EXPR more "${tubes} + 2")
+    set_source_files_properties(tools/ctcr/_core/${part}_of_${tubes}.cpp tools/ctcr/_core/${part}_of_${more}.cpp
+                                PROPERTIES UNITY_GROUP ${part}_${tubes})
+  endforeach()
+endforeach()
 target_link_libraries(_core PRIVATE ctcr::calibration ctcr_flags)
 target_precompile_headers(_core PRIVATE <Eigen/Dense>)
 target_compile_definitions(_core PRIVATE CTCR_VERSION="${PROJECT_VERSION}")

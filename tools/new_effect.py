@@ -62,7 +62,7 @@ TEST = """\
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace @id@_test {
 
 using Alone = EffectList<@Name@>;
 using Parameters = SystemParameters<2, Alone>;
@@ -127,7 +127,7 @@ TEST(@Name@, HasExactDerivatives) {
   }
 }
 
-}  // namespace
+}  // namespace @id@_test
 }  // namespace ctcr
 """
 

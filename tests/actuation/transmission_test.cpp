@@ -6,7 +6,7 @@
 
 #include "support/random_robots.hpp"
 
-namespace {
+namespace transmission_test {
 
 using namespace ctcr;
 
@@ -49,4 +49,4 @@ TEST(Transmission, OneTurnMovesOneAxisByItsRatio) {
   EXPECT_NEAR(q.alpha[1], 1 - std::numbers::pi, 1e-15);
 }
 
-}  // namespace
+}  // namespace transmission_test

@@ -4,7 +4,7 @@
 
 #include "calibration/simulated.hpp"
 
-namespace {
+namespace cantilever_test {
 
 using namespace ctcr;
 using namespace ctcr::test;
@@ -177,4 +177,4 @@ TEST(Cantilever, RefusesWithWords) {
   EXPECT_TRUE(contains(refusal([&] { (void)fit_cantilever(one, tube); }), "no scatter"));
 }
 
-}  // namespace
+}  // namespace cantilever_test

@@ -3,7 +3,7 @@
 
 #include "calibration/toy.hpp"
 
-namespace {
+namespace descent_test {
 
 using namespace ctcr;
 using test::infinity;
@@ -102,4 +102,4 @@ TEST(Descent, ShortensAStepThatCannotBePredicted) {
   EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace descent_test

@@ -4,7 +4,7 @@
 
 #include "calibration/simulated.hpp"
 
-namespace {
+namespace home_test {
 
 using namespace ctcr;
 using namespace ctcr::test;
@@ -118,4 +118,4 @@ TEST(Home, RefusesWithWords) {
   EXPECT_TRUE(contains(said(sound, 0), "ratio"));
 }
 
-}  // namespace
+}  // namespace home_test

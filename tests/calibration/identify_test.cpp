@@ -5,7 +5,7 @@
 #include "calibration/toy.hpp"
 #include "ctcr/calibration/row_report.hpp"
 
-namespace {
+namespace identify_test {
 
 using namespace ctcr;
 using test::infinity;
@@ -235,4 +235,4 @@ TEST(Identify, RefusesInWords) {
                  [&] { (void)identify([](auto&&...) { return false; }, toy.parameters(), noise, toy.places); });
 }
 
-}  // namespace
+}  // namespace identify_test

@@ -9,7 +9,7 @@
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
 
-namespace {
+namespace recording_test {
 
 using namespace ctcr;
 using P = ParameterVector<2>;
@@ -288,4 +288,4 @@ TEST(IdentifyReadings, LeavesOutRowsThatStandInTheWay) {
   EXPECT_NEAR(fit.values[1] - readings.nominal()[1], 1e-3, 4 * fit.sd[1]);
 }
 
-}  // namespace
+}  // namespace recording_test

@@ -5,7 +5,7 @@
 #include "calibration/simulated.hpp"
 #include "ctcr/sensing/pose_sensor.hpp"
 
-namespace {
+namespace registration_test {
 
 using namespace ctcr;
 using namespace ctcr::test;
@@ -268,4 +268,4 @@ TEST(Registration, RefusesWithWords) {
   EXPECT_TRUE(contains(said({sound[0], sound[1], sound[0]}), "given twice"));
 }
 
-}  // namespace
+}  // namespace registration_test

@@ -4,7 +4,7 @@
 
 #include "calibration/simulated.hpp"
 
-namespace {
+namespace rotation_offset_test {
 
 using namespace ctcr;
 using namespace ctcr::test;
@@ -298,4 +298,4 @@ TEST(RotationOffset, RefusesWithWords) {
   EXPECT_TRUE(contains(said(sound.readings(random), options), "ratio"));
 }
 
-}  // namespace
+}  // namespace rotation_offset_test

@@ -6,7 +6,7 @@
 
 #include "calibration/simulated.hpp"
 
-namespace {
+namespace tube_shape_test {
 
 using namespace ctcr;
 using namespace ctcr::test;
@@ -168,4 +168,4 @@ TEST(TubeShape, RefusesWithWords) {
   EXPECT_TRUE(contains(refusal([] { (void)picture_scale({1, 1}, {1, 1}, 0.1); }), "two different points"));
 }
 
-}  // namespace
+}  // namespace tube_shape_test

@@ -5,7 +5,7 @@
 #include "ctcr/calibration/outliers.hpp"
 #include "support/random_robots.hpp"
 
-namespace {
+namespace whitening_test {
 
 using namespace ctcr;
 
@@ -186,4 +186,4 @@ TEST(OutlierWeights, KeepNormalRowsAndFindTheOthersBelowTheField) {
   EXPECT_EQ(weights(1, 0), 0);
 }
 
-}  // namespace
+}  // namespace whitening_test

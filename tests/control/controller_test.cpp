@@ -9,7 +9,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace controller_test {
 
 constexpr double period = 0.025;
 const Joints<3> home{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}};
@@ -154,5 +154,5 @@ TEST(SimulatedRobot, IsItsModelPlusNoise) {
   EXPECT_NEAR(std::sqrt(squares / (3 * count)), 35e-6, 1.5e-6);
 }
 
-}  // namespace
+}  // namespace controller_test
 }  // namespace ctcr

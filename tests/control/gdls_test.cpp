@@ -5,7 +5,7 @@
 #include "random_control.hpp"
 
 namespace ctcr {
-namespace {
+namespace gdls_test {
 
 using test::Random, test::uniform;
 
@@ -66,5 +66,5 @@ TEST(LeastSquares, WhatIsLeftFreeIsSingularAndStandsStill) {
   EXPECT_EQ(v.norm(), 0);
 }
 
-}  // namespace
+}  // namespace gdls_test
 }  // namespace ctcr

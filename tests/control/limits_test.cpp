@@ -4,7 +4,7 @@
 #include "random_control.hpp"
 
 namespace ctcr {
-namespace {
+namespace limits_test {
 
 using test::Random, test::uniform;
 
@@ -114,5 +114,5 @@ TEST(Limits, TheOtherJointsTakeOver) {
   EXPECT_GT(better, 20);
 }
 
-}  // namespace
+}  // namespace limits_test
 }  // namespace ctcr

@@ -9,7 +9,7 @@
 #include "random_control.hpp"
 
 namespace ctcr {
-namespace {
+namespace live_effects_test {
 
 using Path3 = EffectList<Friction, BacklashRotation, Delay>;
 
@@ -45,5 +45,5 @@ TEST(LiveEffects, RememberWhatRecordedRowsDo) {
   }
 }
 
-}  // namespace
+}  // namespace live_effects_test
 }  // namespace ctcr

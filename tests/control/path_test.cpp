@@ -7,7 +7,7 @@
 #include "support/no_alloc.hpp"
 
 namespace ctcr {
-namespace {
+namespace path_test {
 
 using test::Random, test::uniform;
 
@@ -111,5 +111,5 @@ TEST(Paths, DoNotAllocateOnTheWay) {
   EXPECT_GT(sum, 0);
 }
 
-}  // namespace
+}  // namespace path_test
 }  // namespace ctcr

@@ -5,7 +5,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace tasks_test {
 
 using test::Random, test::uniform;
 
@@ -133,5 +133,5 @@ TEST(StabilityMargin, RaisesTheDeterminant) {
   EXPECT_GT(tried, test::cases(20) / 2);
 }
 
-}  // namespace
+}  // namespace tasks_test
 }  // namespace ctcr

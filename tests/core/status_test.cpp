@@ -6,7 +6,7 @@
 #include <string>
 
 namespace ctcr {
-namespace {
+namespace status_test {
 
 TEST(Status, EachHasItsOwnName) {
   std::set<std::string> names;
@@ -18,5 +18,5 @@ TEST(Status, EachHasItsOwnName) {
   EXPECT_STREQ(to_string(static_cast<Status>(200)), "unknown");
 }
 
-}  // namespace
+}  // namespace status_test
 }  // namespace ctcr

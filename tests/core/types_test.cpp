@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace ctcr {
-namespace {
+namespace types_test {
 
 Pose pose(double angle, const Vec3& axis, const Vec3& position) {
   return {Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix(), position};
@@ -30,5 +30,5 @@ TEST(Pose, IsIdentityByDefault) {
   EXPECT_TRUE(Pose{}.position.isZero(0));
 }
 
-}  // namespace
+}  // namespace types_test
 }  // namespace ctcr

@@ -8,7 +8,7 @@
 #include "support/laws.hpp"
 #include "support/no_alloc.hpp"
 
-namespace {
+namespace parameters_test {
 
 using namespace ctcr;
 
@@ -241,4 +241,4 @@ TEST(TipDerivatives, DoNotTouchTheHeap) {
   }
 }
 
-}  // namespace
+}  // namespace parameters_test

@@ -7,7 +7,7 @@
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace devices_test {
 
 using test::Random;
 
@@ -142,5 +142,5 @@ TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
   }
 }
 
-}  // namespace
+}  // namespace devices_test
 }  // namespace ctcr

@@ -7,7 +7,7 @@
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace history_test {
 
 using test::effect, test::Random;
 
@@ -231,5 +231,5 @@ TEST(Delay, VanishesAtRestAndWhereAClockStartsAnew) {
   EXPECT_EQ(lag(walk.to(at(3, 0), std::numeric_limits<double>::quiet_NaN())), none);  // without times there is none
 }
 
-}  // namespace
+}  // namespace history_test
 }  // namespace ctcr

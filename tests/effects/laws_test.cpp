@@ -7,7 +7,7 @@
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace laws_test {
 
 using test::effect, test::Random;
 
@@ -252,5 +252,5 @@ TEST(Softening, IsSolvedUpToItsHardBounds) {
     }
 }
 
-}  // namespace
+}  // namespace laws_test
 }  // namespace ctcr

@@ -6,7 +6,7 @@
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace neutral_test {
 
 using test::Random;
 
@@ -135,5 +135,5 @@ TYPED_TEST(NeutralEffects, HaveExactDerivativesByJointsAndLoad) {
   }
 }
 
-}  // namespace
+}  // namespace neutral_test
 }  // namespace ctcr

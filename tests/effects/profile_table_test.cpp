@@ -6,7 +6,7 @@
 #include "ctcr/pipeline/recorded.hpp"
 
 namespace ctcr {
-namespace {
+namespace profile_table_test {
 
 using Fx = EffectList<ProfileTable>;
 using Parameters = SystemParameters<1, Fx>;
@@ -92,5 +92,5 @@ TEST(ProfileTable, DerivativesFollowTheTable) {
   }
 }
 
-}  // namespace
+}  // namespace profile_table_test
 }  // namespace ctcr

@@ -7,7 +7,7 @@
 #include "support/no_alloc.hpp"
 
 namespace ctcr {
-namespace {
+namespace realtime_test {
 
 TEST(EffectsInRealTime, DoNotTouchTheHeap) {
   test::Random random(1);
@@ -67,5 +67,5 @@ TEST(EffectsInRealTime, AnswerAbsurdValues) {
   }
 }
 
-}  // namespace
+}  // namespace realtime_test
 }  // namespace ctcr

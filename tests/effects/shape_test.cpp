@@ -4,7 +4,7 @@
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace shape_test {
 
 using test::Random;
 
@@ -77,5 +77,5 @@ TEST(ShapeWithEffects, CarriesTheLoadFromTheTipToTheBase) {
   }
 }
 
-}  // namespace
+}  // namespace shape_test
 }  // namespace ctcr

@@ -4,11 +4,11 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace toy_test {
 
 namespace stronger {
 constexpr EffectInfo info{.id = "stronger", .title = "Toy"};
-constexpr std::array parameters{
+inline constexpr std::array parameters{
     EffectParameter{.name = "curvature", .neutral = 1, .per_tube = true},
     EffectParameter{.name = "stiffness", .neutral = 1, .per_tube = true},
 };
@@ -54,5 +54,5 @@ TEST(ToyEffect, EqualsTheRobotThatItAmountsTo) {
   }
 }
 
-}  // namespace
+}  // namespace toy_test
 }  // namespace ctcr

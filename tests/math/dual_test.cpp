@@ -7,7 +7,7 @@
 #include "support/cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace dual_test {
 
 using D = Dual<2>;
 using Tail = TailDual<2, 1>;
@@ -88,5 +88,5 @@ TEST(Dual, LengthsWithDerivativesInTheLastGroupsOnly) {
   static_assert(!has_length_tangent<Tail, 0> && has_length_tangent<Tail, 1> && !has_length_tangent<double, 0>);
 }
 
-}  // namespace
+}  // namespace dual_test
 }  // namespace ctcr

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace ctcr {
-namespace {
+namespace lanes_test {
 
 TEST(Lanes, ComputeLaneByLane) {
   const Lanes a{1, -2, 3, 0.5}, b{4, 5, -6, 7};
@@ -33,5 +33,5 @@ TEST(Lanes, GroupsHoldAllValues) {
   EXPECT_EQ(lane_groups(5), 2);
 }
 
-}  // namespace
+}  // namespace lanes_test
 }  // namespace ctcr

@@ -8,7 +8,7 @@
 #include "support/cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace linear_solve_test {
 
 constexpr int unknowns = 5, further = 3, rows = unknowns + further, groups = 3, columns = 4 * groups;
 /// The unknowns stand anywhere in the lanes.
@@ -79,5 +79,5 @@ TEST(Eliminate, ReportsASingularSystem) {
   EXPECT_TRUE(table.allFinite());
 }
 
-}  // namespace
+}  // namespace linear_solve_test
 }  // namespace ctcr

@@ -9,7 +9,7 @@
 #include "support/cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace se3_test {
 
 using Mat4 = Eigen::Matrix4d;
 
@@ -144,5 +144,5 @@ TEST(RotationZ, TurnsXToY) {
   EXPECT_LT((rotation_z(0.3) - rotation_matrix(Vec3(0, 0, 0.3))).cwiseAbs().maxCoeff(), 1e-15);
 }
 
-}  // namespace
+}  // namespace se3_test
 }  // namespace ctcr

@@ -10,7 +10,7 @@
 #include "support/cases.hpp"
 
 namespace ctcr {
-namespace {
+namespace sincos_test {
 
 double worst_error(double x) {
   double s, c;
@@ -74,5 +74,5 @@ TEST(Sincos, PassesOnNaN) {
   EXPECT_TRUE(std::isnan(s) && std::isnan(c));
 }
 
-}  // namespace
+}  // namespace sincos_test
 }  // namespace ctcr

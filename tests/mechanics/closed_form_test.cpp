@@ -6,7 +6,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace closed_form_test {
 
 using test::Random, test::uniform;
 
@@ -159,5 +159,5 @@ TYPED_TEST(ClosedForm, StraightTubesSagUnderTheirWeight) {
   }
 }
 
-}  // namespace
+}  // namespace closed_form_test
 }  // namespace ctcr

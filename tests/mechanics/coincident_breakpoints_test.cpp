@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace coincident_breakpoints_test {
 
 using test::Random, test::uniform;
 
@@ -100,5 +100,5 @@ TEST(Retracted, EndsAtThePlate) {
   EXPECT_TRUE(s.jacobian.allFinite() && s.compliance.allFinite());
 }
 
-}  // namespace
+}  // namespace coincident_breakpoints_test
 }  // namespace ctcr

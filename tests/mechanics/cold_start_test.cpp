@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace cold_start_test {
 
 using test::Random;
 
@@ -76,5 +76,5 @@ TYPED_TEST(ColdStarts, RandomRobots) {
   EXPECT_LE(outcome.others, 1 + cases / 100) << outcome.singular << " singular";
 }
 
-}  // namespace
+}  // namespace cold_start_test
 }  // namespace ctcr

@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace derivatives_test {
 
 using test::Random;
 constexpr int fine = 16;
@@ -125,5 +125,5 @@ TYPED_TEST(TipDerivative, ComplianceIsSymmetricWhereTheLoadsHaveAPotential) {
   }
 }
 
-}  // namespace
+}  // namespace derivatives_test
 }  // namespace ctcr

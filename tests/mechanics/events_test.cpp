@@ -5,7 +5,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace events_test {
 
 using test::Random;
 
@@ -60,5 +60,5 @@ TEST(Events, AStraightTubeHasNoCurvedStart) {
   for (std::size_t e = 0; e < 6; ++e) EXPECT_EQ(events.s[e] < 0, events.id[e] == 4 || events.id[e] == 5);
 }
 
-}  // namespace
+}  // namespace events_test
 }  // namespace ctcr

@@ -7,7 +7,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace integrators_test {
 
 template <class Tableau>
 double node(std::size_t i) {
@@ -130,5 +130,5 @@ TEST(Integrators, SolveToTheSameRobot) {
   solves_to_the_same_robot<PrinceDormand8>(4, 1e-8, 1e-6);
 }
 
-}  // namespace
+}  // namespace integrators_test
 }  // namespace ctcr

@@ -6,7 +6,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace invalid_input_test {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
 constexpr Derivatives all = Derivatives::compliance;
@@ -103,5 +103,5 @@ TEST(InvalidInput, TooFewIterationsAreReported) {
   EXPECT_TRUE(finite(s));
 }
 
-}  // namespace
+}  // namespace invalid_input_test
 }  // namespace ctcr

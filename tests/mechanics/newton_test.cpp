@@ -9,7 +9,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace newton_test {
 
 using test::Random;
 
@@ -132,5 +132,5 @@ TYPED_TEST(Newton, ConvergesQuadratically) {
   }
 }
 
-}  // namespace
+}  // namespace newton_test
 }  // namespace ctcr

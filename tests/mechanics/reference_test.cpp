@@ -5,7 +5,7 @@
 #include "support/reference_poses.hpp"
 
 namespace ctcr {
-namespace {
+namespace reference_test {
 
 namespace fs = std::filesystem;
 
@@ -81,5 +81,5 @@ TEST(Reference, SharedPoses) {
     expect_reference(shared / (robot + ".yaml"), shared / (robot + "_poses.csv"), 2e-4);
 }
 
-}  // namespace
+}  // namespace reference_test
 }  // namespace ctcr

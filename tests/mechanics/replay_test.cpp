@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace replay_test {
 
 using test::Random, test::uniform;
 
@@ -66,5 +66,5 @@ void expect_all_derivatives(unsigned seed) {
 TYPED_TEST(Replayed, UnderForce) { expect_all_derivatives<Loading::force, TypeParam::N>(43); }
 TYPED_TEST(Replayed, UnderAnyLoad) { expect_all_derivatives<Loading::weight, TypeParam::N>(49); }
 
-}  // namespace
+}  // namespace replay_test
 }  // namespace ctcr

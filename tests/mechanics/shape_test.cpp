@@ -9,7 +9,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace shape_test {
 
 template <int N>
 struct Case {
@@ -242,5 +242,5 @@ TEST(ShapePlaces, AreUniformWithEveryBreakpointOnce) {
   });
 }
 
-}  // namespace
+}  // namespace shape_test
 }  // namespace ctcr

@@ -7,7 +7,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace stability_test {
 
 /// Two tubes curved over the same place behind their flush tips: psi'' = c sin psi for their angle psi, w = 0 at the
 /// tip, straight before. One turns the other through a shaft of length `transmission` (in one piece of each).
@@ -185,5 +185,5 @@ TEST(SnapMargin, MarksWhereTheSolutionTurnsSingular) {
   EXPECT_GE(snapped, 3);
 }
 
-}  // namespace
+}  // namespace stability_test
 }  // namespace ctcr

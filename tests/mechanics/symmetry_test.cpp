@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace symmetry_test {
 
 using test::Random, test::uniform;
 constexpr Derivatives all = Derivatives::compliance;
@@ -137,5 +137,5 @@ TYPED_TEST(Symmetry, AVanishingWeightLeavesTheWeightlessRobot) {
   }
 }
 
-}  // namespace
+}  // namespace symmetry_test
 }  // namespace ctcr

@@ -8,7 +8,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace torsion_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -96,5 +96,5 @@ TEST(Torsion, OpposedTubesThatMustSnapAreNeverCalledOk) {
   EXPECT_LT(std::abs(twist_at_tip(off)), pi - 0.5);
 }
 
-}  // namespace
+}  // namespace torsion_test
 }  // namespace ctcr

@@ -4,7 +4,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace warm_start_test {
 
 using test::Random, test::uniform;
 
@@ -156,5 +156,5 @@ TEST(Step, SolvesWhereThereIsNoStartOrItIsTooFar) {
   EXPECT_LT(s.residual, 1e-10);
 }
 
-}  // namespace
+}  // namespace warm_start_test
 }  // namespace ctcr

@@ -10,7 +10,7 @@
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
 
-namespace {
+namespace batch_test {
 
 using namespace ctcr;
 
@@ -126,4 +126,4 @@ TEST(Batch, MemoryDoesNotGrowWithTheCount) {
   }
 }
 
-}  // namespace
+}  // namespace batch_test

@@ -9,7 +9,7 @@
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
 
-namespace {
+namespace split_step_test {
 
 using namespace ctcr;
 
@@ -66,4 +66,4 @@ TEST(SplitStep, StartsFromNothingLikeStep) {
   expect_equal(whole, split);
 }
 
-}  // namespace
+}  // namespace split_step_test

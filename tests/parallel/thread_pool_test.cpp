@@ -13,7 +13,7 @@
 
 #include "support/no_alloc.hpp"
 
-namespace {
+namespace thread_pool_test {
 
 using ctcr::ThreadPool;
 using namespace std::chrono_literals;
@@ -168,4 +168,4 @@ TEST(ThreadPool, DoesNotAllocateInTheLoop) {
   EXPECT_EQ(sum, 28000);
 }
 
-}  // namespace
+}  // namespace thread_pool_test

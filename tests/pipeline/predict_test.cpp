@@ -9,7 +9,7 @@
 #include "support/laws.hpp"
 #include "support/no_alloc.hpp"
 
-namespace {
+namespace predict_test {
 
 using namespace ctcr;
 
@@ -146,4 +146,4 @@ TEST(Pipeline, DoesNotTouchTheHeap) {
   }
 }
 
-}  // namespace
+}  // namespace predict_test

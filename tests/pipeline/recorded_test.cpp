@@ -10,7 +10,7 @@
 #include "support/catalogue_cases.hpp"
 #include "support/no_alloc.hpp"
 
-namespace {
+namespace recorded_test {
 
 using namespace ctcr;
 
@@ -198,4 +198,4 @@ TEST(Recorded, PromisesNotToThrow) {
   static_assert(never_throws<decltype(&differentiate<3, Catalogue>)>);
 }
 
-}  // namespace
+}  // namespace recorded_test

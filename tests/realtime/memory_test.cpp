@@ -8,7 +8,7 @@
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace {
+namespace memory_test {
 
 constexpr std::size_t limit = 64 * 1024;
 using Largest = Evaluation<3, Loading::weight, Derivatives::compliance>;
@@ -77,5 +77,5 @@ TEST(Memory, OneThreadWithThreeTubesNeedsLessThan64kB) {
   EXPECT_LE(used + kept, limit) << used << " on the stack, " << kept << " kept";
 }
 
-}  // namespace
+}  // namespace memory_test
 }  // namespace ctcr

@@ -8,7 +8,7 @@
 #include "support/no_alloc.hpp"
 
 namespace ctcr {
-namespace {
+namespace no_allocation_test {
 
 using test::HeapGuard, test::Random;
 
@@ -61,5 +61,5 @@ TEST(Guard, CatchesAPlantedAllocationInTheStep) {
   EXPECT_EQ(guard.uses(), 1);
 }
 
-}  // namespace
+}  // namespace no_allocation_test
 }  // namespace ctcr

@@ -7,7 +7,7 @@
 #include "ctcr/ctcr.hpp"
 
 namespace ctcr {
-namespace {
+namespace noexcept_test {
 
 template <int N, Derivatives D>
 constexpr bool promises =
@@ -30,5 +30,5 @@ TEST(Noexcept, NothingOwnsMemory) {
   static_assert(std::is_trivially_destructible_v<Model<3>>);
 }
 
-}  // namespace
+}  // namespace noexcept_test
 }  // namespace ctcr

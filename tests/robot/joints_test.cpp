@@ -7,7 +7,7 @@
 #include "support/random_robots.hpp"
 
 namespace ctcr {
-namespace {
+namespace joints_test {
 
 const Robot<3> robot = test::paper_robot();
 /// Deployed by 0.163, 0.1305 and 0.099 m.
@@ -55,5 +55,5 @@ TEST(CheckJoints, SlackForgivesRounding) {
   EXPECT_EQ(check_joints(robot, q, 3e-6), Status::ok);
 }
 
-}  // namespace
+}  // namespace joints_test
 }  // namespace ctcr

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-namespace {
+namespace parameters_test {
 
 using namespace ctcr;
 
@@ -45,4 +45,4 @@ TEST(Parameters, RangesAreRanges) {
   for (const ParameterKind& kind : parameter_kinds) EXPECT_LT(kind.low, kind.high) << kind.name;
 }
 
-}  // namespace
+}  // namespace parameters_test

@@ -7,7 +7,7 @@
 #include "support/random_robots.hpp"
 
 namespace ctcr {
-namespace {
+namespace tube_test {
 
 TEST(Tube, StiffnessAndMassOfAnAnnulus) {
   const Tube tube = test::paper_robot().tubes[0];
@@ -34,5 +34,5 @@ TEST(Tube, AKnownBendingStiffnessGoesBeforeTheDiameters) {
   EXPECT_EQ(tube.GJ(), 0.123 / 1.3);
 }
 
-}  // namespace
+}  // namespace tube_test
 }  // namespace ctcr

@@ -9,7 +9,7 @@
 #include "support/solver.hpp"
 
 namespace ctcr {
-namespace {
+namespace scalar_lanes_test {
 
 #include "model_to_numbers.hpp"
 
@@ -42,5 +42,5 @@ TEST(ScalarLanes, EqualVectorLanes) {
   EXPECT_GT(compared, test::cases(200) / 2);
 }
 
-}  // namespace
+}  // namespace scalar_lanes_test
 }  // namespace ctcr

@@ -5,7 +5,7 @@
 #include "ctcr/sensing/residual.hpp"
 #include "support/laws.hpp"
 
-namespace {
+namespace pose_sensor_test {
 
 using namespace ctcr;
 
@@ -80,4 +80,4 @@ TEST(Residual, DerivativeIsThatOfItsDefinitionFarAndNear) {
     }
 }
 
-}  // namespace
+}  // namespace pose_sensor_test

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-namespace {
+namespace no_alloc_test {
 
 using ctcr::test::HeapGuard;
 
@@ -112,4 +112,4 @@ TEST(HeapGuard, IsQuietAfterItsLife) {
   EXPECT_EQ(guard.uses(), 0);
 }
 
-}  // namespace
+}  // namespace no_alloc_test

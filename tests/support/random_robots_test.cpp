@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace random_robots_test {
 
 using namespace ctcr;
 
@@ -53,4 +53,4 @@ TEST(RandomRobots, LoadsAreBounded) {
   }
 }
 
-}  // namespace
+}  // namespace random_robots_test

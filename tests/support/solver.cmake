@@ -1,8 +1,8 @@
 # Gives ${program} the instantiations of support/solver.hpp, compiled once for all programs, in files of bearable size.
 if(NOT TARGET ctcr_test_solver)
   # The slowest first. DIRECT is the slower twin that serves one test.
-  foreach(tubes 4 3 2 1)
-    foreach(kind SOLVER DIRECT PARAMETERS)
+  foreach(kind SOLVER DIRECT PARAMETERS)
+    foreach(tubes 4 3 2 1)
       if((kind STREQUAL DIRECT AND NOT tubes MATCHES "[23]") OR (kind STREQUAL PARAMETERS AND tubes EQUAL 4))
         continue()
       endif()
@@ -21,6 +21,7 @@ if(NOT TARGET ctcr_test_solver)
   target_include_directories(ctcr_test_solver PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
   target_link_libraries(ctcr_test_solver PRIVATE ctcr::ctcr ctcr_flags)
   target_compile_options(ctcr_test_solver PRIVATE $<$<CONFIG:Release>:-O1>)
+  set_target_properties(ctcr_test_solver PROPERTIES UNITY_BUILD_BATCH_SIZE 3)
   unset(instances)
 endif()
 target_link_libraries(${program} PRIVATE ctcr_test_solver)
