@@ -10,9 +10,6 @@ execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARI
 find_package(nanobind CONFIG REQUIRED)
 
 nanobind_add_module(_core NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
-# Half the compile time of -O3, nearly its speed.
-file(GLOB control CONFIGURE_DEPENDS tools/ctcr/_core/control_of_*.cpp)
-set_source_files_properties(${control} PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O2>")
 # Two numbers of tubes as one file to the compiler: a quarter less time.
 set_target_properties(_core PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 foreach(part control model recording)
