@@ -102,4 +102,42 @@ TEST(Descent, ShortensAStepThatCannotBePredicted) {
   EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
+// Rows 2 + |w . x - c| make convex costs whose minimum mostly lies where some of them have their kinks.
+TEST(Descent, FindsAMinimumWhereSlopesJump) {
+  int at_kink = 0;
+  for (int seed = 0; seed < 40; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    constexpr Eigen::Index n = 5, rows = 4;
+    Eigen::MatrixXd A(6 * rows, n);
+    for (Eigen::Index k = 0; k < n; ++k) A.col(k) = 5 * normals(6 * rows, random);
+    const Eigen::VectorXd b = A * normals(n, random) + normals(6 * rows, random);
+    const int kinks = 1 + seed % 3;
+    const Predictor predict = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+      residual = A * x - b;
+      if (jacobian) *jacobian = A;
+      for (Eigen::Index i = 0; i < kinks; ++i) {
+        if (jacobian) jacobian->row(i) = residual[i] < 0 ? Eigen::RowVectorXd(-A.row(i)) : Eigen::RowVectorXd(A.row(i));
+        residual[i] = 2 + std::abs(residual[i]);
+      }
+      return true;
+    };
+    std::vector<FreeParameter> parameters(n, {"p", 0, 1});
+    detail::Objective objective(predict, parameters, Eigen::VectorXd::Ones(n));
+    const Noise one{.position_jitter = 1, .rotation_jitter = 1};
+    const SmoothField none{Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)};
+    const Whitening whitening(one, none, RowWeights::Ones(rows, 2));
+    objective.set_whitening(whitening);
+    const detail::Bounds bounds(parameters, {}, Eigen::VectorXd::Ones(n));
+    Eigen::VectorXd z = Eigen::VectorXd::Zero(n);
+    const detail::Descent found = detail::descend(objective, bounds, 50, z);
+    EXPECT_TRUE(found.converged) << seed;
+    EXPECT_LT(objective.evaluations(), 60) << seed;
+    EXPECT_NEAR(found.cost, objective.cost(z), 1e-12);
+    for (int probe = 0; probe < 400; ++probe)
+      EXPECT_GT(objective.cost(z + std::pow(10, test::uniform(random, -3, 0)) * normals(n, random)), found.cost - 0.03);
+    at_kink += found.at_kink;
+  }
+  EXPECT_GT(at_kink, 10);
+}
+
 }  // namespace descent_test

@@ -90,43 +90,95 @@ struct Goal {
 
 struct Descent {
   double cost = std::numeric_limits<double>::infinity();
-  double left = std::numeric_limits<double>::infinity();  ///< length of the step still to be done, in posterior sd
   bool converged = false;
+  bool at_kink = false;  ///< converged where the slopes jump: by those of this side the descent would go on
   int iterations = 0;
 };
 
+/// What a step changes of a cost, to second order: value + gradient . step + step^T hessian step / 2.
+struct Quadratic {
+  double value = 0;
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd hessian;
+  double operator()(const Eigen::VectorXd& step) const { return value + step.dot(gradient + 0.5 * (hessian * step)); }
+};
+
+/// The combination (1 - t) a + t b, 0 <= t <= 1, whose minimum within the bounds is that of max(a, b), where a model a
+/// foresaw too little at its own minimum and b is right there. Damping is added to the diagonal while minimising.
+inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bounds, const Eigen::VectorXd& z,
+                       const Eigen::VectorXd& damping) {
+  Quadratic mixed;
+  double low = 0, high = 1;
+  for (int halving = 0; halving < 20; ++halving) {
+    const double t = halving == 0 ? 1.0 : 0.5 * (low + high);
+    mixed.value = (1 - t) * a.value + t * b.value;
+    mixed.gradient = (1 - t) * a.gradient + t * b.gradient;
+    mixed.hessian = (1 - t) * a.hessian + t * b.hessian;
+    Eigen::MatrixXd damped = mixed.hessian;
+    damped.diagonal() += damping;
+    const Eigen::VectorXd step = bounds.step(z, mixed.gradient, damped);
+    const bool more_of_b = b(step) > a(step);
+    if (halving == 0 && more_of_b) break;
+    (more_of_b ? low : high) = t;
+  }
+  return mixed;
+}
+
 /// Goes down from z to the nearest minimum within bounds: Levenberg-Marquardt, each step the exact minimum of its model
 /// within the bounds (Ceres projects its steps onto them instead, which stalls where parameters go together).
+///
+/// Where a tube's curve begins at the plate, or a load lifts off, slopes jump, and the minimum may lie at such a kink,
+/// where they never vanish. So a step that fails brings the slopes of the other side, and the next one follows the kink or
+/// finds that nothing is left to gain.
 /// @param goal  ends the descent where it is about to arrive there; or null
-/// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999.
+/// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999; the model beyond a kink is an aggregated
+/// bundle, Kiwiel 1983.
 inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, Eigen::VectorXd& z,
                        const Goal* goal = nullptr) {
   constexpr double arrived = 0.1, settled = 0.003;  // posterior sd
+  constexpr double nothing = 0.02;                  // of the cost: a fifth of a posterior sd
   constexpr double most_damping = 1e10;
   Descent out;
   z = bounds.clamped(z);
-  Linearised here;
+  Linearised here, there;
   if (!objective.linearise(z, here)) return out;
+  const auto hessian = [&](const Linearised& at) {
+    return Eigen::MatrixXd(at.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
+  };
+  out.cost = here.cost;
   double damping = 1e-4;
   for (bool moved = true; moved && out.iterations < max_iterations; ++out.iterations) {
     moved = false;
-    const Eigen::MatrixXd H = here.information + Eigen::MatrixXd(objective.prior().asDiagonal());
-    out.converged = bounds.step_left(z, here.gradient, H) < settled || (goal && goal->distance(z) < arrived);
+    Quadratic model{0, here.gradient, hessian(here)};
+    const Eigen::VectorXd diagonal = model.hessian.diagonal();
+    out.converged =
+        bounds.step_left(z, here.gradient, model.hessian) < settled || (goal && goal->distance(z) < arrived);
     if (out.converged) break;
+    bool kinked = false;
     for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
-      Eigen::MatrixXd damped = H;
-      damped.diagonal() += damping * H.diagonal();
-      const Eigen::VectorXd step = bounds.step(z, here.gradient, damped);
-      const double foreseen = -step.dot(here.gradient + 0.5 * (H * step));
+      Eigen::MatrixXd damped = model.hessian;
+      damped.diagonal() += damping * diagonal;
+      const Eigen::VectorXd step = bounds.step(z, model.gradient, damped);
+      const double foreseen = -model(step);
+      out.at_kink = out.converged = kinked && foreseen < nothing;
+      if (out.converged) return out;
       const double gain = (here.cost - objective.cost(z + step)) / foreseen;
-      if (!(gain > 1e-3)) continue;
+      if (!(gain > 0.1)) {
+        if (!objective.linearise(z + step, there)) continue;
+        kinked = true;
+        const Eigen::MatrixXd H = hessian(there);
+        const Eigen::VectorXd slope = there.gradient - H * step;
+        model = upper(model, {there.cost - here.cost - step.dot(slope + 0.5 * (H * step)), slope, H}, bounds, z,
+                      damping * diagonal);
+        continue;
+      }
       z += step;
       damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
       if (!objective.linearise(z, here)) return out;
+      out.cost = here.cost;
       moved = true;
     }
   }
-  out.cost = here.cost;
   return out;
 }
 

@@ -197,9 +197,9 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   if ((objective.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
 
   const double left = bounds.step_left(z, here.gradient, precision());
-  out.converged = left < 0.05;
+  out.converged = left < 0.05 || best.converged;
   out.evaluations = objective.evaluations() + 1;
-  out.status = out.converged ? "converged"
+  out.status = out.converged ? (best.at_kink && left >= 0.05 ? "converged, at a kink of the model" : "converged")
                              : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
                                    detail::number(left) + " standard deviations is left";
   detail::add_warnings(parameters, posterior, here.information.diagonal(), bounds.reached(z), use, out);
