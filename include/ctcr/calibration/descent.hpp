@@ -101,10 +101,16 @@ struct Quadratic {
   Eigen::VectorXd gradient;
   Eigen::MatrixXd hessian;
   double operator()(const Eigen::VectorXd& step) const { return value + step.dot(gradient + 0.5 * (hessian * step)); }
+  /// The step from z to its minimum within the bounds, with damping added to the diagonal.
+  Eigen::VectorXd minimum(const Bounds& bounds, const Eigen::VectorXd& z, const Eigen::VectorXd& damping) const {
+    Eigen::MatrixXd damped = hessian;
+    damped.diagonal() += damping;
+    return bounds.step(z, gradient, damped);
+  }
 };
 
 /// The combination (1 - t) a + t b, 0 <= t <= 1, whose minimum within the bounds is that of max(a, b), where a model a
-/// foresaw too little at its own minimum and b is right there. Damping is added to the diagonal while minimising.
+/// foresaw too little at its own minimum and b is right there. Damping as in minimum().
 inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bounds, const Eigen::VectorXd& z,
                        const Eigen::VectorXd& damping) {
   Quadratic mixed;
@@ -114,9 +120,7 @@ inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bou
     mixed.value = (1 - t) * a.value + t * b.value;
     mixed.gradient = (1 - t) * a.gradient + t * b.gradient;
     mixed.hessian = (1 - t) * a.hessian + t * b.hessian;
-    Eigen::MatrixXd damped = mixed.hessian;
-    damped.diagonal() += damping;
-    const Eigen::VectorXd step = bounds.step(z, mixed.gradient, damped);
+    const Eigen::VectorXd step = mixed.minimum(bounds, z, damping);
     const bool more_of_b = b(step) > a(step);
     if (halving == 0 && more_of_b) break;
     (more_of_b ? low : high) = t;
@@ -156,9 +160,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
     if (out.converged) break;
     bool kinked = false;
     for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
-      Eigen::MatrixXd damped = model.hessian;
-      damped.diagonal() += damping * diagonal;
-      const Eigen::VectorXd step = bounds.step(z, model.gradient, damped);
+      const Eigen::VectorXd step = model.minimum(bounds, z, damping * diagonal);
       const double foreseen = -model(step);
       out.at_kink = out.converged = kinked && foreseen < nothing;
       if (out.converged) return out;
