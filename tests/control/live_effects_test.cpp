@@ -16,7 +16,7 @@ using Path3 = EffectList<Friction, BacklashRotation, Delay>;
 TEST(LiveEffects, RememberWhatRecordedRowsDo) {
   test::Random random(41);
   Path3::On<3> effects;
-  std::get<0>(effects.list).values = {0.03, 0.02, 0.05, 0.3, 0.4};
+  std::get<0>(effects.list).values = {0.03, 0.02, 0.05, 0.008, 0.3, 0.4};
   std::get<1>(effects.list).values = {0.01, 0.02, 0.015};
   std::get<2>(effects.list).values = {0.06};
   const System<3, Path3> system{{1, 1, Vec3::Zero(), Vec3::Zero()}, Model<3, Path3>(test::paper_robot(), effects), {}};

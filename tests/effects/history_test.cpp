@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "ctcr/mechanics/shape.hpp"
 #include "support/catalogue_cases.hpp"
 
 namespace ctcr {
@@ -52,7 +53,7 @@ Joints<2> at(double alpha_1, double alpha_2, double beta_1 = -0.35, double beta_
 
 Catalogue::On<2> with_friction(double coefficient, double insertion = 0, double law = 0) {
   Catalogue::On<2> effects;
-  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0.3, insertion, law};
+  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0, 0.3, insertion, law};
   return effects;
 }
 
@@ -76,7 +77,7 @@ TEST(Friction, HoldsTheTipBackByTheTorqueThatItTransmits) {
   Joints<1> q;
   q.beta << 0.02 - tube.length;
   Catalogue::On<1> effects;
-  effect<Friction, 1>(effects).values = {0.05, 0.3, 0};
+  effect<Friction, 1>(effects).values = {0.05, 0, 0.3, 0};
   for (const double direction : {1.0, -1.0}) {
     Joints<1> end = q;
     end.alpha << 10 * direction;
@@ -86,6 +87,58 @@ TEST(Friction, HoldsTheTipBackByTheTorqueThatItTransmits) {
     EXPECT_NEAR(std::remainder(stands - (end.alpha[0] - direction * lag), 2 * std::numbers::pi), 0, 1e-6);
     EXPECT_GT(lag, 0.1);
   }
+}
+
+TEST(Friction, AlongTheLengthWindsTheInnerTubeUp) {
+  Robot<2> robot = two_tubes();
+  for (Tube& tube : robot.tubes) tube.curvature = 0;
+  const Tube &inner = robot.tubes[0], &outer = robot.tubes[1];
+  Catalogue::On<2> effects;
+  effect<Friction, 2>(effects).values = {0, 0, 0.02, 0.3, 0};
+  for (const double direction : {1.0, -1.0}) {
+    const Joints<2> start = at(-10 * direction, 0), end = at(0.4, 0);
+    const Solution<2> s = Walk<2>(robot, effects).to(start).to(end).solution();
+    const double overlap = outer.length + end.beta[1], torque = 0.02 * overlap;
+    const auto wound = [&](const Tube& t, double beta) { return torque * (-beta + 0.5 * overlap) / t.GJ(); };
+    EXPECT_NEAR(rotation_vector(s.rotation).z(), 0.4 - direction * wound(inner, end.beta[0]), 1e-9);
+    EXPECT_NEAR(rotation_vector(s.tube_tips[1].rotation).z(), direction * wound(outer, end.beta[1]), 1e-9);
+    EXPECT_GT(wound(inner, end.beta[0]), 0.05);
+  }
+}
+
+TEST(Friction, FollowsWhatTheTwistLeavesOfARotation) {
+  Walk<2> walk(two_tubes(), with_friction(0.03, 0, 1)), straight = walk;
+  walk.to(at(0, 0)).to(at(0.12, 0)).to(at(0.2, 0));
+  walk.rows[1].twist = {-0.06, 0};  // half of it
+  walk.rows[2].twist = {-0.14, 0};  // no more motion at the tip
+  EXPECT_NEAR(walk.remembered<Friction>()[0], straight.to(at(0, 0)).to(at(0.06, 0)).remembered<Friction>()[0], 1e-12);
+}
+
+TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
+  const System<2> system{{1, 1, VecN<2>::Zero(), VecN<2>::Zero()}, Model<2>(two_tubes()), {}, {.tolerance = 1e-12}};
+  std::vector<RecordedRow<2>> rows;
+  for (int k = 0; k <= 30; ++k) rows.push_back({{at(0, 0).beta, at(0.4 * k, 0.05 * k).alpha}, {}, {}});
+  rows[0].theta.translation[0] = -1;  // unsolvable
+  rows[20].theta.translation[0] = -1;
+  add_twist<2>(system, rows);
+  EXPECT_EQ(rows[0].twist, rows[1].twist);
+  EXPECT_EQ(rows[20].twist, rows[19].twist);
+  Workspace<2> ws;
+  Solution<2> solution;
+  double largest = 0;
+  for (const RecordedRow<2>& row : rows) {
+    if (row.theta.translation[0] == -1) continue;
+    const std::array<double, 1> place{two_tubes().tubes[1].length + row.theta.translation[1] - 1e-9};
+    std::array<ShapePoint<2>, 1> here;
+    ASSERT_EQ(shape<2>(system.model, {row.theta.translation, row.theta.rotation}, {}, place, here, ws, solution),
+              Status::ok);
+    const double at_tip = here[0].tube[0].angle - here[0].tube[1].angle;
+    const double at_base = row.theta.rotation[0] - row.theta.rotation[1];
+    EXPECT_NEAR(std::remainder(row.twist[0] - (at_tip - at_base), 2 * std::numbers::pi), 0, 1e-5);
+    EXPECT_EQ(row.twist[1], 0);
+    largest = std::max(largest, std::abs(row.twist[0]));
+  }
+  EXPECT_GT(largest, 0.2);
 }
 
 TEST(Friction, LagsAndNeverLeads) {

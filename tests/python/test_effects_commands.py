@@ -97,8 +97,8 @@ def test_an_unknown_effect(run):
 
 def test_settings(robot):
     assert settings(["friction.coefficient.2=0.02"], robot) == {"effects.friction.coefficient.2": 0.02}
-    assert settings(["friction=0.02"], robot) == {
-        f"effects.friction.coefficient.{i}": 0.02 for i in (1, 2, 3)
+    assert settings(["backlash_rotation=0.02"], robot) == {
+        f"effects.backlash_rotation.play.{i}": 0.02 for i in (1, 2, 3)
     }
     assert settings(["gamma=1e-3,0,0"], robot, ["softening"]) == {
         "effects.softening.gamma.1": 1e-3, "effects.softening.gamma.2": 0, "effects.softening.gamma.3": 0,
@@ -113,10 +113,10 @@ def test_settings(robot):
         ("friction.coeficient=0", "did you mean coefficient?"),
         ("friction.coefficient.4=0", "a tube from 1 to 3"),
         ("delay.delay.1=0", "one value"),
-        ("friction=x", "is not a number"),
-        ("friction=-1", "is impossible"),
-        ("friction=nan", "is impossible"),
-        ("friction=0,0", "needs one number, or 3"),
+        ("friction.coefficient=x", "is not a number"),
+        ("friction.coefficient=-1", "is impossible"),
+        ("friction.coefficient=nan", "is impossible"),
+        ("friction.coefficient=0,0", "needs one number, or 3"),
         ("tip_load=1", "name one: mass, force_x"),
     ],
 )
@@ -157,7 +157,7 @@ def test_a_model_uses_the_tube_not_the_sensor(robot, plan):
 
 def test_a_model_refuses_what_it_cannot_use(robot):
     with pytest.raises(InputError, match="friction, delay need the rows in their order"):
-        ctcr.Model(hidden(robot, friction="0.01", delay="0.05"))
+        ctcr.Model(hidden(robot, friction__coefficient="0.01", delay="0.05"))
     model = ctcr.Model(hidden(robot, softening="0.01"))
     with pytest.raises(InputError, match="softening a model gives poses under forces"):
         model.predict(np.zeros((1, 3)), np.zeros((1, 3)), derivatives=True)
@@ -286,7 +286,10 @@ def test_remove_what_is_not_there(run, tmp_path):
 def test_commands_use_the_effects(run, robot, plan, table, tmp_path):
     true, made, poses = tmp_path / "true.yaml", tmp_path / "made.csv", tmp_path / "poses.csv"
     assert run("add", ROBOT, "friction", "--set", "coefficient=0.02", "-o", true)[0] == 0
-    assert run("simulate", ROBOT, table, "--hide", "friction=0.02", "--noise", "none", "-o", made)[0] == 0
+    assert (
+        run("simulate", ROBOT, table, "--hide", "friction.coefficient=0.02", "--noise", "none", "-o", made)[0]
+        == 0
+    )
     assert run("predict", true, made, "-o", poses, "--steps", 4)[0] == 0
     columns = np.genfromtxt(poses, delimiter=",", names=True)
     for axis in "xyz":

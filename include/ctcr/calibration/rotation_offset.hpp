@@ -6,6 +6,7 @@
 
 #include "ctcr/calibration/circle_solution.hpp"
 #include "ctcr/calibration/significance.hpp"
+#include "ctcr/math/functions.hpp"
 #include "ctcr/math/se3.hpp"
 
 namespace ctcr {
@@ -86,8 +87,6 @@ namespace rotation_offset {
 
 inline constexpr double surprising = 3.5;  // a notice comes by chance once in some thousand calibrations
 inline constexpr double degree = std::numbers::pi / 180, mm = 1e-3;
-
-inline double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
 
 /// Series 0 is forward, 1 backward. A motor that stands keeps its direction; what comes before it first moves gets that
 /// of the first motion.

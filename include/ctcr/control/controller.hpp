@@ -76,7 +76,7 @@ public:
     const Joints<N> motors = joints(system_.transmission, measured.theta);
     Joints<N> q = motors;
     if constexpr (!Fx::none) {
-      q = live_.advance(motors, time_);
+      q = live_.advance(motors, time_, ws_);
       time_ += period_;
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }

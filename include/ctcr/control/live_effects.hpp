@@ -16,8 +16,9 @@ public:
   explicit LiveEffects(const Effects& effects) noexcept : effects_(effects) {}
 
   /// Takes the next joints of the motors, and their time [s]; returns the joints that the tubes have.
+  /// @param before  the equilibrium of the period before; none: tubes count as stiff in torsion
   /// Real time: yes.
-  Joints<N> advance(const Joints<N>& motors, double time) noexcept {
+  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& before = {}) noexcept {
     if (count_ == window) {
       std::copy(rows_.begin() + 1, rows_.end(), rows_.begin());
       std::copy(times_.begin() + 1, times_.end(), times_.begin());
@@ -27,6 +28,11 @@ public:
       rows_[count_].beta[i] = motors.beta[Eigen::Index(i)];
       rows_[count_].alpha[i] = motors.alpha[Eigen::Index(i)];
     }
+    twist_ = twist_between(before, twist_);
+    if (before.warm && !knows_twist_)
+      for (std::size_t k = 0; k < count_; ++k) rows_[k].twist = twist_;
+    knows_twist_ = knows_twist_ || before.warm;
+    rows_[count_].twist = twist_;
     times_[count_] = time;
     at_.time = time;
     const std::size_t row = count_++;
@@ -34,7 +40,7 @@ public:
     effects_.for_each([&](auto& effect, int) {
       if constexpr (requires { effect.remember(path, row); }) effect.remember(path, row);
     });
-    auto [beta, alpha] = rows_[row];
+    auto [beta, alpha, twist] = rows_[row];
     effects_.actuate(at_, beta, alpha);
     return {Eigen::Map<const VecN<N>>(beta.data()), Eigen::Map<const VecN<N>>(alpha.data())};
   }
@@ -48,6 +54,8 @@ private:
   std::array<typename Path<N, double>::Row, window> rows_{};
   std::array<double, window> times_{};
   std::size_t count_ = 0;
+  std::array<double, N> twist_{};
+  bool knows_twist_ = false;
   Occasion at_;
 };
 

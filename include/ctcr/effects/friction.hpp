@@ -8,11 +8,11 @@ inline constexpr EffectInfo info{
     .id = "friction",
     .title = "Friction between the tubes",
     .physics =
-        "Tubes that turn inside one another rub where they press on each other: at their ends, where they start to "
-        "curve and in the front plate. The inner tube lags behind its base.",
+        "Tubes that turn inside one another rub: where they press on each other, at their ends, where they start to "
+        "curve and in the front plate, or all along. The inner tube lags behind its base.",
     .signature =
-        "The same joints give another pose when they are reached from the other side; the difference grows with the "
-        "bending moments and lasts until the motion reverses.",
+        "The same joints give another pose when they are reached from the other side; the difference lasts until the "
+        "motion reverses, and grows with the bending moments or with the length over which tubes overlap.",
     .measure = "Visit the same joints from both directions, each time after turning by at least 40 degrees.",
     .look_alikes = "backlash_rotation delay",
     .reference =
@@ -32,6 +32,16 @@ inline constexpr std::array parameters{
                     .per_tube = true,
                     .meaning = "friction torque per jump of the bending moment of all tubes inside the contact, of a "
                                "tube in the next outer one (of the outermost: in the front plate)"},
+    EffectParameter{.name = "torque_per_length",
+                    .unit = "N",
+                    .neutral = 0,
+                    .sigma = 0.01,
+                    .soft_low = 0,
+                    .soft_high = 0.05,
+                    .hard_low = 0,
+                    .hard_high = 0.5,
+                    .meaning = "friction torque per length between a tube and the next outer one, all along, however "
+                               "hard they press"},
     EffectParameter{.name = "slip_angle",
                     .unit = "rad",
                     .neutral = 20 * 0.017453292519943295,
@@ -68,12 +78,14 @@ inline constexpr std::array parameters{
 };
 }  // namespace friction
 
-/// Torque exchanged where the bending moment of the tubes inside a contact jumps: C |jump| h. h in [-1, 1] follows the
-/// tube's rotation against the next outer one (the guide, for the outermost), so that the tube lags its base.
+/// Torque exchanged where the bending moment of the tubes inside a contact jumps, C |jump| h, and all along the overlap
+/// of two tubes, so much per length times h. h in [-1, 1] follows the tube's rotation in the next outer one (in the guide,
+/// for the outermost), as far as their twist leaves of that of their bases, so that the tube lags its base.
 /// State: h of each tube, then with the second law the share of the limit that insertion takes.
 template <int N, class P = double>
 struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = friction::info;
+  static constexpr bool follows_twist = true;
 
   void station(Station<P, N>& s) const noexcept {
     P dx = 0.0, dy = 0.0;
@@ -90,6 +102,10 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
     }
   }
 
+  void rub(std::array<P, N>& torque) const noexcept {
+    for (std::size_t i = 0; i + 1 < N; ++i) torque[i] = torque[i] - this->template get<1>() * this->past.state[i];
+  }
+
   /// Exactly along each straight move.
   void remember(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
@@ -97,10 +113,10 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
     constexpr double per_radius = 1 / 0.8e-3;
     for (std::size_t i = 0; i < N; ++i) {
       const auto against_next = [&](const std::array<P, N>& v) -> P { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
-      const P turn = against_next(to.alpha) - against_next(from.alpha);
+      const P turn = against_next(to.alpha) - against_next(from.alpha) + (to.twist[i] - from.twist[i]);
       const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
       P &h = this->past.state[i], &k = this->past.state[N + i];
-      if (value(this->template get<3>()) < 0.5)
+      if (value(this->template get<4>()) < 0.5)
         bend(turn, slide, h);
       else
         slip(turn, slide, h, k);
@@ -112,18 +128,18 @@ private:
 
   /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip.
   void bend(const P& turn, const P& slide, P& h) const noexcept {
-    const P travel = magnitude(turn) + this->template get<2>() * magnitude(slide) + rest;
+    const P travel = magnitude(turn) + this->template get<3>() * magnitude(slide) + rest;
     const P target = turn * inverse(travel);
-    h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<1>())));
+    h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<2>())));
   }
 
   /// (h, k)' = (turn', share slide') / slip within the unit circle; on it the part that points out is slip. There the angle
   /// to the motion falls as tan(angle / 2)' = -tan(angle / 2) / slip.
   void slip(const P& turn, const P& slide, P& h, P& k) const noexcept {
-    const P shared = this->template get<2>() * slide, square = turn * turn + shared * shared;
+    const P shared = this->template get<3>() * slide, square = turn * turn + shared * shared;
     if (!(value(square) > rest * rest)) return;
     const P travel = square_root(square), c = turn * inverse(travel), s = shared * inverse(travel);
-    P far = travel * inverse(this->template get<1>()), along = h * c + k * s, across = k * c - h * s;
+    P far = travel * inverse(this->template get<2>()), along = h * c + k * s, across = k * c - h * s;
     const P room = 1.0 - across * across;  // the circle is met where along^2 is that
     const P edge = value(room) > 1e-12 ? square_root(room) : P(0.0);
     if (value(along + far) < value(edge)) {

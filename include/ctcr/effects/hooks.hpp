@@ -4,6 +4,7 @@
 //
 //   material(TubePlace<P>, Material<P>&)         what a tube is made of at a place
 //   station(Station<P, N>&)                      torques between tubes, and kinks, where tubes end or start to curve
+//   rub(torque&)                                 torque per length between each tube and the next outer one
 //   grip(torque, angle&)                         angles of the tubes at their grasped ends
 //   tip_force(gravity, force&)                   a force at the robot tip, base frame
 //   environment(position, force&)                the same, depending on where the tip is
@@ -71,7 +72,8 @@ struct Occasion {
 template <int N, class P>
 struct Path {
   struct Row {
-    std::array<P, N> beta, alpha;  ///< [m], [rad]
+    std::array<P, N> beta, alpha;   ///< [m], [rad]
+    std::array<double, N> twist{};  ///< as in RecordedRow
   };
   std::span<const Row> q;
   std::span<const double> time;  ///< [s]; empty: unknown
@@ -87,12 +89,16 @@ concept HasEnvironment = requires(const Effect& effect, const std::array<P, 3>& 
 template <class Effect, class P, int N>
 concept HasStation = requires(const Effect& effect, Station<P, N>& station) { effect.station(station); };
 
+/// An effect between tubes wherever both of them are.
+template <class Effect, class P, int N>
+concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effect.rub(torque); };
+
 /// An effect that changes the equilibrium of the rod.
 template <class Effect, class P, int N>
 concept ActsOnRod =
-    HasStation<Effect, P, N> || requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) {
-      effect.material(place, m);
-    } || requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
+    HasStation<Effect, P, N> || HasRub<Effect, P, N> ||
+    requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) { effect.material(place, m); } ||
+    requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
       effect.grip(torque, angle);
     } || requires(const Effect& effect, const std::array<P, 3>& gravity, std::array<P, 3>& force) {
       effect.tip_force(gravity, force);
@@ -113,6 +119,8 @@ struct EffectList {
     static constexpr int count = (0 + ... + E<N, P>::count);  ///< values of all parameters
     /// Whether anything happens where tubes end or start to curve.
     static constexpr bool has_station = (false || ... || HasStation<E<N, P>, P, N>);
+    /// Whether tubes rub along their length.
+    static constexpr bool has_rub = (false || ... || HasRub<E<N, P>, P, N>);
     /// Whether the tip's surroundings act on it.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 
@@ -188,6 +196,12 @@ struct EffectList {
       for_each([&](const auto& e, int) {
         if constexpr (requires { e.station(s); })
           if (e.active) e.station(s);
+      });
+    }
+    void rub(std::array<P, N>& torque) const noexcept {
+      for_each([&](const auto& e, int) {
+        if constexpr (HasRub<std::remove_cvref_t<decltype(e)>, P, N>)
+          if (e.active) e.rub(torque);
       });
     }
     void grip(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "ctcr/math/dual.hpp"
 
@@ -19,6 +20,9 @@ S exponential_of(const S& x) noexcept {
   const double e = std::exp(value(x));
   return mapped(x, e, e);
 }
+
+/// An angle within half a turn, [-pi, pi].
+inline double wrapped(double angle) noexcept { return std::remainder(angle, 2 * std::numbers::pi); }
 
 /// |x|.
 template <class S>

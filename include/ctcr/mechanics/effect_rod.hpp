@@ -1,7 +1,7 @@
 #pragma once
 // The general path: the rod with effects, for any scalar S, from the robot tip to the front plate. Every tube may bend
-// anywhere and by any law of hooks.hpp; tubes may exchange torque and the frame may kink where tubes end or start to
-// curve. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
+// anywhere and by any law of hooks.hpp; tubes may exchange torque along their length and where tubes end or start to
+// curve, and there the frame may kink. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
 #include "ctcr/mechanics/bending.hpp"
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
@@ -57,7 +57,12 @@ public:
     std::array<Material<S>, N> material;  ///< of each present tube here
   };
 
-  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {}
+  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {
+    if constexpr (Fx::template On<N, S>::has_rub) {
+      rub_.fill(0.0);
+      in_.effects.rub(rub_);
+    }
+  }
 
   /// Integrates from the state at the tip to the grasped side of the front plate.
   /// @param frame  out: Bishop frame there as seen from the tip frame
@@ -252,6 +257,12 @@ private:
         d.psi(j) = d.torque(j) = 0.0;
       }
     }
+    if constexpr (Fx::template On<N, S>::has_rub) {
+      for (int j = 0; j + 1 < place.present; ++j) {
+        d.torque(j) = d.torque(j) - rub_[std::size_t(j)];
+        d.torque(j + 1) = d.torque(j + 1) + rub_[std::size_t(j)];
+      }
+    }
     const S &ux = u[0], &uy = u[1];
     d.m(0) = y.n(1) - uy * mz;
     d.m(1) = ux * mz - y.n(0);
@@ -344,6 +355,7 @@ private:
   }
 
   const Inputs& in_;
+  std::array<S, N> rub_;  ///< what each tube takes from the next outer one, per length [N]
 };
 
 }  // namespace ctcr

@@ -10,16 +10,9 @@
 #include "ctcr/math/frame_algebra.hpp"
 #include "ctcr/pipeline/parameters.hpp"
 #include "ctcr/pipeline/predict.hpp"
+#include "ctcr/pipeline/recorded_row.hpp"
 
 namespace ctcr {
-
-/// One row of a recording.
-template <int N>
-struct RecordedRow {
-  MotorAngles<N> theta;
-  TipLoad load;
-  Occasion at;
-};
 
 namespace detail {
 
@@ -50,11 +43,13 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
     return p;
   };
   std::vector<typename Path<N, P>::Row> q(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i)
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    q[i].twist = rows[i].twist;
     joints_of<N, P>(
         transmission, rows[i].theta,
         [&](double x, int index) { return seeded(x, count + index - V::index(Parameter::translation_ratio)); },
         q[i].beta, q[i].alpha);
+  }
   E<N, P> dual;
   for (int k = 0; k < count; ++k) dual.values[std::size_t(k)] = seeded(effect.values[std::size_t(k)], k);
   for (std::size_t row = 0; row < rows.size(); ++row) {

@@ -67,7 +67,7 @@ private:
   void settle() noexcept {
     Joints<N> q = joints(system_.transmission, theta_);
     if constexpr (!Fx::none) {
-      q = live_.advance(q, time_);
+      q = live_.advance(q, time_, ws_);
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }
     (void)solve<Derivatives::jacobian>(model_, q, load_, ws_, solution_, system_.settings);

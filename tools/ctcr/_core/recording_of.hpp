@@ -9,9 +9,23 @@
 
 namespace ctcr::python {
 
+/// Whether an effect that follows the twist of the tubes acts, or is asked for.
+template <int N>
+bool twist_counts(const Table& table) {
+  bool counts = false;
+  typename AllEffects::On<N>{}.for_each([&](const auto& effect, int first) {
+    if constexpr (requires { effect.follows_twist; })
+      for (int k = 0; k < effect.count; ++k)
+        counts = counts || table.effects[first + k] != effect.values[std::size_t(k)] ||
+                 std::ranges::count(table.free, ParameterVector<N>::count + first + k) > 0;
+  });
+  return counts;
+}
+
 template <int N>
 std::vector<RecordedRow<N>> rows_of(const Table& table) {
-  const Transmission<N> transmission = plain_system<N>(table.parameters, table.sensor_tube, table.steps).transmission;
+  const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
+  const Transmission<N>& transmission = plain.transmission;
   std::vector<RecordedRow<N>> rows(std::size_t(table.beta.rows()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto k = Eigen::Index(i);
@@ -19,6 +33,7 @@ std::vector<RecordedRow<N>> rows_of(const Table& table) {
     rows[i].load.force = table.force.row(k).transpose();
     rows[i].at = {table.time[k], table.part[k], table.run[k], table.centre};
   }
+  if (twist_counts<N>(table)) add_twist<N>(plain, rows);
   return rows;
 }
 

@@ -12,6 +12,7 @@ from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
 VARIANTS = {
+    "friction": (("coefficient",), ("torque_per_length",)),
     "tip_load": (("mass",), ("force_x", "force_y", "force_z")),
     "precurvature_profile": (
         ("linear",),
