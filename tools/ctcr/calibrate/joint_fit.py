@@ -27,11 +27,13 @@ MOST_ROWS_FOLDED = 5000  # beyond, one part is held out instead of each in turn
 
 @dataclass(frozen=True)
 class Stage:
-    """The error at one stage of the calibration, RMS; NaN where not known."""
+    """The error at one stage of the calibration, RMS, mean and largest; NaN where not known."""
 
     name: str
     rms_mm: float
     rms_deg: float = nan
+    mean_mm: float = nan
+    max_mm: float = nan
 
 
 @dataclass(frozen=True)
@@ -165,10 +167,10 @@ def calibrate(
             alone = fitted(frame, noise=fit.noise, starts=1)
         pair = [fitted(names, rows=both.part == part, **_as_in(fit)) for part in range(2)] if both else []
     after = fit.apply(robot)
-    stages = [Stage("nominal", *_rms(fit.nominal_residual[usable]))]
+    stages = [_stage("nominal", fit.nominal_residual[usable])]
     if alone is not None:
-        stages.append(_stage("frame alone", alone, usable))
-    stages.append(_stage("calibrated", fit, usable))
+        stages.append(_stage("frame alone", alone.residual[usable]))
+    stages.append(_stage("calibrated", fit.residual[usable]))
     return Calibration(
         before=robot,
         after=after,
@@ -261,8 +263,12 @@ def _held_out_split(readings: Measurements, lever: float, hold_out: int | None) 
     return runs_left_out(readings, hold_out) if hold_out else parts_of(readings, lever, FOLDS)
 
 
-def _stage(name: str, fit, rows: Array) -> Stage:
-    return Stage(name, *_rms(fit.residual[rows]))
+def _stage(name: str, residual: Array) -> Stage:
+    """Of residuals (K, 6), position [m] and rotation [rad]."""
+    position, rotation = (np.linalg.norm(part, axis=1) for part in (residual[:, :3], residual[:, 3:]))
+    position, rotation = (1e3 * position[np.isfinite(position)], np.degrees(rotation[np.isfinite(rotation)]))
+    rms = [float(np.sqrt(np.mean(part**2))) if len(part) else nan for part in (position, rotation)]
+    return Stage(name, *rms, *((float(position.mean()), float(position.max())) if len(position) else ()))
 
 
 def _held_out(folds: list, kind: str, usable: Array) -> HeldOut:
@@ -274,14 +280,6 @@ def _held_out(folds: list, kind: str, usable: Array) -> HeldOut:
         float(np.sqrt(np.mean(expected[known[:, i], i]))) if known[:, i].any() else nan for i in range(2)
     ]
     return HeldOut(
-        kind, len(folds), int(known[:, 0].sum()), Stage("held out", *_rms(residual)),
+        kind, len(folds), int(known[:, 0].sum()), _stage("held out", residual),
         Stage("noise floor", 1e3 * floor[0], float(np.degrees(floor[1]))),
     )  # fmt: skip
-
-
-def _rms(residual: Array) -> tuple[float, float]:
-    """RMS lengths of the position [mm] and rotation [deg] parts of residuals (K, 6); NaN where none is known."""
-    length = [np.linalg.norm(part, axis=1) for part in (residual[:, :3], residual[:, 3:])]
-    known = [part[np.isfinite(part)] for part in length]
-    mean = [float(np.sqrt(np.mean(part**2))) if len(part) else nan for part in known]
-    return 1e3 * mean[0], float(np.degrees(mean[1]))

@@ -8,7 +8,7 @@ from ctcr.calibrate.parameters import doubts
 from ctcr.compare.wording import mm
 from ctcr.output import table
 
-ERROR_COLUMNS = ["", "RMS, mm", "RMS, deg", "readings"]
+ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
 PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]
 SHOWN = 12
 NEEDED_WIDTH = 108  # of the table of parameters; a narrower terminal wraps its lines
@@ -88,4 +88,5 @@ def _with_deviation(value: float, sd: float) -> str:
 
 
 def _sizes(stage) -> list[str]:
-    return [f"{stage.rms_mm:.3f}", f"{stage.rms_deg:.3f}" if isfinite(stage.rms_deg) else "-"]
+    values = (stage.rms_mm, stage.mean_mm, stage.max_mm, stage.rms_deg)
+    return [f"{value:.3f}" if isfinite(value) else "-" for value in values]

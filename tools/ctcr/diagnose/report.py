@@ -56,8 +56,8 @@ def _opening(d: "Diagnosis", title: str) -> str:
         f"<h1>{html.escape(title)}</h1>"
         f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
         f"{cards(numbers)}"
-        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw; noise and uncertain '
-        f"parameters of a right model would leave {d.expected_mm:.2g} mm there.</p>"
+        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw. Even of a right '
+        f"model the tracker's stated accuracy and uncertain parameters allow {d.expected_mm:.2g} mm there.</p>"
     )
 
 
