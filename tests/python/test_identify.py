@@ -301,3 +301,14 @@ def _values(truth, nominal, names):
         if name.startswith("tracker.rotation."):
             values[i] = turn["xyz".index(name[-1])]
     return values
+
+
+def test_many_rows_are_fitted_as_few_are(monkeypatch):
+    """Where the starts are compared on a part of the rows, the fit of all of them is the same."""
+    nominal = robot()
+    readings = table(nominal, rows=200)
+    at_once = identify.fit(nominal, readings, noise=NOISE)
+    monkeypatch.setattr(identify, "FEW_ROWS", 50)
+    from_a_part = identify.fit(nominal, readings, noise=NOISE)
+    assert from_a_part.starts and from_a_part.evaluations < at_once.evaluations
+    np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core, free_parameters, user_effects
+from ctcr import _core, fit_words, free_parameters, user_effects
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
@@ -22,8 +22,7 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-MANY_ROWS = 5000  # beyond, one start is compared with the first, else two
-FEW_RUNS = 2
+FEW_ROWS = 500  # a fit of so many comes first where there are twice as many or more
 Noise = _core.Noise
 expand = free_parameters.expand
 parameter_names = free_parameters.names_of
@@ -247,7 +246,7 @@ def fit(
     admit_model_error: bool = True,
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
-    starts: int | None = None,
+    starts: int = 3,
     steps: int = 1,
     threads: int = 0,
 ) -> Fit:
@@ -269,15 +268,13 @@ def fit(
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    warnings = [*ignored, *_doubts(measurements, measured_rows(measurements) & chosen)]
+    warnings = [*ignored, *fit_words.doubts(measurements, measured_rows(measurements) & chosen)]
     table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
-    table.activate((measured_rows(measurements) & chosen).tolist())
-    if starts is None:
-        starts = 2 if len(measurements) > MANY_ROWS else 3
-    fitted = identify_with(
-        table, names, mean, width, low, high, noise, places_of(robot, measurements),
-        robust=robust, admit_model_error=admit_model_error, weights=weights, inflation=inflation, starts=starts,
-        start=np.clip(table.nominal(), low, high), known=free_parameters.known_directions(robot, names),
+    fitted = identify_rows(
+        table, measured_rows(measurements) & chosen, names, mean, width, low, high, noise,
+        places_of(robot, measurements), robust=robust, admit_model_error=admit_model_error, weights=weights,
+        inflation=inflation, starts=starts, start=np.clip(table.nominal(), low, high),
+        known=free_parameters.known_directions(robot, names),
         within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
     units = free_parameters.units_with_effects(robot)
@@ -287,6 +284,23 @@ def fit(
         warnings=warnings + fitted.warnings,
         seconds=perf_counter() - began,
     )
+
+
+def identify_rows(
+    table: Any, rows: Mask, *arguments: Any, start: Array, starts: int = 1, **options: Any
+) -> Fit:
+    """identify_with() of some rows of a Recording. Where they are many, the starts are compared on a few of them."""
+    every = len(np.flatnonzero(rows)) // FEW_ROWS
+    if every < 2:
+        table.activate(rows.tolist())
+        return identify_with(table, *arguments, start=start, starts=starts, **options)
+    few = np.zeros_like(rows)
+    few[np.flatnonzero(rows)[::every]] = True
+    table.activate(few.tolist())
+    first = identify_with(table, *arguments, start=start, starts=starts, **options)
+    table.activate(rows.tolist())
+    fitted = identify_with(table, *arguments, start=first.values, starts=1, **options)
+    return replace(fitted, starts=first.starts)
 
 
 def identify_with(
@@ -334,7 +348,7 @@ def identify_with(
         seconds=perf_counter() - began,
         core=core,
         predict=predict,
-        warnings=[*core.warnings, *_excluded_text(excluded)],
+        warnings=[*core.warnings, *fit_words.left_out(excluded)],
         **{
             name: getattr(core, name)
             for name in (
@@ -358,30 +372,6 @@ def measured_rows(measurements: Measurements) -> Mask:
 def _is_measured(measurements: Measurements, kind: str) -> bool:
     values = measurements.position if kind == "position" else measurements.quaternion
     return values is not None and bool(np.isfinite(values).all(axis=1).any())
-
-
-def _doubts(measurements: Measurements, rows: Mask) -> Iterable[str]:
-    if not rows.any():
-        return
-    joints = np.hstack([measurements.beta, measurements.alpha])[rows]
-    fixed = np.ptp(joints, axis=0) == 0
-    if fixed.all():
-        yield "all joints are the same in every row: one pose determines few of the parameters"
-    elif fixed.any():
-        n = measurements.beta.shape[1]
-        which = [f"beta{i + 1}" if i < n else f"alpha{i + 1 - n}" for i in np.flatnonzero(fixed)]
-        yield f"these joints never move: {', '.join(which)}"
-    if len(np.unique(measurements.run[rows])) < FEW_RUNS:
-        yield "there is only one run: readings that follow one another cannot check what was learned from them"
-    if measurements.quaternion is None or not np.isfinite(measurements.quaternion[rows]).any():
-        yield "no orientation was measured: positions alone tell the parameters apart less well"
-
-
-def _excluded_text(rows: Sequence[int]) -> list[str]:
-    if not rows:
-        return []
-    shown = ", ".join(str(row + 1) for row in rows[:8]) + (" .." if len(rows) > 8 else "")
-    return [f"{len(rows)} readings were left out, for which the model has no solution: number {shown}"]
 
 
 def _rms(residual: Array, rows: Mask | None) -> float:

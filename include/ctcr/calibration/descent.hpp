@@ -150,7 +150,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
     return Eigen::MatrixXd(at.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
   };
   out.cost = here.cost;
-  double damping = 1e-4;
+  double damping = 1e-8;
   for (bool moved = true; moved && out.iterations < max_iterations; ++out.iterations) {
     moved = false;
     Quadratic model{0, here.gradient, hessian(here)};

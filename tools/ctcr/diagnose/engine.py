@@ -112,13 +112,12 @@ class Engine:
         mean_of = dict(zip(names, mean, strict=True))
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
-        table.activate((self.measured & self.rows).tolist())
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
-        return identify.identify_with(
-            table, names, mean, sd, low, high, noise or self.noise, self.places,
+        return identify.identify_rows(
+            table, self.measured & self.rows, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, starts=1, max_iterations=max_iterations,
+            start=at, max_iterations=max_iterations,
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 
