@@ -26,16 +26,9 @@ TUBE = {
     "length": ("length_mm", 1e-3),
 }
 OUTSIDE = {
-    *("backlash_rotation", "backlash_translation", "delay", "tip_load", "sensor_offset", "field_distortion"),
-    *(
-        "frame_drift",
-        "frame_jump",
-        "periodic_rotation",
-        "periodic_translation",
-        "entry_compliance",
-        "contact",
-    ),
-}
+    "backlash_rotation", "backlash_translation", "delay", "tip_load", "sensor_offset", "field_distortion",
+    "frame_drift", "frame_jump", "periodic_rotation", "periodic_translation", "entry_compliance", "contact",
+}  # fmt: skip
 EFFECTS = {  # id -> parameters without the id, and their true values
     "delay": lambda v: {"delay": v["delay_s"]},
     "sensor_offset": lambda v: dict(zip("xyz", v["offset_m"], strict=True)),

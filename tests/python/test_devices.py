@@ -271,19 +271,18 @@ def test_lateness():
 
 
 @pytest.mark.parametrize(
-    ("shares", "off"),
+    ("effect", "strength", "shares", "off"),
     [
-        ((), 1e-6),
-        ((0.25, 0.5, 0.75), 1e-4),
-    ],  # on its way the twist of the tubes is known better than from row to row
+        ("friction", "coefficient", (), 1e-6),
+        # Told of the way, it knows the twist of the tubes better than from row to row.
+        ("friction", "coefficient", (0.25, 0.5, 0.75), 1e-4),
+        ("backlash_rotation", "play", (0.25, 0.5, 0.75), 1e-6),
+    ],
 )
-def test_moving_model_is_that_of_a_whole_table(robot, shares, off):
+def test_moving_model_is_that_of_a_whole_table(robot, effect, strength, shares, off):
     """Reading after reading it says what the simulation of the whole path says, with effects that remember the path."""
-    effects = {
-        "effects.friction.coefficient.1": 0.02, "effects.friction.coefficient.2": 0.02,
-        "effects.friction.coefficient.3": 0.02,
-    }  # fmt: skip
-    true = effect_fit.with_values(robot, ["friction"], effects)
+    effects = {f"effects.{effect}.{strength}.{i}": 0.02 for i in (1, 2, 3)}
+    true = effect_fit.with_values(robot, [effect], effects)
     plan = measurements.load(DATA / "plan.csv", 3)
     rows = np.arange(40)
     names = ("t", "run", "beta", "alpha", "force", "row")
