@@ -102,7 +102,7 @@ std::vector<int> usual_parameters() {
   std::vector<int> index;
   for (const Parameter kind : {Parameter::youngs_modulus, Parameter::length, Parameter::curved_length,
                                Parameter::curvature, Parameter::home_translation, Parameter::home_rotation,
-                               Parameter::tracker_position, Parameter::tracker_rotation})
+                               Parameter::tracker_position, Parameter::tracker_rotation, Parameter::sensor_roll})
     for (int i = 0; i < P::size(kind); ++i) index.push_back(P::index(kind, i));
   return index;
 }

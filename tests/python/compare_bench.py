@@ -18,7 +18,7 @@ def robot(jitter_mm=JITTER_MM, roll="known", turn=(0.3, -0.2, 0.9)):
         actuation=SimpleNamespace(translation_mm_per_rev=None),
         tracker=SimpleNamespace(
             rotation_vector_rad=list(turn), rotation=matrix_from_rotation_vector(turn),
-            position=np.array([0.05, -0.02, 0.01]), sensor_on_tube=1, sensor_roll=roll,
+            position=np.array([0.05, -0.02, 0.01]), sensor_on_tube=1, roll=0.0, roll_known=roll == "known",
             jitter_mm=jitter_mm, jitter_deg=0.05, accuracy_95_mm=None, accuracy_95_deg=None,
         ),
     )  # fmt: skip

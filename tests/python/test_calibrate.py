@@ -175,3 +175,44 @@ def test_bad_input_gives_words_and_writes_nothing(run, tmp_path, name, lines, op
     assert code == 1 and out == "" and message in err and "Traceback" not in err
     assert err.startswith("Error: ") and "this should not happen" not in err
     assert [path.name for path in tmp_path.iterdir()] == ["circles.csv"]
+
+
+@pytest.mark.parametrize(
+    ("command", "table", "options", "title"),
+    [
+        ("rotation-offset", "circles.csv", [], "Rotation offsets: new robot"),
+        ("registration", "points.csv", [], "Tracker frame: new robot"),
+        ("home", "home.csv", [], "Home: new robot"),
+        ("cantilever", "cantilever.csv", ["--tube", 1], "Cantilever: new robot"),
+        ("curvature", "picture.csv", ["--tube", 2, "--mm-per-px", 0.083333], "Shape of the tube: new robot"),
+    ],
+)
+def test_each_procedure_writes_a_page_that_needs_nothing_else(run, tmp_path, command, table, options, title):
+    page = tmp_path / "page.html"
+    code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "--report", page)
+    assert code == 0 and f"Report: {page}" in out, err
+    text = page.read_text()
+    assert f"<h1>{title}</h1>" in text and text.count("<svg") == 1 and "<th>sd</th>" in text
+    assert f"{table}. Made by ctcr calibrate {command} on" in text
+    assert not re.search(r"""(?:src|href)=["']https?:""", text)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_picture_of_a_circle_shows_how_far_each_way_is_off(sign):
+    from ctcr.calibrate.procedure_figures import Circle
+
+    angle = np.tile(np.linspace(-3, 3, 40), 2)
+    forward = np.arange(80) < 40
+    seen = sign * (angle + 0.7 + np.where(forward, 0.02, -0.02))
+    position = np.column_stack([3 + 0.5 * np.cos(seen), 0.5 * np.sin(seen), np.full(80, 2.0)])
+    circle = Circle(
+        "tube 1",
+        position,
+        angle,
+        forward,
+        np.ones(80, bool),
+        np.array([3.0, 0, 2]),
+        np.array([0.0, 0, 1]),
+        0.5,
+    )
+    assert np.degrees(0.02) * np.where(forward, 1, -1) == pytest.approx(circle.behind(), abs=1e-9)

@@ -43,7 +43,7 @@ def truth(name: str) -> list[float]:
 def rms_mm(robot, readings) -> float:
     """RMS error of a robot file's model, as any other command computes it."""
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    answer = Model(robot).predict(beta, alpha, readings.force)
+    answer = Model(robot, steps=4).predict(beta, alpha, readings.force)
     tip, _ = frames.base_to_tracker(robot.tracker, answer.position, answer.quaternion)
     return 1e3 * float(np.sqrt(np.mean(np.sum((readings.position - tip) ** 2, axis=1))))
 
@@ -158,12 +158,44 @@ def test_no_orientation_is_told(robot, readings):
     assert "look like outliers" not in said(found)
 
 
-def test_an_unknown_roll_leaves_positions(robot, readings):
-    unknown = robot.model_copy(deep=True)
-    unknown.tracker.sensor_roll = "unknown"
-    spun = frames.product(readings.quaternion, frames.quaternion_from_rotation_vector([0, 0, 1.0]))
-    found = outcome(unknown, replace(readings, quaternion=spun))
-    assert np.max(np.abs(found.fit.shift)) < 4
+@pytest.fixture(scope="module")
+def loose(robot):
+    """The robot before anyone has found how its sensor is glued in."""
+    return robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"sensor_roll": "unknown"})})
+
+
+def spun(readings, roll):
+    """The readings of a sensor with other rolls [rad], of all rows or of each."""
+    turn = np.multiply.outer(np.broadcast_to(roll, len(readings)), [0.0, 0.0, 1.0])
+    turned = frames.product(readings.quaternion, frames.quaternion_from_rotation_vector(turn))
+    return replace(readings, quaternion=turned)
+
+
+@pytest.mark.parametrize("roll_deg", [-175.0, 57.0])
+def test_an_unknown_roll_is_found_and_written(robot, loose, readings, roll_deg, tmp_path):
+    plain, turned = outcome(robot, readings), spun(readings, np.radians(roll_deg))
+    found = outcome(loose, turned)
+    (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_roll")
+    assert abs((roll.value - roll_deg + 180) % 360 - 180) < 3 * roll.sd < 2 and roll.ratio < 0.01
+    assert "roll is unknown" in said(found) and found.fit.observations == plain.fit.observations
+    others = [item for item in found.fitted if item is not roll]
+    assert max(abs(a.value - b.value) / a.sd for a, b in zip(others, plain.fitted, strict=True)) < 1
+    joint_fit.write_robot(found, tmp_path / "new.yaml", TABLE)
+    written = robot_file.load(tmp_path / "new.yaml")
+    assert (
+        written.tracker.sensor_roll_deg == pytest.approx(roll.value, abs=1e-4) and written.tracker.roll_known
+    )
+    again = outcome(written, turned)
+    assert again.stages[0].rms_deg == pytest.approx(found.stages[-1].rms_deg, abs=1e-4)
+
+
+def test_a_roll_that_differs_from_reading_to_reading_leaves_positions(loose, readings):
+    rolls = np.random.default_rng(3).uniform(-np.pi, np.pi, len(readings))
+    found = outcome(loose, spun(readings, rolls))
+    assert "differs from reading to reading" in said(found) and np.isnan(found.stages[-1].rms_deg)
+    assert found.fit.observations == 3 * len(readings) and np.max(np.abs(found.fit.shift)) < 4
+    found = outcome(loose, replace(readings, quaternion=None))
+    assert "roll" not in said(found) and np.isnan(found.stages[-1].rms_deg)
 
 
 def test_constant_joints_leave_most_undetermined(robot, readings):
@@ -177,7 +209,10 @@ def test_constant_joints_leave_most_undetermined(robot, readings):
 
 def test_too_few_rows_are_told(robot, readings):
     found = outcome(robot, some(readings, np.arange(2)), ["standard"], hold_out=None)
-    assert "numbers were measured for 24 parameters" in said(found) and found.held_out is None
+    assert "for 24 parameters: the prior decides" in said(found) and found.held_out is None
+    found = outcome(robot, some(readings, np.arange(5)), ["standard"])
+    assert "only 30 numbers were measured for 24 parameters: few are left" in said(found).lower()
+    assert "numbers were measured" not in said(outcome(robot, some(readings, np.arange(20)), ["standard"]))
 
 
 def test_a_frame_that_is_metres_off_is_refused(robot, readings):

@@ -39,10 +39,13 @@ def test_angle_between_is_the_length_of_the_rotation_vector_whatever_the_sign():
 def test_base_to_tracker_is_t_ref():
     vector, offset = RNG.normal(size=3), RNG.normal(size=3)
     rotation = Rotation.from_rotvec(vector)
-    tracker = SimpleNamespace(rotation=rotation.as_matrix(), position=offset, rotation_vector_rad=vector)
+    tracker = SimpleNamespace(
+        rotation=rotation.as_matrix(), position=offset, rotation_vector_rad=vector, roll=0.4
+    )
     position, orientation = RNG.normal(size=(50, 3)), Rotation.from_rotvec(RNG.normal(size=(50, 3)))
     quaternion = orientation.as_quat(scalar_first=True)
     moved, turned = frames.base_to_tracker(tracker, position, quaternion)
     np.testing.assert_allclose(moved, rotation.apply(position) + offset, atol=1e-14)
-    expected = (rotation * orientation).as_quat(scalar_first=True)
+    rolled = orientation * Rotation.from_rotvec([0, 0, 0.4])
+    expected = (rotation * rolled).as_quat(scalar_first=True)
     assert frames.angle_between(turned, expected) == pytest.approx(0, abs=1e-14)

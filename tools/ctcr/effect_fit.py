@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, free_parameters, identify, robot_update, user_effects
+from ctcr import (
+    effects,
+    free_parameters,
+    identify,
+    open_side,
+    recording,
+    robot_update,
+    sensor_roll,
+    user_effects,
+)
 from ctcr.calibrate import parameters
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
@@ -78,9 +87,9 @@ def add(
     full name in SI, keep their value. Every fourth run (where there are few: block of time) is kept out of the fits
     that give the errors; the values are those of a fit to all rows. Raises InputError where no fit is possible.
     """
-    base, fixed = identify.expand(list(free), robot), dict(fixed or {})
+    robot, readings, said = sensor_roll.usable(robot, readings)
+    base, fixed = sensor_roll.with_roll(list(free), robot), dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], fixed)
-    readings, ignored = identify.usable(robot, readings)
     held = locked_rows(readings)
     fitted = [*robot_before(robot, ids).effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
@@ -102,6 +111,7 @@ def add(
             start |= dict(zip(fit.names, fit.values, strict=True))
             fit = stage(fitted, fitted, np.ones(len(readings), bool), start)
         progress.advance(1)
+    fit = open_side.widened(fit)
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, stage.noise, stage.places)))
     return Added(
         _applied(robot, fit),
@@ -109,7 +119,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*ignored, *_notices(robot, fit, ids)],
+        [*said, *_notices(robot, fit, ids)],
     )
 
 
@@ -211,6 +221,7 @@ class _Fitter:
         self.robot, self.readings, self.base, self.fixed = robot, readings, list(base), fixed
         self.noise, self.places = identify.noise_of(robot), identify.places_of(_plain(robot), readings)
         self.measured = identify.measured_rows(readings)
+        self.steps = recording.steps_for(robot, readings, self.noise)
         if not self.measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
 
@@ -233,7 +244,7 @@ class _Fitter:
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
         names = [*self.base, *own]
-        recorded = user_effects.recording_of(self.robot, self.readings, names)
+        recorded = user_effects.recording_of(self.robot, self.readings, names, steps=self.steps)
         if not hasattr(self, "_nominal"):
             self._nominal = recorded.residual(recorded.nominal())[0].reshape(-1, 6)
         recorded.activate((self.measured & rows).tolist())

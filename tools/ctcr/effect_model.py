@@ -82,7 +82,8 @@ def predict(
     from ctcr import recording
 
     rows = len(beta)
-    frame = robot.tracker.model_copy(update={"position_mm": [0.0] * 3, "rotation_vector_rad": [0.0] * 3})
+    at_base = {"position_mm": [0.0] * 3, "rotation_vector_rad": [0.0] * 3, "sensor_roll_deg": None}
+    frame = robot.tracker.model_copy(update=at_base)
     actuation = robot.actuation.model_copy(
         update={"recorded_home_translation_mm": None, "recorded_home_rotation_deg": None}
     )

@@ -50,16 +50,23 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> Array:
 
 
 def base_to_tracker(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
-    """Poses (..., 3), (..., 4) of the base frame seen in the tracker frame: x_tracker = T_ref x_base.
+    """Poses (..., 3), (..., 4) of the tip, base frame, as the sensor reads them: x_tracker = T_ref x_base.
 
-    `tracker` is the robot file's section, which holds T_ref.
+    `tracker` is the robot file's section, which holds T_ref and the roll of the sensor.
     """
     turned = np.asarray(position, dtype=float) @ tracker.rotation.T + tracker.position
-    return turned, product(quaternion_from_rotation_vector(tracker.rotation_vector_rad), quaternion)
+    return turned, product(_frame(tracker), product(quaternion, _roll(tracker)))
 
 
 def tracker_to_base(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
     """The inverse of `base_to_tracker`."""
     turned = (np.asarray(position, dtype=float) - tracker.position) @ tracker.rotation
-    inverse = conjugate(quaternion_from_rotation_vector(tracker.rotation_vector_rad))
-    return turned, product(inverse, quaternion)
+    return turned, product(conjugate(_frame(tracker)), product(quaternion, conjugate(_roll(tracker))))
+
+
+def _frame(tracker) -> Array:
+    return quaternion_from_rotation_vector(tracker.rotation_vector_rad)
+
+
+def _roll(tracker) -> Array:
+    return quaternion_from_rotation_vector([0.0, 0.0, tracker.roll])

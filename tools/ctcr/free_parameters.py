@@ -36,6 +36,7 @@ _FIELDS = {  # of a tube: field of the file, SI unit per unit of that field
     "curvature": ("curvature_per_m", 1.0),
     "bending_stiffness": ("bending_stiffness_Nm2", 1.0),
 }
+ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
 _POSITIVE = ("youngs_modulus", "bending_stiffness", "density", "length", "curved_length", "outer_diameter")
 
 
@@ -160,6 +161,8 @@ def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robo
             setattr(actuation, field, homes)
         elif group == "gravity":
             changed.gravity = _replaced(changed.gravity_vector, rest[0], value)
+        elif rest[0] == "sensor_roll":
+            changed.tracker.sensor_roll_deg = value * 180 / pi
         elif rest[0] == "position":
             changed.tracker.position_mm = _replaced(changed.tracker.position_mm, rest[1], 1e3 * value)
         else:
@@ -265,6 +268,8 @@ def _value(robot: Robot, name: str) -> float:
         return unit * float(getattr(robot.tubes[int(rest[0]) - 1], field) or 0.0)
     if group == "gravity":
         return float(robot.gravity_vector["xyz".index(rest[0])])
+    if name == "tracker.sensor_roll":
+        return float(robot.tracker.roll)
     if group == "tracker":
         vector = robot.tracker.position if rest[0] == "position" else robot.tracker.rotation_vector_rad
         return float(vector["xyz".index(rest[1])])
@@ -282,6 +287,8 @@ def _stated_sd(robot: Robot, name: str) -> float | None:
     """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
     u, kind = robot.uncertainty, name.split(".")[2 if name.startswith("tubes.") else 1]
     size = abs(_value(robot, name))
+    if kind == "sensor_roll":
+        return ANYWHERE if robot.tracker.sensor_roll == "unknown" else None
     if name.startswith("tracker."):
         return 1e-3 * u.tracker_frame_mm if kind == "position" else pi / 180 * u.tracker_frame_deg
     return {

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core, fit_words, free_parameters, user_effects
+from ctcr import _core, fit_words, free_parameters, open_side, recording, sensor_roll, user_effects
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
@@ -208,15 +208,6 @@ def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
     return 1e3 * float(floors[0]), float(np.rad2deg(floors[1])) if used[:, 3:].any() else nan
 
 
-def usable(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The readings that say something of the robot, and in words what was left out."""
-    if robot.tracker.sensor_roll == "unknown" and measurements.quaternion is not None:
-        return replace(measurements, quaternion=None), [
-            "the sensor's roll is unknown: orientations are not used"
-        ]
-    return measurements, []
-
-
 def places_of(robot: Robot, measurements: Measurements) -> Array:
     """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
     places = (
@@ -247,28 +238,31 @@ def fit(
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
     starts: int = 3,
-    steps: int = 1,
+    steps: int | None = None,
     threads: int = 0,
 ) -> Fit:
     """The most probable values of the named parameters (see `expand`), given the readings and the robot file's priors.
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
-    noise    of the tracker; `noise_of(robot)` by default. Where the sensor's roll is unknown, orientations are not used
+    noise    of the tracker; `noise_of(robot)` by default. An unknown roll of the sensor is always free
     robust   whether outliers count for little; `weights` (M, 2) of another fit freezes theirs
     admit_model_error   whether jitter is added where the model misses what the noise cannot explain; `inflation` (2,)
              of another fit freezes it. Compare evidences of models at frozen weights and inflation.
-    starts   how many starts to compare; steps, threads as in Model
+    starts   how many starts to compare
+    steps    of integration per segment; as many as the readings call for by default (recording.steps_for)
+    threads  as in Model
     Raises InputError where no fit is possible.
     """
     began = perf_counter()
-    names = expand(free, robot)
+    robot, measurements, said = sensor_roll.usable(robot, measurements)
+    names = sensor_roll.with_roll(free, robot)
     mean, width, low, high = priors(robot, names, sd)
-    measurements, ignored = usable(robot, measurements)
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    warnings = [*ignored, *fit_words.doubts(measurements, measured_rows(measurements) & chosen)]
+    warnings = [*said, *fit_words.doubts(measurements, measured_rows(measurements) & chosen)]
+    steps = steps or recording.steps_for(robot, measurements, noise)
     table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
     fitted = identify_rows(
         table, measured_rows(measurements) & chosen, names, mean, width, low, high, noise,
@@ -278,29 +272,34 @@ def fit(
         within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
     units = free_parameters.units_with_effects(robot)
-    return replace(
-        fitted,
-        units=[units[name] for name in names],
-        warnings=warnings + fitted.warnings,
-        seconds=perf_counter() - began,
-    )
+    fitted = open_side.widened(replace(fitted, units=[units[name] for name in names]))
+    return replace(fitted, warnings=warnings + fitted.warnings, seconds=perf_counter() - began)
 
 
 def identify_rows(
     table: Any, rows: Mask, *arguments: Any, start: Array, starts: int = 1, **options: Any
 ) -> Fit:
     """identify_with() of some rows of a Recording. Where they are many, the starts are compared on a few of them."""
-    every = len(np.flatnonzero(rows)) // FEW_ROWS
-    if every < 2:
+    few = few_of(rows)
+    if few is None:
         table.activate(rows.tolist())
         return identify_with(table, *arguments, start=start, starts=starts, **options)
-    few = np.zeros_like(rows)
-    few[np.flatnonzero(rows)[::every]] = True
     table.activate(few.tolist())
     first = identify_with(table, *arguments, start=start, starts=starts, **options)
     table.activate(rows.tolist())
     fitted = identify_with(table, *arguments, start=first.values, starts=1, **options)
     return replace(fitted, starts=first.starts)
+
+
+def few_of(rows: Mask) -> Mask | None:
+    """FEW_ROWS or more of many rows (M,), evenly spread; None where they are few."""
+    chosen = np.flatnonzero(rows)
+    every = len(chosen) // FEW_ROWS
+    if every < 2:
+        return None
+    few = np.zeros_like(rows)
+    few[chosen[::every]] = True
+    return few
 
 
 def identify_with(

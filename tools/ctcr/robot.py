@@ -153,7 +153,11 @@ class Actuation(Section):
 
 
 class Tracker(Section):
-    """The sensor, and T_ref, the pose of the robot base frame in the tracker frame."""
+    """The sensor, and T_ref, the pose of the robot base frame in the tracker frame.
+
+    `sensor_roll_deg` is how far the sensor's axes are turned against those of the tip, about their common z axis;
+    without it they agree. Where `sensor_roll` is unknown, fits find it.
+    """
 
     sensor_on_tube: Annotated[int, Field(ge=1, description="the number of a tube, innermost 1")]
     rate_Hz: Annotated[float | None, Quantity("Hz", usual=(0.1, 10000), above=0)]
@@ -164,6 +168,7 @@ class Tracker(Section):
     position_mm: Annotated[Three, Quantity("mm", usual=(0, 5000), count="three numbers")]
     rotation_vector_rad: Annotated[Three, Quantity("rad", usual=(0, 2 * pi), count="three numbers")]
     sensor_roll: Literal["known", "unknown"] = Field("known", description="known or unknown")
+    sensor_roll_deg: Annotated[float | None, Quantity("deg", usual=(0, 360))] = None
 
     @property
     def position(self) -> Array:
@@ -174,6 +179,16 @@ class Tracker(Section):
     def rotation(self) -> Array:
         """R_tracker_base (3, 3)."""
         return matrix_from_rotation_vector(self.rotation_vector_rad)
+
+    @property
+    def roll(self) -> float:
+        """Of the sensor's axes against those of the tip, about their common z axis [rad]."""
+        return np.deg2rad(self.sensor_roll_deg or 0.0)
+
+    @property
+    def roll_known(self) -> bool:
+        """Whether measured orientations can be compared: by the file, or by an earlier fit."""
+        return self.sensor_roll == "known" or self.sensor_roll_deg is not None
 
 
 class Uncertainty(Section):

@@ -50,14 +50,17 @@ inline void check(const std::vector<FreeParameter>& parameters, const Noise& noi
   if (!faults.empty()) throw std::invalid_argument(faults);
 }
 
+constexpr Eigen::Index few_per_parameter = 5;
+
 inline void add_warnings(const std::vector<FreeParameter>& parameters, const Posterior& posterior,
                          const Eigen::VectorXd& information, const std::vector<std::string>& reached,
                          const RowWeights& use, Identification& out) {
   const auto warn = [&](const std::string& text) { out.warnings.push_back(text); };
   const auto n = Eigen::Index(parameters.size());
-  if (out.observations < n)
+  if (out.observations < few_per_parameter * n)
     warn("only " + std::to_string(out.observations) + " numbers were measured for " + std::to_string(n) +
-         " parameters: the prior decides");
+         " parameters: " +
+         (out.observations < n ? "the prior decides" : "few are left to tell a wrong model from a right one"));
   for (Eigen::Index k = 0; k < n; ++k) {
     const FreeParameter& p = parameters[std::size_t(k)];
     if (!(information[k] > 0))

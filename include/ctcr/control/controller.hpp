@@ -80,7 +80,7 @@ public:
       time_ += period_;
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }
-    const Pose tip = system_.sensor.T_tracker_base.inverse() * measured.reading;
+    const Pose tip = tip_of(system_.sensor, measured.reading);
     TipLoad acting = load;
     if (tip_force != TipForce::known)
       acting.force = tip_force == TipForce::estimated ? estimate.force : Vec3(Vec3::Zero());

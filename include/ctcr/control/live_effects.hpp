@@ -28,11 +28,13 @@ public:
       rows_[count_].beta[i] = motors.beta[Eigen::Index(i)];
       rows_[count_].alpha[i] = motors.alpha[Eigen::Index(i)];
     }
-    twist_ = twist_between(before, twist_);
-    if (before.warm && !knows_twist_)
-      for (std::size_t k = 0; k < count_; ++k) rows_[k].twist = twist_;
-    knows_twist_ = knows_twist_ || before.warm;
-    rows_[count_].twist = twist_;
+    if constexpr (Effects::follows_twist) {
+      twist_ = twist_between(before, twist_);
+      if (before.warm && !knows_twist_)
+        for (std::size_t k = 0; k < count_; ++k) rows_[k].twist = twist_;
+      knows_twist_ = knows_twist_ || before.warm;
+      rows_[count_].twist = twist_;
+    }
     times_[count_] = time;
     at_.time = time;
     const std::size_t row = count_++;

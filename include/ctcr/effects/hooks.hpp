@@ -121,6 +121,8 @@ struct EffectList {
     static constexpr bool has_station = (false || ... || HasStation<E<N, P>, P, N>);
     /// Whether tubes rub along their length.
     static constexpr bool has_rub = (false || ... || HasRub<E<N, P>, P, N>);
+    /// Whether it matters how the tips are turned against one another.
+    static constexpr bool follows_twist = (false || ... || requires { E<N, P>::follows_twist; });
     /// Whether the tip's surroundings act on it.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 

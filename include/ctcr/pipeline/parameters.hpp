@@ -43,6 +43,7 @@ struct SystemParameters {
     put(Parameter::home_rotation, system.transmission.home_rotation);
     put(Parameter::tracker_position, system.sensor.T_tracker_base.position);
     put(Parameter::tracker_rotation, Vec3::Zero());
+    x[Robot::index(Parameter::sensor_roll)] = system.sensor.roll;
     system.model.effects().for_each([&](const auto& effect, int first) {
       for (std::size_t k = 0; k < effect.values.size(); ++k)
         x[Robot::count + first + Eigen::Index(k)] = effect.values[k];
@@ -74,6 +75,7 @@ struct SystemParameters {
     sensor.T_tracker_base.position = three(Parameter::tracker_position);
     sensor.T_tracker_base.rotation =
         rotation_matrix(three(Parameter::tracker_rotation)) * nominal.sensor.T_tracker_base.rotation;
+    sensor.roll = x[Robot::index(Parameter::sensor_roll)];
     Effects effects = nominal.model.effects();
     effects.for_each([&](auto& effect, int first) {
       for (std::size_t k = 0; k < effect.values.size(); ++k)

@@ -57,6 +57,7 @@ Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const
   columns(Parameter::home_rotation) = by_alpha;
   columns(Parameter::tracker_position) = by_frame.leftCols<3>();
   columns(Parameter::tracker_rotation) = by_frame.rightCols<3>();
+  columns(Parameter::sensor_roll) = reading_by_roll(prediction.reading);
   return status;
 }
 

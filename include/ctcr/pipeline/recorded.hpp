@@ -188,7 +188,7 @@ CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& 
   Frame<double> reading =
       frame_of<double>(system.sensor.T_tracker_base * out.solution.tube_tips[std::size_t(system.sensor.tube)]);
   effects.sense(row.at, reading);
-  out.reading = pose_of(reading);
+  out.reading = mounted(system.sensor, pose_of(reading));
   if (!(effects.finite() && out.reading.position.allFinite() && out.reading.rotation.allFinite())) {
     out.solution = Solution<N>{};
     out.solution.status = Status::not_finite;
@@ -337,6 +337,8 @@ CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRo
     }
     Frame<S> reading = composed(T_ref, tip);
     seeded_effects(seed).sense(row.at, reading);
+    for (int g = 0; g < Window::groups; ++g)
+      reading.rotation_twist[2][g] += seed(0, V::index(Parameter::sensor_roll)).d[g];
     const Mat3 R = reading.rotation();
     for (int l = 0; l < window.size; ++l) {
       const int j = window.first + l - Pass::unknowns;

@@ -36,6 +36,7 @@ template <int N>
     case Parameter::tracker_rotation:
       sensor.T_tracker_base = moved_frame(sensor.T_tracker_base, change * Vec6::Unit(3 + i));
       break;
+    case Parameter::sensor_roll: sensor.roll += change; break;
     default: robot.tubes[std::size_t(i)].*ParameterVector<N>::info(kind).field += change;
   }
   return {transmission, Model<N>(robot), sensor, system.settings};

@@ -26,7 +26,8 @@ enum class Parameter : int {
   home_translation,
   home_rotation,
   tracker_position,
-  tracker_rotation
+  tracker_rotation,
+  sensor_roll
 };
 
 /// What is known of a kind of parameter before any robot is.
@@ -39,7 +40,7 @@ struct ParameterKind {
 
 /// The tracker frame is T_ref, from base to tracker coordinates. Its rotation is a turn about the tracker's axes that
 /// leaves the base frame's origin where it is: T_ref becomes {exp(turn) R, p}.
-inline constexpr std::array<ParameterKind, 16> parameter_kinds{{
+inline constexpr std::array<ParameterKind, 17> parameter_kinds{{
     {"tubes.#.youngs_modulus", "Pa", 1e9, 250e9, &Tube::youngs_modulus},
     {"tubes.#.poisson_ratio", "", 0.2, 0.5, &Tube::poisson_ratio},
     {"tubes.#.density", "kg/m^3", 800, 20000, &Tube::density},
@@ -56,6 +57,7 @@ inline constexpr std::array<ParameterKind, 16> parameter_kinds{{
     {"actuation.home_rotation.#", "rad", 0, 6.3},
     {"tracker.position.*", "m", 0, 5},
     {"tracker.rotation.*", "rad", 0, 6.3},
+    {"tracker.sensor_roll", "rad", 0, 6.3},
 }};
 
 /// A full name such as "tubes.2.length".

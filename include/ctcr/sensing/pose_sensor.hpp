@@ -12,12 +12,24 @@ namespace ctcr {
 struct PoseSensor {
   Pose T_tracker_base;  ///< T_ref
   int tube = 0;         ///< whose tip carries the sensor, 0 is the innermost
+  double roll = 0;      ///< of the sensor's axes against those of the tip, about their common z axis [rad]
 };
+
+/// The sensor's pose where its tube's tip has the pose `tip`, in the same frame. Real time: yes.
+[[nodiscard]] inline Pose mounted(const PoseSensor& sensor, const Pose& tip) noexcept {
+  return {tip.rotation * rotation_matrix({0, 0, sensor.roll}), tip.position};
+}
 
 /// What the sensor reads of the tubes' tips T_base_tip. Real time: yes.
 template <std::size_t N>
 [[nodiscard]] Pose reading(const PoseSensor& sensor, const std::array<Pose, N>& tube_tips) noexcept {
-  return sensor.T_tracker_base * tube_tips[std::size_t(sensor.tube)];
+  return mounted(sensor, sensor.T_tracker_base * tube_tips[std::size_t(sensor.tube)]);
+}
+
+/// T_base_tip of the tube that carries the sensor, from what that reads. Real time: yes.
+[[nodiscard]] inline Pose tip_of(const PoseSensor& sensor, const Pose& reading) noexcept {
+  const Pose tip = sensor.T_tracker_base.inverse() * reading;
+  return {tip.rotation * rotation_matrix({0, 0, -sensor.roll}), tip.position};
 }
 
 /// Derivative of a reading's position [m] and rotation [rad], tracker axes, by those of the tip, base axes.
@@ -41,6 +53,13 @@ template <std::size_t N>
   Mat6 D = Mat6::Identity();
   for (int j = 0; j < 3; ++j) D.block<3, 1>(0, 3 + j) = Vec3::Unit(j).cross(arm);
   return D;
+}
+
+/// Derivative of a reading, tracker axes, by the sensor's roll: by the parameter tracker.sensor_roll. Real time: yes.
+[[nodiscard]] inline Vec6 reading_by_roll(const Pose& reading) noexcept {
+  Vec6 d;
+  d << Vec3::Zero(), reading.rotation.col(2);
+  return d;
 }
 
 }  // namespace ctcr

@@ -52,11 +52,9 @@ public:
 
   /// Without noise: T_tracker_sensor.
   [[nodiscard]] Pose exact_reading() const noexcept {
-    const Pose plain = system_.sensor.T_tracker_base * solution_.tube_tips[std::size_t(system_.sensor.tube)];
-    if constexpr (Fx::none) return plain;
-    Frame<double> frame = frame_of<double>(plain);
-    live_.effects().sense(live_.occasion(), frame);
-    return pose_of(frame);
+    Frame<double> frame = frame_of<double>(system_.sensor.T_tracker_base * tip());
+    if constexpr (!Fx::none) live_.effects().sense(live_.occasion(), frame);
+    return mounted(system_.sensor, pose_of(frame));
   }
   /// In its true base frame, in the tip that carries the sensor.
   [[nodiscard]] const Pose& tip() const noexcept { return solution_.tube_tips[std::size_t(system_.sensor.tube)]; }

@@ -25,6 +25,7 @@ System<N> plain_system(const Eigen::VectorXd& parameters, int sensor_tube, int s
     turn[i] = value(Parameter::tracker_rotation, i);
   }
   sensor.T_tracker_base.rotation = rotation_matrix(turn);
+  sensor.roll = value(Parameter::sensor_roll);
   return {transmission, Model<N>(robot), sensor, Settings{.steps = steps}};
 }
 

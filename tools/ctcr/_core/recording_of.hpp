@@ -9,17 +9,17 @@
 
 namespace ctcr::python {
 
-/// Whether an effect that follows the twist of the tubes acts, or is asked for.
+/// Whether any of the effects that `chosen` takes acts, or is asked for.
 template <int N>
-bool twist_counts(const Table& table) {
-  bool counts = false;
+bool any_effect(const Table& table, const auto& chosen) {
+  bool found = false;
   typename AllEffects::On<N>{}.for_each([&](const auto& effect, int first) {
-    if constexpr (requires { effect.follows_twist; })
-      for (int k = 0; k < effect.count; ++k)
-        counts = counts || table.effects[first + k] != effect.values[std::size_t(k)] ||
-                 std::ranges::count(table.free, ParameterVector<N>::count + first + k) > 0;
+    if (!chosen(effect)) return;
+    for (int k = 0; k < effect.count; ++k)
+      found = found || table.effects[first + k] != effect.values[std::size_t(k)] ||
+              std::ranges::count(table.free, ParameterVector<N>::count + first + k) > 0;
   });
-  return counts;
+  return found;
 }
 
 template <int N>
@@ -33,7 +33,8 @@ std::vector<RecordedRow<N>> rows_of(const Table& table) {
     rows[i].load.force = table.force.row(k).transpose();
     rows[i].at = {table.time[k], table.part[k], table.run[k], table.centre};
   }
-  if (twist_counts<N>(table)) add_twist<N>(plain, rows);
+  if (any_effect<N>(table, [](const auto& effect) { return requires { effect.follows_twist; }; }))
+    add_twist<N>(plain, rows);
   return rows;
 }
 
@@ -48,11 +49,26 @@ inline std::vector<Pose> measured_of(const Table& table) {
 }
 
 template <int N>
+Profiles<N> profiles_of(const Table& table) {
+  Profiles<N> out;
+  const auto tubes = plain_system<N>(table.parameters, table.sensor_tube, table.steps).model.robot().tubes;
+  for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
+    out.length[i] = tubes[i].length;
+    for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {
+      const auto node = table.profiles.row(k).template segment<3>(3 * Eigen::Index(i));
+      out.nodes[i].push_back({{node[0], node[1]}, node[2]});
+    }
+  }
+  return out;
+}
+
+/// @tparam Fx  AllEffects, or Standard: a tenth of the work
+template <int N, class Fx>
 class RecordingOf final : public AnyRecording {
 public:
   explicit RecordingOf(const Table& table)
     : pool_(table.threads),
-      profiles_(profiles(table)),
+      profiles_(profiles_of<N>(table)),
       recording_(system(table, profiles_), rows_of<N>(table), measured_of(table), table.free, pool_) {}
 
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) override {
@@ -84,25 +100,17 @@ private:
     quaternion.row(i).setConstant(nan);
   }
 
-  static Profiles<N> profiles(const Table& table) {
-    Profiles<N> out;
-    const auto tubes = plain_system<N>(table.parameters, table.sensor_tube, table.steps).model.robot().tubes;
-    for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
-      out.length[i] = tubes[i].length;
-      for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {
-        const auto node = table.profiles.row(k).template segment<3>(3 * Eigen::Index(i));
-        out.nodes[i].push_back({{node[0], node[1]}, node[2]});
-      }
-    }
-    return out;
-  }
-  static System<N, AllEffects> system(const Table& table, const Profiles<N>& profiles) {
-    return with_effects<N>(plain_system<N>(table.parameters, table.sensor_tube, table.steps), table.effects, &profiles);
+  static System<N, Fx> system(const Table& table, const Profiles<N>& profiles) {
+    const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
+    if constexpr (Fx::none)
+      return plain;
+    else
+      return with_effects<N>(plain, table.effects, &profiles);
   }
 
   ThreadPool pool_;
   Profiles<N> profiles_;
-  Recording<N, AllEffects> recording_;
+  Recording<N, Fx> recording_;
 };
 
 template <int N>
@@ -125,7 +133,9 @@ void check(const Table& table) {
 template <int N>
 std::unique_ptr<AnyRecording> make_recording(const Table& table) {
   check<N>(table);
-  return std::make_unique<RecordingOf<N>>(table);
+  const bool plain = table.profiles.size() == 0 && !any_effect<N>(table, [](const auto&) { return true; });
+  if (plain) return std::make_unique<RecordingOf<N, Standard>>(table);
+  return std::make_unique<RecordingOf<N, AllEffects>>(table);
 }
 
 template <int N>

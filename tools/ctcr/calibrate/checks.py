@@ -1,7 +1,5 @@
 """What is wrong with, or worth knowing of, a table that is to be fitted."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,15 +42,6 @@ def start(robot: Robot, readings: Measurements) -> float:
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
 
 
-def without_unknown_roll(robot: Robot, readings: Measurements) -> tuple[Measurements, list[str]]:
-    """The readings without the orientations of a sensor whose roll is not known, and what to say about it."""
-    if robot.tracker.sensor_roll == "known" or readings.quaternion is None:
-        return readings, []
-    return replace(readings, quaternion=None), [
-        "The roll of the sensor is not known: orientations are not used."
-    ]
-
-
 def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
     """Rows that say something new, and what to say about the others."""
     columns = [readings.t[:, None], readings.run[:, None], readings.beta, readings.alpha, readings.force]
@@ -78,7 +67,7 @@ def outlier_rows(fit, readings: Measurements) -> list[int]:
 def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> list[str]:
     """What the user should know of a fit, in sentences."""
     told_as_doubts = "prior standard deviations"
-    said = [_sentence(text) for text in fit.warnings if told_as_doubts not in text]
+    said = [sentence(text) for text in fit.warnings if told_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
@@ -90,6 +79,12 @@ def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> l
     if not frame_per_run and len(np.unique(readings.run)) > 1:
         said += _run_frames(after, readings, fit)
     return said
+
+
+def sentence(text: str) -> str:
+    """A warning of a fit as a sentence."""
+    first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
+    return first + ("" if text.endswith(".") else ".")
 
 
 def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
@@ -116,11 +111,6 @@ def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
         far = wording.join([str(run) for run in found.outlying[:8]])
         text += f"; runs {far} lie about {wording.mm(found.outlying_mm)} from the others"
     return [text + ". --frame-per-run fits a frame for each."]
-
-
-def _sentence(text: str) -> str:
-    first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
-    return first + ("" if text.endswith(".") else ".")
 
 
 def _rows(rows: NDArray[np.int64]) -> str:

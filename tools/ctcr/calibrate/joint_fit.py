@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import robot_update
+from ctcr import robot_update, sensor_roll
 from ctcr.calibrate import checks, parameters
 from ctcr.calibrate.halves import Halves, compare_halves
 from ctcr.calibrate.parameters import Fitted
@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 FOLDS = 4
 REJECTED = 0.01  # chance below which noise does not explain the residual
+NEARLY = 1.5  # reduced chi-square up to which the tracker's smooth error is still taken for the noise
 MOST_ROWS_FOLDED = 5000  # beyond, one part is held out instead of each in turn
 
 
@@ -134,20 +135,18 @@ def calibrate(
     """Fits the parameters named in `free`.
 
     `noise`: "jitter", "field" (with the smooth error that the tracker's accuracy figure allows), or "auto": the smaller
-    one that explains the residual; where neither does, that with the smaller held-out error. `sd`: prior standard
-    deviations by name, in the units of the robot file, that come before those of its `uncertainty`.
+    one that explains the residual, the second also where it nearly does; else that with the smaller held-out error.
+    `sd`: prior standard deviations by name, in the units of the robot file, that come before its `uncertainty`.
     Raises InputError where the input cannot be used: nothing measured, a frame that is metres off, a name that does
     not exist, a prior of zero width, too few rows.
     """
-    from ctcr import identify
-
-    names = identify.expand(list(free), robot)
-    readings, notices = checks.without_unknown_roll(robot, readings)
+    robot, readings, notices = sensor_roll.usable(robot, readings)
+    names = sensor_roll.with_roll(list(free), robot)
     lever = checks.start(robot, readings)
     usable, repeated = checks.usable_rows(readings)
     frame = [name for name in names if name.startswith("tracker.")]
     if frame_per_run:
-        names = [name for name in names if name not in frame]
+        names = [name for name in names if name not in frame or name == sensor_roll.NAME]
     parts = _held_out_split(readings, lever, hold_out)
     judged = range(parts.parts) if parts else []
     if hold_out or len(readings) > MOST_ROWS_FOLDED:
@@ -182,7 +181,11 @@ def calibrate(
         floor=Stage("noise floor", fit.floor_mm(usable), fit.floor_deg(usable)),
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
         frames=getattr(fit, "frames", None),
-        notices=[*notices, *repeated, *checks.notices(after, readings, fit, frame_per_run)],
+        notices=[
+            *map(checks.sentence, notices),
+            *repeated,
+            *checks.notices(after, readings, fit, frame_per_run),
+        ],
     )
 
 
@@ -237,7 +240,8 @@ def _chosen(
     tried = []
     for noise in noises:
         tried.append(fitted(names, noise=noise))
-        if tried[-1].p_value > REJECTED:
+        near = noise is noises[-1] and noise.position_field > 0 and tried[-1].reduced_chi_square < NEARLY
+        if tried[-1].p_value > REJECTED or near:
             tried = tried[-1:]
             break
     if not judged:

@@ -22,6 +22,16 @@ class Row:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """What a report draws: plot(figure, subject)."""
+
+    plot: Callable
+    subject: Any
+    caption: str
+    height: float = 3.8  # [in]
+
+
+@dataclass(frozen=True)
 class Outcome:
     """The rows to show, what to say about them, and what changes in the robot file."""
 
@@ -31,6 +41,7 @@ class Outcome:
     changes: list[Change] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
+    picture: Picture | None = None
 
     def as_dict(self) -> dict[str, Any]:
         values = [
@@ -65,30 +76,40 @@ def deliver(
     target: str | None,
     in_place: bool,
     json_target: str | None,
+    report: str | None,
 ) -> None:
     """Writes what was asked for, the files first, and prints the table."""
     if target:
         entry = Entry(command, sources, outcome.figures, " ".join(outcome.notices))
         robot_update.write(robot, target, outcome.changes, entry, in_place=in_place)
+    if report:
+        from ctcr.calibrate import procedure_report
+
+        procedure_report.write(outcome, report, command, " and ".join(map(str, sources)), robot)
     if json_target:
         output.write_json(outcome.as_dict(), json_target)
     console = output.console(json_target)
     show(console, outcome)
-    if target:
-        console.print(f"Robot file: {target}", markup=False)
+    for name, file in (("Report", report), ("Robot file", target)):
+        if file:
+            console.print(f"{name}: {file}", markup=False)
 
 
 def show(console, outcome: Outcome) -> None:
+    console.print(output.table(outcome.title, *cells(outcome), text_columns=2))
+    for notice in outcome.notices:
+        console.print(f"  • {notice}", markup=False)
+
+
+def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of the table; the first two columns are text."""
     with_old = any(isfinite(row.old) for row in outcome.rows)
     columns = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"]
-    rows = [
+    return columns, [
         [row.name, row.unit, *([number(row.old, row.deviation)] if with_old else []),
          number(row.value, row.deviation), deviation(row.deviation)]
         for row in outcome.rows
     ]  # fmt: skip
-    console.print(output.table(outcome.title, columns, rows, text_columns=2))
-    for notice in outcome.notices:
-        console.print(f"  • {notice}", markup=False)
 
 
 def number(value: float, deviation: float = nan) -> str:

@@ -99,6 +99,8 @@ def field_of(name: str) -> Field:
         return Field(("gravity", "xyz".index(rest[0])), "m/s^2", 1.0)
     if name.startswith("tracker.position."):
         return Field(("tracker", "position_mm", "xyz".index(rest[1])), "mm", 1e3)
+    if name == "tracker.sensor_roll":
+        return Field(("tracker", "sensor_roll_deg"), "deg", 180 / pi)
     if name.startswith("tracker.rotation."):
         return Field(None, "deg", 180 / pi)
     return Field(None, _effect_unit(name), 1.0)

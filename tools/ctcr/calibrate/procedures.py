@@ -5,7 +5,8 @@ from math import degrees, isfinite, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.calibrate.outcome import Outcome, Row, computed
+from ctcr.calibrate import procedure_figures as figures_of
+from ctcr.calibrate.outcome import Outcome, Picture, Row, computed
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot import Robot
@@ -62,7 +63,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
 
     tubes = table["tube"] if "tube" in table else np.ones(len(table), np.int64)
     ratio = _rotation_ratio(robot, ratio)
-    rows, notices, changes, details = [], [], [], {}
+    rows, notices, changes, details, circles = [], [], [], {}, []
     for tube in np.unique(tubes).tolist():
         mine = np.flatnonzero(tubes == tube)
         _check_tube(tube, robot, table.file, int(table.row[mine[0]]))
@@ -95,6 +96,10 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         rows.append(Row("    distance from the circle, RMS", "mm", 1e3 * fit.rms))
         notices += [f"{name}: {notice.text}" for notice in fit.notices]
         notices += _left_out(name, [int(table.row[mine[i]]) for i in fit.outliers])
+        position, angle = table.stacked(*AXES)[mine], table["motor_angle"][mine]
+        moved = np.diff(angle)
+        forward = table["direction"][mine] > 0 if "direction" in table else np.append(moved[:1], moved) > 0
+        circles.append(figures_of.circle_of(name, position, ratio * angle, forward, fit, robot))
         details[f"tube_{tube}"] = {
             "centre_mm": 1e3 * np.asarray(fit.centre), "normal": fit.normal, "arc_deg": degrees(fit.arc),
             "in_base_frame": fit.in_base_frame, "rms_mm": 1e3 * fit.rms, "used": fit.used,
@@ -102,7 +107,12 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
             "direction_difference_sd_deg": degrees(fit.direction_difference_sd),
         }  # fmt: skip
     figures = {f"radius_rms_mm_{name}": detail["rms_mm"] for name, detail in details.items()}
-    return Outcome("Rotation offsets", rows, notices, changes, figures, {"tubes": details})
+    caption = (
+        "Left: the readings on the circle fitted to them. Right: how far the tip is from where its motor says; where "
+        "the two ways differ, friction or backlash holds it back."
+    )
+    picture = Picture(figures_of.circles, circles, caption, figures_of.ROW_HEIGHT * len(circles))
+    return Outcome("Rotation offsets", rows, notices, changes, figures, {"tubes": details}, picture)
 
 
 def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> Outcome:
@@ -157,7 +167,12 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
         "degrees_of_freedom": fit.degrees_of_freedom,
         "repeatability_mm": 1e3 * fit.repeatability_sd,
     }  # fmt: skip
-    return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], changes, figures, details)
+    where = 1e3 * np.array([place[names.index(name)] for name in fit.names])
+    caption = "Left: where the readings lie against the CAD points. Right: how far."
+    picture = Picture(figures_of.points, (where, fit), caption, 4.4)
+    return Outcome(
+        "Tracker frame", rows, [notice.text for notice in fit.notices], changes, figures, details, picture
+    )
 
 
 def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict[str, float]) -> Outcome:
@@ -201,8 +216,22 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
             rows.append(Row(f"tube {tube}: {name}", "mm", 1e3 * value, 1e3 * sd, old))
             changes.append(Change(path, "mm", 1e3 * value, 1e3 * sd))
         rows.append(Row("    deployed at home", "mm", 1e3 * fit.deployed[i], 1e3 * fit.deployed_sd[i]))
-    details = {"correlation": fit.correlation}
-    return Outcome("Home", rows, [notice.text for notice in fit.notices], changes, {}, details)
+    old = [[robot.actuation.home_translation_mm[i],
+            robot.actuation.home_translation_mm[i] + robot.tubes[i].length_mm] if robot else [nan, nan]
+           for i in range(len(tubes))]  # fmt: skip
+    ends = (1e3 * np.array(fit.offset), 1e3 * np.array(fit.deployed))
+    sd = 1e3 * np.column_stack([fit.offset_sd, fit.deployed_sd])
+    caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
+    picture = Picture(figures_of.homes, (tubes, *ends, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
+    return Outcome(
+        "Home",
+        rows,
+        [notice.text for notice in fit.notices],
+        changes,
+        {},
+        {"correlation": fit.correlation},
+        picture,
+    )
 
 
 def cantilever(
@@ -254,8 +283,13 @@ def cantilever(
                  for row, modulus, residual in zip(table.row, fit.row_modulus, fit.residuals, strict=True)],
         "largest_slope_deg": float(np.degrees(np.max(np.abs(fit.slope_angle)))),
     }  # fmt: skip
-    figures = {"deflection_rms_mm": 1e3 * fit.rms}
-    return Outcome("Cantilever", rows, [notice.text for notice in fit.notices], changes, figures, details)
+    read = 1e3 * table["deflection"]
+    caption = "What was read and what the fitted modulus gives; right, the difference."
+    picture = Picture(
+        figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption
+    )
+    said = [notice.text for notice in fit.notices]
+    return Outcome("Cantilever", rows, said, changes, {"deflection_rms_mm": 1e3 * fit.rms}, details, picture)
 
 
 def curvature(
@@ -308,10 +342,19 @@ def curvature(
     if described is not None:
         for key, row in (("curvature_per_m", rows[0]), ("curved_length_mm", rows[1])):
             changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.deviation))
-    notices = [notice.text for notice in fit.notices]
-    notices += _left_out("", [int(table.row[i]) for i in fit.outliers])
+    notices = [notice.text for notice in fit.notices] + _left_out(
+        "", [int(table.row[i]) for i in fit.outliers]
+    )
     details = {"correlation": fit.correlation, "junction": fit.junction, "tip": fit.tip, "points_unit": unit}
-    return Outcome("Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details)
+    ends = (np.asarray(fit.junction), np.asarray(fit.tip))
+    bend = fit.curved_length / abs(fit.radius)
+    picture = Picture(
+        figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)),
+        "The points on the tube that was fitted to them; the mark is where its curve starts.", 5.0,
+    )  # fmt: skip
+    return Outcome(
+        "Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details, picture
+    )
 
 
 def _tracker_pose(robot: Robot) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ctcr import free_parameters, user_effects
+from ctcr import free_parameters, recording, user_effects
 from ctcr.errors import InputError, Problem
 from ctcr.frames import conjugate, product, quaternion_from_rotation_vector
 from ctcr.measurements import Measurements
@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 WIDER = 10.0  # the frames' prior against that of the robot file
-ROUNDS = 2  # of fit and alignment: within a fit the frames act linearly
 ALIGNMENT_STEPS = 6  # before the first fit
+STARTS = 4  # frames of their own make room for other minima
 
 
 @dataclass(frozen=True)
@@ -109,16 +109,17 @@ def fit_with_frames(
     nominal = framed.unprofiled(priors[0])
     for _ in range(ALIGNMENT_STEPS):
         framed.align(priors[0])
-    start = None
-    for round_ in range(ROUNDS):
-        framed.activate((rows & framed.solvable(priors[0])).tolist())
+    rows = rows & framed.solvable(priors[0])
+    few, fit = identify.few_of(rows), None
+    # Twice, as within a fit the frames act linearly.
+    for chosen in (rows if few is None else few, rows):
+        framed.activate(chosen.tolist())
         fit = identify.identify_with(
-            framed, names, *priors, noise, identify.places_of(robot, readings), start=start,
-            starts=starts or 2 if round_ == ROUNDS - 1 else 1, inflation=inflation,
+            framed, names, *priors, noise, identify.places_of(robot, readings), start=fit and fit.values,
+            starts=1 if fit else starts or STARTS, inflation=inflation,
             within=free_parameters.admissible(robot, readings.beta[rows], names),
         )  # fmt: skip
-        start = fit.values
-        framed.align(start)
+        framed.align(fit.values)
     fit = replace(fit, seconds=perf_counter() - began)
     frames, common = framed.frames()
     return FramedFit(fit, frames, common, nominal)
@@ -150,6 +151,7 @@ class _Framed:
         )
         jitter = (noise.position_jitter, noise.rotation_jitter)
         field = (noise.position_field, noise.rotation_field)
+        self.steps = recording.steps_for(robot, readings, noise)
         self.weight = 1 / np.repeat(np.hypot(jitter, field), 3) ** 2
         self._read()
 
@@ -170,7 +172,7 @@ class _Framed:
 
     def unprofiled(self, values: Array) -> Array:
         """Residuals (M, 6) with the one frame of the robot file."""
-        self.solvable(values)
+        self.activate([True] * len(self.readings))
         return self.table.residual(values)[0].reshape(-1, 6)
 
     def __call__(self, values: Array, derivatives: bool) -> tuple[Array, Array] | None:
@@ -183,7 +185,7 @@ class _Framed:
 
     def align(self, values: Array) -> None:
         """Moves each run's frame to where it fits best at these values."""
-        self.solvable(values)
+        self.activate([True] * len(self.readings))
         residual = self.table.residual(values)[0]
         moves = self._frame_part(residual, residual[:, None])[1]
         turn = Rotation.from_rotvec(self.turn)
@@ -208,7 +210,7 @@ class _Framed:
             quaternion = product(conjugate(quaternion_from_rotation_vector(turn.as_rotvec())), quaternion)
         seen = replace(self.readings, position=position, quaternion=quaternion)
         self.seen_position = position
-        self.table = user_effects.recording_of(self.robot, seen, self.names)
+        self.table = user_effects.recording_of(self.robot, seen, self.names, steps=self.steps)
 
     def _frame_part(self, residual: Array, columns: Array) -> tuple[Array, Array]:
         """What the frames take of columns (6 M, k), and the frames' moves (R, 6) for the first column."""

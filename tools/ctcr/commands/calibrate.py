@@ -19,6 +19,7 @@ def _outputs(function):
         click.option(
             "--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output."
         ),
+        click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page."),
         click.option("--in-place", is_flag=True, help="Change the robot file itself."),
         click.option("-o", "--output", "target", metavar="NEW", help="Write the updated robot file."),
     ):
@@ -40,7 +41,7 @@ def _length(name: str, default: float | None, text: str):
 
 
 def _run(
-    name: str, columns: str, procedure: str, table, robot, target, in_place, json_target, **options
+    name: str, columns: str, procedure: str, table, robot, target, in_place, json_target, report, **options
 ) -> None:
     from ctcr import robot_file
     from ctcr.calibrate import outcome, procedures, tables
@@ -49,7 +50,7 @@ def _run(
     target = outcome.check_target(loaded, target, in_place)
     data = tables.read(table, getattr(procedures, columns))
     found = getattr(procedures, procedure)(data, loaded, **options)
-    outcome.deliver(found, loaded, f"ctcr calibrate {name}", [table], target, in_place, json_target)
+    outcome.deliver(found, loaded, f"ctcr calibrate {name}", [table], target, in_place, json_target, report)
 
 
 @command.command(name="rotation-offset")
@@ -182,7 +183,6 @@ def curvature(table: str, robot, tube, scale_mm, scale_sd_percent, reference, po
     "--sd", "widths", multiple=True, metavar="NAME=SD",
     help="What is known of a parameter: a standard deviation in the unit of the robot file, or inf. May be repeated.",
 )  # fmt: skip
-@click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
 @click.option("--frame-per-run", is_flag=True, help="Fit a tracker frame for every run.")
 @click.option(
     "--hold-out", type=click.IntRange(min=0), metavar="N",

@@ -1,5 +1,7 @@
 """`ctcr info`: what a robot file says, and what looks wrong in it."""
 
+from math import degrees
+
 import click
 
 
@@ -60,6 +62,7 @@ def _bench_rows(robot) -> list[list[str]]:
     return [
         ["gravity in the base frame", text(robot.gravity), "m/s^2"],
         ["sensor on tube", text(tracker.sensor_on_tube), ""],
+        ["its roll about the tip's axis", text(degrees(tracker.roll) if tracker.roll_known else None), "deg"],
         ["base frame in the tracker frame", text(tracker.position_mm), "mm"],
         ["its rotation vector", text(tracker.rotation_vector_rad), "rad"],
         ["readings", text(tracker.rate_Hz), "Hz"],

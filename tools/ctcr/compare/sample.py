@@ -65,7 +65,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
 
     predicted, orientation = base_to_tracker(robot.tracker, base_position, prediction.quaternion)
     error = measured - predicted
-    roll_known = getattr(robot.tracker, "sensor_roll", "known") != "unknown"
+    roll_known = robot.tracker.roll_known
     rotation_error = None
     if measurements.quaternion is not None:
         rotation_error = _rotation_error(measurements.quaternion[keep], orientation[keep], roll_known)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify
+from ctcr import effects, identify, open_side, sensor_roll
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
@@ -112,7 +112,7 @@ def diagnose(
     has errors which the others do not, it changes places with another one, and all begins anew.
     """
     began = perf_counter()
-    measurements, notices = identify.usable(robot, measurements)
+    robot, measurements, notices = sensor_roll.usable(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(measurements, turn)
         result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
@@ -171,7 +171,7 @@ def _diagnose(
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
-        robot, measurements, locked, unseen, before, after, fit,
+        robot, measurements, locked, unseen, before, after, open_side.widened(fit),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip

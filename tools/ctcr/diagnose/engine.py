@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, free_parameters, identify, recording, user_effects
+from ctcr import effects, free_parameters, identify, recording, sensor_roll, user_effects
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+
+CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 
 @dataclass(frozen=True)
@@ -57,15 +60,16 @@ class Engine:
     noise: Any
     rows: Mask  # that are fitted
     robust: bool = True  # whether readings that are far off count for little
-    steps: int = recording.STEPS
     threads: int = 0
+    steps: int = field(init=False)
     places: Array = field(init=False)
     base: list[str] = field(init=False)  # calibration parameters
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
-        self.base = free_parameters.expand("standard", self.robot)
+        self.base = sensor_roll.with_roll("standard", self.robot)
         self.measured = identify.measured_rows(self.measurements)
+        self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
     def noise_with(self, part: float) -> Any:
         """The tracker's noise with a part of its stated field error."""

@@ -1,0 +1,108 @@
+"""Whether the standard deviations of a fit hold what they promise, where the usual covariance does not."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import identify, open_side, recording, robot_file
+from ctcr import measurements as tables
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+DATA = ROOT / "examples" / "data" / "calibration"
+NOISE = identify.Noise(position_jitter=1e-4, rotation_jitter=1e-3)
+
+
+class Kinked:
+    """Readings of a curved length `c` that shows only where a tube is deployed further, and of an offset `o`."""
+
+    REACH = np.linspace(0.03, 0.05, 21)
+
+    def __init__(self, curved_length: float, offset: float, random: np.random.Generator):
+        self.measured = np.full((len(self.REACH), 6), np.nan)
+        self.measured[:, :3] = self._model(curved_length, offset) + 1e-4 * random.standard_normal((21, 3))
+
+    def _model(self, curved_length, offset):
+        straight = np.maximum(self.REACH - curved_length, 0.0)
+        return np.column_stack([0.3 * straight, 0 * straight, offset + 0 * straight])
+
+    def residual(self, x, derivatives=False):
+        residual = self.measured.copy()
+        residual[:, :3] -= self._model(*x)
+        slope = np.zeros((len(self.REACH), 6, 2))
+        slope[:, 0, 0] = 0.3 * (self.REACH > x[0])
+        slope[:, 2, 1] = -1.0
+        return residual.ravel(), slope.reshape(-1, 2), True
+
+    def __call__(self, x, derivatives):
+        return self.residual(x, derivatives)[:2]
+
+
+def fit_of(curved_length, offset, random):
+    mean, sd = np.array([0.0493, 0.0]), np.array([2.5e-3, 1e-3])
+    return identify.identify_with(
+        Kinked(curved_length, offset, random), ["tubes.1.curved_length", "tracker.position.z"], mean, sd,
+        mean - 0.05, mean + 0.05, NOISE, np.zeros((21, 3)), starts=1,
+    )  # fmt: skip
+
+
+def test_a_length_bounded_on_one_side_is_within_its_deviation_as_often_as_that_says():
+    random = np.random.default_rng(4)
+    truths = random.normal([0.0493, 0.0], [2.5e-3, 1e-3], (300, 2))
+    plain, honest = np.empty((2, 300, 2))
+    for i, truth in enumerate(truths):
+        fit = fit_of(*truth, random)
+        plain[i] = (fit.values - truth) / fit.sd
+        fit = open_side.widened(fit)
+        honest[i] = (fit.values - truth) / fit.sd
+    assert np.mean(np.abs(honest) < 2, axis=0) == pytest.approx(0.96, abs=0.03)
+    assert (
+        np.mean(honest[:, 0] ** 2) < 2.5 < 8 < np.mean(plain[:, 0] ** 2)
+    )  # the guard has something to guard
+    np.testing.assert_allclose(honest[:, 1], plain[:, 1], rtol=1e-12)
+
+
+def test_a_length_bounded_on_both_sides_is_left_alone_and_an_open_side_is_told():
+    random = np.random.default_rng(5)
+    inside, outside = fit_of(0.042, 0.0, random), fit_of(0.054, 0.0, random)
+    assert open_side.widened(inside) is inside
+    if outside.sd[0] < 0.5 * outside.prior_sd[0]:
+        told = open_side.widened(outside)
+        assert "how much longer" in told.warnings[-1] and told.ratio[0] > 0.3
+        assert told.covariance[0, 0] == pytest.approx(told.sd[0] ** 2)
+
+
+@pytest.mark.parametrize(("modulus", "more"), [(1.0, False), (0.1, True)])
+def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
+    """Softer tubes under a weight bend more, and take more steps; readings of a coarser tracker fewer."""
+    robot = robot_file.load(DATA / "robot.yaml")
+    for tube in robot.tubes:
+        tube.youngs_modulus_GPa *= modulus
+    table = tables.load(DATA / "measurements.csv", robot.n_tubes)
+    table.force[:] = [0.0, -0.1, 0.0]
+    noise = identify.Noise(position_jitter=3.5e-5, rotation_jitter=5e-4)
+    steps = recording.steps_for(robot, table, noise)
+    assert (steps > recording.STEPS) == more
+    fine = recording.recording_of(robot, table, steps=16).residual(np.empty(0))[0].reshape(-1, 6)
+    scale = np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
+
+    def missed(steps):
+        coarse = recording.recording_of(robot, table, steps=steps).residual(np.empty(0))[0].reshape(-1, 6)
+        return np.nansum(((coarse - fine) / scale) ** 2)
+
+    assert missed(steps) < 2 * recording.UNSEEN
+    assert not more or missed(steps - 1) > 0.5 * recording.UNSEEN
+    coarse = identify.Noise(position_jitter=1e-2, rotation_jitter=1e-1)
+    assert recording.steps_for(robot, table, coarse) == recording.STEPS
+
+
+@pytest.mark.slow
+def test_true_values_are_within_two_deviations_on_random_robots_of_the_oracle():
+    import calibration_study as study
+
+    answers = study.study(200)
+    for noise in study.NOISES:
+        hits, count = study.within(answers, noise)
+        assert 0.90 < hits / count < 0.98
+        assert study.over_floor(answers, noise) < 1.1
