@@ -5,7 +5,8 @@ import re
 import numpy as np
 import pytest
 from ctcr.calibrate import tables
-from ctcr.calibrate.procedures import CANTILEVER, HOME, REGISTRATION, ROTATION_OFFSET
+from ctcr.calibrate.procedures import HOME, REGISTRATION, ROTATION_OFFSETS
+from ctcr.calibrate.specimens import CANTILEVER
 from ctcr.errors import InputError
 
 
@@ -24,7 +25,7 @@ def table(tmp_path):
     [("x_mm", "12.5", 0.0125), ("x_m", "0.0125", 0.0125), ("x_um", "12500", 0.0125)],
 )
 def test_lengths_in_any_unit(table, heading, value, si):
-    data = tables.read(table(f"motor_angle_deg,{heading},y_mm,z_mm\n90,{value},1,2\n"), ROTATION_OFFSET)
+    data = tables.read(table(f"motor_angle_deg,{heading},y_mm,z_mm\n90,{value},1,2\n"), ROTATION_OFFSETS)
     assert data["x"] == pytest.approx([si], rel=1e-12) and data.unit["x"] == heading[2:]
     assert data["motor_angle"] == pytest.approx([np.pi / 2])
     assert data.stacked("x", "y", "z").shape == (1, 3)
@@ -67,7 +68,7 @@ def test_empty_fields_blank_lines_and_names(table):
 )  # fmt: skip
 def test_every_fault_is_told_with_its_place(table, text, faults):
     with pytest.raises(InputError) as caught:
-        tables.read(table(text), ROTATION_OFFSET)
+        tables.read(table(text), ROTATION_OFFSETS)
     for fault in faults:
         assert re.search(fault.replace("?", r"\?"), str(caught.value)), caught.value
 

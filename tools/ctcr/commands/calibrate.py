@@ -41,15 +41,19 @@ def _length(name: str, default: float | None, text: str):
 
 
 def _run(
-    name: str, columns: str, procedure: str, table, robot, target, in_place, json_target, report, **options
+    name: str, room: str, procedure: str, table, robot, target, in_place, json_target, report, **options
 ) -> None:
-    from ctcr import robot_file
-    from ctcr.calibrate import outcome, procedures, tables
+    """Runs a procedure of ctcr.calibrate.procedures or .specimens; its columns have its name in capitals."""
+    from importlib import import_module
 
+    from ctcr import robot_file
+    from ctcr.calibrate import outcome, tables
+
+    room = import_module(f"ctcr.calibrate.{room}")
     loaded = robot_file.load(robot) if robot else None
     target = outcome.check_target(loaded, target, in_place)
-    data = tables.read(table, getattr(procedures, columns))
-    found = getattr(procedures, procedure)(data, loaded, **options)
+    data = tables.read(table, getattr(room, procedure.upper()))
+    found = getattr(room, procedure)(data, loaded, **options)
     outcome.deliver(found, loaded, f"ctcr calibrate {name}", [table], target, in_place, json_target, report)
 
 
@@ -64,7 +68,7 @@ def rotation_offset(table: str, robot, ratio, **outputs) -> None:
     TABLE: motor_angle_deg, x_mm, y_mm, z_mm of the tip (tracker frame); tube (default 1) and direction (1 or -1,
     default: from the order of the rows) may be added. One row per reading, in the order measured.
     """
-    _run("rotation-offset", "ROTATION_OFFSET", "rotation_offsets", table, robot, ratio=ratio, **outputs)
+    _run("rotation-offset", "procedures", "rotation_offsets", table, robot, ratio=ratio, **outputs)
 
 
 @command.command(name="registration")
@@ -82,7 +86,7 @@ def registration(points: str, robot, placement_sd_mm, **outputs) -> None:
     """
     _run(
         "registration",
-        "REGISTRATION",
+        "procedures",
         "registration",
         points,
         robot,
@@ -109,7 +113,7 @@ def home(table: str, robot, pitch_mm, distance_sd_mm, flush_sd_mm, length_sd_mm,
     angle and length for each tube; an empty field was not measured; several rows a tube are averaged.
     """
     sds = {"distance_sd": distance_sd_mm, "flush_sd": flush_sd_mm, "length_sd": length_sd_mm}
-    _run("home", "HOME", "home", table, robot, pitch_mm=pitch_mm, sds_mm=sds, **outputs)
+    _run("home", "procedures", "home", table, robot, pitch_mm=pitch_mm, sds_mm=sds, **outputs)
 
 
 @command.command(name="cantilever")
@@ -145,7 +149,7 @@ def cantilever(
         "free_length_sd": free_length_sd_mm,
         "diameter_sd": diameter_sd_mm,
     }
-    _run("cantilever", "CANTILEVER", "cantilever", table, robot, tube=tube, inner_mm=inner_mm, outer_mm=outer_mm,
+    _run("cantilever", "specimens", "cantilever", table, robot, tube=tube, inner_mm=inner_mm, outer_mm=outer_mm,
          sds_mm=sds, fit_zero=fit_zero, **outputs)  # fmt: skip
 
 
@@ -168,7 +172,7 @@ def curvature(table: str, robot, tube, scale_mm, scale_sd_percent, reference, po
 
     TABLE: x_px, y_px (or x_mm, y_mm) along the tube, in any order, over the curved part and some of the straight one.
     """
-    _run("curvature", "CURVATURE", "curvature", table, robot, tube=tube, scale_mm=scale_mm,
+    _run("curvature", "specimens", "curvature", table, robot, tube=tube, scale_mm=scale_mm,
          scale_sd_percent=scale_sd_percent, reference=reference, point_sd=point_sd, **outputs)  # fmt: skip
 
 
