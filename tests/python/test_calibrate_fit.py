@@ -207,6 +207,14 @@ def test_constant_joints_leave_most_undetermined(robot, readings):
     assert sum(item.says_nothing for item in found.fitted) > 10
 
 
+def test_a_frame_further_off_than_the_file_allows_is_told(robot, readings):
+    moved = robot.model_copy(deep=True)
+    moved.tracker.position_mm = [value + 12.0 for value in robot.tracker.position_mm]
+    found = outcome(moved, readings)
+    assert found.stages[-1].rms_mm > 5 and "Another tracker frame leaves" in said(found)
+    assert "Another tracker frame" not in said(outcome(robot, readings))
+
+
 def test_too_few_rows_are_told(robot, readings):
     found = outcome(robot, some(readings, np.arange(2)), ["standard"], hold_out=None)
     assert "for 24 parameters: the prior decides" in said(found) and found.held_out is None

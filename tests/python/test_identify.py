@@ -312,3 +312,14 @@ def test_many_rows_are_fitted_as_few_are(monkeypatch):
     from_a_part = identify.fit(nominal, readings, noise=NOISE)
     assert from_a_part.starts and from_a_part.evaluations < at_once.evaluations
     np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)
+
+
+def test_a_frame_far_off_is_found_first():
+    bench = robot()
+    readings = table(bench, rows=40)
+    moved = bench.model_copy(deep=True)
+    moved.tracker.position_mm = [p + s for p, s in zip(bench.tracker.position_mm, (80, -60, 90), strict=True)]
+    moved.tracker.rotation_vector_rad = [1.0, 1.5, -1.3]
+    found = identify.fit(moved, readings, "standard", noise=NOISE, starts=1, sd={"tracker.frame": inf})
+    assert found.nominal_rms_mm() > 100 and found.rms_mm() < 0.1
+    assert found.evaluations <= 6  # twice as many where the rest is dragged along

@@ -4,8 +4,7 @@ Positions in m, rotations in rad, tracker axes. Residuals are measured - predict
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from math import nan
 from time import perf_counter
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ctcr import _core, fit_words, free_parameters, open_side, recording, sensor_roll, user_effects
 from ctcr.errors import InputError, Problem
+from ctcr.fit import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
@@ -55,139 +55,6 @@ def noise_of(
     return Noise(**figures, correlation_length=correlation_length)
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Fitted parameters and what is known of them. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows."""
-
-    names: list[str]
-    units: list[str]
-    prior_mean: Array  # (n,)
-    prior_sd: Array  # (n,)
-    values: Array  # (n,)
-    sd: Array  # (n,) posterior; inf: not determined at all
-    covariance: Array  # (n, n)
-    shift: Array  # (n,) (value - mean) / prior sd; NaN without a prior
-    ratio: Array  # (n,) posterior / prior sd: 1 means that the readings say nothing
-    correlations: list[tuple[str, str, float]]  # beyond 0.9, strongest first
-    directions: list[Any]  # undetermined combinations: .text, .ratio, .coefficients in prior sd
-    chi_square: float  # under the noise as stated
-    shift_square: float
-    observations: int
-    bulk_observations: float  # without outliers: degrees of freedom of chi_square + shift_square
-    effective_parameters: float
-    reduced_chi_square: float
-    log_evidence: float  # Laplace, under this fit's weights and inflation; NaN where a prior is infinite
-    inflation: (
-        Array  # (2,) factor on the jitter of positions and rotations that the fit had to admit; 1: none
-    )
-    weights: Array  # (M, 2) 1 plain, less for outliers, 0 not fitted
-    excluded: list[int]  # rows that the model cannot solve
-    converged: bool
-    status: str
-    warnings: list[str]
-    starts: list[Any]  # .cost, .distance from the result in posterior sd, .converged
-    noise: Noise
-    iterations: int
-    evaluations: int
-    seconds: float
-    core: Any  # the compiled fit
-    predict: Any  # what was fitted
-
-    @property
-    def used(self) -> Mask:
-        """Rows that were fitted (M,)."""
-        return (self.weights > 0).any(axis=1)
-
-    @cached_property
-    def _every_row(self) -> Any:
-        """The predictor, of rows that were not fitted too."""
-        if hasattr(self.predict, "activate"):
-            active = np.ones(len(self.weights), bool)
-            active[self.excluded] = False
-            self.predict.activate(active.tolist())
-        return self.predict
-
-    @cached_property
-    def _report(self) -> tuple[Array, Array, Array, Array]:
-        return self.core.report(self._every_row)
-
-    @property
-    def residual(self) -> Array:
-        """(M, 6) at the fitted values; NaN where not measured or not solved."""
-        return self._report[0].reshape(-1, 6)
-
-    @property
-    def jacobian_all(self) -> Array:
-        """(6 M, n) derivative of `residual`."""
-        return self._report[1]
-
-    @property
-    def field(self) -> Array:
-        """(M, 6) posterior mean of the tracker's smooth error, a part of the residual."""
-        return self._report[2].reshape(-1, 6)
-
-    @property
-    def expected_square(self) -> Array:
-        """(M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open."""
-        return self._report[3]
-
-    @cached_property
-    def nominal_residual(self) -> Array:
-        """(M, 6) at the robot file's values."""
-        every = self._every_row
-        if not hasattr(every, "nominal"):
-            return np.asarray(every(self.prior_mean, False)[0]).reshape(-1, 6)
-        return np.asarray(every.residual(every.nominal())[0]).reshape(-1, 6)
-
-    @cached_property
-    def p_value(self) -> float:
-        """Probability of so large a chi-square where model, priors and noise are right."""
-        from scipy.stats import chi2
-
-        return float(chi2.sf(self.chi_square + self.shift_square, self.bulk_observations))
-
-    def rms_mm(self, rows: Mask | None = None) -> float:
-        """RMS length of the position residual of some rows, all by default."""
-        return 1e3 * _rms(self.residual[:, :3], rows)
-
-    def rms_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(_rms(self.residual[:, 3:], rows)))
-
-    def nominal_rms_mm(self, rows: Mask | None = None) -> float:
-        return 1e3 * _rms(self.nominal_residual[:, :3], rows)
-
-    def nominal_rms_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(_rms(self.nominal_residual[:, 3:], rows)))
-
-    def floor_mm(self, rows: Mask | None = None) -> float:
-        """RMS position residual that noise alone would leave, the uncertainty of the parameters included."""
-        return 1e3 * self._floor(0, rows)
-
-    def floor_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(self._floor(1, rows)))
-
-    def apply(self, robot: Robot) -> Robot:
-        """A copy of the robot with the fitted values."""
-        return free_parameters.applied(robot, self.names, self.values)
-
-    def whiten(self, columns: ArrayLike) -> Array:
-        """Columns (M, 6) or (M, 6, k) with the noise of the fit made independent and of unit variance, (6 M, k).
-
-        Rows that were not fitted become 0.
-        """
-        columns = np.asarray(columns, dtype=float)
-        return self.core.whiten(columns.reshape(6 * len(columns), -1))
-
-    def whitened(self) -> tuple[Array, Array]:
-        """Whitened residual (6 M,) and its derivative (6 M, n) by the parameters; the prior is not in it."""
-        both = self.core.whiten(np.column_stack([self.residual.ravel(), self.jacobian_all]))
-        return both[:, 0], both[:, 1:]
-
-    def _floor(self, kind: int, rows: Mask | None) -> float:
-        known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
-        return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
-
-
 def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
     """RMS of position [mm] and rotation [deg] that the tracker's noise leaves of a right model.
 
@@ -201,7 +68,7 @@ def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
         lambda _x, _derivatives: (residual, nothing), ["nothing"], 0 * one, one, -one, one, noise, places,
         robust=False, weights=fit.weights, admit_model_error=False, inflation=np.ones(2), start=0 * one, starts=1,
     ).field  # fmt: skip
-    smooth = [_rms(np.where(used, field, nan)[:, kind : kind + 3], None) for kind in (0, 3)]
+    smooth = [rms(np.where(used, field, nan)[:, kind : kind + 3], None) for kind in (0, 3)]
     floors = np.hypot(
         np.sqrt(3) * np.array([noise.position_jitter, noise.rotation_jitter]), np.nan_to_num(smooth)
     )
@@ -264,16 +131,65 @@ def fit(
     warnings = [*said, *fit_words.doubts(measurements, measured_rows(measurements) & chosen)]
     steps = steps or recording.steps_for(robot, measurements, noise)
     table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
+    rows, places = measured_rows(measurements) & chosen, places_of(robot, measurements)
+    options = {
+        "robust": robust,
+        "admit_model_error": admit_model_error,
+        "weights": weights,
+        "inflation": inflation,
+    }
+    start = np.clip(table.nominal(), low, high)
     fitted = identify_rows(
-        table, measured_rows(measurements) & chosen, names, mean, width, low, high, noise,
-        places_of(robot, measurements), robust=robust, admit_model_error=admit_model_error, weights=weights,
-        inflation=inflation, starts=starts, start=np.clip(table.nominal(), low, high),
+        table, rows, names, mean, width, low, high, noise, places, **options, starts=starts,
+        start=_with_frame(start, table, rows, names, (mean, width, low, high), noise, places, options),
         known=free_parameters.known_directions(robot, names),
         within=free_parameters.admissible(robot, measurements.beta[chosen], names),
     )  # fmt: skip
     units = free_parameters.units_with_effects(robot)
     fitted = open_side.widened(replace(fitted, units=[units[name] for name in names]))
     return replace(fitted, warnings=warnings + fitted.warnings, seconds=perf_counter() - began)
+
+
+def _with_frame(
+    start: Array,
+    table: Any,
+    rows: Mask,
+    names: Sequence[str],
+    priors: Sequence[Array],
+    noise: Noise,
+    places: Array,
+    options: Mapping[str, Any],
+) -> Array:
+    """The start with the tracker frame that fits the other values best, where both are free.
+
+    A frame that is far off would drag the others along.
+    """
+    frame = np.array([name.startswith("tracker.") for name in names])
+    if not frame.any() or frame.all() or not rows.any():
+        return start
+    few = few_of(rows)
+    table.activate((rows if few is None else few).tolist())
+
+    def predict(x: Array, derivatives: bool) -> tuple[Array, Array]:
+        values = start.copy()
+        values[frame] = x
+        residual, jacobian, _ = table.residual(values, derivatives)
+        return residual, jacobian[:, frame] if derivatives else jacobian
+
+    chosen = [name for name, free in zip(names, frame, strict=True) if free]
+    fitted = identify_with(
+        predict,
+        chosen,
+        *(part[frame] for part in priors),
+        noise,
+        places,
+        **options,
+        start=start[frame],
+        starts=1,
+    )
+    start = start.copy()
+    start[frame] = fitted.values
+    return start
 
 
 def identify_rows(
@@ -371,9 +287,3 @@ def measured_rows(measurements: Measurements) -> Mask:
 def _is_measured(measurements: Measurements, kind: str) -> bool:
     values = measurements.position if kind == "position" else measurements.quaternion
     return values is not None and bool(np.isfinite(values).all(axis=1).any())
-
-
-def _rms(residual: Array, rows: Mask | None) -> float:
-    square = np.sum(residual**2, axis=1)
-    known = np.isfinite(square) & (True if rows is None else rows)
-    return float(np.sqrt(square[known].mean())) if known.any() else nan

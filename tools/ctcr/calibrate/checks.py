@@ -1,5 +1,7 @@
 """What is wrong with, or worth knowing of, a table that is to be fitted."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -76,8 +78,8 @@ def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> l
         said.append(
             f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted."
         )
-    if not frame_per_run and len(np.unique(readings.run)) > 1:
-        said += _run_frames(after, readings, fit)
+    if not frame_per_run:
+        said += _one_frame(after, readings, fit) or _run_frames(after, readings, fit)
     return said
 
 
@@ -85,6 +87,21 @@ def sentence(text: str) -> str:
     """A warning of a fit as a sentence."""
     first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
     return first + ("" if text.endswith(".") else ".")
+
+
+def _one_frame(robot: Robot, readings: Measurements, fit) -> list[str]:
+    """A sentence where an error far beyond noise goes away with another frame for all."""
+    from ctcr.calibrate.run_frames import error_with_frames
+
+    together = replace(readings, run=np.zeros_like(readings.run))
+    before_mm, after_mm = error_with_frames(robot, together, fit.noise)
+    if before_mm < FRAMES_BEYOND * fit.floor_mm() or after_mm > FRAMES_LEAVE * before_mm:
+        return []
+    return [
+        f"Another tracker frame leaves {wording.mm(after_mm)} of the {wording.mm(before_mm)} RMS error, but lies "
+        "further off than the robot file allows: find it with `ctcr calibrate registration`, or widen "
+        "tracker_frame_mm and tracker_frame_deg under uncertainty."
+    ]
 
 
 def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
@@ -96,6 +113,8 @@ def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
     from ctcr.compare.visits import find_revisits, find_stops
     from ctcr.model import Model
 
+    if len(np.unique(readings.run)) < 2:
+        return []
     before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
     if before_mm > FRAMES_BEYOND * fit.floor_mm() and after_mm < FRAMES_LEAVE * before_mm:
         text = f"The runs do not share one frame: a frame for each leaves {wording.mm(after_mm)} of the "
