@@ -87,8 +87,8 @@ def add(
     full name in SI, keep their value. Every fourth run (where there are few: block of time) is kept out of the fits
     that give the errors; the values are those of a fit to all rows. Raises InputError where no fit is possible.
     """
-    robot, readings, said = sensor_roll.usable(robot, readings)
-    base, fixed = sensor_roll.with_roll(list(free), robot), dict(fixed or {})
+    readings, said = sensor_roll.positions_alone(robot, readings)
+    base, fixed = identify.expand(list(free), robot), dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], fixed)
     held = locked_rows(readings)
     fitted = [*robot_before(robot, ids).effects]

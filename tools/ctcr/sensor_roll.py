@@ -36,6 +36,17 @@ def usable(robot: Robot, measurements: Measurements) -> tuple[Robot, Measurement
     return _with(robot, roll), measurements, [said]
 
 
+def positions_alone(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """The readings without the orientations of a sensor whose roll is not known, and what to say about it.
+
+    Such a sensor may be tilted too: where effects are judged, that would count as what the robot does.
+    """
+    if robot.tracker.sensor_roll == "known" or not _turned(measurements).any():
+        return measurements, []
+    said = "the sensor's roll is unknown: orientations are not used (write sensor_roll: known once it is)"
+    return replace(measurements, quaternion=None), [said]
+
+
 def with_roll(free: str | Iterable[str], robot: Robot) -> list[str]:
     """The parameters that names stand for (`free_parameters.expand`), and the roll where it must be fitted too."""
     names = free_parameters.expand(free, robot)

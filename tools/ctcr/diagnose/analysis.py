@@ -112,7 +112,7 @@ def diagnose(
     has errors which the others do not, it changes places with another one, and all begins anew.
     """
     began = perf_counter()
-    robot, measurements, notices = sensor_roll.usable(robot, measurements)
+    measurements, notices = sensor_roll.positions_alone(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(measurements, turn)
         result = _diagnose(robot, measurements, locked, progress, threads, robust=True)

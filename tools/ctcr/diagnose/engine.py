@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, free_parameters, identify, recording, sensor_roll, user_effects
+from ctcr import effects, free_parameters, identify, recording, user_effects
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
@@ -67,7 +67,7 @@ class Engine:
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
-        self.base = sensor_roll.with_roll("standard", self.robot)
+        self.base = free_parameters.expand("standard", self.robot)
         self.measured = identify.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
