@@ -25,7 +25,7 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
 @click.option(
     "--steps",
     type=click.IntRange(1, 1000),
-    default=1,
+    default=4,
     show_default=True,
     help="Integration steps per segment; more is finer and slower.",
 )

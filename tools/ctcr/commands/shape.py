@@ -28,7 +28,7 @@ class Numbers(click.ParamType):
 @click.option(
     "--steps",
     type=click.IntRange(1, 1000),
-    default=1,
+    default=4,
     show_default=True,
     help="Integration steps per segment.",
 )
