@@ -26,6 +26,7 @@ SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 REFITS = 6  # effects that are refitted, the best by their slopes
 ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be followed to the end
+IN_REACH = 0.5  # of the best evidence on a few of many rows: candidates below it are not refitted to all
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
@@ -178,8 +179,12 @@ def race(
         same = [other for other in chosen if other.id == entry.id]
         if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
             chosen.append(entry)
-    entries = [refit(engine, before, entry, fixed, progress) for entry in chosen]
-    entries += [entry for entry in screened if entry not in chosen]
+    entries = [
+        refit(engine, before, entry, fixed, progress)
+        for entry in _in_reach(engine, before, chosen, fixed, progress)
+    ]
+    refitted = [entry.candidate for entry in entries]
+    entries += [entry for entry in screened if entry.candidate not in refitted]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
     decide(round_, len({c.id for c in candidates}), bool(accepted), is_rejected(engine, before))
@@ -224,6 +229,26 @@ def screen(
     return sorted(entries, key=lambda entry: -entry.linear)
 
 
+def _in_reach(
+    engine: Engine, before: identify.Fit, chosen: list[Entry], fixed: dict[str, float], progress: Progress
+) -> list[Entry]:
+    """Those that a refit to a few of many rows does not leave far behind the best, with where that ended."""
+    few = identify.few_of(engine.measured & engine.rows)
+    if few is None or len(chosen) < 2:
+        return chosen
+    small = replace(engine, rows=few)
+    added = [name for name in before.names if name.startswith("effects.")]
+    frozen = {"noise": before.noise, "weights": before.weights, "inflation": before.inflation}
+    base = small.fit(added, start=values_of(before), fixed=fixed, **frozen)
+    tried = [refit(small, base, entry, fixed, progress) for entry in chosen]
+    best = max(entry.score for entry in tried)
+    return [
+        replace(entry, fit=there.fit)
+        for entry, there in zip(chosen, tried, strict=True)
+        if there.score >= IN_REACH * best
+    ]
+
+
 def refit(
     engine: Engine, before: identify.Fit, entry: Entry, fixed: dict[str, float], progress: Progress
 ) -> Entry:
@@ -231,7 +256,8 @@ def refit(
     candidate = entry.candidate
     progress(f"fitting {candidate.label}")
     added = [name for name in before.names if name.startswith("effects.")]
-    for start in (_start(engine, before, entry), values_of(before)):
+    first = values_of(entry.fit) if entry.fit else _start(engine, before, entry)
+    for start in (first, values_of(before)):
         try:
             fit = engine.fit(
                 [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape), noise=before.noise,
@@ -241,7 +267,7 @@ def refit(
         except InputError:
             continue  # the model has no solution there
     else:
-        return entry
+        return replace(entry, fit=None)
     return replace(
         entry,
         refit=fit.log_evidence - before.log_evidence,
