@@ -20,6 +20,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are
     os.environ.setdefault(_threads, "1")
 
 import numpy as np  # noqa: E402
+from coverage import truth_of  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
 from score import ROOT, wilson  # noqa: E402
 
@@ -29,11 +30,8 @@ SETS = ROOT / "build" / "calibration_study"
 KEPT = ROOT / "docs" / "calibration_study.md"
 NOISES = ("jitter", "realistic")
 WIDTH = 2.0  # sd
-SIZES = {
-    "length_mm": 0.06,
-    "curved_length_mm": 0.2,
-    "curvature_per_m": 0.25,
-}  # of a data sheet, about those of a bench
+# Of a data sheet, about those of a bench.
+SIZES = {"length_mm": 0.06, "curved_length_mm": 0.2, "curvature_per_m": 0.25}
 MODULUS = (40.0, 80.0)  # [GPa]
 
 
@@ -67,12 +65,13 @@ def description(robot: str, rng: np.random.Generator) -> dict[str, Any]:
 def make(number: int) -> Path:
     """The set of a number, from the disk where it is; its folder."""
     from benches import ROBOTS, joint_range
+    from make_set import Session, bench_facts
     from mechanics import Mechanics
     from robot import from_description
     from ruamel.yaml import YAML
     from session import Setup, draw_noise, draw_plan, run_session
     from simulate import SHARE_OF_UNCERTAINTY, draw_bench
-    from tables import pose_fields, write_robot, write_table
+    from tables import write_robot, write_table
 
     folder = SETS / f"{number:03d}"
     if (folder / "truth.yaml").exists():
@@ -86,19 +85,10 @@ def make(number: int) -> Path:
     position, rotation = np.array([p for p, _ in poses]), Rotation.concatenate([r for _, r in poses])
     kind = NOISES[number // len(ROBOTS) % 2]
     noise = draw_noise(sheet["tracker"], position, kind, rng)
-    position = position + noise.position + noise.field_position
-    rotation = Rotation.from_rotvec(noise.rotation + noise.field_rotation) * rotation
-    force = plan.mass[:, None] * np.array(sheet["gravity"])
-    rows = [
-        [time, run, *joints, *load, *pose_fields(place, turn)]
-        for time, run, joints, load, place, turn in zip(
-            plan.time, plan.run, plan.joints, force, position, rotation.as_matrix(), strict=True
-        )
-    ]
+    session = Session(sheet, bench, plan, position, rotation, noise, [])
     write_robot(folder / "robot.yaml", sheet)
-    write_table(folder / "measurements.csv", rows, len(sheet["tubes"]), ("force",), ("t_s", "run"))
-    turn = bench.tracker_rotation * Rotation.from_rotvec(sheet["tracker"]["rotation_vector_rad"]).inv()
-    truth = {"noise": kind, "parameters": _truth(bench, turn.as_rotvec())}
+    write_table(folder / "measurements.csv", session.rows(), len(sheet["tubes"]), ("force",), ("t_s", "run"))
+    truth = {"noise": kind, "bench": bench_facts(bench), "causes": []}
     unfinished = folder / "truth.unfinished"
     with unfinished.open("w", encoding="utf-8") as file:
         YAML(typ="safe").dump(truth, file)
@@ -106,20 +96,14 @@ def make(number: int) -> Path:
     return folder
 
 
-def _truth(bench: Any, turn: np.ndarray) -> dict[str, float]:
-    """True values by the name of the parameter, SI; homes against those of the file."""
-    units = {"youngs_modulus": ("youngs_modulus_GPa", 1e9), "curvature": ("curvature_per_m", 1.0),
-             "curved_length": ("curved_length_mm", 1e-3), "length": ("length_mm", 1e-3)}  # fmt: skip
-    true = {
-        f"tubes.{i}.{name}": tube[key] * unit
-        for i, tube in enumerate(bench.description["tubes"], start=1)
-        for name, (key, unit) in units.items()
-    }
-    for kind, offsets in (("rotation", bench.alpha_offset), ("translation", bench.beta_offset)):
-        true |= {f"actuation.home_{kind}.{i}": float(value) for i, value in enumerate(offsets, start=1)}
-    for kind, values in (("position", bench.tracker_position), ("rotation", turn)):
+def _truth(answers: dict[str, Any], robot: Any) -> dict[str, float]:
+    """True values by the name of the parameter, SI; homes and the turn of the tracker against those of the file."""
+    bench, nominal = answers["bench"], Rotation.from_rotvec(robot.tracker.rotation_vector_rad)
+    turn = (Rotation.from_rotvec(bench["tracker_rotation_vector_rad"]) * nominal.inv()).as_rotvec()
+    true = truth_of(answers)
+    for kind, values in (("position", bench["tracker_position_m"]), ("rotation", turn)):
         true |= {f"tracker.{kind}.{axis}": float(value) for axis, value in zip("xyz", values, strict=True)}
-    return {name: float(value) for name, value in true.items()}
+    return true
 
 
 def judge(number: int) -> Answer:
@@ -132,13 +116,16 @@ def judge(number: int) -> Answer:
     robot = robot_file.load(folder / "robot.yaml")
     table = measurements.load(folder / "measurements.csv", robot.n_tubes)
     found = joint_fit.calibrate(robot, table, ["standard"], halves=False)
-    truth, fit = YAML(typ="safe").load((folder / "truth.yaml").read_text()), found.fit
+    answers, fit = YAML(typ="safe").load((folder / "truth.yaml").read_text()), found.fit
+    true = _truth(answers, robot)
     pulls = {}
     for name, value, mean, sd in zip(fit.names, fit.values, fit.prior_mean, fit.sd, strict=True):
         since = mean if name.startswith("actuation.") else 0.0
-        pulls[name] = float((value - since - truth["parameters"][name]) / sd)
+        pulls[name] = float((value - since - true[name]) / sd)
     held = found.held_out
-    return Answer(truth["noise"], pulls, held.error.rms_mm, held.floor.rms_mm, float(fit.reduced_chi_square))
+    return Answer(
+        answers["noise"], pulls, held.error.rms_mm, held.floor.rms_mm, float(fit.reduced_chi_square)
+    )
 
 
 def study(count: int, jobs: int = 2, tell=print) -> list[Answer]:
@@ -153,17 +140,20 @@ def study(count: int, jobs: int = 2, tell=print) -> list[Answer]:
     return answers
 
 
-def within(answers: list[Answer], noise: str | None = None) -> tuple[int, int]:
+def within(answers: list[Answer], noise: str) -> tuple[int, int]:
     """True values inside WIDTH standard deviations, of how many."""
-    pulls = [p for a in answers if noise in (None, a.noise) for p in a.pulls.values()]
+    pulls = [p for a in answers if a.noise == noise for p in a.pulls.values()]
     return int(np.sum(np.abs(pulls) <= WIDTH)), len(pulls)
 
 
-def over_floor(answers: list[Answer], noise: str | None = None) -> float:
-    """Held-out error over noise floor, RMS of all robots."""
-    chosen = [a for a in answers if noise in (None, a.noise)]
-    square = [np.mean([getattr(a, name) ** 2 for a in chosen]) for name in ("held_out_mm", "floor_mm")]
-    return float(np.sqrt(square[0] / square[1]))
+def errors_mm(answers: list[Answer], noise: str) -> tuple[float, float]:
+    """Held-out error and noise floor, RMS of all robots with this noise."""
+    chosen = [a for a in answers if a.noise == noise]
+    held, floor = (
+        float(np.sqrt(np.mean(np.square([getattr(a, n) for a in chosen]))))
+        for n in ("held_out_mm", "floor_mm")
+    )
+    return held, floor
 
 
 def summary(answers: list[Answer]) -> str:
@@ -184,9 +174,7 @@ def summary(answers: list[Answer]) -> str:
     for noise in NOISES:
         chosen = [a for a in answers if a.noise == noise]
         pulls = [p for a in chosen for p in a.pulls.values()]
-        held, floor = (
-            float(np.sqrt(np.mean([getattr(a, n) ** 2 for a in chosen]))) for n in ("held_out_mm", "floor_mm")
-        )
+        held, floor = errors_mm(answers, noise)
         lines.append(f"| {noise} | {len(chosen)} | {wilson(*within(answers, noise))} | {np.mean(np.square(pulls)):.2f} "
                      f"| {held:.3f} | {floor:.3f} | {held / floor:.2f} |")  # fmt: skip
     lines += ["", "| parameters | noise | within | mean square error / variance |", "|---|---|---|---|"]
@@ -194,13 +182,7 @@ def summary(answers: list[Answer]) -> str:
     for a in answers:
         for name, pull in a.pulls.items():
             parts = name.split(".")
-            kind = (
-                parts[2]
-                if parts[0] == "tubes"
-                else parts[1]
-                if parts[0] == "actuation"
-                else f"tracker {parts[1]}"
-            )
+            kind = {"tubes": parts[-1], "actuation": parts[1]}.get(parts[0], f"tracker {parts[1]}")
             kinds[kind, a.noise].append(pull)
     for (kind, noise), pulls in sorted(kinds.items()):
         hits = int(np.sum(np.abs(pulls) <= WIDTH))

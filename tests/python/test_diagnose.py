@@ -3,11 +3,13 @@
 import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import effects, recording, robot_file
+from ctcr import effects, identify, recording, robot_file
 from ctcr.diagnose import diagnose
+from ctcr.diagnose import race as racing
 from ctcr.diagnose.engine import Linear
 from ctcr.diagnose.split import groups, locked_rows
 from ctcr.measurements import Measurements
@@ -131,3 +133,29 @@ def test_rows_are_locked_by_run(robot):
         assert np.ptp(locked[table.run == run].astype(int)) == 0
     one = dataclasses.replace(table, run=np.zeros_like(table.run))
     assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)
+
+
+@pytest.mark.parametrize(("scores", "kept"), [([40.0, 25.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])
+def test_of_many_rows_the_best_candidate_is_always_refitted(monkeypatch, scores, kept):
+    """Also where a few rows alone do not speak for it."""
+    entries = [dataclasses.replace(blank, refit=score) for score in scores]
+    monkeypatch.setattr(racing, "refit", lambda engine, base, entry, fixed, progress: entry)
+    monkeypatch.setattr(identify, "few_of", lambda rows: rows)
+    engine = ManyRows(np.ones(4, bool), np.ones(4, bool))
+    before = SimpleNamespace(names=[], values=[], noise=None, weights=None, inflation=None)
+    found = racing._in_reach(engine, before, entries, {}, lambda _: None)
+    assert [entries.index(entry) for entry in found] == kept
+
+
+blank = racing.Entry(candidate=None, gain=None)
+
+
+@dataclasses.dataclass
+class ManyRows:
+    """Stands for an engine whose fits nobody looks at."""
+
+    measured: np.ndarray
+    rows: np.ndarray
+
+    def fit(self, *_, **__):
+        return None

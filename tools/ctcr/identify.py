@@ -128,10 +128,10 @@ def fit(
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     noise = noise or noise_of(robot, kinds=kinds)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    warnings = [*said, *fit_words.doubts(measurements, measured_rows(measurements) & chosen)]
+    rows, places = measured_rows(measurements) & chosen, places_of(robot, measurements)
+    warnings = [*said, *fit_words.doubts(measurements, rows)]
     steps = steps or recording.steps_for(robot, measurements, noise)
     table = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
-    rows, places = measured_rows(measurements) & chosen, places_of(robot, measurements)
     options = {
         "robust": robust,
         "admit_model_error": admit_model_error,

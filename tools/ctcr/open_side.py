@@ -43,9 +43,8 @@ def widened(fit: Any) -> Any:
     if not warnings:
         return fit
     sd = np.sqrt(np.diag(covariance))
-    return replace(
-        fit, covariance=covariance, sd=sd, ratio=sd / fit.prior_sd, warnings=[*fit.warnings, *warnings]
-    )
+    ratio = np.where(np.isfinite(fit.prior_sd), sd / fit.prior_sd, fit.ratio)
+    return replace(fit, covariance=covariance, sd=sd, ratio=ratio, warnings=[*fit.warnings, *warnings])
 
 
 def _chi_square(fit: Any):

@@ -127,13 +127,18 @@ def answer(order: Order, session: Session) -> dict:
             "field": _rms_mm(session.noise.field_position),
         },
         "chi_square_after_calibration": left.chi_square,
-        "bench": {
-            "tubes": session.bench.description["tubes"],
-            "beta_offset_m": session.bench.beta_offset.tolist(),
-            "alpha_offset_rad": session.bench.alpha_offset.tolist(),
-            "tracker_position_m": session.bench.tracker_position.tolist(),
-            "tracker_rotation_vector_rad": session.bench.tracker_rotation.as_rotvec().tolist(),
-        },
+        "bench": bench_facts(session.bench),
+    }
+
+
+def bench_facts(bench: Bench) -> dict:
+    """What is really there, as truth files hold it."""
+    return {
+        "tubes": bench.description["tubes"],
+        "beta_offset_m": bench.beta_offset.tolist(),
+        "alpha_offset_rad": bench.alpha_offset.tolist(),
+        "tracker_position_m": bench.tracker_position.tolist(),
+        "tracker_rotation_vector_rad": bench.tracker_rotation.as_rotvec().tolist(),
     }
 
 

@@ -245,6 +245,7 @@ def _rotation_ratio(robot: Robot | None, ratio: float | None) -> float:
 
 
 def check_tube(tube: int, robot: Robot | None, file: str, row: int | None = None) -> None:
+    """Raises InputError where the robot has no such tube."""
     if robot is not None and tube > robot.n_tubes:
         raise InputError(
             Problem(f"tube {tube} is not there: the robot has {robot.n_tubes}", file, row, "tube", "row")
@@ -281,6 +282,7 @@ def _check_same_place(table: Table, names: list[str], cad: Array, place: Array) 
 
 
 def left_out(name: str, rows: list[int]) -> list[str]:
+    """A notice of outliers, by their rows of the file."""
     if not rows:
         return []
     listed = ", ".join(map(str, rows[:10])) + (", ..." if len(rows) > 10 else "")

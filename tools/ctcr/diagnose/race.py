@@ -242,10 +242,11 @@ def _in_reach(
     base = small.fit(added, start=values_of(before), fixed=fixed, **frozen)
     tried = [refit(small, base, entry, fixed, progress) for entry in chosen]
     best = max(entry.score for entry in tried)
+    reach = min(best, IN_REACH * best)  # the best itself always is
     return [
         replace(entry, fit=there.fit)
         for entry, there in zip(chosen, tried, strict=True)
-        if there.score >= IN_REACH * best
+        if there.score >= reach
     ]
 
 
