@@ -129,7 +129,7 @@ TEST(Descent, FindsAMinimumWhereSlopesJump) {
     objective.set_whitening(whitening);
     const detail::Bounds bounds(parameters, {}, Eigen::VectorXd::Ones(n));
     Eigen::VectorXd z = Eigen::VectorXd::Zero(n);
-    const detail::Descent found = detail::descend(objective, bounds, 50, z);
+    const detail::Descent found = detail::descend(objective, bounds, 50, 0.02, z);
     EXPECT_TRUE(found.converged) << seed;
     EXPECT_LT(objective.evaluations(), 60) << seed;
     EXPECT_NEAR(found.cost, objective.cost(z), 1e-12);
@@ -138,6 +138,38 @@ TEST(Descent, FindsAMinimumWhereSlopesJump) {
     at_kink += found.at_kink;
   }
   EXPECT_GT(at_kink, 10);
+}
+
+// Rows k max(t - c, 0), as of a wall that some tips touch: each has a kink, and the cost is not convex.
+TEST(Descent, DoesNotTakeACostThatIsNotConvexForAKink) {
+  for (int seed = 0; seed < 40; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    constexpr Eigen::Index rows = 10;
+    const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(6 * rows, 0, 1);
+    const Eigen::Vector2d truth(test::uniform(random, 50, 300), test::uniform(random, 0.3, 0.8));
+    const auto reading = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd { return x[0] * (t - x[1]).max(0); };
+    const Eigen::VectorXd y = reading(truth) + normals(6 * rows, random);
+    const Predictor predict = [&](const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+      residual = reading(x) - y;
+      if (!jacobian) return true;
+      jacobian->resize(6 * rows, 2);
+      jacobian->col(0) = (t - x[1]).max(0);
+      jacobian->col(1) = (t > x[1]).select(Eigen::ArrayXd::Constant(t.size(), -x[0]), 0.0);
+      return true;
+    };
+    std::vector<FreeParameter> parameters{{"k", 0, 1000}, {"c", 0.5, 1}};
+    const Eigen::Vector2d scale(1000, 1);
+    detail::Objective objective(predict, parameters, scale);
+    const Noise one{.position_jitter = 1, .rotation_jitter = 1};
+    const SmoothField none{Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)};
+    const Whitening whitening(one, none, RowWeights::Ones(rows, 2));
+    objective.set_whitening(whitening);
+    const detail::Bounds bounds(parameters, {}, scale);
+    Eigen::VectorXd z = objective.z(Eigen::Vector2d(test::uniform(random, 20, 600), test::uniform(random, 0.1, 0.9)));
+    const detail::Descent found = detail::descend(objective, bounds, 50, 0.02, z);
+    EXPECT_TRUE(found.converged) << seed;
+    EXPECT_LT(found.cost, objective.cost(objective.z(truth))) << seed;
+  }
 }
 
 }  // namespace descent_test

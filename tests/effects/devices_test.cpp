@@ -101,6 +101,19 @@ TEST(FrameDrift, IsNothingHalfWay) {
   EXPECT_LE((middle.position - centre - 0.5 * Vec3(1e-3, 2e-3, -1e-3)).norm(), 1e-15);
 }
 
+TEST(FrameDrift, EndsWhereItWouldEvenlyButFasterAtFirstWhereItSettles) {
+  FrameDrift<1> even, settling;
+  even.values = settling.values = {1e-3, 2e-3, -1e-3, 0, 0, 0, 0};
+  settling.values[6] = 1;
+  const Pose pose{Mat3::Identity(), Vec3::Zero()};
+  const auto moved = [&](const FrameDrift<1>& drift, double from, double to) {
+    return (sensed(drift, {.part = to}, pose).position - sensed(drift, {.part = from}, pose).position).eval();
+  };
+  EXPECT_LE((moved(settling, 0, 1) - moved(even, 0, 1)).norm(), 1e-15);
+  EXPECT_LE((moved(settling, 0, 1e-6) - 2 * moved(even, 0, 1e-6)).norm(), 1e-11);
+  EXPECT_LE(moved(settling, 1 - 1e-6, 1).norm(), 1e-11);
+}
+
 TEST(FrameJump, HappensOnce) {
   Random random(4);
   FrameJump<1> effect;
@@ -140,6 +153,49 @@ TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
       // The push is sought to 1e-8 N, and moves the tip by the compliance.
       const double compliance = touching.solution.compliance.topLeftCorner<3, 3>().norm();
       EXPECT_LE((push / stiffness + depth * normal).norm(), 1e-8 * (1 / stiffness + compliance)) << stiffness;
+    }
+  }
+}
+
+TEST(Contact, SetsInOverItsRoundingWithoutAJumpOfTheSlope) {
+  constexpr double stiffness = 20, distance = 0.1, r = 2e-3;
+  Contact<1> effect;
+  effect.values = {stiffness, distance, 0, 0, r};
+  const auto push = [&](double depth) {
+    std::array<double, 3> force{};
+    effect.environment({distance + depth, 0.01, -0.02}, force);
+    EXPECT_EQ(std::hypot(force[1], force[2]), 0);
+    return -force[0];
+  };
+  EXPECT_EQ(push(-1.0001 * r), 0);
+  EXPECT_NEAR(push(0), stiffness * r / 4, 1e-15);
+  EXPECT_NEAR(push(3 * r), stiffness * 3 * r, 1e-15);
+  for (const double edge : {-r, r}) {
+    constexpr double h = 1e-8;
+    EXPECT_NEAR(push(edge + h) - push(edge), push(edge) - push(edge - h), 1.01 * stiffness * h * h / r);
+  }
+}
+
+TEST(Contact, IsAPlaneABallOrAHollow) {
+  Random random(6);
+  for (int n = 0; n < 50; ++n) {
+    const Vec3 normal = test::random_vector(random, 1).normalized(), tip = test::random_vector(random, 0.05);
+    const double distance = test::uniform(random, -0.05, 0.05), radius = test::uniform(random, 0.02, 1);
+    const auto force = [&](double curvature) {
+      Contact<1> effect;
+      effect.values = {20, distance, std::atan2(normal.y(), normal.x()), std::asin(normal.z()), 0, curvature};
+      std::array<double, 3> f{};
+      effect.environment({tip.x(), tip.y(), tip.z()}, f);
+      return Vec3(f[0], f[1], f[2]);
+    };
+    const auto expected = [&](double depth, const Vec3& outwards) -> Vec3 {
+      return 20 * std::max(depth, 0.0) * outwards;
+    };
+    EXPECT_LE((force(0) - expected(normal.dot(tip) - distance, -normal)).norm(), 1e-14);
+    for (const double side : {1.0, -1.0}) {
+      const Vec3 from = tip - (distance + side * radius) * normal;
+      const double depth = side * (radius - from.norm());
+      EXPECT_LE((force(side / radius) - expected(depth, side * from.normalized())).norm(), 1e-13) << side;
     }
   }
 }

@@ -12,6 +12,7 @@ from ctcr.diagnose import diagnose
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.engine import Linear
 from ctcr.diagnose.split import groups, locked_rows
+from ctcr.diagnose.verdict import judge
 from ctcr.measurements import Measurements
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml"
@@ -109,6 +110,52 @@ def test_a_hidden_effect_is_named(robot, hidden, identity):
         assert abs(result.final.values[place] - value) < 4 * result.final.sd[place]
 
 
+def test_a_wall_that_few_tips_touch_is_no_set_of_outliers(robot):
+    """The fit would drop the readings that touch it, and then find nothing."""
+    tips = measured(robot, np.random.default_rng(4), {}, calibration=0).position
+    base = (tips - robot.tracker.position) @ robot.tracker.rotation
+    azimuth = 2.0
+    reach = base @ [np.cos(azimuth), np.sin(azimuth), 0]
+    hidden = {"stiffness": 60.0, "distance": np.quantile(reach, 0.85), "azimuth": azimuth}
+    table = measured(
+        robot, np.random.default_rng(4), {f"effects.contact.{name}": value for name, value in hidden.items()}
+    )
+    result = diagnose(robot, table)
+    assert result.accepted[0].ids == ["contact"]
+    assert racing.outliers(result.final) <= racing.MOST_OUTLIERS
+    floor, seen = result.rms_mm["noise_floor"], ~result.locked
+    assert result.final.rms_mm(seen) < 1.1 * floor < 2 * floor < result.calibrated.rms_mm(seen)
+
+
+@pytest.mark.parametrize(
+    ("score", "is_further", "is_rejected", "accepts"),
+    [(9, False, True, True), (9, False, False, False), (14, False, False, True), (14, True, False, False),
+     (19, True, False, True)],
+)  # fmt: skip
+def test_more_evidence_is_needed_where_noise_explains_what_is_left(score, is_further, is_rejected, accepts):
+    entry = dataclasses.replace(
+        blank, candidate=SimpleNamespace(id="delay"), refit=score, share=1.0, fit="a fit"
+    )
+    round_ = racing.Round("a fit", [entry], {})
+    racing.decide(round_, 21, is_further, is_rejected)
+    assert (round_.accepted is entry) == accepts
+    assert accepts or "below" in round_.reason
+
+
+@pytest.mark.parametrize(
+    ("calibrated", "with_effects", "structured", "word"),
+    [(0.3, 0.1, True, "identified"), (0.3, 0.29, True, "stand_in"), (0.3, 0.29, False, "identified"),
+     (0.061, 0.062, True, "identified")],
+)  # fmt: skip
+def test_what_other_runs_do_not_confirm_is_a_stand_in(calibrated, with_effects, structured, word):
+    noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
+    fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (calibrated, with_effects)]
+    entry = SimpleNamespace(id="delay", implausible=())
+    accepted = [SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)]
+    said = judge(*fits, accepted, [], SimpleNamespace(structured=structured), np.ones(3, bool))
+    assert said.word == word
+
+
 def test_linear_gain_is_the_evidence_of_a_linear_model():
     random = np.random.default_rng(3)
     for _ in range(20):
@@ -135,7 +182,7 @@ def test_rows_are_locked_by_run(robot):
     assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)
 
 
-@pytest.mark.parametrize(("scores", "kept"), [([40.0, 25.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])
+@pytest.mark.parametrize(("scores", "kept"), [([40.0, 33.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])
 def test_of_many_rows_the_best_candidate_is_always_refitted(monkeypatch, scores, kept):
     """Also where a few rows alone do not speak for it."""
     entries = [dataclasses.replace(blank, refit=score) for score in scores]

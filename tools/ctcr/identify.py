@@ -22,7 +22,8 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEW_ROWS = 500  # a fit of so many comes first where there are twice as many or more
+FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or more
+COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
 Noise = _core.Noise
 expand = free_parameters.expand
 parameter_names = free_parameters.names_of
@@ -201,7 +202,7 @@ def identify_rows(
         table.activate(rows.tolist())
         return identify_with(table, *arguments, start=start, starts=starts, **options)
     table.activate(few.tolist())
-    first = identify_with(table, *arguments, start=start, starts=starts, **options)
+    first = identify_with(table, *arguments, start=start, starts=starts, **options | {"tolerance": COARSE})
     table.activate(rows.tolist())
     fitted = identify_with(table, *arguments, start=first.values, starts=1, **options)
     return replace(fitted, starts=first.starts)
@@ -235,6 +236,7 @@ def identify_with(
     start: Array | None = None,
     starts: int = 3,
     max_iterations: int = 50,
+    tolerance: float = 0.02,
     known: Sequence[tuple[str, Array]] = (),
     within: Sequence[tuple[str, Array, float]] = (),
 ) -> Fit:
@@ -248,7 +250,7 @@ def identify_with(
             places=np.asarray(places, dtype=float), robust=robust,
             admit_model_error=admit_model_error, weights=weights,
             inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
-            max_iterations=max_iterations, known=list(known), within=list(within),
+            max_iterations=max_iterations, tolerance=tolerance, known=list(known), within=list(within),
         )  # fmt: skip
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None

@@ -134,14 +134,14 @@ inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bou
 /// Where a tube's curve begins at the plate, or a load lifts off, slopes jump, and the minimum may lie at such a kink,
 /// where they never vanish. So a step that fails brings the slopes of the other side, and the next one follows the kink or
 /// finds that nothing is left to gain.
-/// @param goal  ends the descent where it is about to arrive there; or null
+/// @param tolerance  of the cost; it may be left to gain at a kink. Elsewhere 0.15 times as many posterior sd may
+/// @param goal       ends the descent where it is about to arrive there; or null
 /// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999; the model beyond a kink is an aggregated
 /// bundle, Kiwiel 1983.
-inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, Eigen::VectorXd& z,
-                       const Goal* goal = nullptr) {
-  constexpr double arrived = 0.1, settled = 0.003;  // posterior sd
-  constexpr double nothing = 0.02;                  // of the cost: a fifth of a posterior sd
-  constexpr double most_damping = 1e10;
+inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, double tolerance,
+                       Eigen::VectorXd& z, const Goal* goal = nullptr) {
+  constexpr double arrived = 0.1, most_damping = 1e10;
+  const double settled = 0.15 * tolerance;
   Descent out;
   z = bounds.clamped(z);
   Linearised here, there;
@@ -158,15 +158,22 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
     out.converged =
         bounds.step_left(z, here.gradient, model.hessian) < settled || (goal && goal->distance(z) < arrived);
     if (out.converged) break;
-    bool kinked = false;
+    bool kinked = false, doubted = false;
     for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
       const Eigen::VectorXd step = model.minimum(bounds, z, damping * diagonal);
       const double foreseen = -model(step);
-      out.at_kink = out.converged = kinked && foreseen < nothing;
-      if (out.converged) return out;
+      if (kinked && foreseen < tolerance) {
+        out.at_kink = out.converged = doubted;
+        if (doubted) return out;
+        // What looks like a kink may be a cost that is not convex: short steps on this side tell.
+        doubted = true;
+        model = {0, here.gradient, hessian(here)};
+        damping = std::max(damping, 1.0), growth = 15;
+        continue;
+      }
       const double gain = (here.cost - objective.cost(z + step)) / foreseen;
       if (!(gain > 0.1)) {
-        if (!objective.linearise(z + step, there)) continue;
+        if (doubted || !objective.linearise(z + step, there)) continue;
         kinked = true;
         const Eigen::MatrixXd H = hessian(there);
         const Eigen::VectorXd slope = there.gradient - H * step;

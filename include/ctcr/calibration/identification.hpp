@@ -22,7 +22,8 @@ struct IdentifyOptions {
   std::optional<Eigen::VectorXd> start = {};     ///< where to start; the prior means otherwise
   int starts = 3;                                ///< the first and others drawn from the prior, compared at the end
   int max_iterations = 50;                       ///< of each descent
-  std::vector<LinearBound> within = {};          ///< bounds of sums of parameters, beside those of each
+  double tolerance = 0.02;                 ///< of minus the log posterior: where less is to gain, a descent may end
+  std::vector<LinearBound> within = {};    ///< bounds of sums of parameters, beside those of each
   std::vector<KnownDirection> known = {};  ///< directions that deserve their own words where they are undetermined
   double strong_correlation = 0.9;         ///< correlations beyond it are listed
 };

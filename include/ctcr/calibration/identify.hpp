@@ -126,15 +126,18 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
     }
     return true;
   };
+  const auto descend = [&](double tolerance) {
+    best = detail::descend(objective, bounds, options.max_iterations, tolerance, z);
+    out.iterations += best.iterations;
+  };
   const auto descend_robustly = [&] {
     constexpr int rounds = 8;
-    for (int round = 0; round < rounds; ++round) {
-      best = detail::descend(objective, bounds, options.max_iterations, z);
-      out.iterations += best.iterations;
-      if (!(finds_weights || finds_inflation) || !objective.at(z) || !settle()) return;
+    const double round_tolerance = std::max(0.5, options.tolerance);
+    for (int round = 0; (finds_weights || finds_inflation) && round < rounds; ++round) {
+      descend(round_tolerance);
+      if (!objective.at(z) || !settle()) break;
     }
-    best = detail::descend(objective, bounds, options.max_iterations, z);
-    out.iterations += best.iterations;
+    descend(options.tolerance);
   };
   // The first descent takes all that is wrong at the start for noise: far from the truth, details mislead.
   if (finds_inflation) inflate(residual);
@@ -155,7 +158,8 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
     for (int halving = 0; halving < 5 && !objective.at(other); ++halving) other = 0.5 * (other + z);
     if (!objective.at(other)) continue;
     const detail::Goal goal{z, precision()};
-    const detail::Descent there = detail::descend(objective, bounds, options.max_iterations, other, &goal);
+    const detail::Descent there =
+        detail::descend(objective, bounds, options.max_iterations, options.tolerance, other, &goal);
     out.iterations += there.iterations;
     out.starts.push_back({there.cost, goal.distance(other), there.converged});
     if (there.cost < best.cost - 0.5 && goal.distance(other) > 0.5) {

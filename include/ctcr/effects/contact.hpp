@@ -1,5 +1,6 @@
 #pragma once
 #include "ctcr/effects/hooks.hpp"
+#include "ctcr/math/functions.hpp"
 
 namespace ctcr {
 namespace contact {
@@ -10,7 +11,7 @@ inline constexpr EffectInfo info{
     .signature = "Nothing over most of the workspace, then an error on one side of a plane that grows with the depth.",
     .measure = "Go to the same region along several ways; look.",
     .look_alikes = "field_distortion",
-    .reference = "penalty contact, general practice",
+    .reference = "penalty contact, general practice; a sphere or a soft wall: Hertz 1882",
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "stiffness",
@@ -31,7 +32,7 @@ inline constexpr std::array parameters{
                     .hard_low = -5,
                     .hard_high = 5,
                     .role = Role::shape,
-                    .meaning = "of the plane from the origin of the base frame, along its normal"},
+                    .meaning = "of the surface from the origin of the base frame, along the normal"},
     EffectParameter{.name = "azimuth",
                     .unit = "rad",
                     .neutral = 0,
@@ -52,24 +53,58 @@ inline constexpr std::array parameters{
                     .hard_high = 1.6,
                     .role = Role::shape,
                     .meaning = "of the normal above the plane of x and y"},
+    EffectParameter{.name = "rounding",
+                    .unit = "m",
+                    .neutral = 2e-3,
+                    .sigma = 2e-3,
+                    .soft_low = 0,
+                    .soft_high = 0.01,
+                    .hard_low = 0,
+                    .hard_high = 0.05,
+                    .role = Role::shape,
+                    .meaning = "depth on either side of the surface over which the push sets in"},
+    EffectParameter{.name = "curvature",
+                    .unit = "1/m",
+                    .neutral = 0,
+                    .sigma = 10,
+                    .soft_low = -100,
+                    .soft_high = 100,
+                    .hard_low = -100,
+                    .hard_high = 100,
+                    .role = Role::shape,
+                    .meaning = "of the surface: 0 of a plane, 1 / radius of a ball, negative inside a hollow"},
 };
 }  // namespace contact
 
-/// An elastic plane that pushes back where the tip enters it.
+/// An elastic plane, ball or hollow that pushes back where the tip enters it.
 template <int N, class P = double>
 struct Contact : EffectValues<contact::parameters, N, P> {
   static constexpr const EffectInfo& info = contact::info;
 
-  /// The normal points into the surface: the force is -k n (n p - d) where that is deeper than 0.
+  /// The normal n points into the surface, through the middle of a ball. The force along its outward normal is k d, d the
+  /// depth where that is beyond the rounding r, (d + r)^2 / (4 r) within it, and nothing before.
   void environment(const std::array<P, 3>& p, std::array<P, 3>& force) const noexcept {
     P sa, ca, se, ce;
     sincos(this->template get<2>(), sa, ca);
     sincos(this->template get<3>(), se, ce);
+    const P &distance = this->template get<1>(), &r = this->template get<4>(), &curvature = this->template get<5>();
     const P n[3] = {ce * ca, ce * sa, se};
-    const P depth = n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - this->template get<1>();
-    if (!(value(depth) > 0)) return;
-    const P push = this->template get<0>() * depth;
-    for (std::size_t i = 0; i < 3; ++i) force[i] = force[i] - push * n[i];
+    P along = 0.0, square = 0.0, length = 0.0, inwards[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      const P v = p[i] - distance * n[i];
+      inwards[i] = n[i] - curvature * v;
+      along = along + n[i] * v;
+      square = square + v * v;
+      length = length + inwards[i] * inwards[i];
+    }
+    length = square_root(length);
+    // 1 / curvature less the distance from the middle of the ball, without the difference of two large numbers.
+    const P depth = (2.0 * along - curvature * square) * inverse(1.0 + length);
+    if (!(value(depth + r) > 0)) return;
+    // A push that set in with a jump of its slope would stop fits wherever a reading just touches.
+    const P pressed = value(depth) < value(r) ? (depth + r) * (depth + r) * inverse(4.0 * r) : depth;
+    const P push = this->template get<0>() * pressed * inverse(length);
+    for (std::size_t i = 0; i < 3; ++i) force[i] = force[i] - push * inwards[i];
   }
 };
 

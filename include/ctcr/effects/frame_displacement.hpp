@@ -34,9 +34,9 @@ constexpr std::array<EffectParameter, 6> frame_displacement(double sigma, double
 
 /// Displaces a reading by a part of the first six values.
 template <class P, std::size_t Count>
-void displace_frame(const Occasion& at, double part, const std::array<P, Count>& values, Frame<P>& reading) noexcept {
+void displace_frame(const Occasion& at, const P& part, const std::array<P, Count>& values, Frame<P>& reading) noexcept {
   const Triple<P> about{-at.centre[0], -at.centre[1], -at.centre[2]}, back{at.centre[0], at.centre[1], at.centre[2]};
-  const auto by = [&](std::size_t k) { return P(part * values[k]); };
+  const auto by = [&](std::size_t k) { return part * values[k]; };
   shift(reading, about);
   reading = composed(displacement<P>({by(0), by(1), by(2)}, {by(3), by(4), by(5)}), reading);
   shift(reading, back);

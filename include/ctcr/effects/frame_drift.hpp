@@ -13,16 +13,34 @@ inline constexpr EffectInfo info{
     .reference = "Jang et al. 2016",
     .needs = {.order = true, .time = true},
 };
-inline constexpr std::array parameters = frame_displacement(3e-4, 2e-3);
+inline constexpr auto parameters = [] {
+  std::array<EffectParameter, 7> all{};
+  const std::array frame = frame_displacement(3e-4, 2e-3);
+  for (std::size_t i = 0; i < frame.size(); ++i) all[i] = frame[i];
+  all[6] = EffectParameter{.name = "settling",
+                           .unit = "",
+                           .neutral = 0,
+                           .sigma = 0.5,
+                           .soft_low = -1,
+                           .soft_high = 1,
+                           .hard_low = -2,
+                           .hard_high = 2,
+                           .role = Role::shape,
+                           .meaning =
+                               "how much faster than on average it drifts at first, and slower at last: 0 evenly, "
+                               "1 twice as fast at first and not at all at last"};
+  return all;
+}();
 }  // namespace frame_drift
 
-/// T_ref that drifts evenly from the first to the last row, about the centre of all readings.
+/// T_ref that drifts from the first to the last row, evenly or ever more slowly, about the centre of all readings.
 template <int N, class P = double>
 struct FrameDrift : EffectValues<frame_drift::parameters, N, P> {
   static constexpr const EffectInfo& info = frame_drift::info;
 
+  /// Between first and last row the drift is 1, in the middle of the session about 0.
   void sense(const Occasion& at, Frame<P>& reading) const noexcept {
-    displace_frame(at, at.part - 0.5, this->values, reading);
+    displace_frame(at, P(at.part - 0.5 + at.part * (1 - at.part) * this->template get<6>()), this->values, reading);
   }
 };
 

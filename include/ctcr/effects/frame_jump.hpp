@@ -37,7 +37,7 @@ struct FrameJump : EffectValues<frame_jump::parameters, N, P> {
   static constexpr const EffectInfo& info = frame_jump::info;
 
   void sense(const Occasion& at, Frame<P>& reading) const noexcept {
-    if (!(at.part <= value(this->values[6]))) displace_frame(at, 1, this->values, reading);
+    if (!(at.part <= value(this->values[6]))) displace_frame(at, P(1.0), this->values, reading);
   }
 };
 

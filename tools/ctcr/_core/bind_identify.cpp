@@ -52,7 +52,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
                             bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
                             const std::optional<Eigen::Vector2d>& inflation,
                             const std::optional<Eigen::VectorXd>& start, int starts, int max_iterations,
-                            const Known& known, const Within& within, std::vector<int>& excluded) {
+                            double tolerance, const Known& known, const Within& within, std::vector<int>& excluded) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
   options.robust = robust;
@@ -62,6 +62,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
   options.start = start;
   options.starts = starts;
   options.max_iterations = max_iterations;
+  options.tolerance = tolerance;
   for (const auto& [text, change] : known) {
     if (change.size() != mean.size()) throw std::invalid_argument("a known direction needs one number a parameter");
     options.known.push_back({text, change});
@@ -164,17 +165,18 @@ void bind_identify(nb::module_& m) {
          const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
          const Eigen::MatrixX3d& places, bool robust, bool admit_model_error,
          const std::optional<Eigen::MatrixX2d>& weights, const std::optional<Eigen::Vector2d>& inflation,
-         const std::optional<Eigen::VectorXd>& start, int starts, int max_iterations, const Known& known,
-         const Within& within) {
+         const std::optional<Eigen::VectorXd>& start, int starts, int max_iterations, double tolerance,
+         const Known& known, const Within& within) {
         std::vector<int> excluded;
-        Identification fit = identify_any(predict, names, mean, sd, low, high, noise, places, robust, admit_model_error,
-                                          weights, inflation, start, starts, max_iterations, known, within, excluded);
+        Identification fit =
+            identify_any(predict, names, mean, sd, low, high, noise, places, robust, admit_model_error, weights,
+                         inflation, start, starts, max_iterations, tolerance, known, within, excluded);
         return std::pair(std::move(fit), std::move(excluded));
       },
       nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a, "places"_a,
       "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
       "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50,
-      "known"_a = Known{}, "within"_a = Within{},
+      "tolerance"_a = 0.02, "known"_a = Known{}, "within"_a = Within{},
       "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
       "rows.");
 }

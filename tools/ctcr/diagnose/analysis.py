@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side, sensor_roll
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import candidates
+from ctcr.diagnose.candidates import Candidate, candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.race import Entry, Progress, Round
@@ -61,6 +61,13 @@ class Diagnosis:
     def outliers(self) -> float:
         """Share of the readings that calibration alone takes for outliers."""
         return racing.outliers(self.rounds[0].before)
+
+    @property
+    def hides_in_outliers(self) -> bool:
+        """Whether more readings are taken for outliers than there may be, and effects do not tell why."""
+        left = racing.outliers(self.final) > max(racing.MOST_OUTLIERS, 0.5 * self.outliers)
+        others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
+        return left and (self.explained < EXPLAINED or bool(others_fit))
 
     @property
     def rms_mm(self) -> dict[str, float]:
@@ -116,10 +123,10 @@ def diagnose(
     for turn in range(TURNS):
         locked = locked_rows(measurements, turn)
         result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
-        if result.explained < EXPLAINED and result.outliers > racing.MOST_OUTLIERS:
+        if result.hides_in_outliers:
             # What an effect does to a few readings looks like outliers, until they count.
             other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
-            result = max(result, other, key=lambda r: r.explained)
+            result = max(result, other, key=lambda r: r.final.log_evidence)
         if result.accepted or not _surprises(result):
             break
     result.notices = notices
@@ -148,22 +155,20 @@ def _diagnose(
     pool, unseen = candidates(robot, measurements)
     pool = [c for c in pool if c.id not in robot.effects]
 
-    calibrated = fit = racing.baseline(engine, [], {}, progress)
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    while len(accepted) < racing.MAX_EFFECTS:
-        round_ = racing.race(engine, fit, pool, [a.entry for a in accepted], progress)
-        rounds.append(round_)
-        if round_.accepted is None:
-            break
-        entry, engine.robust = round_.accepted, True
-        accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, entry.share))
-        fit = racing.baseline(engine, [a.entry for a in accepted], values_of(entry.fit), progress)
-        if racing.is_rejected(engine, fit):
-            fit = _with_shapes(engine, accepted, fit, progress)
-            if accepted[0].share < EXPLAINED:
-                break  # no effect is stacked on one that hardly explains anything
-        pool = [c for c in pool if c.id not in round_.ids]
+    start: dict[str, float] = {}
+    few = identify.few_of(engine.measured & engine.rows)
+    if few is not None:
+        progress("a part of the readings first")
+        part = replace(engine, rows=few)
+        first = racing.baseline(part, [], {}, progress)
+        start = values_of(_grow(part, first, pool, accepted, rounds, progress, beyond_doubt=True))
+    calibrated = fit = racing.baseline(engine, [], start, progress)
+    if accepted:
+        engine.robust = True
+        fit = racing.baseline(engine, [a.entry for a in accepted], start, progress)
+    fit = _grow(engine, fit, pool, accepted, rounds, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
@@ -175,6 +180,39 @@ def _diagnose(
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
+
+
+def _grow(
+    engine: Engine,
+    fit: identify.Fit,
+    pool: list[Candidate],
+    accepted: list[Accepted],
+    rounds: list[Round],
+    progress: Progress,
+    beyond_doubt: bool = False,
+) -> identify.Fit:
+    """Accepts one effect after the other, and returns the fit with them.
+
+    beyond_doubt: as long as nothing else comes near; the round that is in doubt is left to another look.
+    """
+    while len(accepted) < racing.MAX_EFFECTS:
+        taken = {identity for a in accepted for identity in a.ids}
+        open_to = [c for c in pool if c.id not in taken]
+        round_ = racing.race(engine, fit, open_to, [a.entry for a in accepted], progress)
+        if beyond_doubt and (round_.accepted is None or len(round_.ids) > 1 or round_.margin < racing.SURE):
+            break
+        rounds.append(round_)
+        if round_.accepted is None:
+            break
+        entry, engine.robust = round_.accepted, True
+        accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, entry.share))
+        start = racing.arrived(engine, fit, [a.entry for a in accepted])
+        fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
+        if racing.is_rejected(engine, fit):
+            fit = _with_shapes(engine, accepted, fit, progress)
+            if accepted[0].share < EXPLAINED:
+                break  # no effect is stacked on one that hardly explains anything
+    return fit
 
 
 def _with_shapes(
@@ -196,6 +234,7 @@ def _with_shapes(
         noise=fit.noise,
         weights=fit.weights,
         inflation=fit.inflation,
+        tolerance=identify.COARSE,
     )
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
@@ -219,6 +258,7 @@ def _backward(
             noise=fit.noise,
             weights=fit.weights,
             inflation=fit.inflation,
+            tolerance=identify.COARSE,
         )
         a.log_evidence = fit.log_evidence - without.log_evidence
         if a.log_evidence < racing.EVIDENCE:

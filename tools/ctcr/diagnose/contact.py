@@ -17,7 +17,8 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
     tracker = engine.robot.tracker
     tips = (engine.places - tracker.position) @ tracker.rotation
     sigma = effects.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
-    shapes = (STEM + "distance", STEM + "azimuth", STEM + "elevation")
+    shapes = [STEM + name for name in ("distance", "azimuth", "elevation", "rounding", "curvature")]
+    others = [float(value) for value in engine.priors(shapes[3:])[0]]
     options = []
     for elevation in np.deg2rad((-60, -30, 0, 30, 60, 90)):
         for azimuth in np.deg2rad(np.arange(0, 360, 30) if elevation < 1.5 else [0]):
@@ -31,7 +32,9 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
                 if np.count_nonzero(inside) < FEWEST:
                     continue
                 column = -sigma * inside[:, None] * (by_force @ normal)
-                shape = tuple(zip(shapes, (float(distance), float(azimuth), float(elevation)), strict=True))
+                shape = tuple(
+                    zip(shapes, (float(distance), float(azimuth), float(elevation), *others), strict=True)
+                )
                 options.append(
                     (Candidate(candidate.id, (STEM + "stiffness", *shapes), shape), column[:, :, None])
                 )

@@ -105,6 +105,7 @@ class Engine:
         inflation: Array | None = None,
         noise: Any = None,
         max_iterations: int = 50,
+        tolerance: float = 0.02,
     ) -> identify.Fit:
         """Calibration and `added` parameters of effects together.
 
@@ -121,7 +122,7 @@ class Engine:
         return identify.identify_rows(
             table, self.measured & self.rows, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, max_iterations=max_iterations,
+            start=at, max_iterations=max_iterations, tolerance=tolerance,
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 
@@ -156,11 +157,16 @@ class Engine:
         return Linear(residual, jacobian * fit.prior_sd)
 
     def slopes(self, fit: identify.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
-        """Raw slopes (M, 6, k) of the residual by parameters, fitted or neutral, in units of their prior sd."""
+        """Raw slopes (M, 6, k) of the residual by parameters, fitted or neutral, in units of their prior sd.
+
+        0 in rows that are not fitted.
+        """
         everything = [*fit.names, *(name for name in names if name not in fit.names)]
         neutral, sd, _, _ = self.priors(everything)
         at = np.concatenate([fit.values, neutral[len(fit.names) :]])
-        _, jacobian, _ = self.recording(everything, fixed).residual(at, True)
+        table = self.recording(everything, fixed)
+        table.activate((self.measured & self.rows).tolist())
+        _, jacobian, _ = table.residual(at, True)
         chosen = [everything.index(name) for name in names]
         slopes = jacobian[:, chosen] * sd[chosen]
         return np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(self.measurements), 6, len(names))

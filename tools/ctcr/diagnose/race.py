@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having looked at many: log(number of candidates)
-UNASKED = 10.0  # evidence needed besides where noise alone explains what is left
+UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains what is left, and
+FIRST_UNASKED = 5.0  # of the first one
 SHARE = 0.25  # of the excess that a further effect must remove, and
 FIRST_SHARE = 0.1  # the first one
 HELD_OUT_SHARE = 0.1  # of the error of other runs that a further effect must remove
@@ -26,7 +27,7 @@ SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 REFITS = 6  # effects that are refitted, the best by their slopes
 ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be followed to the end
-IN_REACH = 0.5  # of the best evidence on a few of many rows: candidates below it are not refitted to all
+IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
@@ -34,6 +35,7 @@ SIGNIFICANCE = 0.01
 BETTER = 0.95
 MUCH_BETTER = 0.6  # where the model explains the readings as it is
 SOUND = 1.05  # inflation of the noise up to which it does
+FITS = 1.2  # ... and beyond which it certainly does not
 OUTLIER = 0.3  # weight below which a reading is taken for one
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
@@ -106,7 +108,7 @@ def outliers(fit: identify.Fit) -> float:
 
 def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
     """Whether noise alone, as stated, does not explain what is left."""
-    if np.max(fit.inflation) > 1.2:
+    if np.max(fit.inflation) > FITS:
         return True
     return engine.as_stated(fit).p_value < SIGNIFICANCE
 
@@ -128,7 +130,24 @@ def baseline(
         engine.linear_fit(full, noise=engine.noise_with(part), weights=full.weights) for part in FIELDS[1:]
     ]
     best = max([full, *others], key=lambda fit: fit.log_evidence)
-    return full if best is full else engine.fit(names, start=values_of(best), fixed=fixed, noise=best.noise)
+    # From the full model's place: what effects do far from there, slopes do not tell.
+    return full if best is full else engine.fit(names, start=values_of(full), fixed=fixed, noise=best.noise)
+
+
+def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> identify.Fit:
+    """Where the refit of the last accepted effect leads in the end, at the weights of the fit before."""
+    fit = accepted[-1].fit
+    if fit.converged:
+        return fit
+    names, fixed = parameters(accepted)
+    return engine.fit(
+        names,
+        start=values_of(fit),
+        fixed=fixed,
+        noise=before.noise,
+        weights=before.weights,
+        inflation=before.inflation,
+    )
 
 
 def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> float:
@@ -156,8 +175,9 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
         return fit
     names, fixed = parameters(accepted)
     return engine.fit(
-        names, start=values_of(fit), fixed=fixed, noise=engine.noise_with(part), weights=fit.weights
-    )
+        names, start=values_of(fit), fixed=fixed, noise=engine.noise_with(part), weights=fit.weights,
+        tolerance=identify.COARSE,
+    )  # fmt: skip
 
 
 def race(
@@ -263,6 +283,7 @@ def refit(
             fit = engine.fit(
                 [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape), noise=before.noise,
                 weights=before.weights, inflation=before.inflation, max_iterations=ITERATIONS,
+                tolerance=identify.COARSE,
             )  # fmt: skip
             break
         except InputError:
@@ -311,7 +332,8 @@ def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> No
     if best is None:
         round_.reason = "no candidate explains anything"
         return
-    threshold = EVIDENCE + np.log(tried) + (UNASKED if is_further and not is_rejected else 0.0)
+    unasked = UNASKED if is_further else FIRST_UNASKED
+    threshold = EVIDENCE + np.log(tried) + (0.0 if is_rejected else unasked)
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 # Share of the excess, of the error on locked runs or of chi-square, that effects must remove to be no stand-ins.
 EXPLAINED = 0.4
+# ... and of the error on locked runs in any case, where that is not mere noise.
+LEARNED, MORE_THAN_NOISE = 0.2, 0.25
 
 
 @dataclass
@@ -44,7 +46,8 @@ def judge(
             ["Something is missing that no effect of the catalogue explains.", rounds[-1].reason],
         )
     first = accepted[0]
-    if leftover.structured and max(explained, first.share) < EXPLAINED:
+    learned_nothing = explained < LEARNED and before > MORE_THAN_NOISE * jitter**2
+    if leftover.structured and (max(explained, first.share) < EXPLAINED or learned_nothing):
         return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but most of it stays."])
     if any(a.entry.implausible for a in accepted):
         return Verdict(
