@@ -1,6 +1,6 @@
 #pragma once
 // Bounds of parameters and of sums of them, and the best step within them.
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <string>
@@ -41,18 +41,16 @@ public:
     }
     for (const LinearBound& bound : within) add(scale.cwiseProduct(bound.change), bound.low, bound.text);
     std::stable_sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return a.limit > b.limit; });
+    T_.resize(n, n), inverse_.resize(n, n);
     for (const Side& side : sides)
       if (!merge(side)) append(side);
     for (Eigen::Index k = 0; k < n; ++k) append({Eigen::VectorXd::Unit(n, k), -infinity, {}});
-    T_.resize(n, n);
     low_.resize(n), high_.resize(n);
     for (Eigen::Index k = 0; k < n; ++k) {
       const Coordinate& y = coordinates_[std::size_t(k)];
-      T_.row(k) = y.change.transpose();
       low_[k] = y.low;
       high_[k] = y.high;
     }
-    inverse_ = T_.inverse();
   }
 
   [[nodiscard]] Eigen::VectorXd clamped(const Eigen::VectorXd& z) const {
@@ -65,7 +63,7 @@ public:
                                      const Eigen::MatrixXd& hessian) const {
     const Eigen::Index n = z.size();
     const Eigen::VectorXd at = T_ * z, g = inverse_.transpose() * gradient;
-    const Eigen::MatrixXd H = inverse_.transpose() * hessian * inverse_;
+    const Eigen::MatrixXd H = transposed_product(inverse_, product(hessian, inverse_));
     const Eigen::VectorXd low = (low_ - at).cwiseMin(0.0), high = (high_ - at).cwiseMax(0.0);
     Eigen::VectorXd d = Eigen::VectorXd::Zero(n);
     std::vector<bool> stands(std::size_t(n), false);
@@ -75,7 +73,9 @@ public:
         if (!stands[std::size_t(k)]) free.push_back(k);
       const Eigen::VectorXd slope = g + H * d;
       Eigen::VectorXd change = Eigen::VectorXd::Zero(n);
-      change(free) = -H(free, free).ldlt().solve(slope(free));
+      const Eigen::MatrixXd H_free = H(free, free);
+      const Eigen::VectorXd slope_free = slope(free);
+      change(free) = -H_free.ldlt().solve(slope_free);
       double share = 1;
       Eigen::Index first = -1;
       for (const Eigen::Index k : free) {
@@ -153,6 +153,11 @@ private:
       for (const Eigen::VectorXd& axis : axes_) apart -= axis * axis.dot(apart);
     if (!(apart.norm() > dependent)) return;
     axes_.push_back(apart.normalized());
+    const auto last = Eigen::Index(coordinates_.size());
+    T_.row(last) = side.change.transpose();
+    // A step along the new axis moves no coordinate before; the columns before must not move the new one.
+    inverse_.col(last) = axes_.back() / axes_.back().dot(side.change);
+    for (Eigen::Index k = 0; k < last; ++k) inverse_.col(k) -= side.change.dot(inverse_.col(k)) * inverse_.col(last);
     coordinates_.push_back({side.change, side.limit, infinity, side.text, {}});
   }
 

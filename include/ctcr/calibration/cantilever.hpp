@@ -1,7 +1,5 @@
 #pragma once
 // Young's modulus of a tube from how far it deflects when it is clamped at one end and loaded across.
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +8,7 @@
 
 #include "ctcr/calibration/elastica.hpp"
 #include "ctcr/calibration/notice.hpp"
+#include "ctcr/calibration/propagation.hpp"
 #include "ctcr/calibration/significance.hpp"
 #include "ctcr/robot/tube.hpp"
 
@@ -144,7 +143,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   };
   for (int k = 0; k < 50; ++k) {
     evaluate();
-    const Eigen::VectorXd step = J.colPivHouseholderQr().solve(error);
+    const Eigen::VectorXd step = least_squares(J, error);
     log_EI += std::clamp(step[0], -0.5, 0.5);
     if (options.fit_zero) result.zero += step[1];
     if (std::abs(step[0]) < 1e-13) break;
@@ -154,8 +153,8 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   const double EI = std::exp(log_EI), degrees = double(n - unknowns), sum = error.squaredNorm();
   const double stated = options.deflection_sd * options.deflection_sd;
   const double variance = degrees > 0 ? std::max(stated, sum / degrees) : stated;
-  const Eigen::MatrixXd covariance = variance * (J.transpose() * J).inverse();
-  require(covariance.allFinite() && covariance(0, 0) < 100,
+  const Eigen::MatrixXd G = gain(J), covariance = propagated(G, variance, {});
+  require(G.size() > 0 && covariance(0, 0) < 100,
           "the loads do not tell the zero from the stiffness: use loads that differ more");
   // What a common error of the lengths does, as a relative change of EI.
   Eigen::VectorXd by_length(n);
@@ -169,7 +168,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
     }
     by_length[i] = (end_of(longer, EI).deflection - end_of(shorter, EI).deflection) / (2 * h);
   }
-  const double length_part = J.colPivHouseholderQr().solve(by_length)[0] * options.free_length_sd;
+  const double length_part = G.row(0).dot(by_length) * options.free_length_sd;
   const Tube tube{.inner_diameter = options.inner_diameter, .outer_diameter = options.outer_diameter};
   const double I = tube.second_moment();
   const double di3 = std::pow(options.inner_diameter, 3), do3 = std::pow(options.outer_diameter, 3);
@@ -209,7 +208,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
          sentence("deflections scatter by %.3f mm about the elastica, more than the %.3f mm stated",
                   1e3 * std::sqrt(sum / degrees), 1e3 * options.deflection_sd));
   if (degrees < 3 || !(largest > 1.01 * least)) return result;
-  const Eigen::VectorXd x = wide.colPivHouseholderQr().solve(error);
+  const Eigen::VectorXd x = least_squares(wide, error);
   const double remaining = (error - wide * x).squaredNorm(), saved = sum - remaining;
   const double floor = 1e-20 * error.size() * std::pow(rows.front().free_length, 2);
   const double score = stated > 0

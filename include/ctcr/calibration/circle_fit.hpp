@@ -1,6 +1,5 @@
 #pragma once
 // A point that a motor turns on a circle in space, fitted to readings of where it is.
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "ctcr/calibration/ceres_problem.hpp"
+#include "ctcr/calibration/dense.hpp"
 #include "ctcr/core/types.hpp"
 
 namespace ctcr {
@@ -63,8 +63,8 @@ inline Circle approximate_circle(const std::vector<CircleReading>& readings, con
   }
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(n);
   for (int k = 0; k < 30; ++k) {
-    ellipse = (weight.asDiagonal() * M).colPivHouseholderQr().solve(weight.asDiagonal() * X);
-    const Eigen::VectorXd distance = (X - M * ellipse).rowwise().norm();
+    ellipse = least_squares(weight.asDiagonal() * M, weight.asDiagonal() * X);
+    const Eigen::VectorXd distance = (X - product(M, ellipse)).rowwise().norm();
     weight = (distance.array() + 1e-3 * distance.mean() + 1e-12).sqrt().inverse();
   }
   const Vec3 A = ellipse.row(shift), B = ellipse.row(shift + 1);

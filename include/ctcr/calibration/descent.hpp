@@ -65,9 +65,7 @@ public:
     out.chi_square = residual.squaredNorm();
     out.cost = 0.5 * (out.chi_square + prior_.dot(z.cwiseAbs2()));
     out.gradient = jacobian.transpose() * residual + prior_.cwiseProduct(z);
-    out.information.setZero(z.size(), z.size());
-    out.information.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
-    out.information = out.information.selfadjointView<Eigen::Lower>();
+    out.information = transposed_product(jacobian, jacobian);
     return std::isfinite(out.cost) && out.information.allFinite();
   }
 

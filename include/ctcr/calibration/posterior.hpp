@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "ctcr/calibration/dense.hpp"
 #include "ctcr/core/types.hpp"
 
 namespace ctcr {
@@ -50,7 +51,7 @@ public:
     const Eigen::ArrayXd lambda = eigen.eigenvalues().array();
     const Eigen::ArrayXd inverse = (lambda > nothing).select(lambda.inverse(), 0.0);
     const Eigen::MatrixXd V = unit.asDiagonal() * eigen.eigenvectors();
-    covariance_ = V * inverse.matrix().asDiagonal() * V.transpose();
+    covariance_ = product(V * inverse.matrix().asDiagonal(), V.transpose());
     sd_ = covariance_.diagonal().cwiseMax(0.0).cwiseSqrt();
     for (Eigen::Index j = 0; j < lambda.size() && !(lambda[j] > nothing); ++j) {
       singular_ = true;
@@ -58,7 +59,7 @@ public:
         if (std::abs(eigen.eigenvectors()(k, j)) > 1e-3) sd_[k] = std::numeric_limits<double>::infinity();
     }
     log_determinant_ = lambda.max(nothing).log().sum() - 2 * unit.array().log().sum();
-    effective_ = (covariance_ * information).trace();
+    effective_ = covariance_.cwiseProduct(information).sum();
   }
 
   [[nodiscard]] const Eigen::MatrixXd& covariance() const { return covariance_; }
@@ -146,8 +147,8 @@ inline std::vector<Direction> undetermined_directions(const Posterior& posterior
     taken.conservativeResize(n, taken.cols() + 1);
     taken.rightCols(1) = v.normalized();
   }
-  const Eigen::MatrixXd apart = Eigen::MatrixXd::Identity(n, n) - taken * taken.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(apart * C * apart);
+  const Eigen::MatrixXd apart = Eigen::MatrixXd::Identity(n, n) - product(taken, taken.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(product(product(apart, C), apart));
   const Eigen::Index open = (eigen.eigenvalues().array() > limit * limit).count();
   Eigen::MatrixXd V = eigen.eigenvectors().rightCols(open);
   detail::make_simple(V);

@@ -1,8 +1,8 @@
 #pragma once
 // What noise of points does to parameters fitted to them by least squares: the fit is a linear map near its solution.
-#include <Eigen/QR>
 #include <cmath>
 
+#include "ctcr/calibration/dense.hpp"
 #include "ctcr/calibration/noise.hpp"
 
 namespace ctcr {
@@ -21,7 +21,7 @@ inline Eigen::MatrixXd gain(const Eigen::MatrixXd& J) {
   Eigen::MatrixXd root =
       qr.matrixQR().topRows(n).template triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n));
   root = scale.cwiseInverse().asDiagonal() * (qr.colsPermutation() * root);
-  return root * (root.transpose() * J.transpose());
+  return product(root, product(J, root).transpose());
 }
 
 /// The part of points' covariance that a tracker's field error makes, as factor factor^T over (points), the same for
@@ -39,10 +39,10 @@ inline Eigen::MatrixXd axis_columns(const Eigen::MatrixXd& G, int axis) {
 /// Covariance of parameters with gain G (parameters, 3 points; x, y, z of a point together) when every coordinate has
 /// an error of its own with `variance` [m^2], and all share a field.
 inline Eigen::MatrixXd propagated(const Eigen::MatrixXd& G, double variance, const Eigen::MatrixXd& field) {
-  Eigen::MatrixXd covariance = variance * (G * G.transpose());
+  Eigen::MatrixXd covariance = variance * product(G, G.transpose());
   for (int axis = 0; axis < 3 && field.cols() > 0; ++axis) {
-    const Eigen::MatrixXd moved = axis_columns(G, axis) * field;
-    covariance += moved * moved.transpose();
+    const Eigen::MatrixXd moved = product(axis_columns(G, axis), field);
+    covariance += product(moved, moved.transpose());
   }
   return covariance;
 }
@@ -53,7 +53,7 @@ inline double expected_field_squares(const Eigen::MatrixXd& J, const Eigen::Matr
   double squares = 3 * field.squaredNorm();
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::MatrixXd J_axis = J(Eigen::seq(axis, Eigen::last, 3), Eigen::all);
-    squares -= (axis_columns(G, axis) * field).cwiseProduct(J_axis.transpose() * field).sum();
+    squares -= product(axis_columns(G, axis), field).cwiseProduct(transposed_product(J_axis, field)).sum();
   }
   return squares;
 }

@@ -1,6 +1,5 @@
 #pragma once
 // The angle at which a motor holds a tube: from readings of its tip while it alone is out and turns.
-#include <Eigen/Eigenvalues>
 #include <numbers>
 #include <span>
 
@@ -190,8 +189,8 @@ inline RotationOffset result_of(const CircleSolution& solved) {
   result.normal = circle.normal;
   if (column[4] >= 0) {
     const Eigen::Matrix2d tilt = solved.covariance.block<2, 2>(column[4], column[4]);
-    result.tilt_sd =
-        std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(tilt, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+    // The larger eigenvalue.
+    result.tilt_sd = std::sqrt(0.5 * tilt.trace() + std::hypot(0.5 * (tilt(0, 0) - tilt(1, 1)), tilt(0, 1)));
   }
   const Mat3 R = circle.frame();
   result.zero_axis = R.col(0);
@@ -284,7 +283,8 @@ inline void tell_of_misfit(const CircleSolution& solved, const RotationOffsetOpt
         Misfit{not_planar, 2, 2, "the tip's path is not planar"},
         Misfit{not_uniform, 4, 4, "the tip does not turn as the motor does"}}) {
     const Eigen::VectorXd a = amplitude.segment(first, count);
-    const double chi_square = a.dot(covariance.block(first, first, count, count).colPivHouseholderQr().solve(a));
+    const Eigen::VectorXd scaled = least_squares(covariance.block(first, first, count, count), a);
+    const double chi_square = a.dot(scaled);
     const double size = std::max(a.head<2>().norm(), a.tail<2>().norm()), limit = options.wanted_sd * result.radius;
     if (size > limit && chi_square_score(chi_square, count) > surprising)
       tell(result, kind, size, limit, sentence("%s: an error of %.3f mm repeats with every turn", text, size / mm));

@@ -35,10 +35,10 @@ inline RowReport report_rows(const Identification& fit, const Predictor& predict
     // Change of the parameters that a unit of the field at a row brings with it.
     const Eigen::MatrixXd shared = axes.field_mean(J);
     for (Eigen::Index i = 0; i < rows; ++i) {
-      Eigen::Matrix<double, Eigen::Dynamic, 3> j(n, 3), s(n, 3);
+      Eigen::MatrixXd j(n, 3), s(n, 3);
       for (Eigen::Index k = 0; k < n; ++k)
         j.row(k) = J.row(i).segment<3>(3 * k), s.row(k) = shared.row(i).segment<3>(3 * k);
-      const Eigen::Matrix<double, Eigen::Dynamic, 3> Cj = fit.covariance * j;
+      const Eigen::MatrixXd Cj = product(fit.covariance, j);
       const double parameters = Cj.cwiseProduct(j).sum(), common = Cj.cwiseProduct(s).sum();
       // What the fit was told of the noise is more than that where it had to admit a model error.
       const double told = 3 * (axes.variance() + (std::pow(fit.inflation[kind], 2) - 1) * axes.jitter_variance());

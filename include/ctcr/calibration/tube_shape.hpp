@@ -1,7 +1,5 @@
 #pragma once
 // Curvature and curved length of a tube from points of its outline in a photo: a straight line, then an arc.
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -181,18 +179,19 @@ inline Bend start_at(const std::vector<Vec2>& order, std::size_t k) {
   for (std::size_t i = 0; i < k; ++i) mean += order[i] / double(k);
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
   for (std::size_t i = 0; i < k; ++i) moments += (order[i] - mean) * (order[i] - mean).transpose();
-  Vec2 along = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(moments).eigenvectors().col(1);
+  const double principal = 0.5 * std::atan2(2 * moments(0, 1), moments(0, 0) - moments(1, 1));
+  Vec2 along(std::cos(principal), std::sin(principal));
   if (along.dot(order[k] - order[0]) < 0) along = -along;
   // x^2 + y^2 = 2 c . (x, y) + rest, about the point k.
   const Eigen::Index n = Eigen::Index(order.size() - k);
-  Eigen::MatrixX3d M(n, 3);
+  Eigen::MatrixXd M(n, 3);
   Eigen::VectorXd squares(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec2 p = order[k + std::size_t(i)] - order[k];
     M.row(i) << 2 * p.x(), 2 * p.y(), 1;
     squares[i] = p.squaredNorm();
   }
-  const Vec3 x = M.colPivHouseholderQr().solve(squares);
+  const Vec3 x = least_squares(M, squares);
   const double radius = std::sqrt(std::max(x[2] + x.head<2>().squaredNorm(), 1e-12 * squares.maxCoeff()));
   const double side = along.x() * x[1] - along.y() * x[0];
   return {mean + along.dot(order[k] - mean) * along, std::atan2(along.y(), along.x()), std::copysign(1 / radius, side)};
@@ -293,7 +292,8 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
     };
     D(1, j) = (moved(h) - moved(-h)) / (2 * h);
   }
-  Eigen::Matrix2d covariance = variance * (D * G) * (D * G).transpose();
+  const Eigen::MatrixXd DG = product(D, G);
+  Eigen::Matrix2d covariance = variance * product(DG, DG.transpose());
   covariance(1, 1) += variance;  // of the last point along the shape
   const double m = options.scale, relative = options.scale_sd;
   result.curvature = std::abs(k) / m;

@@ -8,6 +8,7 @@
 #include <array>
 #include <type_traits>
 
+#include "ctcr/calibration/dense.hpp"
 #include "ctcr/calibration/noise.hpp"
 
 namespace ctcr {
@@ -38,9 +39,9 @@ public:
     log_determinant_ = -2 * (scale_.array() > 0).select(scale_.array().log(), 0.0).sum();
     if (field_.cols() == 0) return;
     const Eigen::MatrixXd A = scale_.asDiagonal() * field_;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(A.transpose() * A);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(transposed_product(A, A));
     const Eigen::ArrayXd t = eigen.eigenvalues().array().max(0.0);
-    field_ *= (eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal()).eval();
+    field_ = product(field_, eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal());
     shrink_ = (1 + t).sqrt() / (1 + (1 + t).sqrt());
     strength_ = t;
     log_determinant_ += (1 + t).log().sum();
@@ -50,12 +51,12 @@ public:
   void whiten(Eigen::MatrixXd& y) const {
     y = scale_.asDiagonal() * y;
     if (field_.cols() == 0) return;
-    const Eigen::MatrixXd small = shrink_.matrix().asDiagonal() * (field_.transpose() * (scale_.asDiagonal() * y));
-    y.noalias() -= scale_.asDiagonal() * (field_ * small);
+    const Eigen::MatrixXd small = shrink_.matrix().asDiagonal() * transposed_product(field_, scale_.asDiagonal() * y);
+    y -= scale_.asDiagonal() * product(field_, small);
   }
   /// Posterior mean of the field error at every row, given residuals (rows, any).
   [[nodiscard]] Eigen::MatrixXd field_mean(const Eigen::MatrixXd& residual) const {
-    return field_ * (field_.transpose() * (scale_.cwiseAbs2().asDiagonal() * residual));
+    return product(field_, transposed_product(field_, scale_.cwiseAbs2().asDiagonal() * residual));
   }
   /// Factor on the jitter's variance with which the chi-square of a residual (rows, 3) is `expected`; 1 where it is not
   /// significantly above that (four standard deviations).
@@ -64,7 +65,7 @@ public:
     const double all = y.squaredNorm();
     Eigen::ArrayXd smooth;  // what of it the field can explain, by eigenvector of A A^T
     if (field_.cols() > 0)
-      smooth = (1 + strength_) * (field_.transpose() * (scale_.asDiagonal() * y)).rowwise().squaredNorm().array();
+      smooth = (1 + strength_) * transposed_product(field_, scale_.asDiagonal() * y).rowwise().squaredNorm().array();
     const auto chi_square = [&](double s2) {
       return (all - (smooth.size() > 0 ? (smooth / (s2 + strength_)).sum() : 0.0)) / s2;
     };
