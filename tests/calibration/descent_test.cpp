@@ -44,7 +44,7 @@ Eigen::VectorXd minimum_within(const Eigen::MatrixXd& H, const Eigen::VectorXd& 
       right.conservativeResize(m + 1);
       right[m] = within[k].low;
     }
-    const Eigen::VectorXd x = KKT.fullPivLu().solve(right).head(n);
+    const Eigen::VectorXd x = least_squares(KKT, right).topRows(n);
     bool inside = true;
     for (const LinearBound& bound : within) inside = inside && bound.change.dot(x) >= bound.low - 1e-9;
     const double cost = 0.5 * x.dot(H * x) - g.dot(x);
@@ -65,9 +65,9 @@ TEST(Descent, KeepsSumsOfParametersWithinBounds) {
     for (int k = 0; k < 3; ++k) within.push_back({"bound", normals(5, random), -test::uniform(random, 0, 0.5)});
     IdentifyOptions options{.robust = false, .admit_model_error = false, .starts = 1, .within = within};
     const Identification fit = identify(toy.predictor(), toy.parameters(), noise, toy.places, options);
-    const Eigen::LLT<Eigen::MatrixXd> inverse(toy.covariance(noise));
-    const Eigen::MatrixXd H = toy.slope.transpose() * inverse.solve(toy.slope) + Eigen::MatrixXd::Identity(5, 5);
-    const Eigen::VectorXd x = minimum_within(H, toy.slope.transpose() * inverse.solve(toy.y), within);
+    const Eigen::MatrixXd weighted = least_squares(toy.covariance(noise), toy.slope);
+    const Eigen::MatrixXd H = transposed_product(toy.slope, weighted) + Eigen::MatrixXd::Identity(5, 5);
+    const Eigen::VectorXd x = minimum_within(H, weighted.transpose() * toy.y, within);
     EXPECT_TRUE(fit.converged) << fit.status;
     EXPECT_LT(std::sqrt((fit.values - x).dot(H * (fit.values - x))), 0.02) << seed;
     stopped += int(!fit.warnings.empty());

@@ -22,15 +22,16 @@ TEST(Identify, IsTheExactPosteriorOfALinearModel) {
   ASSERT_TRUE(fit.converged) << fit.status;
   const Eigen::MatrixXd S = toy.covariance(noise);
   const Eigen::LLT<Eigen::MatrixXd> inverse(S);
-  const Eigen::MatrixXd H = toy.slope.transpose() * inverse.solve(toy.slope) + Eigen::MatrixXd::Identity(4, 4);
-  const Eigen::VectorXd x = H.llt().solve(toy.slope.transpose() * inverse.solve(toy.y));
+  const Eigen::MatrixXd weighted = inverse.solve(toy.slope), I = Eigen::MatrixXd::Identity(4, 4);
+  const Eigen::MatrixXd covariance = least_squares(transposed_product(toy.slope, weighted) + I, I);
+  const Eigen::VectorXd x = covariance * (weighted.transpose() * toy.y);
   EXPECT_LE((fit.values - x).norm(), 1e-5);
-  EXPECT_LE((fit.covariance - H.inverse()).norm(), 1e-3 * H.inverse().norm());
+  EXPECT_LE((fit.covariance - covariance).norm(), 1e-3 * covariance.norm());
   const Eigen::VectorXd r = toy.y - toy.slope * x;
   EXPECT_NEAR(fit.chi_square, r.dot(inverse.solve(r)), 1e-3 * fit.chi_square);
-  EXPECT_NEAR(fit.effective_parameters, 4 - H.inverse().trace(), 1e-3);
+  EXPECT_NEAR(fit.effective_parameters, 4 - covariance.trace(), 1e-3);
   // The evidence is the density of the readings when the parameters are drawn from the prior.
-  const Eigen::LLT<Eigen::MatrixXd> all(S + toy.slope * toy.slope.transpose());
+  const Eigen::LLT<Eigen::MatrixXd> all(S + product(toy.slope, toy.slope.transpose()));
   const double log_density =
       -0.5 * (toy.y.dot(all.solve(toy.y)) + double(toy.y.size()) * std::log(2 * std::numbers::pi)) -
       all.matrixLLT().diagonal().array().log().sum();

@@ -58,7 +58,7 @@ struct Toy {
   /// Covariance of the noise, all of it.
   Eigen::MatrixXd covariance(const Noise& n) const {
     const SmoothField field = smooth_field(places, n.correlation_length, 1e-12);
-    const Eigen::MatrixXd K = field.factor * field.factor.transpose();
+    const Eigen::MatrixXd K = product(field.factor, field.factor.transpose());
     Eigen::MatrixXd S = Eigen::MatrixXd::Zero(y.size(), y.size());
     for (int a = 0; a < 6; ++a) {
       const double sd = a < 3 ? n.position_field : n.rotation_field,

@@ -83,7 +83,8 @@ TEST(Whitening, InvertsTheCovarianceAndKnowsItsDeterminant) {
     Eigen::MatrixXd L = Eigen::MatrixXd::Identity(150, 150);
     whitening.apply(L);
     const Eigen::MatrixXd S = covariance(noise, places, weights);
-    EXPECT_LE((L * S * L.transpose() - Eigen::MatrixXd::Identity(150, 150)).cwiseAbs().maxCoeff(), 1e-6);
+    EXPECT_LE((product(product(L, S), L.transpose()) - Eigen::MatrixXd::Identity(150, 150)).cwiseAbs().maxCoeff(),
+              1e-6);
     const Eigen::LLT<Eigen::MatrixXd> cholesky(S);
     const double log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum();
     EXPECT_NEAR(whitening.log_determinant(), log_determinant, 1e-6 * std::abs(log_determinant));
@@ -133,10 +134,10 @@ TEST(Whitening, PredictsTheFieldEverywhereFromTheRowsThatCount) {
     const Eigen::MatrixXd S =
         Eigen::MatrixXd(K.topLeftCorner(15, 15)) + jitter * jitter * Eigen::MatrixXd::Identity(15, 15);
     const Eigen::VectorXd axis = r(Eigen::seq(a, Eigen::last, 6));
-    const Eigen::MatrixXd gain = S.ldlt().solve(K.topRows(15)).transpose();
+    const Eigen::MatrixXd gain = least_squares(S, K.topRows(15)).transpose();
     const Eigen::VectorXd expected = gain * axis.head(15);
     EXPECT_LE((field(Eigen::seq(a, Eigen::last, 6)) - expected).norm(), 1e-4 * expected.norm());
-    const Eigen::VectorXd variance = (K - gain * K.topRows(15)).diagonal();
+    const Eigen::VectorXd variance = (K - product(gain, K.topRows(15))).diagonal();
     EXPECT_LE((whitening.axes(a / 3).field_variance() - variance).norm(), 1e-4 * variance.norm());
   }
 }
