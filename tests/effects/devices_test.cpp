@@ -150,9 +150,9 @@ TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
       const Vec3 push = touching.load.force - recorded.rows.back().load.force;
       EXPECT_GT(depth, 0);
       EXPECT_LT(depth, 1e-3);
-      // The push is sought to 1e-8 N, and moves the tip by the compliance.
+      // The push is sought to 1e-10 N, and moves the tip by the compliance.
       const double compliance = touching.solution.compliance.topLeftCorner<3, 3>().norm();
-      EXPECT_LE((push / stiffness + depth * normal).norm(), 1e-8 * (1 / stiffness + compliance)) << stiffness;
+      EXPECT_LE((push / stiffness + depth * normal).norm(), 1e-10 * (1 / stiffness + compliance)) << stiffness;
     }
   }
 }

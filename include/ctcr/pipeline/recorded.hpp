@@ -124,7 +124,7 @@ template <int N, class Fx>
 Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, const Settings& settings) noexcept {
   using S = Dual<1>;
   constexpr int iterations = 30;
-  constexpr double tolerance = 1e-8;  // [N]
+  constexpr double tolerance = 1e-10;  // [N]
   Status status = solve(out.model, out.q, out.load, ws, out.solution, settings);
   const Vec3 known = out.load.force;
   const auto effects = out.model.effects().template seeded<S>([](double x, int) { return S(x); });
