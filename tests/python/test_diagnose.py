@@ -142,6 +142,21 @@ def test_more_evidence_is_needed_where_noise_explains_what_is_left(score, is_fur
     assert accepts or "below" in round_.reason
 
 
+def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
+    entry = dataclasses.replace(
+        blank, candidate=SimpleNamespace(id="delay"), refit=3.0, share=1.0, fit="a fit"
+    )
+    round_ = racing.Round("a fit", [entry], {})
+    racing.decide(round_, 21, is_further=False, is_rejected=False)
+    assert round_.accepted is None
+    assert round_.is_hopeless(2) and not round_.is_hopeless(3)
+    weak = dataclasses.replace(entry, refit=100.0, share=0.01)
+    round_ = racing.Round("a fit", [weak], {})
+    racing.decide(round_, 21, is_further=True, is_rejected=True)
+    assert round_.accepted is None and not round_.is_hopeless(1.5)
+    assert racing.Round("a fit", [], {}).is_hopeless(1e6)
+
+
 @pytest.mark.parametrize(
     ("calibrated", "with_effects", "structured", "word"),
     [(0.3, 0.1, True, "identified"), (0.3, 0.29, True, "stand_in"), (0.3, 0.29, False, "identified"),

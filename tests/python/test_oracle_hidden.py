@@ -202,6 +202,9 @@ def test_true_bench_lies_within_what_calibration_may_move():
 
 def test_suite_asks_every_question_often_enough_in_both_halves():
     suite = make_suite.entries()
+    other = make_suite.entries(shift=1)
+    assert [e.order.seed % 2 for e in other] == [e.order.seed % 2 for e in suite]
+    assert not {e.order.seed for e in other} & {e.order.seed for e in suite}
     assert len(suite) >= 150 and len({entry.name for entry in suite}) == len(suite)
     for half in (0, 1):
         own = [entry for entry in suite if entry.order.seed % 2 == half]

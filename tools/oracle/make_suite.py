@@ -1,9 +1,12 @@
 """The whole suite of sets with hidden causes, for scoring: every set fixed by this table, whole or absent on disk.
 
-    python tools/oracle/make_suite.py [--out build/suite] [--only GROUP] [--jobs 2]
+    python tools/oracle/make_suite.py [--out build/suite] [--only GROUP] [--jobs 2] [--shift K]
 
 writes FOLDER/s001/robot.yaml and measurements.csv (nothing there tells what is hidden), FOLDER/truth/s001.yaml and
 FOLDER/truth/index.csv. Run again, it makes what is missing. Even seeds are for tuning, odd ones for reporting.
+
+Who has looked at the scores of a suite can no longer judge by it: --shift K adds 10000 K to all seeds, and makes
+another one of the same kinds.
 """
 
 import argparse
@@ -63,9 +66,9 @@ class Entry:
     order: Order
 
 
-def orders() -> Iterator[tuple[str, Order]]:
+def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
     """(group, order) of every set. New ones go to the end, so that the names of the others stay."""
-    robots, seeds = cycle(ROBOTS), count(1000)
+    robots, seeds = cycle(ROBOTS), count(10000 * shift + 1000)
 
     def order(
         *effects: tuple[str, float], noise: str = "jitter", seed: int | None = None, **rest: object
@@ -86,7 +89,7 @@ def orders() -> Iterator[tuple[str, Order]]:
             )
     for k, name in enumerate(REALISTIC_EFFECTS):
         for n, size in enumerate(SIZES):
-            seed = 3000 + 10 * k + 2 * n + (k + n) % 2
+            seed = 10000 * shift + 3000 + 10 * k + 2 * n + (k + n) % 2
             yield "single", order((name, size), noise="realistic", seed=seed)
     for noise in ("jitter", "realistic"):
         for pair in SEPARABLE_PAIRS:
@@ -106,9 +109,9 @@ def orders() -> Iterator[tuple[str, Order]]:
             yield "strange", order((name, 1.0), noise=noise)
 
 
-def entries() -> list[Entry]:
+def entries(shift: int = 0) -> list[Entry]:
     """The suite. Names say nothing about what is hidden."""
-    return [Entry(f"s{k:03d}", group, order) for k, (group, order) in enumerate(orders(), start=1)]
+    return [Entry(f"s{k:03d}", group, order) for k, (group, order) in enumerate(orders(shift), start=1)]
 
 
 def make(entry: Entry, folder: Path) -> tuple[str, str]:
@@ -150,8 +153,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=SUITE)
     parser.add_argument("--only", action="append", help="a group; may be repeated")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--shift", type=int, default=0, help="other seeds; needs another folder")
     given = parser.parse_args(arguments)
-    suite = entries()
+    suite = entries(given.shift)
     write_index(given.out, suite)
     wanted = [entry for entry in suite if not given.only or entry.group in given.only]
     missing = [entry for entry in wanted if not _truth(entry, given.out).exists()]

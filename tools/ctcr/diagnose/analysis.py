@@ -157,18 +157,20 @@ def _diagnose(
 
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    start: dict[str, float] = {}
+    start, settled = {}, False
     few = identify.few_of(engine.measured & engine.rows)
     if few is not None:
         progress("a part of the readings first")
-        part = replace(engine, rows=few)
+        part, more = replace(engine, rows=few), np.sum(engine.measured & engine.rows) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
-        start = values_of(_grow(part, first, pool, accepted, rounds, progress, beyond_doubt=True))
+        first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
+        start = values_of(first)
     calibrated = fit = racing.baseline(engine, [], start, progress)
     if accepted:
         engine.robust = True
         fit = racing.baseline(engine, [a.entry for a in accepted], start, progress)
-    fit = _grow(engine, fit, pool, accepted, rounds, progress)
+    if not settled:
+        fit, _ = _grow(engine, fit, pool, accepted, rounds, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
@@ -189,18 +191,20 @@ def _grow(
     accepted: list[Accepted],
     rounds: list[Round],
     progress: Progress,
-    beyond_doubt: bool = False,
-) -> identify.Fit:
-    """Accepts one effect after the other, and returns the fit with them.
+    more: float = 1.0,
+) -> tuple[identify.Fit, bool]:
+    """Accepts one effect after the other; the fit with them, and whether nothing is left to look for.
 
-    beyond_doubt: as long as nothing else comes near; the round that is in doubt is left to another look.
+    more: how many times as many readings there are in all. Where these could change the outcome of a round, it is left
+    to them.
     """
     while len(accepted) < racing.MAX_EFFECTS:
         taken = {identity for a in accepted for identity in a.ids}
         open_to = [c for c in pool if c.id not in taken]
         round_ = racing.race(engine, fit, open_to, [a.entry for a in accepted], progress)
-        if beyond_doubt and (round_.accepted is None or len(round_.ids) > 1 or round_.margin < racing.SURE):
-            break
+        sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= racing.SURE)
+        if more > 1 and not sure:
+            return fit, False
         rounds.append(round_)
         if round_.accepted is None:
             break
@@ -212,7 +216,7 @@ def _grow(
             fit = _with_shapes(engine, accepted, fit, progress)
             if accepted[0].share < EXPLAINED:
                 break  # no effect is stacked on one that hardly explains anything
-    return fit
+    return fit, True
 
 
 def _with_shapes(

@@ -78,6 +78,12 @@ class Round:
     ids: list[str] = field(default_factory=list)  # the accepted effect and those the data cannot tell from it
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
+    needed: float = np.inf  # log evidence below which nothing is accepted in any case
+
+    def is_hopeless(self, more: float) -> bool:
+        """Whether nothing would be accepted even with `more` times the readings."""
+        best = max((entry.score for entry in self.entries), default=-np.inf)
+        return self.accepted is None and more * best < self.needed
 
 
 def misfit(fit: identify.Fit) -> float:
@@ -327,13 +333,14 @@ def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> No
     tried: number of effects that were looked at; is_further: whether others are in the model already; is_rejected:
     whether the noise as stated does not explain what is left.
     """
+    unasked = UNASKED if is_further else FIRST_UNASKED
+    round_.needed = EVIDENCE + np.log(tried)
+    threshold = round_.needed + (0.0 if is_rejected else unasked)
     fitted = [entry for entry in round_.entries if entry.fit is not None]
     best = next((entry for entry in fitted if not (is_further and entry.implausible)), None)
     if best is None:
         round_.reason = "no candidate explains anything"
         return
-    unasked = UNASKED if is_further else FIRST_UNASKED
-    threshold = EVIDENCE + np.log(tried) + (0.0 if is_rejected else unasked)
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
