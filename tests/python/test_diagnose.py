@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import effects, identify, recording, robot_file
+from ctcr import effect_fit, effects, identify, recording, robot_file
 from ctcr.diagnose import diagnose
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.engine import Linear
@@ -108,6 +108,16 @@ def test_a_hidden_effect_is_named(robot, hidden, identity):
     for name, value in hidden.items():
         place = result.final.names.index(name)
         assert abs(result.final.values[place] - value) < 4 * result.final.sd[place]
+
+
+def test_positions_alone_need_no_jitter_of_orientations(robot):
+    plain = robot.model_copy(deep=True)
+    plain.tracker.jitter_deg = plain.tracker.accuracy_95_deg = None
+    table = measured(robot, np.random.default_rng(2), {"effects.tip_load.mass": 3e-3})
+    result = diagnose(plain, dataclasses.replace(table, quaternion=None))
+    assert result.accepted[0].ids[0] == "tip_load"
+    added = effect_fit.add(plain, dataclasses.replace(table, quaternion=None), ["tip_load"])
+    assert added.fit.rms_mm() < 1.5 * result.rms_mm["noise_floor"]
 
 
 def test_a_wall_that_few_tips_touch_is_no_set_of_outliers(robot):

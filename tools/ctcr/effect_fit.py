@@ -219,7 +219,8 @@ class _Fitter:
 
     def __init__(self, robot: Robot, readings: Measurements, base: Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.readings, self.base, self.fixed = robot, readings, list(base), fixed
-        self.noise, self.places = identify.noise_of(robot), identify.places_of(_plain(robot), readings)
+        self.noise = identify.noise_of_readings(robot, readings)
+        self.places = identify.places_of(_plain(robot), readings)
         self.measured = identify.measured_rows(readings)
         self.steps = recording.steps_for(robot, readings, self.noise)
         if not self.measured.any():

@@ -56,6 +56,12 @@ def noise_of(
     return Noise(**figures, correlation_length=correlation_length)
 
 
+def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = True) -> Noise:
+    """noise_of() what the table holds: who measured no orientations need not state their jitter."""
+    kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
+    return noise_of(robot, field=field, kinds=kinds)
+
+
 def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
     """RMS of position [mm] and rotation [deg] that the tracker's noise leaves of a right model.
 
@@ -113,7 +119,7 @@ def fit(
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
-    noise    of the tracker; `noise_of(robot)` by default. An unknown roll of the sensor is always free
+    noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
     robust   whether outliers count for little; `weights` (M, 2) of another fit freezes theirs
     admit_model_error   whether jitter is added where the model misses what the noise cannot explain; `inflation` (2,)
              of another fit freezes it. Compare evidences of models at frozen weights and inflation.
@@ -126,8 +132,7 @@ def fit(
     robot, measurements, said = sensor_roll.usable(robot, measurements)
     names = sensor_roll.with_roll(free, robot)
     mean, width, low, high = priors(robot, names, sd)
-    kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
-    noise = noise or noise_of(robot, kinds=kinds)
+    noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     rows, places = measured_rows(measurements) & chosen, places_of(robot, measurements)
     warnings = [*said, *fit_words.doubts(measurements, rows)]

@@ -225,10 +225,7 @@ def _noises(robot: Robot, readings: Measurements, noise: str) -> list:
     """The noises to try, the smaller first."""
     from ctcr import identify
 
-    if readings.quaternion is None and not robot.tracker.jitter_deg:  # then any figure does
-        robot = robot.model_copy(deep=True)
-        robot.tracker.jitter_deg = 1.0
-    jitter, field = (identify.noise_of(robot, field=wanted) for wanted in (False, True))
+    jitter, field = (identify.noise_of_readings(robot, readings, field=wanted) for wanted in (False, True))
     smooth = field.position_field > 0 or field.rotation_field > 0
     return {"jitter": [jitter], "field": [field], "auto": [jitter, field] if smooth else [jitter]}[noise]
 

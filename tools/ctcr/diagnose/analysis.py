@@ -151,7 +151,8 @@ def _diagnose(
     threads: int,
     robust: bool,
 ) -> Diagnosis:
-    engine = Engine(robot, measurements, identify.noise_of(robot), ~locked, robust, threads=threads)
+    noise = identify.noise_of_readings(robot, measurements)
+    engine = Engine(robot, measurements, noise, ~locked, robust, threads=threads)
     pool, unseen = candidates(robot, measurements)
     pool = [c for c in pool if c.id not in robot.effects]
 
