@@ -65,7 +65,8 @@ class Diagnosis:
     @property
     def hides_in_outliers(self) -> bool:
         """Whether more readings are taken for outliers than there may be, and effects do not tell why."""
-        left = racing.outliers(self.final) > max(racing.MOST_OUTLIERS, 0.5 * self.outliers)
+        most = racing.MOST_OUTLIERS
+        left = self.outliers > most and racing.outliers(self.final) > max(most, 0.5 * self.outliers)
         others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
         return left and (self.explained < EXPLAINED or bool(others_fit))
 
@@ -239,7 +240,6 @@ def _with_shapes(
         noise=fit.noise,
         weights=fit.weights,
         inflation=fit.inflation,
-        tolerance=identify.COARSE,
     )
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
