@@ -102,6 +102,30 @@ TEST(Descent, ShortensAStepThatCannotBePredicted) {
   EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
+/// The cost of readings whose noise is 1, in parameters scaled by their prior sd.
+struct UnitNoise {
+  UnitNoise(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::Index rows)
+    : scale(Eigen::Index(parameters.size())),
+      whitening({.position_jitter = 1, .rotation_jitter = 1}, {Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)},
+                RowWeights::Ones(rows, 2)),
+      objective(predict, parameters, scaled(parameters)),
+      bounds(parameters, {}, scale) {
+    objective.set_whitening(whitening);
+  }
+  detail::Descent descend(Eigen::VectorXd& z) { return detail::descend(objective, bounds, 50, 0.02, z); }
+
+  Eigen::VectorXd scale;
+  Whitening whitening;
+  detail::Objective objective;
+  detail::Bounds bounds;
+
+private:
+  const Eigen::VectorXd& scaled(const std::vector<FreeParameter>& parameters) {
+    for (Eigen::Index k = 0; k < scale.size(); ++k) scale[k] = parameters[std::size_t(k)].sd;
+    return scale;
+  }
+};
+
 // Rows 2 + |w . x - c| make convex costs whose minimum mostly lies where some of them have their kinks.
 TEST(Descent, FindsAMinimumWhereSlopesJump) {
   int at_kink = 0;
@@ -121,15 +145,10 @@ TEST(Descent, FindsAMinimumWhereSlopesJump) {
       }
       return true;
     };
-    std::vector<FreeParameter> parameters(n, {"p", 0, 1});
-    detail::Objective objective(predict, parameters, Eigen::VectorXd::Ones(n));
-    const Noise one{.position_jitter = 1, .rotation_jitter = 1};
-    const SmoothField none{Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)};
-    const Whitening whitening(one, none, RowWeights::Ones(rows, 2));
-    objective.set_whitening(whitening);
-    const detail::Bounds bounds(parameters, {}, Eigen::VectorXd::Ones(n));
+    UnitNoise cost(predict, std::vector<FreeParameter>(n, {"p", 0, 1}), rows);
+    detail::Objective& objective = cost.objective;
     Eigen::VectorXd z = Eigen::VectorXd::Zero(n);
-    const detail::Descent found = detail::descend(objective, bounds, 50, 0.02, z);
+    const detail::Descent found = cost.descend(z);
     EXPECT_TRUE(found.converged) << seed;
     EXPECT_LT(objective.evaluations(), 60) << seed;
     EXPECT_NEAR(found.cost, objective.cost(z), 1e-12);
@@ -157,16 +176,10 @@ TEST(Descent, DoesNotTakeACostThatIsNotConvexForAKink) {
       jacobian->col(1) = (t > x[1]).select(Eigen::ArrayXd::Constant(t.size(), -x[0]), 0.0);
       return true;
     };
-    std::vector<FreeParameter> parameters{{"k", 0, 1000}, {"c", 0.5, 1}};
-    const Eigen::Vector2d scale(1000, 1);
-    detail::Objective objective(predict, parameters, scale);
-    const Noise one{.position_jitter = 1, .rotation_jitter = 1};
-    const SmoothField none{Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)};
-    const Whitening whitening(one, none, RowWeights::Ones(rows, 2));
-    objective.set_whitening(whitening);
-    const detail::Bounds bounds(parameters, {}, scale);
+    UnitNoise cost(predict, {{"k", 0, 1000}, {"c", 0.5, 1}}, rows);
+    detail::Objective& objective = cost.objective;
     Eigen::VectorXd z = objective.z(Eigen::Vector2d(test::uniform(random, 20, 600), test::uniform(random, 0.1, 0.9)));
-    const detail::Descent found = detail::descend(objective, bounds, 50, 0.02, z);
+    const detail::Descent found = cost.descend(z);
     EXPECT_TRUE(found.converged) << seed;
     EXPECT_LT(found.cost, objective.cost(objective.z(truth))) << seed;
   }

@@ -68,7 +68,7 @@ Vec6 slope(const F& f, const Variation& v) {
 
 /// A plane that the tip has entered.
 template <int N>
-void touch(test::Recorded<N>& recorded, double depth, double stiffness, double rounding = 0) {
+void touch(test::Recorded<N>& recorded, double depth, double stiffness, double rounding) {
   Workspace<N> ws;
   RecordedPrediction<N, Catalogue> free;
   auto effects = recorded.system.model.effects();
@@ -117,10 +117,10 @@ void expect_slopes(int cases) {
   for (int n = 0; n < cases; ++n) {
     const std::string what = std::to_string(N) + " tubes, case " + std::to_string(n);
     auto neutral = test::random_recording<N>({}, n % N, random);
-    touch(neutral, 2e-3, 0.0);  // a plane that gives way altogether, yet might not
+    touch(neutral, 2e-3, 0.0, 0.0);  // a plane that gives way altogether, yet might not
     expect_slopes(neutral, what + ", neutral");
     auto recorded = test::random_recording<N>(test::random_effects<N>(random), n % N, random);
-    touch(recorded, 2e-3, n % 2 == 0 ? 3.0 : 1000.0, 4e-3);
+    n % 2 == 0 ? touch(recorded, 2e-3, 3.0, 0.0) : touch(recorded, 2e-3, 1000.0, 4e-3);
     expect_slopes(recorded, what);
   }
 }
@@ -134,7 +134,7 @@ TEST(RecordedDerivatives, AreSlopesByEveryParameterWithHistoryLoadsAndContact) {
 TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
   test::Random random(3);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
-  touch(recorded, 1e-3, 30);
+  touch(recorded, 1e-3, 30, 0.0);
   const auto& [system, rows] = recorded;
   Workspace<3> ws;
   RecordedPrediction<3, Catalogue> prediction;
@@ -173,7 +173,7 @@ TEST(Recorded, AnswersParametersThatAreNoNumbers) {
 TEST(Recorded, DoesNotTouchTheHeap) {
   test::Random random(5);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
-  touch(recorded, 1e-3, 30);
+  touch(recorded, 1e-3, 30, 0.0);
   const auto& [system, rows] = recorded;
   const auto memory = memories<3, Catalogue>(system, rows);
   const std::vector<int> all = all_parameters<3>();

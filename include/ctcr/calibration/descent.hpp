@@ -161,8 +161,10 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
       const Eigen::VectorXd step = model.minimum(bounds, z, damping * diagonal);
       const double foreseen = -model(step);
       if (kinked && foreseen < tolerance) {
-        out.at_kink = out.converged = doubted;
-        if (doubted) return out;
+        if (doubted) {
+          out.at_kink = out.converged = true;
+          return out;
+        }
         // What looks like a kink may be a cost that is not convex: short steps on this side tell.
         doubted = true;
         model = {0, here.gradient, hessian(here)};

@@ -8,7 +8,7 @@ inline constexpr EffectInfo info{
     .id = "contact",
     .title = "The tip touches something",
     .physics = "A wall, tissue or a stop pushes the tip where it reaches too far one way.",
-    .signature = "Nothing over most of the workspace, then an error on one side of a plane that grows with the depth.",
+    .signature = "Nothing over most of the workspace, then an error beyond a surface that grows with the depth.",
     .measure = "Go to the same region along several ways; look.",
     .look_alikes = "field_distortion",
     .reference = "penalty contact, general practice; a sphere or a soft wall: Hertz 1882",

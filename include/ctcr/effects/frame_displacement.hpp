@@ -1,14 +1,15 @@
 #pragma once
-// What effects share that displace the tracker frame about the centre of all readings: six parameters, and the hook.
+// What effects share that displace the tracker frame about the centre of all readings: parameters, and the hook.
 #include "ctcr/effects/hooks.hpp"
 #include "ctcr/math/frame_algebra.hpp"
 
 namespace ctcr {
 
-/// Displacements along, then turns about the tracker's axes.
+/// Displacements along, then turns about the tracker's axes, then what says when.
 /// @param sigma       plausible standard deviation of a displacement [m]
 /// @param turn_sigma  and of a turn [rad]
-constexpr std::array<EffectParameter, 6> frame_displacement(double sigma, double turn_sigma) noexcept {
+constexpr std::array<EffectParameter, 7> frame_displacement(double sigma, double turn_sigma,
+                                                            const EffectParameter& course) noexcept {
   const EffectParameter along{.name = {},
                               .unit = "m",
                               .sigma = sigma,
@@ -23,7 +24,7 @@ constexpr std::array<EffectParameter, 6> frame_displacement(double sigma, double
                               .soft_high = 0.03,
                               .hard_low = -0.5,
                               .hard_high = 0.5};
-  std::array<EffectParameter, 6> all{along, along, along, about, about, about};
+  std::array<EffectParameter, 7> all{along, along, along, about, about, about, course};
   constexpr std::string_view names[]{"x", "y", "z", "turn_x", "turn_y", "turn_z"};
   constexpr std::string_view meanings[]{"along the tracker axis x", "along the tracker axis y",
                                         "along the tracker axis z", "about the tracker axis x",

@@ -13,24 +13,19 @@ inline constexpr EffectInfo info{
     .reference = "Jang et al. 2016",
     .needs = {.order = true, .time = true},
 };
-inline constexpr auto parameters = [] {
-  std::array<EffectParameter, 7> all{};
-  const std::array frame = frame_displacement(3e-4, 2e-3);
-  for (std::size_t i = 0; i < frame.size(); ++i) all[i] = frame[i];
-  all[6] = EffectParameter{.name = "settling",
-                           .unit = "",
-                           .neutral = 0,
-                           .sigma = 0.5,
-                           .soft_low = -1,
-                           .soft_high = 1,
-                           .hard_low = -2,
-                           .hard_high = 2,
-                           .role = Role::shape,
-                           .meaning =
-                               "how much faster than on average it drifts at first, and slower at last: 0 evenly, "
-                               "1 twice as fast at first and not at all at last"};
-  return all;
-}();
+inline constexpr std::array parameters = frame_displacement(
+    3e-4, 2e-3,
+    EffectParameter{.name = "settling",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.5,
+                    .soft_low = -1,
+                    .soft_high = 1,
+                    .hard_low = -2,
+                    .hard_high = 2,
+                    .role = Role::shape,
+                    .meaning = "how much faster than on average it drifts at first, and slower at last: 0 evenly, "
+                               "1 twice as fast at first and not at all at last"});
 }  // namespace frame_drift
 
 /// T_ref that drifts from the first to the last row, evenly or ever more slowly, about the centre of all readings.

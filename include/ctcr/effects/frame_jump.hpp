@@ -13,22 +13,18 @@ inline constexpr EffectInfo info{
     .reference = "practice",
     .needs = {.order = true, .time = true},
 };
-inline constexpr auto parameters = [] {
-  std::array<EffectParameter, 7> all{};
-  const std::array frame = frame_displacement(5e-4, 5e-3);
-  for (std::size_t i = 0; i < frame.size(); ++i) all[i] = frame[i];
-  all[6] = EffectParameter{.name = "when",
-                           .unit = "",
-                           .neutral = 0.5,
-                           .sigma = 0.3,
-                           .soft_low = 0,
-                           .soft_high = 1,
-                           .hard_low = 0,
-                           .hard_high = 1,
-                           .role = Role::choice,
-                           .meaning = "part of the session after which it jumped"};
-  return all;
-}();
+inline constexpr std::array parameters =
+    frame_displacement(5e-4, 5e-3,
+                       EffectParameter{.name = "when",
+                                       .unit = "",
+                                       .neutral = 0.5,
+                                       .sigma = 0.3,
+                                       .soft_low = 0,
+                                       .soft_high = 1,
+                                       .hard_low = 0,
+                                       .hard_high = 1,
+                                       .role = Role::choice,
+                                       .meaning = "part of the session after which it jumped"});
 }  // namespace frame_jump
 
 /// T_ref that jumps once, about the centre of all readings.

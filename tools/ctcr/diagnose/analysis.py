@@ -160,10 +160,10 @@ def _diagnose(
     rounds: list[Round] = []
     accepted: list[Accepted] = []
     start, settled = {}, False
-    few = identify.few_of(engine.measured & engine.rows)
+    few = identify.few_of(engine.fitted)
     if few is not None:
         progress("a part of the readings first")
-        part, more = replace(engine, rows=few), np.sum(engine.measured & engine.rows) / np.sum(few)
+        part, more = replace(engine, rows=few), np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
         first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
         start = values_of(first)
@@ -233,14 +233,7 @@ def _with_shapes(
     progress(f"freeing the shape of {last.id}")
     entry = replace(last, candidate=replace(last.candidate, names=(*last.candidate.names, *shapes)))
     names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
-    freed = engine.fit(
-        names,
-        start=dict(last.candidate.shape) | values_of(fit),
-        fixed=fixed,
-        noise=fit.noise,
-        weights=fit.weights,
-        inflation=fit.inflation,
-    )
+    freed = engine.fit_like(fit, names, start=dict(last.candidate.shape) | values_of(fit), fixed=fixed)
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
     accepted[-1].entry = replace(entry, fit=freed)
@@ -256,15 +249,7 @@ def _backward(
         rest = [b for b in accepted if b is not a]
         progress(f"without {a.entry.id}")
         names, fixed = racing.parameters(b.entry for b in rest)
-        without = engine.fit(
-            names,
-            start=values_of(fit),
-            fixed=fixed,
-            noise=fit.noise,
-            weights=fit.weights,
-            inflation=fit.inflation,
-            tolerance=identify.COARSE,
-        )
+        without = engine.fit_like(fit, names, start=values_of(fit), fixed=fixed, tolerance=identify.COARSE)
         a.log_evidence = fit.log_evidence - without.log_evidence
         if a.log_evidence < racing.EVIDENCE:
             accepted.remove(a)

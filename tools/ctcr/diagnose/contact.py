@@ -17,8 +17,8 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
     tracker = engine.robot.tracker
     tips = (engine.places - tracker.position) @ tracker.rotation
     sigma = effects.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
-    shapes = [STEM + name for name in ("distance", "azimuth", "elevation", "rounding", "curvature")]
-    others = [float(value) for value in engine.priors(shapes[3:])[0]]
+    shapes = effects.get("contact", engine.robot.n_tubes).shapes
+    neutral = dict(zip(shapes, map(float, engine.priors(shapes)[0]), strict=True))
     options = []
     for elevation in np.deg2rad((-60, -30, 0, 30, 60, 90)):
         for azimuth in np.deg2rad(np.arange(0, 360, 30) if elevation < 1.5 else [0]):
@@ -32,10 +32,8 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
                 if np.count_nonzero(inside) < FEWEST:
                     continue
                 column = -sigma * inside[:, None] * (by_force @ normal)
-                shape = tuple(
-                    zip(shapes, (float(distance), float(azimuth), float(elevation), *others), strict=True)
-                )
-                options.append(
-                    (Candidate(candidate.id, (STEM + "stiffness", *shapes), shape), column[:, :, None])
-                )
+                plane = {"distance": distance, "azimuth": azimuth, "elevation": elevation}
+                shape = neutral | {STEM + name: float(value) for name, value in plane.items()}
+                names = (STEM + "stiffness", *shapes)
+                options.append((Candidate(candidate.id, names, tuple(shape.items())), column[:, :, None]))
     return options

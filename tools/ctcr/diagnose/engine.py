@@ -71,6 +71,11 @@ class Engine:
         self.measured = identify.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
+    @property
+    def fitted(self) -> Mask:
+        """Rows that hold something to fit."""
+        return self.measured & self.rows
+
     def noise_with(self, part: float) -> Any:
         """The tracker's noise with a part of its stated field error."""
         n = self.noise
@@ -120,11 +125,15 @@ class Engine:
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         return identify.identify_rows(
-            table, self.measured & self.rows, names, mean, sd, low, high, noise or self.noise, self.places,
+            table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
             start=at, max_iterations=max_iterations, tolerance=tolerance,
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
+
+    def fit_like(self, other: identify.Fit, added: Iterable[str] = (), **options: Any) -> identify.Fit:
+        """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
+        return self.fit(added, noise=other.noise, weights=other.weights, inflation=other.inflation, **options)
 
     def linear_fit(
         self,
@@ -165,7 +174,7 @@ class Engine:
         neutral, sd, _, _ = self.priors(everything)
         at = np.concatenate([fit.values, neutral[len(fit.names) :]])
         table = self.recording(everything, fixed)
-        table.activate((self.measured & self.rows).tolist())
+        table.activate(self.fitted.tolist())
         _, jacobian, _ = table.residual(at, True)
         chosen = [everything.index(name) for name in names]
         slopes = jacobian[:, chosen] * sd[chosen]

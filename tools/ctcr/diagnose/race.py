@@ -146,14 +146,7 @@ def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> iden
     if fit.converged:
         return fit
     names, fixed = parameters(accepted)
-    return engine.fit(
-        names,
-        start=values_of(fit),
-        fixed=fixed,
-        noise=before.noise,
-        weights=before.weights,
-        inflation=before.inflation,
-    )
+    return engine.fit_like(before, names, start=values_of(fit), fixed=fixed)
 
 
 def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> float:
@@ -259,13 +252,12 @@ def _in_reach(
     engine: Engine, before: identify.Fit, chosen: list[Entry], fixed: dict[str, float], progress: Progress
 ) -> list[Entry]:
     """Those that a refit to a few of many rows does not leave far behind the best, with where that ended."""
-    few = identify.few_of(engine.measured & engine.rows)
+    few = identify.few_of(engine.fitted)
     if few is None or len(chosen) < 2:
         return chosen
     small = replace(engine, rows=few)
     added = [name for name in before.names if name.startswith("effects.")]
-    frozen = {"noise": before.noise, "weights": before.weights, "inflation": before.inflation}
-    base = small.fit(added, start=values_of(before), fixed=fixed, **frozen)
+    base = small.fit_like(before, added, start=values_of(before), fixed=fixed)
     tried = [refit(small, base, entry, fixed, progress) for entry in chosen]
     best = max(entry.score for entry in tried)
     reach = min(best, IN_REACH * best)  # the best itself always is
@@ -286,10 +278,9 @@ def refit(
     first = values_of(entry.fit) if entry.fit else _start(engine, before, entry)
     for start in (first, values_of(before)):
         try:
-            fit = engine.fit(
-                [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape), noise=before.noise,
-                weights=before.weights, inflation=before.inflation, max_iterations=ITERATIONS,
-                tolerance=identify.COARSE,
+            fit = engine.fit_like(
+                before, [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape),
+                max_iterations=ITERATIONS, tolerance=identify.COARSE,
             )  # fmt: skip
             break
         except InputError:
