@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <ctcr/ctcr.hpp>
 #include <ctcr/effects/softening.hpp>
-#include <ctcr/pipeline/recorded.hpp>
+#include <ctcr/pipeline/recorded_derivatives.hpp>
 
 namespace pickup {
 

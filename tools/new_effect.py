@@ -58,7 +58,7 @@ TEST = """\
 
 #include <gtest/gtest.h>
 
-#include "ctcr/pipeline/recorded.hpp"
+#include "ctcr/pipeline/recorded_derivatives.hpp"
 #include "support/laws.hpp"
 
 namespace ctcr {

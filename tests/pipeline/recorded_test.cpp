@@ -1,5 +1,3 @@
-#include "ctcr/pipeline/recorded.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <numeric>
 #include <string>
 
+#include "ctcr/pipeline/recorded_derivatives.hpp"
 #include "support/catalogue_cases.hpp"
 #include "support/no_alloc.hpp"
 
@@ -147,6 +146,49 @@ TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
     for (std::size_t k = 0; k < few.size(); ++k)
       EXPECT_LE((some.col(Eigen::Index(k)) - all.col(few[k])).norm(), 1e-12 * (1 + all.col(few[k]).norm()));
   }
+}
+
+// Where no effect is asked for that changes the equations, the standard model's own derivatives are taken.
+template <int N>
+void expect_same_slopes_by_the_standard_model(int cases) {
+  test::Random random(11 * N);
+  for (int n = 0; n < cases; ++n) {
+    auto effects = test::random_effects<N>(random);
+    std::vector<int> few, all = all_parameters<N>();
+    effects.for_each([&](auto& effect, int) {
+      using E = std::remove_cvref_t<decltype(effect)>;
+      if (ActsOnRod<E, double, N> || HasEnvironment<E, double>) effect.values = E::neutral();
+    });
+    for (const int place : all)
+      if (detail::reaches<N, Catalogue>[std::size_t(place)] != detail::Reach::equations) few.push_back(place);
+    auto [system, rows] = test::random_recording<N>(effects, n % N, random);
+    const bool loaded = n % 2 == 1;
+    if (!loaded) {  // nor any weight
+      Eigen::VectorXd x = P<N>::values(system);
+      x.segment<3>(ParameterVector<N>::index(Parameter::gravity)).setZero();
+      system = P<N>::with_values(system, x);
+      rows.back().load = {};
+    }
+    Workspace<N> ws;
+    RecordedPrediction<N, Catalogue> prediction;
+    ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
+    Slopes some(6, Eigen::Index(few.size())), every(6, Eigen::Index(all.size()));
+    ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, few, some)), Status::ok);
+    ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, all, every)), Status::ok);
+    EXPECT_LT(few.size(), all.size());
+    for (std::size_t k = 0; k < few.size(); ++k) {
+      const Vec6 expected = every.col(few[k]);
+      // Without load the standard model has equations of its own, with another discretisation error.
+      EXPECT_LE((some.col(Eigen::Index(k)) - expected).norm(), (loaded ? 1e-9 : 1e-6) * (1 + expected.norm()))
+          << P<N>::name(few[k]) << ", " << N << " tubes, case " << n;
+    }
+  }
+}
+
+TEST(RecordedDerivatives, AreThoseOfTheStandardModelWhereNothingChangesItsEquations) {
+  expect_same_slopes_by_the_standard_model<1>(4);
+  expect_same_slopes_by_the_standard_model<2>(6);
+  expect_same_slopes_by_the_standard_model<3>(6);
 }
 
 TEST(Recorded, AnswersParametersThatAreNoNumbers) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "ctcr/parallel/batch.hpp"
-#include "ctcr/pipeline/recorded.hpp"
+#include "ctcr/pipeline/recorded_derivatives.hpp"
 
 namespace ctcr {
 

@@ -93,16 +93,24 @@ concept HasStation = requires(const Effect& effect, Station<P, N>& station) { ef
 template <class Effect, class P, int N>
 concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effect.rub(torque); };
 
+/// An effect on what tubes are made of.
+template <class Effect, class P>
+concept HasMaterial =
+    requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) { effect.material(place, m); };
+
 /// An effect that changes the equilibrium of the rod.
 template <class Effect, class P, int N>
-concept ActsOnRod =
-    HasStation<Effect, P, N> || HasRub<Effect, P, N> ||
-    requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) { effect.material(place, m); } ||
-    requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
-      effect.grip(torque, angle);
-    } || requires(const Effect& effect, const std::array<P, 3>& gravity, std::array<P, 3>& force) {
-      effect.tip_force(gravity, force);
-    };
+concept ActsOnRod = HasStation<Effect, P, N> || HasRub<Effect, P, N> || HasMaterial<Effect, P> ||
+                    requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
+                      effect.grip(torque, angle);
+                    } || requires(const Effect& effect, const std::array<P, 3>& gravity, std::array<P, 3>& force) {
+                      effect.tip_force(gravity, force);
+                    };
+
+/// An effect on the joints.
+template <class Effect, class P, int N>
+concept ActsOnJoints =
+    requires(const Effect& effect, const Occasion& at, std::array<P, N>& q) { effect.actuate(at, q, q); };
 
 /// Numbers without derivatives.
 struct Constant {};
@@ -175,6 +183,14 @@ struct EffectList {
       });
       return any;
     }
+    /// Whether an effect that is active changes what tubes are made of.
+    [[nodiscard]] bool acts_on_material() const noexcept {
+      bool any = false;
+      for_each([&](const auto& e, int) {
+        if constexpr (HasMaterial<std::remove_cvref_t<decltype(e)>, P>) any = any || e.active;
+      });
+      return any;
+    }
 
     /// Calls f(effect, place of its first value) for each.
     template <class F>
@@ -190,7 +206,7 @@ struct EffectList {
 
     void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.material(place, m); })
+        if constexpr (HasMaterial<std::remove_cvref_t<decltype(e)>, P>)
           if (e.active) e.material(place, m);
       });
     }
@@ -246,12 +262,7 @@ struct EffectList {
         const EffectParameter& parameter = effect.parameters[std::size_t(k)];
         if (parameter.role != Role::amplitude) continue;
         for (int i = 0; i < effect.size(k); ++i) {
-          const auto& x = effect.values[std::size_t(effect.place(k, i))];
-          if (value(x) != parameter.neutral) return true;
-          if constexpr (is_dual<std::remove_cvref_t<decltype(x)>>)
-            for (const Lanes& d : x.d)
-              for (std::size_t lane = 0; lane < lane_count; ++lane)
-                if (d[lane] != 0) return true;
+          if (!vanishes(effect.values[std::size_t(effect.place(k, i))] - parameter.neutral)) return true;
         }
       }
       return false;

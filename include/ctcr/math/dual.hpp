@@ -53,6 +53,19 @@ CTCR_INLINE double value(const TailDual<G, H>& x) noexcept {
   return x.v;
 }
 
+/// Whether a number is 0, with all of its derivatives. Real time: yes.
+CTCR_INLINE bool vanishes(double x) noexcept {
+  return x == 0;
+}
+template <int G>
+CTCR_INLINE bool vanishes(const Dual<G>& x) noexcept {
+  if (x.v != 0) return false;
+  for (const Lanes& d : x.d)
+    for (std::size_t lane = 0; lane < lane_count; ++lane)
+      if (d[lane] != 0) return false;
+  return true;
+}
+
 /// Derivatives of a length in group g of G, whatever type carries it.
 template <int G>
 CTCR_INLINE Lanes length_tangent(double, int) noexcept {

@@ -17,6 +17,12 @@ T as(const S& x) noexcept {
     return value(x);
 }
 
+/// Whether a tube resists alike in all directions and however far it bends.
+template <class S>
+bool is_even(const Material<S>& m) noexcept {
+  return vanishes(m.softening) && vanishes(m.anisotropy[0]) && vanishes(m.anisotropy[1]);
+}
+
 /// A d, d = (x, y): the unsoftened bending moment is EI times that.
 template <class T, class S>
 std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept {
@@ -81,7 +87,7 @@ template <class T, class S>
 Response<T> response(const Material<S>& m, const T& dx, const T& dy) noexcept {
   const std::array<T, 2> e = weighed(m, dx, dy);
   T k = as<T>(m.bending_stiffness);
-  if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
+  if (vanishes(as<T>(m.softening))) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
   const T z = dx * e[0] + dy * e[1];
   const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness));
   const double loss = 2 * value(m.bending_stiffness) * left.by_z, x = value(e[0]), y = value(e[1]);

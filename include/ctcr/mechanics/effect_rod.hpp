@@ -57,7 +57,7 @@ public:
     std::array<Material<S>, N> material;  ///< of each present tube here
   };
 
-  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs) {
+  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs), varied_(inputs.effects.acts_on_material()) {
     if constexpr (Fx::template On<N, S>::has_rub) {
       rub_.fill(0.0);
       in_.effects.rub(rub_);
@@ -111,14 +111,73 @@ public:
   /// How the tubes bend under the moment of a state.
   [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
     Bend b;
+    bool even = true;
+    for (int j = 0; j < place.present; ++j) {
+      const auto i = std::size_t(j);
+      sincos(y.psi(j), b.sine[i], b.cosine[i]);
+      b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
+      even = even && (!varied_ || bending::is_even(place.material[i]));
+    }
+    even ? bend_evenly(place, y, b) : bend_by_iteration(place, y, b);
+    return b;
+  }
+
+  /// One integration step of length h inside a segment: the scheme of MagnusRk4.
+  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
+    const S half = 0.5 * h;
+    const auto moved = [](const State& y0, const S& k, const State& d) {
+      State r;
+      for (std::size_t i = 0; i < State::size; ++i) r.y[i] = y0.y[i] + k * d.y[i];
+      return r;
+    };
+    const auto advance = [&] {
+      if (!varied_) return;
+      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
+      locate(place);
+    };
+    std::array<S, 2> u1, u2, u3, u4;
+    const State k1 = rates(place, y, u1);
+    advance();
+    const State k2 = rates(place, moved(y, half, k1), u2);
+    const State k3 = rates(place, moved(y, half, k2), u3);
+    advance();
+    const State k4 = rates(place, moved(y, h, k3), u4);
+    const S sixth = (1.0 / 6.0) * h;
+    for (std::size_t i = 0; i < State::size; ++i)
+      y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
+    move_frame(frame, u1, std::array<S, 2>{0.5 * (u2[0] + u3[0]), 0.5 * (u2[1] + u3[1])}, u4, h);
+  }
+
+private:
+  static constexpr int softening_iterations = 12;  ///< convex and quadratic: 3 are usual
+
+  /// Where all tubes are even, by one division.
+  static void bend_evenly(const Place& place, const State& y, Bend& b) noexcept {
+    S stiffness = 0.0;
+    std::array<S, 2> moment{y.m(0), y.m(1)};
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
+      const Material<S>& m = place.material[i];
+      const S &k = m.bending_stiffness, &s = b.sine[i], &c = b.cosine[i];
+      const std::array<S, 2> q{k * m.curvature[0], k * m.curvature[1]};
+      moment = {moment[0] + (c * q[0] - s * q[1]), moment[1] + (s * q[0] + c * q[1])};
+      stiffness = stiffness + k;
+    }
+    const S compliance = inverse(stiffness);
+    b.u = {compliance * moment[0], compliance * moment[1]};
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
+      const Material<S>& m = place.material[i];
+      b.curvature[i] = seen_by_tube(b, i, b.u);
+      for (std::size_t k = 0; k < 2; ++k) b.moment[i][k] = m.bending_stiffness * (b.curvature[i][k] - m.curvature[k]);
+    }
+  }
+
+  /// The value by Newton's method; one more step of it with derivatives then makes both exact to rounding.
+  static void bend_by_iteration(const Place& place, const State& y, Bend& b) noexcept {
     bending::Slope slope;
     std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
     bool linear = true;
-    for (int j = 0; j < place.present; ++j) {
-      const auto i = std::size_t(j);
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
       const Material<S>& m = place.material[i];
-      sincos(y.psi(j), b.sine[i], b.cosine[i]);
-      b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
       const bending::Slope unsoftened = bending::stiffness(m, 1.0);
       const auto q = unsoftened * std::array{value(m.curvature[0]), value(m.curvature[1])};
       const double s = value(b.sine[i]), c = value(b.cosine[i]);
@@ -127,7 +186,6 @@ public:
       slope += unsoftened.turned(s, c);
       linear = linear && value(m.softening) == 0;
     }
-    // The value by Newton's method; one more step of it with derivatives then makes both exact to rounding.
     std::array<double, 2> u = slope.inverted() * moment;
     double left = linear ? 0 : 1;  // (relative change)^2
     for (int k = 0; k < softening_iterations && left > 1e-10; ++k) {
@@ -149,36 +207,7 @@ public:
         b.moment[i][k] = tubes[i].moment[k] + moment_more[k];
       }
     }
-    return b;
   }
-
-  /// One integration step of length h inside a segment: the scheme of MagnusRk4.
-  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
-    const S half = 0.5 * h;
-    const auto moved = [](const State& y0, const S& k, const State& d) {
-      State r;
-      for (std::size_t i = 0; i < State::size; ++i) r.y[i] = y0.y[i] + k * d.y[i];
-      return r;
-    };
-    const auto advance = [&] {
-      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
-      locate(place);
-    };
-    std::array<S, 2> u1, u2, u3, u4;
-    const State k1 = rates(place, y, u1);
-    advance();
-    const State k2 = rates(place, moved(y, half, k1), u2);
-    const State k3 = rates(place, moved(y, half, k2), u3);
-    advance();
-    const State k4 = rates(place, moved(y, h, k3), u4);
-    const S sixth = (1.0 / 6.0) * h;
-    for (std::size_t i = 0; i < State::size; ++i)
-      y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
-    move_frame(frame, u1, std::array<S, 2>{0.5 * (u2[0] + u3[0]), 0.5 * (u2[1] + u3[1])}, u4, h);
-  }
-
-private:
-  static constexpr int softening_iterations = 12;  ///< convex and quadratic: 3 are usual
 
   template <class T>
   using Tubes = std::array<bending::Response<T>, N>;
@@ -205,7 +234,7 @@ private:
     const auto i = std::size_t(j);
     const TubeParameters<S>& t = in_.tubes[i];
     Material<S> m{.bending_stiffness = t.k, .curvature = {place.curved[i] ? t.kappa : S(0.0), S(0.0)}};
-    if constexpr (!Fx::none) {
+    if (varied_) {
       const S straight = t.length - t.curved_length;
       const S within = place.curved[i] ? S(place.along[i] - straight) : place.along[i];
       const S part = within * inverse(place.curved[i] ? t.curved_length : straight);
@@ -355,6 +384,7 @@ private:
   }
 
   const Inputs& in_;
+  bool varied_;           ///< whether effects change what tubes are made of
   std::array<S, N> rub_;  ///< what each tube takes from the next outer one, per length [N]
 };
 

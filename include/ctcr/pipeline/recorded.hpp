@@ -1,9 +1,8 @@
 #pragma once
-// Recorded rows through the whole system with its effects, and the derivatives of what the tracker reads along the way:
+// Recorded rows through the whole system with its effects:
 //
 //   motor angles --transmission--> joints --past, drives--> joints that the tubes have --model--> tip --T_ref,
 //   sensor--> reading
-#include <numbers>
 #include <span>
 #include <vector>
 
@@ -96,28 +95,6 @@ struct RecordedPrediction : Prediction<N> {
 
 namespace detail {
 
-template <int N, class S>
-TubeParameters<S> tube_of(const Tube& t, int i, const auto& seed) noexcept {
-  using P = ParameterVector<N>;
-  const auto field = [&](Parameter kind) { return S(seed(t.*P::info(kind).field, P::index(kind, i))); };
-  constexpr double pi = std::numbers::pi;
-  const S inner = field(Parameter::inner_diameter), outer = field(Parameter::outer_diameter);
-  const S inner2 = inner * inner, outer2 = outer * outer;
-  const S k = t.bending_stiffness > 0
-                  ? field(Parameter::bending_stiffness)
-                  : field(Parameter::youngs_modulus) * ((pi / 64) * (outer2 * outer2 - inner2 * inner2));
-  return {k,
-          k * inverse(1.0 + field(Parameter::poisson_ratio)),
-          field(Parameter::curvature),
-          field(Parameter::length),
-          field(Parameter::curved_length),
-          field(Parameter::density) * ((pi / 4) * (outer2 - inner2))};
-}
-
-}  // namespace detail
-
-namespace detail {
-
 /// Solves with what the tip's surroundings add to the load: Newton's method on that push, whose slope by the tip's
 /// position is known, and so is the tip's compliance.
 template <int N, class Fx>
@@ -198,163 +175,6 @@ CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& 
   return out.solution.status;
 }
 
-/// Exact derivatives, of the discretised model, of the reading that predict() just left in `ws` and `prediction`, by
-/// some of the system's parameters. Rows: position [m], rotation [rad], tracker axes.
-/// @param variables  places in SystemParameters<N, Fx>, each once
-/// @param out        6 x variables.size()
-/// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for sixteen variables.
-template <int N, class Fx>
-  requires(!Fx::none)
-CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
-                                   const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
-  using P = SystemParameters<N, Fx>;
-  using V = ParameterVector<N>;
-  using Window = detail::Window<4>;
-  using Pass = detail::EffectPass<N, Fx, Window::groups>;
-  using S = Window::S;
-  using On = typename Fx::template On<N>;
-  constexpr int groups = Window::groups_for(Pass::unknowns + P::count + 3);
-
-  out.setZero();
-  const Status status = prediction.solution.status;
-  if (!(status == Status::ok || status == Status::singular)) return status;
-  const Model<N, Fx>& model = prediction.model;
-  const On& effects = model.effects();
-
-  std::array<int, P::count> slot;
-  slot.fill(-1);
-  const int asked = int(variables.size());
-  for (int j = 0; j < asked; ++j) slot[std::size_t(variables[std::size_t(j)])] = Pass::unknowns + j;
-  const int force = Pass::unknowns + asked;
-
-  const auto seeding = [&](const Window& window) {
-    return [&slot, window](double x, int index) noexcept {
-      const int lane = slot[std::size_t(index)];
-      return lane < 0 ? S(x) : window(x, lane);
-    };
-  };
-  const auto seeded_effects = [&](const auto& seed) {
-    return effects.template seeded<S>([&](double x, int k) { return seed(x, V::count + k); },
-                                      [&](int k) { return seed(0, V::index(Parameter::translation_ratio) + k); });
-  };
-
-  // What the surroundings add, and its slopes by the variables: it may be nothing and yet have some.
-  bool pushed = false;
-  std::array<std::array<S, 3>, groups / Window::groups> push;
-  if constexpr (On::has_environment) {
-    const Vec3& p = prediction.solution.position;
-    for (Window window; window.first < force; window.first += window.size) {
-      auto& f = push[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
-      seeded_effects(seeding(window)).environment({p[0], p[1], p[2]}, f);
-      for (const S& x : f) {
-        pushed = pushed || x.v != 0;
-        for (int l = 0; l < window.size; ++l) pushed = pushed || x.d[l / lane_count][l % lane_count] != 0;
-      }
-    }
-  }
-  const int count = force + (pushed ? 3 : 0);
-
-  LaneRow<groups> rows[Pass::rows + (On::has_environment ? 3 : 0)];
-  for (auto& r : rows)
-    for (auto& x : r.x) x = Lanes{};
-  const Events<N> events = sort_events(with_all_curves(model.robot()), prediction.q.beta);
-  TipGuess<N> guess = ws.guess;
-  for (Window window; window.first < count; window.first += window.size) {
-    const auto seed = seeding(window);
-    RodInputs<N, S, Fx> in;
-    in.effects = seeded_effects(seed);
-    detail::joints_of<N, S>(system.transmission, row.theta, seed, in.beta, in.alpha);
-    in.effects.actuate(row.at, in.beta, in.alpha);
-    for (int i = 0; i < N; ++i)
-      in.tubes[std::size_t(i)] = detail::tube_of<N, S>(model.robot().tubes[std::size_t(i)], i, seed);
-    for (int i = 0; i < 3; ++i) {
-      const auto k = std::size_t(i);
-      in.gravity[k] = seed(model.robot().gravity[i], V::index(Parameter::gravity, i));
-      in.moment[k] = prediction.load.moment[i];
-      in.force[k] = pushed ? window(prediction.load.force[i], force + i) : S(prediction.load.force[i]);
-    }
-    Pass(in, events, guess, system.sensor.tube, system.settings.steps, window).write(rows, window.first / lane_count);
-  }
-  constexpr auto lane = [](int j) constexpr { return j; };
-  (void)eliminate<Pass::unknowns>(rows, lane);
-
-  if constexpr (On::has_environment) {
-    if (pushed) {
-      // df = push dv + slope dp and dp = A dv + C df, p the robot tip.
-      using Slope = Dual<1>;
-      const Vec3& p = prediction.solution.position;
-      std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
-      for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
-      effects.template seeded<Slope>([](double x, int) { return Slope(x); }).environment(at, f);
-      Mat3 slope, C;
-      Eigen::Matrix<double, 6, 3> by_force;
-      for (int j = 0; j < 3; ++j) {
-        for (int i = 0; i < 6; ++i) by_force(i, j) = rows[Pass::unknowns + i][force + j];
-        for (int i = 0; i < 3; ++i) C(i, j) = rows[Pass::rows + i][force + j];
-        for (int i = 0; i < 3; ++i) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
-      }
-      const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - slope * C);
-      for (int j = Pass::unknowns; j < force; ++j) {
-        Vec3 A, direct;
-        for (int i = 0; i < 3; ++i) {
-          A[i] = rows[Pass::rows + i][j];
-          const int l = j % Window::size;
-          direct[i] = push[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
-        }
-        const Vec6 change = by_force * lu.solve(direct + slope * A);
-        for (int i = 0; i < 6; ++i) rows[Pass::unknowns + i].add(j, change[i]);
-      }
-    }
-  }
-
-  using detail::operator*;
-  const Pose& T_base_tip = prediction.solution.tube_tips[std::size_t(system.sensor.tube)];
-  const Mat3 R_tip_base = T_base_tip.rotation.transpose(),
-             R_base_tracker = system.sensor.T_tracker_base.rotation.transpose();
-  for (Window window; window.first < force; window.first += window.size) {
-    const auto seed = seeding(window);
-    Frame<S> tip = frame_of<S>(T_base_tip), T_ref = frame_of<S>(system.sensor.T_tracker_base);
-    for (int g = 0; g < Window::groups; ++g) {
-      const int at = window.first / lane_count + g;
-      const auto& r = rows;
-      constexpr int u = Pass::unknowns;
-      const detail::Lanes3 v = R_tip_base * detail::Lanes3{r[u].x[at], r[u + 1].x[at], r[u + 2].x[at]};
-      const detail::Lanes3 w = R_tip_base * detail::Lanes3{r[u + 3].x[at], r[u + 4].x[at], r[u + 5].x[at]};
-      detail::Lanes3 shift{}, turn{};
-      for (int i = 0; i < 3; ++i) {
-        shift[std::size_t(i)] = seed(0, V::index(Parameter::tracker_position, i)).d[g];
-        turn[std::size_t(i)] = seed(0, V::index(Parameter::tracker_rotation, i)).d[g];
-      }
-      shift = R_base_tracker * shift;
-      turn = R_base_tracker * turn;
-      for (std::size_t i = 0; i < 3; ++i) {
-        tip.translation_twist[i][g] = v[i];
-        tip.rotation_twist[i][g] = w[i];
-        T_ref.translation_twist[i][g] = shift[i];
-        T_ref.rotation_twist[i][g] = turn[i];
-      }
-    }
-    Frame<S> reading = composed(T_ref, tip);
-    seeded_effects(seed).sense(row.at, reading);
-    for (int g = 0; g < Window::groups; ++g)
-      reading.rotation_twist[2][g] += seed(0, V::index(Parameter::sensor_roll)).d[g];
-    const Mat3 R = reading.rotation();
-    for (int l = 0; l < window.size; ++l) {
-      const int j = window.first + l - Pass::unknowns;
-      if (j < 0 || j >= asked) continue;
-      const int g = l / lane_count, i = l % lane_count;
-      Vec3 v, w;
-      for (int k = 0; k < 3; ++k) v[k] = reading.translation_twist[k][g][i], w[k] = reading.rotation_twist[k][g][i];
-      out.template block<3, 1>(0, j) = R * v;
-      out.template block<3, 1>(3, j) = R * w;
-    }
-  }
-  if (out.allFinite()) return status;
-  out.setZero();
-  return Status::not_finite;
-}
-
 /// As above without effects, by the faster way of predict.hpp.
 template <int N, class Fx>
   requires(Fx::none)
@@ -362,16 +182,6 @@ Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typ
                Workspace<N>& ws, RecordedPrediction<N, Fx>& out) noexcept {
   out.load = row.load;
   return predict(system, row.theta, row.load, ws, out);
-}
-template <int N, class Fx>
-  requires(Fx::none)
-Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
-                     const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
-  PredictionDerivatives<N> all;
-  const Status status = differentiate(system, row.theta, ws, prediction, all);
-  for (std::size_t j = 0; j < variables.size(); ++j) out.col(Eigen::Index(j)) = all.by_parameters.col(variables[j]);
-  return status;
 }
 
 }  // namespace ctcr

@@ -73,16 +73,22 @@ template <int N>
 struct ParameterVector {
   static_assert(N >= 1 && N <= 9, "a tube has one digit in a name");
 
+private:
+  /// Where each kind begins, and the end.
+  static constexpr auto first = [] {
+    std::array<int, parameter_kinds.size() + 1> place{};
+    for (std::size_t k = 0; k < parameter_kinds.size(); ++k) {
+      const std::string_view name = parameter_kinds[k].name;
+      place[k + 1] = place[k] + (name.find('#') != name.npos ? N : name.find('*') != name.npos ? 3 : 1);
+    }
+    return place;
+  }();
+
+public:
   /// Entries of a kind.
-  static constexpr int size(Parameter kind) noexcept {
-    const std::string_view name = info(kind).name;
-    return name.find('#') != name.npos ? N : name.find('*') != name.npos ? 3 : 1;
-  }
+  static constexpr int size(Parameter kind) noexcept { return first[std::size_t(kind) + 1] - first[std::size_t(kind)]; }
   /// Place of a kind's entry i: tube i + 1, or axis i.
-  static constexpr int index(Parameter kind, int i = 0) noexcept {
-    for (int k = 0; k < int(kind); ++k) i += size(Parameter(k));
-    return i;
-  }
+  static constexpr int index(Parameter kind, int i = 0) noexcept { return first[std::size_t(kind)] + i; }
   static constexpr int robot_count = index(Parameter::translation_ratio);      ///< those of Robot<N>: tubes and gravity
   static constexpr int count = index(Parameter(int(parameter_kinds.size())));  ///< all
 
