@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from ctcr.model import Model
-from ctcr.reproduce import control, model
+from ctcr.reproduce import control, influence, model
 from ctcr.reproduce.claim import Claim
 from ctcr.reproduce.robot import paper_robot, random_design, random_rows
+from ctcr.sensitivity.ranges import all_varied
 
 
 def test_a_claim_has_a_ratio_where_the_paper_is_not_zero():
@@ -48,4 +49,14 @@ def test_scenarios_hold_what_the_text_says():
     assert of["S3 and S4 above 20 g: runs that fail"].ours == 100
     assert of["20 g unknown: increase of the mean error"].ours <= 0.012
     assert of["largest error of all"].ours <= 1.22
-    assert paper_robot().n_tubes == 3
+    assert of["S5 (beyond the paper) at 25 and 27 g: runs that fail"].ours == 0
+    assert of["S5 at 30 g: runs that fail"].ours == 100 and runs.reach[25.0] == 0 and runs.reach[30.0] > 1e-3
+
+
+def test_what_is_measured_spans_its_uncertainty():
+    varied = all_varied(paper_robot())
+    known = [influence._as_measured(one) for one in varied if influence._measured(one)]
+    assert len(known) == 12 and {one.high for one in known} == {1.0, 0.5, 0.3}
+    whole = {one.name: one for one in varied}
+    for one in known:
+        assert np.array_equal(one.at(1.0), whole[one.name].at(one.high / whole[one.name].high))

@@ -10,6 +10,7 @@ from ctcr import robot_file
 from ctcr.cli import cli
 from ctcr.errors import InputError
 from ctcr.track import scenario as scenario_file
+from ctcr.track.reach import Room, least_distance
 from ctcr.track.runs import run_all, run_once, system_values
 from ctcr.track.summary import figures
 
@@ -61,9 +62,32 @@ def test_above_20_g_the_failure_is_named(robot, name):
     assert found["obstacle_mm"] > 0
 
 
-def test_estimated_force_and_redundancy_go_on(robot):
-    found = outcome(robot, "S5", 25.0)
-    assert found["failed"] == 0 and found["max_mm"] < 0.5 and found["held_periods"] > 0
+@pytest.mark.parametrize("mass", [25.0, 27.0])
+def test_estimated_force_redundancy_and_posture_go_on(robot, mass):
+    found = outcome(robot, "S5", mass)
+    assert found["failed"] == 0 and found["max_mm"] < 0.8 and found["held_periods"] > 0
+
+
+def test_above_27_g_no_posture_reaches_the_cube(robot):
+    found = outcome(robot, "S5", 30.0)
+    assert found["failed"] == found["runs"]
+    least = 1e3 * least_distance(robot, load("S5"), 30.0, starts=6)
+    assert 1 < least < found["max_mm"]
+    assert least_distance(robot, load("S5"), 25.0, starts=6) == 0
+    wide = load("S5", limits={"base_gap_mm": 2.0})
+    assert 1e3 * least_distance(robot, wide, 30.0, starts=6) < least
+
+
+def test_postures_are_drawn_within_the_limits(robot):
+    limits = load(
+        "S5", limits={"beta_low_mm": [-320.0, -230.0, -150.0], "beta_high_mm": [-100.0, -180.0, -60.0]}
+    ).limits
+    room, random = Room.of(robot, limits), np.random.default_rng(4)
+    for _ in range(100):
+        beta = room.drawn(random)
+        assert room.holds(np.append(beta, random.uniform(-3, 3, 3)))
+        assert (np.diff(np.append(beta, 0)) >= 56.5e-3 - 1e-9).all() and (beta >= [-0.32, -0.23, -0.15]).all()
+    assert not room.holds(np.array([-0.3, -0.25, -0.145, 0, 0, 0]))
 
 
 def test_the_force_is_estimated(robot):

@@ -16,7 +16,7 @@ def command(quick: bool, report: str, json_target: str | None) -> None:
     import time
 
     from ctcr import output
-    from ctcr.reproduce import control, model
+    from ctcr.reproduce import control, influence, model
     from ctcr.reproduce import report as page
     from ctcr.reproduce.claim import COLUMNS
 
@@ -25,19 +25,19 @@ def command(quick: bool, report: str, json_target: str | None) -> None:
     start, clock = time.process_time(), time.monotonic()
     with output.Progress("integration schemes", designs) as progress:
         errors, seconds = model.integration_errors(designs, configurations, progress.advance)
-    with output.Progress("scenarios", 23 * repetitions) as progress:
+    with output.Progress("scenarios", 24 * repetitions) as progress:
         runs = control.scenarios(repetitions, progress.advance)
-    with output.Progress("sensitivity", samples + 30 * points + 1) as progress:
-        opened, closed = control.sensitivity(samples, points, progress.advance)
+    with output.Progress("sensitivity", samples + 2 * (30 * points + 1 + 12 * 3 + 1)) as progress:
+        found = influence.study(samples, points, progress.advance)
     claims = [
         *model.rates(2000 if quick else 20_000),
         *model.integration_claims(errors, seconds),
         *control.tracking_claims(runs),
-        *control.sensitivity_claims(opened, closed),
+        *influence.claims(found),
     ]
     shown = (0, 1, 3, 4, 5)  # the reasons are on the page
     made = f"{time.process_time() - start:.0f} s of processor time in {time.monotonic() - clock:.0f} s"
-    page.write(report, claims, errors, runs, opened, closed, made, quick)
+    page.write(report, claims, errors, runs, found, made, quick)
     if json_target:
         output.write_json([{**vars(claim), "ratio": claim.ratio} for claim in claims], json_target)
     console = output.console(json_target)

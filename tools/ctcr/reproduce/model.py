@@ -16,7 +16,7 @@ SCHEMES = {"RK3": "ssprk3", "RK4": "rk4", "RK8": "rk8", "ours": "default"}
 REFERENCE_STEPS = (
     10  # of RK8 a segment: the paper takes 100, which differ from these by less than 1e-12 of the length
 )
-_RATES = (("unloaded", 0.0, False, 154e3), ("loaded", 0.3, False, 41e3), ("loaded, J and C", 0.3, True, 14e3))
+_RATES = (("unloaded", 0.0, False, 154), ("loaded", 0.3, False, 41), ("loaded, J and C", 0.3, True, 14))
 
 
 def rates(count: int) -> list[Claim]:
@@ -27,9 +27,9 @@ def rates(count: int) -> list[Claim]:
         model, loads = Model(robot), force if most_force else None
         start = time.process_time()
         model.predict(beta, alpha, loads, derivatives=derivatives, threads=1)
-        rate = count / (time.process_time() - start)
+        rate = 1e-3 * count / (time.process_time() - start)
         why = "whole solves to 1e-10 from a cold start, against one Newton step; another machine"
-        found.append(Claim("Table I", f"computations a second, {name}", paper, rate, "1/s", why))
+        found.append(Claim("Table I", f"computations a second, {name}", paper, rate, "kHz", why))
     return found
 
 
@@ -57,7 +57,10 @@ def integration_errors(
 
 
 def integration_claims(errors: dict[str, Array], seconds: dict[str, float]) -> list[Claim]:
-    designs = "other random designs: the paper does not list its ranges"
+    designs = (
+        "the paper does not list the ranges of its designs: ours end at the curvature (10 1/m) and curved length (50 "
+        "mm) of its own robot; with 2 to 12 1/m and 20 to 80 mm the mean is 12 times as large"
+    )
     worst = "largest of all designs and configurations, those beside a snap included"
     return [
         Claim("Fig. 2", "RK3, largest error, of the length", 1.0, 100 * errors["RK3"].max(), "%", worst),

@@ -34,17 +34,21 @@ def forces(figure: Figure, s: Scenarios) -> None:
 
 
 def beyond(figure: Figure, s: Scenarios) -> None:
-    """The largest error by weight: the paper's scheme with unknown and known force, and ours."""
+    """The largest error by weight: the paper's scheme with unknown and known force, ours, and what is possible."""
     axes = figure.subplots()
-    masses = sorted({mass for name, mass in s.runs if name == "S3"})
-    for name, colour, label in (
-        ("S3", ERROR, "unknown (S3)"),
-        ("S4", AXES[1], "known (S4)"),
-        ("S5", AXES[0], "S5"),
+    for scenario, colour, label in (
+        ("S3", ERROR, "the paper's scheme, force unknown (S3)"),
+        ("S4", AXES[1], "the paper's scheme, force known (S4)"),
+        ("S5", AXES[0], "ours (S5)"),
     ):
-        axes.plot(
-            masses, [errors_mm(s.runs[name, mass]).max() for mass in masses], "o-", color=colour, label=label
-        )
+        masses = sorted(mass for name, mass in s.runs if name == scenario)
+        largest = [errors_mm(s.runs[scenario, mass]).max() for mass in masses]
+        axes.plot(masses, largest, "o-", color=colour, label=label)
+    least = {mass: 1e3 * away for mass, away in s.reach.items() if away > 0}
+    axes.plot(
+        list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits"
+    )
     axes.axhline(1, color="#8794a0", lw=1, ls="--")
     axes.set(yscale="log", xlabel="weight at the tip, g", ylabel="largest error, mm")
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.legend(fontsize=9)

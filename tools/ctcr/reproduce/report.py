@@ -8,6 +8,7 @@ from ctcr.output import atomic_writer
 from ctcr.reproduce import pictures
 from ctcr.reproduce.claim import COLUMNS, Claim
 from ctcr.reproduce.control import Scenarios
+from ctcr.reproduce.influence import SLOW_FEEDBACK, Influence
 from ctcr.reproduce.robot import paper_robot
 from ctcr.sensitivity import figures as sensitivity_figures
 from ctcr.track import figures as track_figures
@@ -20,8 +21,7 @@ def write(
     claims: list[Claim],
     errors: dict,
     s: Scenarios,
-    opened,
-    closed,
+    found: Influence,
     made: str,
     quick: bool,
 ) -> None:
@@ -53,10 +53,10 @@ def write(
         ),
         figure(
             sensitivity_figures.curves,
-            closed,
+            found.slow,
             10.4,
             5.4,
-            "Figure 4. Wrong parameters in closed loop.",
+            f"Figure 4. Wrong parameters in closed loop, with a feedback of {SLOW_FEEDBACK:g} 1/s.",
             wide=True,
         ),
         figure(
@@ -70,7 +70,7 @@ def write(
         figure(pictures.beyond, s, 8, 3.4, "Beyond the paper: weights above 20 g. Dashed: 1 mm.", wide=True),
         figure(
             sensitivity_figures.bars,
-            opened,
+            found.opened,
             10.4,
             8,
             "Wrong parameters in open loop (Section V.A).",

@@ -25,11 +25,11 @@ def paper_robot() -> Robot:
 
 
 def random_design(random: np.random.Generator) -> Robot:
-    """Lengths and diameters of Table II, other curvatures, curved lengths and stiffnesses."""
+    """Table II with other stiffnesses, and with curvatures and curved lengths up to its largest."""
     robot = paper_robot().model_copy(deep=True)
     for tube in robot.tubes:
-        tube.curvature_per_m = random.uniform(2, 12)
-        tube.curved_length_mm = random.uniform(20, 80)
+        tube.curvature_per_m = random.uniform(0, 10)
+        tube.curved_length_mm = random.uniform(10, 50)
         tube.youngs_modulus_GPa *= random.uniform(0.7, 1.3)
     return robot
 

@@ -25,7 +25,7 @@ def bars(figure: Figure, study: OpenLoop) -> None:
     axes.plot([max(one.maximum, 1e-4) for one in order], place, "|", color="#1c2733", ms=8, label="largest")
     axes.set_yticks(place, [one.name for one in order])
     axes.set(xscale="log", xlabel="tip error, mm")
-    axes.legend(loc="lower right", fontsize=9)
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 2 / len(order)), fontsize=9)  # above the last bar
 
 
 def curves(figure: Figure, study: ClosedLoop) -> None:

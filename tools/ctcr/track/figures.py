@@ -50,7 +50,7 @@ def actuators(figure: Figure, subject: tuple[Run, Robot, Scenario]) -> None:
         left.plot(run.time[held], beta[held], ".", color=ERROR, ms=2)
     left.set(xlabel="time, s", ylabel="beta, mm")
     right.set(xlabel="time, s", ylabel="alpha, deg")
-    left.set_title("-- base of the next tube, ·· its tip", fontweight="normal", fontsize=9)
+    left.set_title("limits: dashed, base of the next tube; dotted, its tip", fontweight="normal", fontsize=9)
     right.legend(fontsize=9)
 
 

@@ -1,0 +1,103 @@
+"""How near any posture within the limits brings the tip to a point: what no controller can beat."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, minimize
+
+from ctcr.model import Model
+from ctcr.robot import Robot
+from ctcr.track.scenario import Limits, Scenario
+
+Array = NDArray[np.float64]
+
+REACHED = 1e-6  # [m]
+
+
+def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int = 20, seed: int = 1) -> float:
+    """The largest distance [m] of a corner of the path from the nearest tip that any posture within the limits has.
+
+    `starts` random postures are moved towards each corner by sequential quadratic programming with the Jacobian,
+    under the weight; a corner that one of them reaches counts 0.
+    """
+    model, force = Model(robot), scenario.force(mass_g)[None]
+    room = Room.of(robot, scenario.limits)
+    corners = np.unique(scenario.trajectory.points, axis=0)
+    return max(
+        _nearest(model, force, room, corner, starts, np.random.default_rng(seed)) for corner in corners
+    )
+
+
+@dataclass(frozen=True)
+class Room:
+    """The positions that limits allow [m]: intervals of beta_i - beta_i+1 (of the last tube: beta) and of beta_i."""
+
+    gap_low: Array
+    gap_high: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, robot: Robot, limits: Limits) -> "Room":
+        n, lengths = robot.n_tubes, np.array([tube.length for tube in robot.tubes])
+        return cls(
+            1e-3 * limits.tip_gap_mm - (lengths - np.append(lengths[1:], 0)),
+            np.full(n, -1e-3 * limits.base_gap_mm),
+            np.full(n, -np.inf) if limits.beta_low_mm is None else 1e-3 * np.array(limits.beta_low_mm),
+            np.full(n, np.inf) if limits.beta_high_mm is None else 1e-3 * np.array(limits.beta_high_mm),
+        )
+
+    @property
+    def _gaps(self) -> Array:
+        """(N, 2N) takes (beta, alpha) to beta_i - beta_i+1."""
+        n = len(self.low)
+        return np.hstack([np.eye(n) - np.eye(n, k=1), np.zeros((n, n))])
+
+    @property
+    def constraint(self) -> LinearConstraint:
+        return LinearConstraint(self._gaps, self.gap_low, self.gap_high)
+
+    @property
+    def bounds(self) -> Bounds:
+        free = np.full(len(self.low), np.inf)
+        return Bounds(np.append(self.low, -free), np.append(self.high, free))
+
+    def drawn(self, random: np.random.Generator) -> Array:
+        """Positions anywhere in it (N,), outermost tube first."""
+        beta, after = np.empty(len(self.low)), 0.0
+        for i in reversed(range(len(beta))):
+            low, high = max(self.gap_low[i] + after, self.low[i]), min(self.gap_high[i] + after, self.high[i])
+            beta[i] = after = random.uniform(low, max(low, high))
+        return beta
+
+    def holds(self, x: Array) -> bool:
+        """Whether (beta, alpha) lies within it, but for rounding."""
+        gaps, beta, slack = self._gaps @ x, x[: len(self.low)], 1e-6
+        return bool(
+            ((gaps > self.gap_low - slack) & (gaps < self.gap_high + slack)).all()
+            and ((beta > self.low - slack) & (beta < self.high + slack)).all()
+        )
+
+
+def _nearest(
+    model: Model, force: Array, room: Room, target: Array, starts: int, random: np.random.Generator
+) -> float:
+    n, best = len(room.low), np.inf
+
+    def squared_mm(x: Array) -> tuple[float, Array]:
+        tips = model.predict(x[None, :n], x[None, n:], force, derivatives=True)
+        if not tips.solved[0]:
+            return 1e6, np.zeros(2 * n)
+        away = 1e3 * (tips.position[0] - target)
+        return float(away @ away), 2e3 * tips.jacobian[0, :3].T @ away
+
+    for _ in range(starts):
+        start = np.append(room.drawn(random), random.uniform(-np.pi, np.pi, n))
+        found = minimize(squared_mm, start, jac=True, method="SLSQP", bounds=room.bounds, constraints=room.constraint,
+                         options={"maxiter": 200, "ftol": 1e-9})  # fmt: skip
+        if room.holds(found.x):
+            best = min(best, 1e-3 * np.sqrt(found.fun))
+        if best < REACHED:
+            return 0.0
+    return best
