@@ -45,9 +45,8 @@ def actuators(figure: Figure, subject: tuple[Run, Robot, Scenario]) -> None:
         high, low = outer - limits.base_gap_mm, outer_tip + limits.tip_gap_mm - lengths[i]
         left.plot(run.time, high, color=AXES[i % 3], lw=0.8, ls="--")
         left.plot(run.time, low, color=AXES[i % 3], lw=0.8, ls=":")
-    held = run.at_limit
-    if held.any():
-        left.plot(run.time[held], beta[held], ".", color=ERROR, ms=2)
+        held = (run.held[:, :3] >> i & 1).any(axis=1)
+        left.plot(run.time[held], beta[held, i], ".", color=ERROR, ms=2)
     left.set(xlabel="time, s", ylabel="beta, mm")
     right.set(xlabel="time, s", ylabel="alpha, deg")
     left.set_title("limits: dashed, base of the next tube; dotted, its tip", fontweight="normal", fontsize=9)
@@ -60,7 +59,8 @@ def tasks(figure: Figure, subject: tuple[Run, Scenario]) -> None:
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1.2))
     top.plot(run.time, 1e3 * run.error, color=FAINT, lw=1, label="near the obstacle")
     top.plot(run.time, np.where(run.far, 1e3 * run.error, np.nan), color=ERROR, lw=1, label="counted")
-    top.set(ylabel="error, mm")
+    most = 1e3 * run.counted.max(initial=0)
+    top.set(ylabel="error, mm", ylim=(0, 1.15 * most) if most > 0 else None)
     top.legend(fontsize=9)
     weights = [getattr(scenario.tasks, name.replace(" ", "_")) for name in TASKS]
     rows = [k for k in range(len(TASKS)) if any(weights[k])]

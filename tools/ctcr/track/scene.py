@@ -9,7 +9,7 @@ from ctcr.track.runs import Run
 from ctcr.track.scenario import Scenario
 
 MOST_POINTS = 3000
-COLOURS = (MEASURED, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733")
+COLOURS = (MEASURED, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
 
 
 def scene(runs: list[Run], scenario: Scenario) -> str:
