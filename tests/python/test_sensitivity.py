@@ -186,6 +186,10 @@ def test_advice():
     assert grouped(advice.calibrate + ["length, tube 3", "tracker position x"]) == (
         "length of tubes 1 and 3, tracker position x"
     )
+    assert (
+        grouped(["E, tube 2", "E, tube 3", "E, tube 1", "nu, tube 1"])
+        == "E of tubes 1, 2 and 3, nu of tube 1"
+    )
 
 
 def test_command(tmp_path):

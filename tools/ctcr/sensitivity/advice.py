@@ -44,12 +44,14 @@ def advise(
 
 
 def grouped(names: Iterable[str]) -> str:
-    """Names with those of several tubes as one: "length of tubes 1, 3, tracker position x"."""
+    """Names with those of several tubes as one: "length of tubes 1 and 3, tracker position x"."""
     tubes: dict[str, list[str]] = {}
     for name in names:
         kind, _, tube = name.partition(", tube ")
         tubes.setdefault(kind, []).append(tube)
-    return ", ".join(
-        kind + (f" of tube{'s' if len(found) > 1 else ''} {' and '.join(sorted(found))}" if found[0] else "")
-        for kind, found in tubes.items()
-    )
+
+    def of(found: list[str]) -> str:
+        *first, last = sorted(found)
+        return f" of tubes {', '.join(first)} and {last}" if first else f" of tube {last}"
+
+    return ", ".join(kind + (of(found) if found[0] else "") for kind, found in tubes.items())
