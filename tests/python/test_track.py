@@ -164,12 +164,16 @@ def test_all_faults_at_once_with_their_lines():
 
 
 def test_limits_that_exclude_the_start_are_named(robot):
-    with pytest.raises(InputError, match="base of tube 2 against that of tube 3: 75.5 mm, but .* 76 mm"):
+    told = r"S2.yaml, line \d+, start.beta_mm: .*base of tube 2 against that of tube 3: 75.5 mm, but .* 76 mm"
+    with pytest.raises(InputError, match=told):
         run_all(load("S2", limits={"base_gap_mm": 76.0}), robot, robot)
 
 
 def test_a_start_out_of_reach_is_named(robot):
-    with pytest.raises(InputError, match="start of the path is not reached, the tip stays .* mm away"):
+    with pytest.raises(
+        InputError,
+        match=r"S2.yaml, line \d+, trajectory: the start of the path is not reached, the tip stays .* mm away",
+    ):
         run_all(load("S2", trajectory={"corner_mm": [-18.0, 9.0, 600.0]}), robot, robot)
 
 

@@ -182,8 +182,8 @@ def run_all(
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         runs = list(pool.map(work, jobs))
     if not any(run.started for run in runs):
-        text = f"{runs[0].verdict()}: move trajectory or start, or settle longer"
-        raise InputError(Problem(text, field="trajectory"))
+        text = f"{runs[0].verdict().removeprefix('failed: ')}: move trajectory or start, or settle longer"
+        raise InputError(scenario.problem(text, "trajectory"))
     return runs
 
 
@@ -195,7 +195,7 @@ def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:
             text = (
                 f"the {kind} has {one.n_tubes} tubes, the scenario starts with {len(scenario.start.beta_mm)}"
             )
-            problems.append(Problem(text, field="start.beta_mm"))
+            problems.append(scenario.problem(text, "start", "beta_mm"))
         if one.tracker.sensor_on_tube != 1:
             text = f"the sensor of the {kind} is on tube {one.tracker.sensor_on_tube}: control needs it on tube 1"
             problems.append(Problem(text, field="tracker.sensor_on_tube"))
@@ -217,10 +217,10 @@ def _excluded(scenario: Scenario, robot: Robot) -> list[Problem]:
             text = (
                 f"{_limit(kind, tube, n)}: {gaps[tube]:g} mm, but limits.{name}_gap_mm asks for {least:g} mm"
             )
-            found.append(Problem(f"the limits exclude the start: {text}", field="start.beta_mm"))
+            found.append(scenario.problem(f"the limits exclude the start: {text}", "start", "beta_mm"))
     for low, high in ((scenario.limits.beta_low_mm, scenario.limits.beta_high_mm),):
         for tube in range(n):
             if (low and beta[tube] < low[tube]) or (high and beta[tube] > high[tube]):
                 text = f"the limits exclude the start: travel of tube {tube + 1} does not reach {beta[tube]:g} mm"
-                found.append(Problem(text, field="start.beta_mm"))
+                found.append(scenario.problem(text, "start", "beta_mm"))
     return found

@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Len
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError
 
 from ctcr import yaml_document
 from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
@@ -129,6 +129,12 @@ class Scenario(Section):
     noise_mm: Annotated[float, Quantity("mm", usual=(1e-4, 5), least=0)] = 0.035
     noise_deg: Annotated[float, Quantity("deg", usual=(1e-4, 5), least=0)] = 0.0
     repetitions: Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")] = 10
+    _source: tuple[str, yaml_document.YamlDocument] | None = PrivateAttr(None)
+
+    def problem(self, text: str, *path: str) -> Problem:
+        """A fault of a field, with file and line where it comes from a file."""
+        file, line = (self._source[0], self._source[1].line(path)) if self._source else (None, None)
+        return Problem(text, file, line, path_text(path))
 
     def force(self, mass_g: float) -> Array:
         """Pull of a weight (3,) [N], base frame."""
@@ -179,6 +185,7 @@ def parse(text: str, file: str, n_tubes: int) -> Scenario:
     if scenario is None or faults:
         found = [Problem(text, file, document.line(path), path_text(path)) for path, text in faults]
         raise InputError(sorted(found, key=lambda problem: problem.line or 0))
+    scenario._source = (file, document)
     return scenario
 
 
