@@ -118,6 +118,7 @@ TYPED_TEST(WarmStart, StepTakesOneEvaluationAndItsResidualTellsItsError) {
     EXPECT_EQ(s.iterations, 1);
     const Vec6 error = test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
     EXPECT_LT(error.norm(), 10 * s.residual * s.residual + 1e-9);
+    EXPECT_TRUE(s.tube_tips[0].position == s.position && s.tube_tips[0].rotation == s.rotation);
   }
 }
 

@@ -295,6 +295,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   }
   if constexpr (Ev::Col::jacobian)
     for (int k = 0; k < 3; ++k) out.position[k] += ev.pose(k, Ev::Col::newton);
+  out.tube_tips[0] = {out.rotation, out.position};
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
@@ -349,7 +350,7 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 /// One evaluation from the warm start predicted to the new joints: the control step. Falls back to solve() when there is
 /// no warm start, the joints moved too far (||b|| > 0.05 rad) or the robot is about to snap (Newton step > 0.1 rad).
 /// out.residual is that before the final correction, whose square bounds the error. Ask for the Jacobian to have the
-/// prediction and the corrected pose.
+/// prediction and the corrected pose; tips of the outer tubes are those before the correction.
 /// Real time: yes, one evaluation.
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
