@@ -6,6 +6,8 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
 
@@ -29,6 +31,17 @@ def running(*command):
         process.terminate()
         process.wait(10)
         process.stdout.close()
+
+
+def skip_without_bench():
+    from ctcr.simulators import network
+
+    if not network.is_permitted():
+        pytest.skip(
+            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
+        )
+    for package in ("pysoem", "serial"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
 
 
 def mended_bench() -> Path:

@@ -9,14 +9,13 @@ from pathlib import Path
 
 import pytest
 from ctcr.devices.process_image import ProcessImage, signed
-from ctcr.simulators import network
 from ctcr.simulators.object_dictionary import Entry, ObjectDictionary, ServiceDataServer
 from ctcr.simulators.segment import Segment
 from ctcr.simulators.slave_controller import SlaveController
 from ctcr.simulators.stepper_terminal import Coupler, StepperTerminal
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROBOT, ROOT, ctcr  # noqa: E402
+from simulated_bench import ROBOT, ROOT, ctcr, skip_without_bench  # noqa: E402
 
 ON_BENCH = [Path(__file__).parent / name for name in ("on_bench_masters.py", "on_bench.py")]
 
@@ -213,15 +212,6 @@ def test_too_much_current_burns_the_motor():
 
 
 # ---- on a bench
-
-
-def skip_without_bench():
-    if not network.is_permitted():
-        pytest.skip(
-            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
-        )
-    for package in ("pysoem", "serial"):
-        pytest.importorskip(package, reason=f"{package} is not installed")
 
 
 def on_bench(tmp_path, *options):

@@ -49,12 +49,15 @@ def command(
     Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
     first with `ctcr move --home`.
     """
+    from dataclasses import asdict
+
     import numpy as np
 
     from ctcr import measurements, output, robot_file, user_effects
     from ctcr.devices import bench_file, person
     from ctcr.devices.motors import Motors
     from ctcr.devices.private_folder import private_folder
+    from ctcr.devices.sight import Sight
     from ctcr.devices.tracker import Tracker
     from ctcr.record.display import Display
     from ctcr.record.folder import TABLE, Folder
@@ -66,10 +69,14 @@ def command(
     table = measurements.load(plan, loaded.n_tubes)
     way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
-    options = Options(dwell, readings, speed, patience)
+    options = Options(dwell, readings, speed)
     console = output.console(json_target)
     recording = Folder(
-        target, {"robot": robot, "plan": plan, "bench": bench_path}, options, way, loaded.n_tubes
+        target,
+        {"robot": robot, "plan": plan, "bench": bench_path},
+        asdict(options) | {"approach": asdict(way)},
+        loaded.n_tubes,
+        group=readings + way.has_way_point,
     )
     with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
@@ -79,8 +86,9 @@ def command(
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)
         with Display() as display:
             who = _Paused(person.person_of(bench, place), display)
+            sight = Sight(tracker, patience)
             session = Session(
-                loaded, motors, tracker, who, recording.rows, options, recording.clock, display.show
+                loaded, motors, sight, who, recording.rows, options, recording.clock, display.show
             )
             ended = "interrupted"
             try:
@@ -90,7 +98,7 @@ def command(
                 ended = str(error)
                 raise
             finally:
-                recording.note(motors, tracker, session.lateness, ended)
+                recording.note(motors, tracker, sight.lateness, ended)
     path = recording.path / TABLE
     console.print(
         f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",
