@@ -1,6 +1,7 @@
 """Tests on the simulated bench, of control and calibration: test_live.py runs them in `ctcr sim bench`."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -9,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from ctcr import measurements, robot_file
+from ctcr.cli import cli
 from ctcr.devices import bench_file, emergency_stop
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.motors import Motors
@@ -17,10 +20,12 @@ from ctcr.simulators.control import request
 from ctcr.track.live import track
 from ctcr.track.runs import run_all
 from ctcr.track.summary import errors_mm
+from ruamel.yaml import YAML
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROBOT, ROOT, ctcr, mended_bench  # noqa: E402
+from simulated_bench import HOMES, ROOT, T_REF, ctcr, mended_bench  # noqa: E402
 
+ROBOT = Path(os.environ["ROBOT_FILE"])
 BENCH = ROOT / "examples" / "data" / "bench" / "bench.yaml"
 SCENARIO = (BENCH.parent / "track.yaml").read_text()
 
@@ -41,7 +46,7 @@ def scenario(path, **changes):
     text = SCENARIO.replace("[6, -52, 147], [3, -47, 147], [0, -52, 147]]", "[4, -52, 147]]")
     for old, new in changes.items():
         text = text.replace(old.replace("__", ": "), new)
-    path.write_text(text.replace("settle_s: 3", "settle_s: 2"))
+    path.write_text(text.replace("settle_s: 3", "settle_s: 1"))
     return str(path)
 
 
@@ -158,3 +163,80 @@ def test_a_tip_that_strays_stops_the_run(tmp_path, folder):
     with pytest.raises(DeviceFault, match="its tip is .* mm from where it should be: compare transmission"):
         track(tmp_path / "out", str(wrong), scenario(tmp_path / "s.yaml"), str(BENCH), most_error_mm=5.0)
     assert at_rest(folder)
+
+
+# ---- calibration
+
+
+def calibrate(*arguments):
+    command = ["calibrate", *arguments, "--live", "--bench", quick_bench(arguments[1].parent), "--json", "-"]
+    done = CliRunner().invoke(cli, [str(word) for word in command])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def quick_bench(folder):
+    text = BENCH.read_text().replace("  current_mA", "  speed_mm_s: 90\n  speed_deg_s: 600\n  current_mA")
+    path = folder / "bench.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_registration(tmp_path, folder):
+    new = tmp_path / "new.yaml"
+    found = calibrate(
+        "registration", tmp_path / "points.csv", "--cad", BENCH.parent / "cad.csv", "--robot", ROBOT, "-o", new,
+        "--readings", 8,
+    )  # fmt: skip
+    truth = [*T_REF[0], *T_REF[1]]
+    rows = found["values"][:6]
+    for row, true in zip(rows, truth, strict=True):
+        assert abs(row["value"] - true) < 2 * row["sd"] < 1.0
+    assert (tmp_path / "points.csv").read_text().count("\n") == 7
+    again = calibrate(
+        "registration", tmp_path / "points.csv", "--cad", BENCH.parent / "cad.csv", "--robot", ROBOT
+    )
+    assert again["values"] == found["values"]  # nothing is measured anew
+
+
+def real_frame(path):
+    """The robot file with the tracker frame that it really has."""
+    document = YAML().load(ROBOT)
+    document["tracker"]["position_mm"], document["tracker"]["rotation_vector_rad"] = T_REF
+    YAML().dump(document, path)
+    return path
+
+
+def check_offsets(found, folder):
+    rows = [row for row in found["values"] if "rotation offset" in row["name"]]
+    print(
+        "rotation offsets", *(f"{row['value']:.2f} +- {row['sd']:.2f}" for row in rows), "deg, truth", HOMES
+    )
+    for row, true in zip(rows, HOMES, strict=True):
+        assert abs(row["value"] - true) < 2 * row["sd"] < 1.0
+    deployed = request(folder, "aurora", {})["deployed"]
+    np.testing.assert_allclose(deployed, [0.05, 0, 0], atol=2e-4)
+
+
+@pytest.mark.slow
+def test_rotation_offsets(tmp_path, folder):
+    table, robot = tmp_path / "circles.csv", real_frame(tmp_path / "robot.yaml")
+    found = calibrate("rotation-offset", table, "--robot", robot, "--step-deg", 90, "--readings", 4)
+    check_offsets(found, folder)
+    assert table.read_text().count("\n") == 1 + 3 * 2 * 5
+
+
+@pytest.mark.slow
+def test_interrupted_rotation_offsets(tmp_path, folder):
+    """Killed with the second tube out alone, the same command goes on behind the last row."""
+    table, robot = tmp_path / "circles.csv", real_frame(tmp_path / "robot.yaml")
+    arguments = ["rotation-offset", table, "--robot", robot, "--readings", 4]
+    command = ctcr("calibrate", *arguments, "--live", "--bench", quick_bench(tmp_path))
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wait_for_rows(process, table, 50)
+    process.kill()
+    process.wait()
+    kept = table.read_bytes()
+    time.sleep(1.0)
+    check_offsets(calibrate(*arguments), folder)
+    assert table.read_bytes().startswith(kept) and table.read_text().count("\n") == 1 + 3 * 2 * 19

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
+T_REF = [-59.6, 20.3, -180.5], [0.004, 1.203, 0.297]  # [mm], [rad]
 ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
 
 
