@@ -43,6 +43,8 @@ def command(
     from ctcr.track.summary import COLUMNS, rows, summary
 
     loaded, console = robot_file.load(robot), output.console(json_target)
+    if not live and (bench_path or target):
+        raise click.UsageError("--bench and -o go with --live")
     if live:
         if plant or not bench_path or not target:
             raise click.UsageError("--live needs --bench and -o, and has no --plant")

@@ -38,6 +38,7 @@ class BenchRobot:
     run: int
     force: Array  # (3,) [N] that hangs at the tip
     most_error: float  # [m] between tip and reference
+    advance: Callable[[float], None]  # is told each period as a share of the run
 
     def measure(self) -> tuple[Array, Array, Array]:
         frame = self.sight.seen()
@@ -55,6 +56,7 @@ class BenchRobot:
 
     def record(self, so_far, row: int) -> None:
         self.control.append([control_row(self._t, self.run, so_far, row)])
+        self.advance(1 / len(so_far.time))
         error = float(np.linalg.norm(so_far.tip[row] - so_far.wanted[row]))
         if error > self.most_error:
             remedy = "compare transmission, homes and tracker frame of the robot file with the bench"

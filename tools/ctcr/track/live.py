@@ -14,6 +14,7 @@ from ctcr.devices.private_folder import private_folder
 from ctcr.devices.sight import Sight
 from ctcr.devices.tracker import Tracker
 from ctcr.errors import InputError, Problem
+from ctcr.output import Progress
 from ctcr.record.folder import Folder
 from ctcr.record.row_file import RowFile
 from ctcr.robot import Robot
@@ -139,13 +140,14 @@ class _Tracking:
         entry = {"run": len(entries) + 1, "mass_g": mass, "repetition": repetition, "ended": "interrupted"}
         entries.append(entry)
         self._folder.save()  # rows of a run that is cut off keep their number
-        device = BenchRobot(
-            self._robot, motors, self.sight, self._folder.clock, self._folder.rows, self._control, entry["run"],
-            self._scenario.force(mass), self._most_error,
-        )  # fmt: skip
         values = system_values(self._robot)
         self.sight.forget()
-        run = run_once(self._scenario, values, device, mass, repetition)
+        with Progress(f"{mass:g} g, run {repetition}", 1.0) as progress:
+            device = BenchRobot(
+                self._robot, motors, self.sight, self._folder.clock, self._folder.rows, self._control, entry["run"],
+                self._scenario.force(mass), self._most_error, progress.advance,
+            )  # fmt: skip
+            run = run_once(self._scenario, values, device, mass, repetition)
         motors.halt()
         motors.wait()
         entry |= {"ended": "finished", "status": run.status, "settled_m": run.settled}
