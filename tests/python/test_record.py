@@ -16,6 +16,7 @@ from ctcr.devices.person import PersonPresent
 from ctcr.errors import InputError
 from ctcr.measurements import column_names
 from ctcr.record.display import picture
+from ctcr.record.live_page import LivePage
 from ctcr.record.plan import Approach, steps_of
 from ctcr.record.row_file import RowFile
 from ctcr.record.session import Progress
@@ -155,6 +156,26 @@ def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
     said = capfd.readouterr().err
     assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
     assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
+
+
+def test_live_page(tmp_path, monkeypatch):
+    """It shows the newest state, loads itself anew while the recording goes on, and rests in the end."""
+    target, now = tmp_path / "page.html", [0.0]
+    monkeypatch.setattr("ctcr.record.live_page.time.monotonic", lambda: now[0])
+    progress = Progress(10, done=2, doing="row 4: moving", errors_mm=[3.0, 4.0])
+    with LivePage(target, "A <robot>") as live:
+        live.show(progress)
+        first = target.read_text()
+        progress.errors_mm += [float("nan"), 5.0]
+        live.show(progress)
+        assert target.read_text() == first  # not before its time
+        now[0] += 2.0
+        live.show(progress)
+        second = target.read_text()
+    assert 'http-equiv="refresh" content="2"' in first and first.count("<circle") == 2
+    assert "A &lt;robot&gt;" in first and "row 4: moving" in first and "3.54 mm" in first
+    assert second.count("<circle") == 3 and "5.00 mm" in second
+    assert "refresh" not in target.read_text() and target.read_text().count("<circle") == 3
 
 
 def test_live_picture():

@@ -37,11 +37,14 @@ import click
 @click.option(
     "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
 )
+@click.option(
+    "--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew."
+)
 @click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
 @click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
 def command(
     robot, plan, target, bench_path, dwell, readings, speed, approach, approach_mm, approach_deg, patience, own,
-    folder, json_target,
+    page, folder, json_target,
 ) -> None:  # fmt: skip
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
@@ -49,6 +52,7 @@ def command(
     Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
     first with `ctcr move --home`.
     """
+    from contextlib import nullcontext
     from dataclasses import asdict
 
     import numpy as np
@@ -61,6 +65,7 @@ def command(
     from ctcr.devices.tracker import Tracker
     from ctcr.record.display import Display
     from ctcr.record.folder import TABLE, Folder
+    from ctcr.record.live_page import LivePage
     from ctcr.record.plan import Approach, steps_of
     from ctcr.record.session import Options, Session
 
@@ -84,12 +89,19 @@ def command(
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)
-        with Display() as display:
+        with (
+            Display() as display,
+            LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live,
+        ):
+
+            def shown(progress):
+                display.show(progress)
+                if live:
+                    live.show(progress)
+
             who = _Paused(person.person_of(bench, place), display)
             sight = Sight(tracker, patience)
-            session = Session(
-                loaded, motors, sight, who, recording.rows, options, recording.clock, display.show
-            )
+            session = Session(loaded, motors, sight, who, recording.rows, options, recording.clock, shown)
             ended = "interrupted"
             try:
                 done = session.run(steps)
