@@ -15,7 +15,7 @@ class RowFile:
     def __init__(self, path: Path, columns: Sequence[str], group: int = 1, synced: bool = True):
         """Goes on behind the last whole group of a file that is there; `group` rows make one. Raises InputError.
 
-        Not `synced`, a group outlives this process when `append` returns, and a power cut when `close` does: for
+        Not `synced`, a group outlives this process when `append` returns, and a power cut when `sync` does: for
         loops that cannot wait for a disk.
         """
         self.path, self._synced = path, synced
@@ -55,8 +55,12 @@ class RowFile:
         self._end += len(data)
         self.groups += 1
 
-    def close(self) -> None:
+    def sync(self) -> None:
+        """What was appended is on the disk when it returns."""
         os.fsync(self._file)
+
+    def close(self) -> None:
+        self.sync()
         os.close(self._file)
 
 

@@ -150,6 +150,8 @@ class _Tracking:
             run = run_once(self._scenario, values, device, mass, repetition)
         motors.halt()
         motors.wait()
+        for rows in (self._folder.rows, self._control):
+            rows.sync()
         entry |= {"ended": "finished", "status": run.status, "settled_m": run.settled}
         self._folder.save()
         return run

@@ -19,10 +19,18 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def control_row(t: float, run: int, result, row: int) -> list[float]:
+def control_row(t: float, run: int, result, row: int) -> list[float | str]:
     """A row of COLUMNS: row `row` of a LoopResult, whose reading came at `t` [s]."""
-    columns = (result.wanted, result.shortfall, result.held, result.force)
-    return [t, run, result.time[row], *(v for column in columns for v in column[row]), result.stability[row]]
+    wanted = map(repr, result.wanted[row].tolist())  # exact: whether a row counts must not hang on rounding
+    columns = (result.shortfall, result.held, result.force)
+    return [
+        t,
+        run,
+        result.time[row],
+        *wanted,
+        *(v for column in columns for v in column[row]),
+        result.stability[row],
+    ]
 
 
 def finished(folder: Folder) -> list[dict]:
