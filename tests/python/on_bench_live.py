@@ -156,6 +156,21 @@ def test_a_third_of_the_frames_may_be_missing(tmp_path, folder):
 
 
 @pytest.mark.slow
+def test_a_limit_of_rotation_stops_the_run(tmp_path, folder):
+    """The controller knows no limits of rotation, the bench does."""
+    bench = tmp_path / "bench.yaml"
+    bench.write_text(BENCH.read_text().replace("[-400, 400]]", "[-3, 3]]"))
+    with Motors(bench_file.load(BENCH), robot_file.load(ROBOT), folder) as motors:
+        motors.connect()
+        motors.move(motors.settings.home)
+        motors.wait()
+    with pytest.raises(DeviceFault, match="a limit of the bench file ended the motion"):
+        track(tmp_path / "out", str(ROBOT), scenario(tmp_path / "s.yaml"), str(bench))
+    turned = np.array(request(folder, "ethercat", {})["turns"])[5] * 360
+    assert at_rest(folder) and 2 < abs(turned) < 3.2
+
+
+@pytest.mark.slow
 def test_a_tip_that_strays_stops_the_run(tmp_path, folder):
     """Motors that turn the other way than the file says."""
     wrong = tmp_path / "wrong.yaml"

@@ -56,11 +56,13 @@ class RowFile:
         self.groups += 1
 
     def sync(self) -> None:
-        """What was appended is on the disk when it returns."""
-        os.fsync(self._file)
+        """What was appended is on the disk when it returns. Raises InputError."""
+        try:
+            os.fsync(self._file)
+        except OSError as error:
+            raise file_fault(error, self.path, "write") from None
 
     def close(self) -> None:
-        self.sync()
         os.close(self._file)
 
 

@@ -1,6 +1,7 @@
 """A scenario on the bench: every weight and repetition, recorded as it happens; what was interrupted goes on."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -58,16 +59,15 @@ def track(
         tracker.connect()
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
         tracking = _Tracking(loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm)
-        ended = "interrupted"
         try:
             tracking.run(person_of(devices, place), said)
-            ended = "finished"
-        except Exception as error:
-            ended = str(error)
+        except BaseException as error:
+            with suppress(InputError):  # a full disk must not hide what ended it
+                folder.note(motors, tracker, tracking.sight.lateness, str(error) or "interrupted")
             raise
         finally:
             tracking.close()
-            folder.note(motors, tracker, tracking.sight.lateness, ended)
+        folder.note(motors, tracker, tracking.sight.lateness, "finished")
     return runs_of(folder, wanted, loaded), wanted
 
 
