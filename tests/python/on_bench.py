@@ -19,6 +19,7 @@ from ctcr.devices.health import health_of
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import SimulatedPerson
 from ctcr.devices.private_folder import private_folder
+from ctcr.devices.transmission import joints_of_turns
 from ctcr.simulators import ethercat
 from ctcr.simulators.control import request
 from ctcr.simulators.network import MASTER
@@ -277,6 +278,15 @@ def test_forty_bring_ups(bench, folder):
 KILLS = 1  # here; row files are killed a hundred times in test_record.py
 
 
+@pytest.fixture
+def at_known_joints(robot, bench, folder):
+    """A fault before may have cost the power, and so the joints."""
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        if not motors.state["homed"]:
+            motors.set_joints(joints_of_turns(robot, request(folder, "ethercat", {})["turns"][:6]))
+
+
 def plan(path, rows, force=0.0):
     """`rows` places around home; the second half under a weight."""
     robot = robot_file.load(ROBOT)
@@ -301,6 +311,7 @@ def record(plan, target, *options):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("at_known_joints")
 def test_record(tmp_path, folder, robot):
     """Poses are those of the model at the joints of the encoders, under the weight that was hung."""
     path, target = plan(tmp_path / "plan.csv", 4, force=0.1), tmp_path / "out"
@@ -332,6 +343,7 @@ def wait_for_rows(process, table, rows):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("at_known_joints")
 def test_killed_recorder(tmp_path, folder):
     """Killed at a random moment the recorder loses nothing, the motors stop, and the same command goes on."""
     path, target = plan(tmp_path / "plan.csv", 8), tmp_path / "out"
@@ -360,6 +372,7 @@ def test_killed_recorder(tmp_path, folder):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("at_known_joints")
 def test_recording_survives_the_tracker(tmp_path, folder):
     """Unplugged and back, a third of the frames missing, garbage: rows wait, and all are measured."""
     path, target = plan(tmp_path / "plan.csv", 6), tmp_path / "out"
