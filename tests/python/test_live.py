@@ -4,6 +4,7 @@ import io
 import os
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,14 +13,16 @@ import numpy as np
 import pytest
 from ctcr import robot_file
 from ctcr.calibrate import tables
-from ctcr.calibrate.live import Circles, Desk, rotation_table
+from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table
 from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
 from ctcr.calibrate.still_reading import still_reading
+from ctcr.calibrate.tables import Column
 from ctcr.devices import bench_file
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.person import PersonPresent
 from ctcr.errors import InputError
 from ctcr.one_tube import one_tube
+from ctcr.record.row_file import RowFile
 from ctcr.track import scenario as scenario_file
 from ctcr.track.live import within
 from ctcr.track.runs import run_once, system_values
@@ -169,6 +172,24 @@ def test_a_person_is_told_what_to_fasten_and_to_touch(monkeypatch, capfd):
     said = capfd.readouterr().err
     assert "Fasten the sensor to the tip of tube 2" in said and "Take the sensor off the tube" in said
     assert "Touch point B (CAD 60, -40, -20 mm) with the tip of the probe" in said
+
+
+def test_a_table_of_other_angles_is_not_gone_on_with(robot, bench, tmp_path):
+    table = tmp_path / "circles.csv"
+    table.write_text(",".join(ROTATION_COLUMNS) + "\n1,180,1,0,0,0,0.03,8\n1,90,1,0,0,0,0.03,8\n")
+    with pytest.raises(InputError, match="row 3: holds rows at other angles"):
+        rotation_table(table, robot, Desk(bench, tmp_path, None, print), Circles(np.deg2rad(60), 8))
+
+
+def test_names_of_points_may_hold_commas(tmp_path):
+    path = tmp_path / "points.csv"
+    with closing(RowFile(path, ["point", "x_mm"])) as file:
+        file.append([["hole 3, left", 1.5]])
+        file.append([['"B"', float("nan")]])
+    read = tables.read(path, [Column("point", "text"), Column("x", "length", filled=False)])
+    assert read["point"] == ["hole 3, left", '"B"'] and read["x"][0] == 1.5e-3
+    with closing(RowFile(path, ["point", "x_mm"])) as again:
+        assert again.groups == 2 and again.last == ['"B"', ""]
 
 
 class Seen:

@@ -28,6 +28,7 @@ POSITION_COLUMNS = ("x_mm", "y_mm", "z_mm", "scatter_mm", "readings")
 ROTATION_COLUMNS = ("tube", "motor_angle_deg", "direction", *POSITION_COLUMNS)
 POINT_COLUMNS = ("point", "cad_x_mm", "cad_y_mm", "cad_z_mm", *POSITION_COLUMNS)
 FLUSH_M = 0.2e-3  # a tip that stands out no farther is flush
+OTHER_DEG = 3.0  # of a motor, between rows that are meant to be at one angle
 RUN_UP = np.deg2rad(10.0)  # a way comes to its first angle already turning
 
 
@@ -63,6 +64,7 @@ def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles)
     ):
         turner = _Turner(robot, motors, Sight(tracker, PATIENCE_S), desk.person, circles)
         turner.check()
+        turner.check_last(rows)
         done, angles = divmod(rows.groups, len(turner.jobs))
         if done < robot.n_tubes:
             motors.connect()
@@ -131,6 +133,27 @@ class _Turner:
         if problems:
             raise InputError(problems)
 
+    def check_last(self, rows: RowFile) -> None:
+        """Raises InputError where the rows that are there were made at other angles."""
+        if not rows.last:
+            return
+        tube, job = divmod(rows.groups - 1, len(self.jobs))
+        number, motor, sign = (float(field) for field in rows.last[:3])
+        if tube < self._robot.n_tubes:
+            angle, wanted = self.jobs[job]
+            if (
+                number == tube + 1
+                and sign == wanted
+                and abs(motor - self._motor_deg(tube, self._alone(tube, angle))) < OTHER_DEG
+            ):
+                return
+        text = "holds rows at other angles: choose another name, or the --step-deg and limits of those rows"
+        raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
+
+    def _motor_deg(self, tube: int, joints: Array) -> float:
+        """What the rotation motor of a tube has turned since home."""
+        return 360 * float(turns_of_joints(self._robot, joints)[self._robot.n_tubes + tube])
+
     def look(self) -> None:
         """Which tube has the sensor: the one that is out alone, or else its usual one."""
         tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
@@ -164,8 +187,8 @@ class _Turner:
             before = sign
             self._go(self._alone(tube, angle))
             reading = still_reading(self._sight, self._circles.frames, STILL_M)
-            turns = turns_of_joints(self._robot, self._motors.joints)[self._robot.n_tubes + tube]
-            rows.append([[str(tube + 1), 360 * turns, sign, *_fields(reading)]])
+            motor = self._motor_deg(tube, self._motors.joints)
+            rows.append([[str(tube + 1), motor, sign, *_fields(reading)]])
         self._go(self._alone(tube))
 
     def _go(self, joints: Array) -> None:

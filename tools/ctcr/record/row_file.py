@@ -1,5 +1,7 @@
 """A table while it is being made: what has been written stays, whatever happens next."""
 
+import csv
+import io
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -35,14 +37,17 @@ class RowFile:
                 os.pwrite(self._file, kept, 0)
             self.dropped = len(lines) - self.groups * group
             self._end = len(kept)
-            self.last = whole[self.groups * group - 1].decode().strip().split(",") if self.groups else None
+            last = [whole[self.groups * group - 1].decode()] if self.groups else []
+            self.last: list[str] | None = next(csv.reader(last), None)
             os.fsync(self._file)
         except OSError as error:
             raise file_fault(error, path, "write") from None
 
     def append(self, rows: list[Row]) -> None:
         """One group, in the order of the columns; NaN is an empty field. Raises InputError where the disk is full."""
-        data = "".join(",".join(map(_field, row)) + "\n" for row in rows).encode()
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([map(_field, row) for row in rows])
+        data = text.getvalue().encode()
         try:
             written = os.pwrite(self._file, data, self._end)
             if written < len(data):
