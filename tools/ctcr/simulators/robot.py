@@ -8,6 +8,7 @@ from ctcr.moving_model import MovingModel
 from ctcr.one_tube import one_tube
 from ctcr.robot import Robot
 from ctcr.simulation import ReadingNoise
+from ctcr.simulators.oracle import Oracle
 
 Array = NDArray[np.float64]
 
@@ -17,10 +18,13 @@ INSIDE_M = 2e-4  # a tip that stands out no farther than this is behind the plat
 class SimulatedRobot:
     """A robot with its effects, known or hidden. `force` is what hangs at its tip [N], base frame."""
 
-    def __init__(self, robot: Robot, noise: str = "jitter", seed: int = 1):
-        """`noise`: none, jitter or realistic, as in `ctcr.simulation`. Raises InputError where ratios are unknown."""
+    def __init__(self, robot: Robot, noise: str = "jitter", seed: int = 1, oracle: Oracle | None = None):
+        """`noise`: none, jitter or realistic, as in `ctcr.simulation`; `oracle` knows the physics instead of the model.
+
+        Raises InputError where ratios are unknown.
+        """
         self.robot, self.force = robot, np.zeros(3)
-        self._model = MovingModel(robot)
+        self._model = oracle or MovingModel(robot)
         self._noise = ReadingNoise(robot, noise, seed) if noise != "none" else None
         self.fasten(robot.tracker.sensor_on_tube - 1)
         self.turn(0.0, np.zeros(2 * robot.n_tubes))
