@@ -18,6 +18,18 @@ def ctcr(*arguments) -> list[str]:
     return [sys.executable, "-m", "ctcr", *map(str, arguments)]
 
 
+def skip_without_bench() -> None:
+    """Skips the test that asks, where no bench can be simulated."""
+    from ctcr.simulators import network
+
+    if not network.is_permitted():
+        pytest.skip(
+            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
+        )
+    for package in ("pysoem", "serial"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
+
+
 @contextmanager
 def running(*command):
     """A process that says on its standard output when it is ready; ended when the block ends."""
@@ -33,17 +45,6 @@ def running(*command):
         process.terminate()
         process.wait(10)
         process.stdout.close()
-
-
-def skip_without_bench():
-    from ctcr.simulators import network
-
-    if not network.is_permitted():
-        pytest.skip(
-            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
-        )
-    for package in ("pysoem", "serial"):
-        pytest.importorskip(package, reason=f"{package} is not installed")
 
 
 def mended_bench() -> Path:

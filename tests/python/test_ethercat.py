@@ -17,7 +17,7 @@ from ctcr.simulators.stepper_terminal import Coupler, StepperTerminal
 sys.path.insert(0, str(Path(__file__).parent))
 from simulated_bench import ROBOT, ROOT, ctcr, skip_without_bench  # noqa: E402
 
-ON_BENCH = [Path(__file__).parent / name for name in ("on_bench_masters.py", "on_bench.py")]
+ON_BENCH = [Path(__file__).parent / f"on_bench{name}.py" for name in ("_masters", "_doors", "", "_recording")]
 
 
 # ---- service data, with a client of its own

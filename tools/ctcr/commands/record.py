@@ -59,6 +59,7 @@ def command(
 
     from ctcr import measurements, output, robot_file, user_effects
     from ctcr.devices import bench_file, person
+    from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
     from ctcr.devices.motors import Motors
     from ctcr.devices.private_folder import private_folder
     from ctcr.devices.sight import Sight
@@ -86,6 +87,7 @@ def command(
     with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
+        wish_real_time(CONTROL_PRIORITY)
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)

@@ -9,6 +9,7 @@ import numpy as np
 from ctcr import robot_file
 from ctcr.devices import bench_file
 from ctcr.devices.bench_file import Bench
+from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import Person, person_of
 from ctcr.devices.private_folder import private_folder
@@ -57,6 +58,7 @@ def track(
     with Tracker(devices, place) as tracker, Motors(devices, loaded, place) as motors:
         motors.connect()
         tracker.connect()
+        wish_real_time(CONTROL_PRIORITY)
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
         tracking = _Tracking(loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm)
         try:
@@ -132,6 +134,8 @@ class _Tracking:
                 run = self._one(mass, repetition)
                 error = f", mean error {1e3 * run.counted.mean():.3f} mm" if run.started else ""
                 said(f"{mass:g} g, run {repetition}: {run.verdict()}{error}")
+        if hung:  # whoever measures next begins without a weight
+            person.hang(np.zeros(3))
 
     def _one(self, mass: float, repetition: int) -> Run:
         motors, entries = self._motors, self._folder.about.setdefault("runs", [])
