@@ -12,7 +12,6 @@ from ctcr import (
     effect_fit,
     effect_settings,
     effects,
-    free_parameters,
     identify,
     measurements,
     robot_file,
@@ -38,13 +37,10 @@ path is unknown to all. Written by `tools/control_study.py`."""
 
 
 def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot:
-    names = free_parameters.expand("standard", robot)
-    mean, sd, low, high = free_parameters.priors(robot, names)
-    drawn = np.clip(mean + 0.5 * sd * rng.standard_normal(len(mean)), low, high)
     effect = effects.get(identity, robot.n_tubes)
     strengths = [p for p in effect.parameters if p.kind == "strength"]
     values = {name: p.neutral + SIZE * p.sigma for p in strengths for name in p.full_names}
-    return effect_fit.with_values(free_parameters.applied(robot, names, drawn), [identity], values)
+    return effect_fit.with_values(simulation.as_built(robot, rng), [identity], values)
 
 
 def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], str]:
