@@ -258,7 +258,7 @@ def kill(wires: Wires, times: int) -> Outcome:
     table, kept, lost = wires.folder / target / "measurements.csv", b"", 0
     for _ in range(times):
         process = wires.start(wires.recorder(target))
-        end = time.monotonic() + rng.uniform(0.5, 6.0)
+        end = time.monotonic() + rng.uniform(0.5, 4.5)
         seen = kept
         while time.monotonic() < end and process.poll() is None:
             content = table.read_bytes() if table.exists() else b""

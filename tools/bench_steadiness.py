@@ -16,13 +16,13 @@ from ctcr.demo.bench_story import FILES
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "bench_steadiness.md"
-ROUND_S = 25.0  # of one tour of the cube, about
+ROUND_S = 21.5  # of one tour of the cube, about
 HEAD = """# How steady the bench is
 
 {minutes:.0f} minutes of `ctcr track --live` at 40 Hz on the simulated bench, with everything on {cores} cores: both
 simulators, the owner of the bus, the reader of the tracker, and the controller that records. Real-time priority:
-{real_time}. Load of the computer at the start and at the end: {load}; of this, the bench makes about 1.
-Written by `tools/bench_steadiness.py`.
+{real_time}. Load of the computer at the start and at the end: {load}; the bench itself makes
+about 1 of it. Written by `tools/bench_steadiness.py`.
 
 | | |
 |---|---|

@@ -270,7 +270,7 @@ def test_the_guide_shows_what_works(tmp_path):
     skip_without_bench()
     for name, target in (("examples", ROOT / "examples"), (".venv", Path(sys.prefix))):
         (tmp_path / name).symlink_to(target)
-    command = re.search(r"```bash\n(.*?)\n```", (ROOT / "docs" / "hardware.md").read_text())[1]
+    command = re.search(r"```bash\n(\S+ sim bench .*?)\n```", (ROOT / "docs" / "hardware.md").read_text())[1]
     environment = os.environ | {"CTCR_BENCH": str(tmp_path / "bench")}
     done = subprocess.run(
         ["sh", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
