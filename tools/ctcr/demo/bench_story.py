@@ -68,6 +68,10 @@ def _find_the_effect(story: Story, short: bool) -> None:
         "Ask for the runs that decide",
         f"next {KNOWN} first/measurements.csv --runs 2 -o second.csv", _proposed, "proposal",
     )  # fmt: skip
+    if not story.answers["proposal"]["runs"]:  # the first recording has decided
+        shutil.copy(story.folder / "first" / TABLE, story.folder / "both.csv")
+        shutil.copy(story.folder / "first_diagnosis.json", story.folder / "diagnosis.json")
+        return
     story.do("Measure them", record.format("second"), _recorded, "second")
     story.do(
         "Put both recordings together",
@@ -91,11 +95,11 @@ def _add_the_effect(story: Story, short: bool) -> None:
             f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", lambda _: table,
         )  # fmt: skip
     story.do(
-        "Calibrate without friction, to compare",
+        "Calibrate alone, to compare",
         f"calibrate fit {KNOWN} {table} -o calibrated.yaml", _calibrated, "calibrated",
     )  # fmt: skip
     story.do(
-        "Add friction",
+        "Add what was found",
         f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml", _added, "added",
     )  # fmt: skip
 
