@@ -22,7 +22,7 @@ HEAD = """# How steady the bench is
 {minutes:.0f} minutes of `ctcr track --live` at 40 Hz on the simulated bench, with everything on {cores} cores: both
 simulators, the owner of the bus, the reader of the tracker, and the controller that records. Real-time priority:
 {real_time}. Load of the computer at the start and at the end: {load}; the bench itself makes
-about 1 of it. Written by `tools/bench_steadiness.py`.
+about 1 of it. {beside} Written by `tools/bench_steadiness.py`.
 
 | | |
 |---|---|
@@ -49,6 +49,9 @@ def rows(sitting: dict) -> list[tuple[str, str]]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument(
+        "--beside", default="Nothing else ran.", help="a sentence: what else ran on the computer"
+    )
     parser.add_argument("-o", "--output", type=Path, default=TARGET)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -72,7 +75,7 @@ def main() -> int:
         load.append(os.getloadavg()[0])
         sitting = json.loads((folder / "run" / "session.json").read_text(encoding="utf-8"))["sittings"][-1]
     head = HEAD.format(
-        minutes=sitting["tracker"]["frames"] / 40 / 60, cores=os.cpu_count(),
+        minutes=sitting["tracker"]["frames"] / 40 / 60, beside=given.beside, cores=os.cpu_count(),
         load=" and ".join(f"{value:.1f}" for value in load),
         real_time="granted" if sitting["bus"]["real_time_priority"] else "not granted",
     )  # fmt: skip
