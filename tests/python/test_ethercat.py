@@ -277,3 +277,14 @@ def test_the_guide_shows_what_works(tmp_path):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "15 rows measured" in done.stdout and "The model is wrong by" in done.stdout
+
+
+@pytest.mark.slow
+def test_faults_lose_no_row(tmp_path):
+    """Every fault of docs/bench_faults.md, and some kills: survived, or stopped with the right message."""
+    skip_without_bench()
+    table = tmp_path / "faults.md"
+    command = [sys.executable, ROOT / "tools" / "bench_faults.py", "--kills", "5", "-o", table]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1200)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert table.read_text().count("\n| ") >= 22
