@@ -12,7 +12,6 @@ from ctcr import (
     effect_fit,
     effect_settings,
     effects,
-    free_parameters,
     identify,
     measurements,
     robot_file,
@@ -41,14 +40,11 @@ Jacobian takes friction as it stands: it does not foresee that insertion release
 
 
 def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot:
-    names = free_parameters.expand("standard", robot)
-    mean, sd, low, high = free_parameters.priors(robot, names)
-    drawn = np.clip(mean + 0.5 * sd * rng.standard_normal(len(mean)), low, high)
     effect = effects.get(identity, robot.n_tubes)
     strength, size = HIDDEN[identity]
     hidden = next(p for p in effect.parameters if p.name == strength)
     values = dict.fromkeys(hidden.full_names, hidden.neutral + size * hidden.sigma)
-    return effect_fit.with_values(free_parameters.applied(robot, names, drawn), [identity], values)
+    return effect_fit.with_values(simulation.as_built(robot, rng), [identity], values)
 
 
 def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], str]:

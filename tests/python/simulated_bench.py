@@ -6,12 +6,28 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
+HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
+T_REF = [-59.6, 20.3, -180.5], [0.004, 1.203, 0.297]  # [mm], [rad]
 ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
 
 
 def ctcr(*arguments) -> list[str]:
     return [sys.executable, "-m", "ctcr", *map(str, arguments)]
+
+
+def skip_without_bench() -> None:
+    """Skips the test that asks, where no bench can be simulated."""
+    from ctcr.simulators import network
+
+    if not network.is_permitted():
+        pytest.skip(
+            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
+        )
+    for package in ("pysoem", "serial"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
 
 
 @contextmanager

@@ -9,16 +9,15 @@ from pathlib import Path
 
 import pytest
 from ctcr.devices.process_image import ProcessImage, signed
-from ctcr.simulators import network
 from ctcr.simulators.object_dictionary import Entry, ObjectDictionary, ServiceDataServer
 from ctcr.simulators.segment import Segment
 from ctcr.simulators.slave_controller import SlaveController
 from ctcr.simulators.stepper_terminal import Coupler, StepperTerminal
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROBOT, ROOT, ctcr  # noqa: E402
+from simulated_bench import ROBOT, ROOT, ctcr, skip_without_bench  # noqa: E402
 
-ON_BENCH = [Path(__file__).parent / name for name in ("on_bench_masters.py", "on_bench.py")]
+ON_BENCH = [Path(__file__).parent / f"on_bench{name}.py" for name in ("_masters", "_doors", "", "_recording")]
 
 
 # ---- service data, with a client of its own
@@ -215,15 +214,6 @@ def test_too_much_current_burns_the_motor():
 # ---- on a bench
 
 
-def skip_without_bench():
-    if not network.is_permitted():
-        pytest.skip(
-            "this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing"
-        )
-    for package in ("pysoem", "serial"):
-        pytest.importorskip(package, reason=f"{package} is not installed")
-
-
 def on_bench(tmp_path, *options):
     skip_without_bench()
     robot, bench = tmp_path / "robot.yaml", tmp_path / "bench.yaml"
@@ -280,10 +270,21 @@ def test_the_guide_shows_what_works(tmp_path):
     skip_without_bench()
     for name, target in (("examples", ROOT / "examples"), (".venv", Path(sys.prefix))):
         (tmp_path / name).symlink_to(target)
-    command = re.search(r"```bash\n(.*?)\n```", (ROOT / "docs" / "hardware.md").read_text())[1]
+    command = re.search(r"```bash\n(\S+ sim bench .*?)\n```", (ROOT / "docs" / "hardware.md").read_text())[1]
     environment = os.environ | {"CTCR_BENCH": str(tmp_path / "bench")}
     done = subprocess.run(
         ["sh", "-c", command], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "15 rows measured" in done.stdout and "The model is wrong by" in done.stdout
+
+
+@pytest.mark.slow
+def test_faults_lose_no_row(tmp_path):
+    """Every fault of docs/bench_faults.md, and some kills: survived, or stopped with the right message."""
+    skip_without_bench()
+    table = tmp_path / "faults.md"
+    command = [sys.executable, ROOT / "tools" / "bench_faults.py", "--kills", "5", "-o", table]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=1200)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert table.read_text().count("\n| ") >= 22

@@ -14,7 +14,9 @@ from ctcr import cli, measurements, robot_file
 from ctcr.devices import bench_file
 from ctcr.devices.person import PersonPresent
 from ctcr.errors import InputError
+from ctcr.measurements import column_names
 from ctcr.record.display import picture
+from ctcr.record.live_page import LivePage
 from ctcr.record.plan import Approach, steps_of
 from ctcr.record.row_file import RowFile
 from ctcr.record.session import Progress
@@ -30,7 +32,7 @@ def rows_of(number, group):
 
 
 def _append_for_ever(path, group, pipe):
-    file = RowFile(path, 2, group)
+    file = RowFile(path, column_names(2), group)
     while True:
         file.append(rows_of(file.groups, group))
         pipe.send(file.groups)
@@ -63,14 +65,14 @@ def test_a_hundred_kills_lose_no_row(tmp_path):
 @pytest.mark.parametrize("cut", [1, 20, 70, 150])
 def test_a_power_cut_costs_the_group_it_hit(tmp_path, cut):
     path = tmp_path / "measurements.csv"
-    file = RowFile(path, 2, 2)
+    file = RowFile(path, column_names(2), 2)
     for number in range(5):
         file.append(rows_of(number, 2))
     file.close()
     whole = path.read_bytes()
     path.write_bytes(whole[:-cut])
-    again = RowFile(path, 2, 2)
-    assert 2 <= again.groups < 5 and again.last_t == 2 * again.groups - 1
+    again = RowFile(path, column_names(2), 2)
+    assert 2 <= again.groups < 5 and float(again.last[0]) == 2 * again.groups - 1
     while again.groups < 5:
         again.append(rows_of(again.groups, 2))
     again.close()
@@ -81,14 +83,14 @@ def test_another_table_is_left_alone(tmp_path):
     path = tmp_path / "measurements.csv"
     path.write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="other columns"):
-        RowFile(path, 2, 1)
+        RowFile(path, column_names(2))
     assert path.read_text() == "a,b\n1,2\n"
 
 
 def test_full_disk(tmp_path, monkeypatch):
     """No half of a group stays, and what was there before does."""
     path = tmp_path / "measurements.csv"
-    file = RowFile(path, 2, 1)
+    file = RowFile(path, column_names(2))
     file.append(rows_of(0, 1))
     before, write = path.read_bytes(), os.pwrite
 
@@ -107,7 +109,7 @@ def test_full_disk(tmp_path, monkeypatch):
 
 def test_recorded_tables_can_be_read(tmp_path):
     path = tmp_path / "measurements.csv"
-    file = RowFile(path, 3, 1)
+    file = RowFile(path, column_names(3))
     joints = [-0.3, -0.2, -0.1, 0.1, 0.2, 0.3]
     file.append([np.array([0.5, 1, *joints, 0, -0.1, 0, 0.1, 0.2, 0.3, 1, 0, 0, 0])])
     file.append([np.array([1.5, 1, *joints, 0, -0.1, 0, *[np.nan] * 7])])
@@ -154,6 +156,26 @@ def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
     said = capfd.readouterr().err
     assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
     assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
+
+
+def test_live_page(tmp_path, monkeypatch):
+    """It shows the newest state, loads itself anew while the recording goes on, and rests in the end."""
+    target, now = tmp_path / "page.html", [0.0]
+    monkeypatch.setattr("ctcr.record.live_page.time.monotonic", lambda: now[0])
+    progress = Progress(10, done=2, doing="row 4: moving", errors_mm=[3.0, 4.0])
+    with LivePage(target, "A <robot>") as live:
+        live.show(progress)
+        first = target.read_text()
+        progress.errors_mm += [float("nan"), 5.0]
+        live.show(progress)
+        assert target.read_text() == first  # not before its time
+        now[0] += 2.0
+        live.show(progress)
+        second = target.read_text()
+    assert 'http-equiv="refresh" content="2"' in first and first.count("<circle") == 2
+    assert "A &lt;robot&gt;" in first and "row 4: moving" in first and "3.54 mm" in first
+    assert second.count("<circle") == 3 and "5.00 mm" in second
+    assert "refresh" not in target.read_text() and target.read_text().count("<circle") == 3
 
 
 def test_live_picture():

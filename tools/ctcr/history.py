@@ -105,7 +105,7 @@ def write_report(robot: Robot, target: str | Path, file: str) -> None:
         + "</tr>"
         for line in lines
     )
-    picture = draw(_draw, stages, 10.4, 4.4) if stages else ""
+    picture = draw(draw_waterfall, stages, 10.4, 4.4) if stages else ""
     lead = _lead(stages) if stages else "Nothing was changed yet." if not lines else ""
     section = (
         f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(lead)}</p><figure>{picture}</figure>'
@@ -122,7 +122,8 @@ def _lead(stages: list[Stage]) -> str:
     return text + (f"; noise alone would leave {floor[0].rms_mm:.3g} mm." if floor else ".")
 
 
-def _draw(figure, stages: list[Stage]) -> None:
+def draw_waterfall(figure, stages: list[Stage]) -> None:
+    """A bar a stage, and the noise floor as a line."""
     from ctcr.compare.figures import ERROR, NOISE, OUT
 
     axes = figure.subplots()

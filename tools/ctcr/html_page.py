@@ -7,19 +7,29 @@ from importlib.resources import files
 from typing import Any
 
 
-def page(title: str, sections: Iterable[str], footer: str, command: str, drawing: str | None = None) -> str:
+def page(
+    title: str,
+    sections: Iterable[str],
+    footer: str,
+    command: str,
+    drawing: str | None = None,
+    reload_s: int = 0,
+) -> str:
     """The whole HTML text.
 
     title     plain text
     sections  HTML; empty ones are left out
     footer    plain text: what the page is made from; `command` is the one that made it
     drawing   JSON of a 3-D view, which one of the sections has the element `view` for
+    reload_s  the browser loads the page anew so often; 0: never
     """
     title = html.escape(title)
+    reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
     style = (files("ctcr") / "html_page.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"{reload}"
         f"<title>{title}</title><style>{style}</style></head><body>"
         + "\n".join(filter(None, sections))
         + f"<footer>{html.escape(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"

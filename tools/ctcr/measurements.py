@@ -66,6 +66,11 @@ def load(path: str | Path, n_tubes: int) -> Measurements:
     return _measurements(data, table)
 
 
+def column_names(n_tubes: int) -> list[str]:
+    """All columns of the format, in its order."""
+    return [name for names in group_columns(n_tubes).values() for name in names]
+
+
 def group_columns(n_tubes: int) -> dict[str, tuple[str, ...]]:
     """Columns of the format, by what they hold."""
     numbers = range(1, n_tubes + 1)

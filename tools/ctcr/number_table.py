@@ -4,7 +4,7 @@ Rows are numbered as a spreadsheet shows them: the header is row 1. An empty fie
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -101,6 +101,17 @@ class NumberTable:
                     rows = rows[readable]
                 yield rows, numbers, len(raw)
                 row += len(lines)
+
+
+def read_columns(path: str | Path, columns: Sequence[str]) -> NDArray[np.float64]:
+    """The numbers (M, columns) of a table that has just these columns. Raises InputError with its faults."""
+    table, faults = open_table(path), Faults(str(path))
+    if table.columns != tuple(columns):
+        text = f"holds other columns than {','.join(columns)}"
+        raise InputError(Problem(text, str(path), 1, line_name="row"))
+    numbers = np.vstack([block for _, block, _ in table.blocks(faults)])
+    faults.raise_any()
+    return numbers
 
 
 def open_table(path: str | Path) -> NumberTable:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import identify, user_effects
+from ctcr import free_parameters, identify, user_effects
 from ctcr.frames import product, quaternion_from_rotation_vector
 from ctcr.measurements import Measurements, group_columns
 from ctcr.output import atomic_writer
@@ -57,6 +57,14 @@ def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
         file.writelines(
             ",".join("" if value != value else f"{value:.12g}" for value in row) + "\n" for row in rows
         )
+
+
+def as_built(robot: Robot, rng: np.random.Generator, share: float = 0.5) -> Robot:
+    """A robot that differs from its file in every calibrated parameter: normal, with a share of the file's sd."""
+    names = free_parameters.expand("standard", robot)
+    mean, sd, low, high = free_parameters.priors(robot, names)
+    drawn = np.clip(mean + share * sd * rng.standard_normal(len(mean)), low, high)
+    return free_parameters.applied(robot, names, drawn)
 
 
 class ReadingNoise:

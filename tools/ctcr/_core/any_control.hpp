@@ -1,6 +1,7 @@
 #pragma once
 // Closed loops of robots whose number of tubes is known at run time.
 #include <cstdint>
+#include <functional>
 
 #include "any_recording.hpp"
 
@@ -32,6 +33,16 @@ struct LimitValues {
   bool redistribute;
 };
 
+struct LoopResult;
+
+/// A robot outside of this module, with the calls of a Device; each says whether the loop may go on.
+struct AnyDevice {
+  /// Motor angles (2N,) [rad], and position and rotation of the reading.
+  std::function<bool(Eigen::VectorXd&, Eigen::Vector3d&, Eigen::Matrix3d&)> measure;
+  std::function<bool(const Eigen::VectorXd& velocity, double period)> move;  ///< velocity (2N,) of motors [rad/s]
+  std::function<bool(const LoopResult& so_far, Eigen::Index row)> record;    ///< that row is complete
+};
+
 /// One run of a scenario.
 struct LoopRequest {
   SystemValues controller, plant;
@@ -45,9 +56,11 @@ struct LoopRequest {
   std::string tip_force;        ///< what the controller makes of it: unknown, known, estimated
   double noise_position, noise_rotation;
   std::uint64_t seed;
+  const AnyDevice* device = nullptr;  ///< instead of the plant, of which only the frames count; neither load nor noise
 };
 
-/// What happened, one row a period. Positions [m] in the plant's base frame, where the path is given.
+/// What happened, one row a period. Positions [m] in the plant's base frame, where the path is given. On a device the tip
+/// is that measured.
 struct LoopResult {
   std::string status;  ///< of the plant at the end, in words; "start refused" and why
   bool started = false;

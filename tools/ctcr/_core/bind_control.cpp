@@ -2,9 +2,12 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <exception>
 #include <stdexcept>
+#include <tuple>
 
 #include "any_control.hpp"
 #include "with_tubes.hpp"
@@ -24,6 +27,42 @@ LoopResult any_closed_loop(const LoopRequest& r) {
   if (!fits) throw std::invalid_argument("the arrays of a closed loop do not fit together");
   const nb::gil_scoped_release released;
   return with_tubes(n, [&](auto tubes) { return closed_loop<tubes>(r); });
+}
+
+using Reading = std::tuple<Eigen::VectorXd, Eigen::Vector3d, Eigen::Matrix3d>;
+
+/// Runs on a device in Python: measure() -> (motor angles (2N,) [rad], position (3,) [m], rotation (3, 3)),
+/// move(velocity (2N,) [rad/s], period [s]), record(result so far, row). What one of them raises ends the loop.
+LoopResult closed_loop_on(const nb::object& device, LoopRequest& r) {
+  std::exception_ptr raised;
+  const auto guarded = [&raised](const auto& call) noexcept {
+    const nb::gil_scoped_acquire held;
+    try {
+      call();
+      return true;
+    } catch (...) {
+      raised = std::current_exception();
+      return false;
+    }
+  };
+  const AnyDevice outer{
+      [&](Eigen::VectorXd& theta, Eigen::Vector3d& position, Eigen::Matrix3d& rotation) {
+        return guarded([&] {
+          const auto tubes = theta.size();
+          std::tie(theta, position, rotation) = nb::cast<Reading>(device.attr("measure")());
+          if (theta.size() != tubes) throw std::invalid_argument("a device measures two motor angles a tube");
+        });
+      },
+      [&](const Eigen::VectorXd& velocity, double period) {
+        return guarded([&] { device.attr("move")(velocity, period); });
+      },
+      [&](const LoopResult& so_far, Eigen::Index row) {
+        return guarded([&] { device.attr("record")(nb::cast(so_far, nb::rv_policy::reference), row); });
+      }};
+  r.device = &outer;
+  LoopResult out = any_closed_loop(r);
+  if (raised) std::rethrow_exception(raised);
+  return out;
 }
 
 SensitivityResult any_sensitivity(Eigen::Index tubes, const SensitivityRequest& r) {
@@ -69,13 +108,18 @@ void bind_control(nb::module_& m) {
       [](const SystemValues& controller, const SystemValues& plant, const TaskValues& tasks, const LimitValues& limits,
          const RowMajor& points, bool spline, double speed, double acceleration, double period, double settle,
          const Eigen::VectorXd& beta, const Eigen::VectorXd& alpha, const Eigen::Vector3d& force,
-         const std::string& tip_force, double noise_position, double noise_rotation, std::uint64_t seed) {
-        return any_closed_loop({controller, plant, tasks, limits, points, spline, speed, acceleration, period, settle,
-                                beta, alpha, force, tip_force, noise_position, noise_rotation, seed});
+         const std::string& tip_force, double noise_position, double noise_rotation, std::uint64_t seed,
+         const nb::object& device) {
+        LoopRequest r{controller, plant, tasks, limits, points,    spline,         speed,          acceleration, period,
+                      settle,     beta,  alpha, force,  tip_force, noise_position, noise_rotation, seed};
+        return device.is_none() ? any_closed_loop(r) : closed_loop_on(device, r);
       },
       nb::kw_only(), "controller"_a, "plant"_a, "tasks"_a, "limits"_a, "points"_a, "spline"_a, "speed"_a,
       "acceleration"_a, "period"_a, "settle"_a, "beta"_a, "alpha"_a, "force"_a, "tip_force"_a, "noise_position"_a,
-      "noise_rotation"_a, "seed"_a, "Runs one scenario once. Releases the GIL.");
+      "noise_rotation"_a, "seed"_a, "device"_a = nb::none(),
+      "Runs one scenario once. Releases the GIL. With a device, of ctcr.track.device.Device, that is controlled "
+      "instead of "
+      "a simulated plant.");
   nb::class_<SensitivityResult>(m, "SensitivityResult",
                                 "A row a block and a column a varied system, the last one for all together.")
       .def_ro("count", &SensitivityResult::count)

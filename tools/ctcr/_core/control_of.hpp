@@ -54,6 +54,29 @@ System<N, AllEffects> system_of(const SystemValues& values) {
   return system;
 }
 
+/// AnyDevice as a Device.
+template <int N>
+class OuterDevice {
+public:
+  explicit OuterDevice(const AnyDevice& outer) : outer_(outer), values_(2 * N) {}
+
+  Status measure(Measurement<N>& out) noexcept {
+    if (!outer_.measure(values_, reading_.position, reading_.rotation)) return Status::not_finite;
+    out = {{values_.head<N>(), values_.tail<N>()}, reading_};
+    return Status::ok;
+  }
+  Status move(const MotorAngles<N>& velocity, double period) noexcept {
+    values_ << velocity.translation, velocity.rotation;
+    return outer_.move(values_, period) ? Status::ok : Status::not_finite;
+  }
+  [[nodiscard]] const Pose& exact_reading() const noexcept { return reading_; }
+
+private:
+  const AnyDevice& outer_;
+  Eigen::VectorXd values_;
+  Pose reading_;
+};
+
 template <int N>
 LoopResult closed_loop(const LoopRequest& r) {
   LoopResult out;
@@ -83,49 +106,58 @@ LoopResult closed_loop(const LoopRequest& r) {
     out.status = to_string(status);
     return out;
   }
-  SimulatedRobot<N, AllEffects> plant(real, home, load, TrackerNoise{r.noise_position, r.noise_rotation}, r.seed);
   const Pose T_world_base = T_base_world.inverse();
   const Pose T_world_tracker = T_world_base * system.sensor.T_tracker_base.inverse();
-  const auto tip = [&] { return (T_world_tracker * plant.exact_reading()).position; };
   const auto wanted = [&](const Reference& reference) { return (T_world_base * reference.pose).position; };
-  Status status = run(controller, plant, start, r.period, load, [](const auto&) { return true; });
-  out.settled = (tip() - wanted(path.at(0))).norm();
-  out.started = status == Status::ok;
+  const auto drive = [&](auto& plant) {
+    const auto tip = [&] { return (T_world_tracker * plant.exact_reading()).position; };
+    Status status = run(controller, plant, start, r.period, load, [](const auto&) { return true; });
+    out.settled = (tip() - wanted(path.at(0))).norm();
+    out.started = status == Status::ok;
 
-  const auto rows = Eigen::Index(path.duration() / r.period + 0.5) + 1;
-  out.time.setZero(rows);
-  out.joints.setZero(rows, 2 * N);
-  out.tip.setZero(rows, 3);
-  out.wanted.setZero(rows, 3);
-  out.shortfall.setZero(rows, AllTasks<N>::size);
-  out.held.setZero(rows, 4);
-  out.force.setZero(rows, 3);
-  out.stability.setZero(rows);
-  out.model_status.setZero(rows);
-  Eigen::Index k = 0;
-  if (status == Status::ok)
-    status = run(controller, plant, path, r.period, load, [&](const auto& row) {
-      const Joints<N> q = joints(system.transmission, row.measured.theta);
-      out.time[k] = row.time;
-      out.joints.row(k) << q.beta.transpose(), q.alpha.transpose();
-      out.tip.block<1, 3>(k, 0) = tip().transpose();
-      out.wanted.block<1, 3>(k, 0) = wanted(row.reference).transpose();
-      for (int t = 0; t < AllTasks<N>::size; ++t) out.shortfall(k, t) = row.report.shortfall[std::size_t(t)];
-      const LimitReport& held = row.report.limits;
-      out.held.row(k) << held.base_gaps, held.tip_gaps, held.travel, held.speed;
-      out.force.row(k) = row.report.force.transpose();
-      out.stability[k] = row.report.stability;
-      out.model_status[k] = int(row.report.status);
-      ++k;
-      return true;
-    });
-  out.status = to_string(status);
-  for (auto* m : {&out.joints, &out.tip, &out.wanted, &out.shortfall, &out.force})
-    m->conservativeResize(k, Eigen::NoChange);
-  out.held.conservativeResize(k, Eigen::NoChange);
-  out.time.conservativeResize(k);
-  out.stability.conservativeResize(k);
-  out.model_status.conservativeResize(k);
+    const auto rows = Eigen::Index(path.duration() / r.period + 0.5) + 1;
+    out.time.setZero(rows);
+    out.joints.setZero(rows, 2 * N);
+    out.tip.setZero(rows, 3);
+    out.wanted.setZero(rows, 3);
+    out.shortfall.setZero(rows, AllTasks<N>::size);
+    out.held.setZero(rows, 4);
+    out.force.setZero(rows, 3);
+    out.stability.setZero(rows);
+    out.model_status.setZero(rows);
+    Eigen::Index k = 0;
+    if (status == Status::ok)
+      status = run(controller, plant, path, r.period, load, [&](const auto& row) {
+        const Joints<N> q = joints(system.transmission, row.measured.theta);
+        out.time[k] = row.time;
+        out.joints.block<1, N>(k, 0) = q.beta.transpose();
+        out.joints.block<1, N>(k, N) = q.alpha.transpose();
+        out.tip.block<1, 3>(k, 0) = tip().transpose();
+        out.wanted.block<1, 3>(k, 0) = wanted(row.reference).transpose();
+        for (int t = 0; t < AllTasks<N>::size; ++t) out.shortfall(k, t) = row.report.shortfall[std::size_t(t)];
+        const LimitReport& held = row.report.limits;
+        out.held.row(k) << held.base_gaps, held.tip_gaps, held.travel, held.speed;
+        out.force.row(k) = row.report.force.transpose();
+        out.stability[k] = row.report.stability;
+        out.model_status[k] = int(row.report.status);
+        ++k;
+        return !r.device || r.device->record(out, k - 1);
+      });
+    out.status = to_string(status);
+    for (auto* m : {&out.joints, &out.tip, &out.wanted, &out.shortfall, &out.force})
+      m->conservativeResize(k, Eigen::NoChange);
+    out.held.conservativeResize(k, Eigen::NoChange);
+    out.time.conservativeResize(k);
+    out.stability.conservativeResize(k);
+    out.model_status.conservativeResize(k);
+  };
+  if (r.device) {
+    OuterDevice<N> plant(*r.device);
+    drive(plant);
+  } else {
+    SimulatedRobot<N, AllEffects> plant(real, home, load, TrackerNoise{r.noise_position, r.noise_rotation}, r.seed);
+    drive(plant);
+  }
   return out;
 }
 

@@ -22,16 +22,22 @@ SIGMAS_AT_95 = (
 )
 AXES = "xyz"
 
+SCATTER = (  # of a reading that is the mean of several: their standard deviation per axis, and how many
+    Column("scatter", "length", needed=False, filled=False),
+    Column("readings", "count", needed=False, filled=False),
+)
 ROTATION_OFFSETS = (
     Column("tube", "count", needed=False),
     Column("motor_angle", "angle"),
     Column("direction", "sign", needed=False),
     *(Column(axis, "length") for axis in AXES),
+    *SCATTER,
 )
+CAD_POINTS = (Column("point", "text"), *(Column(f"cad_{axis}", "length") for axis in AXES))
 REGISTRATION = (
-    Column("point", "text"),
-    *(Column(f"cad_{axis}", "length") for axis in AXES),
+    *CAD_POINTS,
     *(Column(axis, "length", filled=False) for axis in AXES),
+    *SCATTER,
 )
 HOME = (
     Column("tube", "count"),
@@ -42,15 +48,21 @@ HOME = (
 )
 
 
-def tracker_noise(robot: Robot | None) -> dict[str, float]:
-    """Jitter and smooth error of a reading per axis [m], as the robot file states them; 0: not known."""
-    if robot is None:
-        return {}
-    tracker = robot.tracker
-    return {
-        "jitter": 1e-3 * (tracker.jitter_mm or 0.0),
-        "field_error": 1e-3 * (tracker.accuracy_95_mm or 0.0) / SIGMAS_AT_95,
-    }
+def tracker_noise(robot: Robot | None, table: Table | None = None) -> dict[str, float]:
+    """Jitter and smooth error of a reading per axis [m], as the robot file states them; 0: not known.
+
+    The jitter of a table whose readings are means is that of their scatter.
+    """
+    noise = {}
+    if robot is not None:
+        noise["jitter"] = 1e-3 * (robot.tracker.jitter_mm or 0.0)
+        noise["field_error"] = 1e-3 * (robot.tracker.accuracy_95_mm or 0.0) / SIGMAS_AT_95
+    if table and "scatter" in table and "readings" in table:
+        known = (table["readings"] > 0) & np.isfinite(table["scatter"])
+        if known.any():
+            variance = table["scatter"][known] ** 2 / table["readings"][known]
+            noise["jitter"] = float(np.sqrt(variance.mean()))
+    return noise
 
 
 def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> Outcome:
@@ -72,7 +84,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
             ratio=ratio,
             T_ref=_tracker_pose(robot) if robot else None,
             bend_angle=-np.pi / 2 if robot is None or robot.tubes[tube - 1].curvature >= 0 else np.pi / 2,
-            **tracker_noise(robot),
+            **tracker_noise(robot, table),
         )
         name = f"tube {tube}"
         old = robot.actuation.home_rotation_deg[tube - 1] if robot else nan
@@ -134,7 +146,7 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
         readings=np.ascontiguousarray(reading[measured]),
         targets=np.ascontiguousarray(place[targets]) if targets.any() else None,
         placement_sd=1e-3 * placement_sd_mm,
-        **tracker_noise(robot),
+        **tracker_noise(robot, table),
     )
     position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
     old_position = robot.tracker.position_mm if robot else [nan] * 3

@@ -35,6 +35,41 @@ _tube = click.option(
 )
 
 
+def _live(function):
+    """The options of procedures that the bench can carry out."""
+    for option in (
+        click.option(
+            "--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's."
+        ),
+        click.option(
+            "--readings",
+            type=click.IntRange(2),
+            default=20,
+            show_default=True,
+            help="With --live, of each row.",
+        ),
+        click.option("--bench", metavar="BENCH.yaml", help="With --live: the devices and their limits."),
+        click.option(
+            "--live", is_flag=True, help="Measure now; the table is written row by row, or gone on with."
+        ),
+    ):
+        function = option(function)
+    return function
+
+
+def _desk(bench, folder, console):
+    from ctcr.calibrate.live import Desk
+    from ctcr.devices import bench_file, person
+    from ctcr.devices.private_folder import private_folder
+
+    if not bench:
+        raise click.UsageError("--live needs --bench")
+    devices, place = bench_file.load(bench), private_folder(folder)
+    return Desk(
+        devices, place, person.person_of(devices, place), lambda text: console.print(text, markup=False)
+    )
+
+
 def _length(name: str, default: float | None, text: str):
     shown = default is not None
     return click.option(name, type=click.FloatRange(min=0), default=default, show_default=shown, help=text)
@@ -61,13 +96,44 @@ def _run(
 @click.argument("table")
 @_robot
 @click.option("--ratio", type=float, help="Turns of a tube in one turn of its motor; else as in ROBOT.")
+@_live
+@click.option(
+    "--step-deg",
+    type=click.FloatRange(1, 90),
+    default=20.0,
+    show_default=True,
+    help="With --live: between rows.",
+)
+@click.option(
+    "--deployed-mm",
+    type=click.FloatRange(min=1),
+    help="With --live: how far a tube stands out; else its curved part.",
+)
 @_outputs
-def rotation_offset(table: str, robot, ratio, **outputs) -> None:
+def rotation_offset(
+    table: str, robot, ratio, live, bench, readings, folder, step_deg, deployed_mm, **outputs
+) -> None:
     """Home rotations from circles: one tube alone is out of the plate and turns, both ways.
 
     TABLE: motor_angle_deg, x_mm, y_mm, z_mm of the tip (tracker frame); tube (default 1) and direction (1 or -1,
-    default: from the order of the rows) may be added. One row per reading, in the order measured.
+    default: from the order of the rows) may be added, and where a row is a mean scatter_mm (standard deviation of one
+    reading, per axis) and readings. One row per reading, in the order measured.
+
+    With --live the bench turns the tubes of ROBOT and writes TABLE; you are asked to move the sensor from tip to tip.
     """
+    if live:
+        import math
+
+        from ctcr import output, robot_file
+        from ctcr.calibrate.live import Circles, rotation_table
+
+        if not robot:
+            raise click.UsageError("--live needs --robot")
+        deployed = None if deployed_mm is None else 1e-3 * deployed_mm
+        desk = _desk(bench, folder, output.console(outputs["json_target"]))
+        rotation_table(
+            table, robot_file.load(robot), desk, Circles(math.radians(step_deg), readings, deployed)
+        )
     _run("rotation-offset", "procedures", "rotation_offsets", table, robot, ratio=ratio, **outputs)
 
 
@@ -77,13 +143,35 @@ def rotation_offset(table: str, robot, ratio, **outputs) -> None:
 @_length(
     "--placement-sd-mm", 0.0, "How far the probe may sit from a CAD point, per axis; 0: from the residuals."
 )
+@_live
+@click.option(
+    "--cad", metavar="CAD.csv", help="With --live: names and places of the points, columns as POINTS."
+)
+@click.option(
+    "--rounds", type=click.IntRange(1), default=1, show_default=True, help="With --live: over all points."
+)
 @_outputs
-def registration(points: str, robot, placement_sd_mm, **outputs) -> None:
+def registration(
+    points: str, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, **outputs
+) -> None:
     """The tracker frame T_ref from named points on the robot, read with a probe.
 
-    POINTS: point (its name), cad_x_mm, cad_y_mm, cad_z_mm (base frame), x_mm, y_mm, z_mm (reading, tracker frame).
-    Several rows may read one point. A point without reading is a target: its expected error is told.
+    POINTS: point (its name), cad_x_mm, cad_y_mm, cad_z_mm (base frame), x_mm, y_mm, z_mm (reading, tracker frame);
+    scatter_mm and readings as in rotation-offset. Several rows may read one point. A point without reading is a target:
+    its expected error is told.
+
+    With --live you are told which point of CAD.csv to touch; it is read when the probe is still, and POINTS is written.
     """
+    if live:
+        from ctcr import output
+        from ctcr.calibrate import tables
+        from ctcr.calibrate.live import point_table
+        from ctcr.calibrate.procedures import CAD_POINTS
+
+        if not cad:
+            raise click.UsageError("--live needs --cad")
+        desk = _desk(bench, folder, output.console(outputs["json_target"]))
+        point_table(points, tables.read(cad, CAD_POINTS), desk, readings, rounds)
     _run(
         "registration",
         "procedures",

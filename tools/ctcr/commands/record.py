@@ -37,11 +37,14 @@ import click
 @click.option(
     "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
 )
+@click.option(
+    "--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew."
+)
 @click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
 @click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
 def command(
     robot, plan, target, bench_path, dwell, readings, speed, approach, approach_mm, approach_deg, patience, own,
-    folder, json_target,
+    page, folder, json_target,
 ) -> None:  # fmt: skip
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
@@ -49,15 +52,21 @@ def command(
     Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
     first with `ctcr move --home`.
     """
+    from contextlib import nullcontext
+    from dataclasses import asdict
+
     import numpy as np
 
     from ctcr import measurements, output, robot_file, user_effects
     from ctcr.devices import bench_file, person
+    from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
     from ctcr.devices.motors import Motors
     from ctcr.devices.private_folder import private_folder
+    from ctcr.devices.sight import Sight
     from ctcr.devices.tracker import Tracker
     from ctcr.record.display import Display
     from ctcr.record.folder import TABLE, Folder
+    from ctcr.record.live_page import LivePage
     from ctcr.record.plan import Approach, steps_of
     from ctcr.record.session import Options, Session
 
@@ -66,22 +75,35 @@ def command(
     table = measurements.load(plan, loaded.n_tubes)
     way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
-    options = Options(dwell, readings, speed, patience)
+    options = Options(dwell, readings, speed)
     console = output.console(json_target)
     recording = Folder(
-        target, {"robot": robot, "plan": plan, "bench": bench_path}, options, way, loaded.n_tubes
+        target,
+        {"robot": robot, "plan": plan, "bench": bench_path},
+        asdict(options) | {"approach": asdict(way)},
+        loaded.n_tubes,
+        group=readings + way.has_way_point,
     )
     with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
+        wish_real_time(CONTROL_PRIORITY)
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)
-        with Display() as display:
+        with (
+            Display() as display,
+            LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live,
+        ):
+
+            def shown(progress):
+                display.show(progress)
+                if live:
+                    live.show(progress)
+
             who = _Paused(person.person_of(bench, place), display)
-            session = Session(
-                loaded, motors, tracker, who, recording.rows, options, recording.clock, display.show
-            )
+            sight = Sight(tracker, patience)
+            session = Session(loaded, motors, sight, who, recording.rows, options, recording.clock, shown)
             ended = "interrupted"
             try:
                 done = session.run(steps)
@@ -90,7 +112,7 @@ def command(
                 ended = str(error)
                 raise
             finally:
-                recording.note(motors, tracker, session.lateness, ended)
+                recording.note(motors, tracker, sight.lateness, ended)
     path = recording.path / TABLE
     console.print(
         f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",

@@ -18,6 +18,10 @@ hide_option = click.option(
     "--hide", "hidden", multiple=True, metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
     help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
 )  # fmt: skip
+oracle_option = click.option(
+    "--oracle", metavar="COMMAND",
+    help="A program that knows where the tip is, instead of the model; gets ROBOT as its last argument.",
+)  # fmt: skip
 noise_option = click.option(
     "--noise", type=click.Choice(NOISES), default="jitter", show_default=True, help="As in ctcr simulate."
 )
@@ -36,17 +40,18 @@ def command() -> None:
 @click.argument("robot")
 @folder_option
 @hide_option
+@oracle_option
 @noise_option
 @seed_option
 @scenario_option
-def aurora(robot, folder, hidden, noise, seed, scenario) -> None:
+def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
     """Simulate an NDI Aurora tracker on a pseudo-terminal, looking at the tip of ROBOT.
 
     The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
     """
     from ctcr.simulators.aurora import AuroraSimulator
 
-    simulator = AuroraSimulator(_robot(robot, hidden, noise, seed), _folder(folder), scenario, seed)
+    simulator = AuroraSimulator(_robot(robot, hidden, oracle, noise, seed), _folder(folder), scenario, seed)
     _serve(simulator, f"tracker: {simulator.line.link}")
 
 
@@ -80,19 +85,22 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @folder_option
 @hide_option
+@oracle_option
 @noise_option
 @seed_option
 @click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
 @click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
-def bench(robot, program, folder, hidden, noise, seed, tracker_scenario, bus_scenario) -> int:
+def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario, bus_scenario) -> int:
     """Simulate a whole bench around ROBOT while COMMAND runs (a shell without one); its motors move the tracked tip.
 
     Needs no rights: bus and COMMAND get a network of their own.
     """
     from ctcr.simulators import bench as simulated
 
-    robots = _robot(robot, hidden, noise, seed)
-    return simulated.run(list(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed)
+    robots = _robot(robot, hidden, oracle, noise, seed)
+    return simulated.run(
+        lambda: _run(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed
+    )
 
 
 @command.command(name="set")
@@ -118,6 +126,19 @@ def set_(device, settings, force, line_break, folder) -> None:
     output.console().print(output.table(f"Simulator: {device}", ["", "value"], rows))
 
 
+def _run(program) -> int:
+    """The exit code of a program, or of a shell."""
+    import os
+    import subprocess
+
+    from ctcr.errors import InputError, Problem
+
+    try:
+        return subprocess.run(program or [os.environ.get("SHELL", "sh")]).returncode
+    except FileNotFoundError:
+        raise InputError(Problem(f"{program[0]}: no such command")) from None
+
+
 def _serve(simulator, text) -> None:
     import signal
 
@@ -131,15 +152,21 @@ def _serve(simulator, text) -> None:
         simulator.close()
 
 
-def _robot(robot, hidden, noise, seed):
+def _robot(robot, hidden, oracle, noise, seed):
+    import shlex
+
     from ctcr import effect_fit, robot_file
     from ctcr.effect_settings import settings
+    from ctcr.simulators.oracle import Oracle
     from ctcr.simulators.robot import SimulatedRobot
 
+    if oracle and hidden:
+        raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
     loaded = robot_file.load(robot)
     values = settings(hidden, loaded)
     names = list(dict.fromkeys(name.split(".")[1] for name in values))
-    return SimulatedRobot(effect_fit.with_values(loaded, names, values), noise, seed)
+    known = Oracle([*shlex.split(oracle), robot], loaded) if oracle else None
+    return SimulatedRobot(effect_fit.with_values(loaded, names, values), noise, seed, known)
 
 
 def _folder(folder):

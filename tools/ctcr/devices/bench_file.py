@@ -30,6 +30,11 @@ class TrackerPort(Section):
     tool: str = Field(
         "0A", pattern="^[0-9A-F]{2}$", description="the handle of the sensor, two hexadecimal digits"
     )
+    probe: str | None = Field(
+        None,
+        pattern="^[0-9A-F]{2}$",
+        description="the handle of the probe, two hexadecimal digits; else as tool",
+    )
 
 
 class Motors(Section):

@@ -25,6 +25,12 @@ class Bus:
 
     def connect(self) -> None:
         """Finds the terminals, configures them and brings all to OP, motors off."""
+        try:
+            self._bring_up()
+        except DeviceFault:  # a computer under load loses the answer of a mailbox now and then
+            self._bring_up()
+
+    def _bring_up(self) -> None:
         pysoem = needed("pysoem", "pysoem", f"bus {self.interface}")
         pysoem.settings.timeouts.ret = RETURN_US
         self.close()

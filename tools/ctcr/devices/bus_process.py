@@ -165,9 +165,8 @@ class _Owner:
             if said.error:
                 control.stop(drive.diagnosis())
             elif self._enabled_at and not said.ready and now - self._enabled_at > READY_S:
-                control.stop(
-                    drive.fault("does not switch its motor on", "check the motor's cable and supply")
-                )
+                off = drive.fault("does not switch its motor on", "check the motor's cable and supply")
+                control.stop(bus.check_states() or off)
         if self._cycles % STATE_CYCLES == 0:
             fault = bus.check_states()
             if fault and self._doubted:  # one lost frame is no fault

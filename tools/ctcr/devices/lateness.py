@@ -4,6 +4,7 @@ import numpy as np
 
 BIN_S = 20e-6
 BINS = 5000  # up to 0.1 s; what is later counts as that
+CONTROL_PRIORITY = 30  # of the process that controls and records: below those that serve the devices
 
 
 class Lateness:

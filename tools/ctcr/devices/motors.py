@@ -3,6 +3,7 @@
 import multiprocessing
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,14 +26,15 @@ POLL_S = 0.005
 class Motors:
     """Starts the bus owner; ends it when closed. Methods raise DeviceFault; none is real-time safe."""
 
-    def __init__(self, bench: Bench, robot: Robot, folder: Path):
+    def __init__(self, bench: Bench, robot: Robot, folder: Path, one_by_one: bool = False):
+        """`one_by_one`: as in JointLimits."""
         self._robot, self._folder, self._number = robot, folder, 0
-        section = bench.motors
+        section, axes = bench.motors, bench.axis_settings(robot)
         self.settings = bus_process.BusSettings(
             interface=interface_of(bench),
             positions=[*section.translation_terminals, *section.rotation_terminals],
             drive=bench.drive_settings,
-            axes=bench.axis_settings(robot),
+            axes=replace(axes, limits=replace(axes.limits, one_by_one=one_by_one)),
             ratios=transmission(robot),
             home=home_joints(robot),
             period=1e-3 * section.period_ms,

@@ -2,7 +2,6 @@
 
 import json
 import time
-from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -12,33 +11,37 @@ from ctcr.devices.lateness import Lateness
 from ctcr.devices.motors import Motors
 from ctcr.devices.tracker import Tracker
 from ctcr.errors import InputError, Problem, file_fault
+from ctcr.measurements import column_names
 from ctcr.output import atomic_writer, write_json
-from ctcr.record.plan import Approach
 from ctcr.record.row_file import RowFile
-from ctcr.record.session import Options
 
 TABLE, ABOUT = "measurements.csv", "session.json"
-COPIES = {"robot": "robot.yaml", "plan": "plan.csv", "bench": "bench.yaml"}
+COPIES = {"robot": "robot.yaml", "plan": "plan.csv", "scenario": "scenario.yaml", "bench": "bench.yaml"}
 
 
 class Folder:
     """Starts a recording, or goes on with the one that is there. Raises InputError where that was another one."""
 
     def __init__(
-        self, path: str | Path, sources: dict[str, str], options: Options, approach: Approach, n_tubes: int
+        self,
+        path: str | Path,
+        sources: dict[str, str],
+        settings: dict[str, Any],
+        n_tubes: int,
+        group: int = 1,
+        synced: bool = True,
     ):
-        """`sources` are the files named in COPIES."""
+        """`sources` are files named in COPIES; `group` and `synced` as those of RowFile."""
         self.path = Path(path)
-        settings = asdict(options) | {"approach": asdict(approach)}
         contents = {name: _read(source) for name, source in sources.items()}
         self.is_new = not (self.path / ABOUT).exists()
         if self.is_new:
             self._start(contents, settings)
         else:
             self._check(contents, settings)
-        group = options.readings + approach.has_way_point
-        self.rows = RowFile(self.path / TABLE, n_tubes, group)
-        elapsed = max(time.time() - self._about["started_unix_s"], self.rows.last_t + 1e-3)
+        self.rows = RowFile(self.path / TABLE, column_names(n_tubes), group, synced)
+        last = float(self.rows.last[0]) if self.rows.last else 0.0
+        elapsed = max(time.time() - self.about["started_unix_s"], last + 1e-3)
         self._zero = time.monotonic() - (0.0 if self.is_new else elapsed)
 
     def clock(self, t: float) -> float:
@@ -48,7 +51,7 @@ class Folder:
     def note(self, motors: Motors, tracker: Tracker, lateness: Lateness, ended: str) -> None:
         """How the devices did in this sitting, and how it ended."""
         state = motors.state
-        self._about["sittings"].append({
+        self.about["sittings"].append({
             "ended": ended, "rows_of_the_plan": self.rows.groups,
             "tracker": {
                 "port": tracker.port, "version": tracker.version, "frames": tracker.frames, "missed": tracker.missed,
@@ -63,7 +66,11 @@ class Folder:
                 "real_time_priority": bool(state["real_time"]),
             },
         })  # fmt: skip
-        write_json(self._about, str(self.path / ABOUT))
+        self.save()
+
+    def save(self) -> None:
+        """Writes `about`."""
+        write_json(self.about, str(self.path / ABOUT))
 
     def _start(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
         try:
@@ -77,18 +84,18 @@ class Folder:
         for name, content in contents.items():
             with atomic_writer(self.path / COPIES[name], binary=True) as file:
                 file.write(content)
-        self._about = {
+        self.about = {
             "started_unix_s": time.time(), "settings": settings, "versions": _versions(), "sittings": [],
         }  # fmt: skip
-        write_json(self._about, str(self.path / ABOUT))
+        self.save()
 
     def _check(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
-        self._about = json.loads(_read(self.path / ABOUT))
+        self.about = json.loads(_read(self.path / ABOUT))
         differs = [
             f"another {COPIES[name]}" for name, content in contents.items()
             if _read(self.path / COPIES[name]) != content
         ]  # fmt: skip
-        before = self._about["settings"]
+        before = self.about["settings"]
         differs += [
             f"{name} {before[name]}, not {settings[name]}"
             for name in settings

@@ -7,11 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.devices.fault import DeviceFault
-from ctcr.devices.lateness import Lateness
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import Person
-from ctcr.devices.tracker import Tracker
+from ctcr.devices.sight import Sight, is_seen, pose_of
 from ctcr.devices.tracker_process import TrackedFrame
 from ctcr.moving_model import MovingModel
 from ctcr.record.plan import Step
@@ -19,8 +17,6 @@ from ctcr.record.row_file import RowFile
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
-
-STALE_S = 0.25  # without a new frame: the pose is no longer that of now
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,6 @@ class Options:
     dwell_s: float = 0.5  # from rest to the first reading
     readings: int = 1  # of each row
     speed: float = 1.0  # share of the highest
-    patience_s: float = 30.0  # with a tracker that does not see the sensor, before the recording stops
 
 
 @dataclass
@@ -56,7 +51,7 @@ class Session:
         self,
         robot: Robot,
         motors: Motors,
-        tracker: Tracker,
+        sight: Sight,
         person: Person,
         rows: RowFile,
         options: Options,
@@ -64,12 +59,10 @@ class Session:
         shown: Callable[[Progress], None] = lambda progress: None,
     ):
         """`clock` gives t_s of the rows from a time of `time.monotonic`."""
-        self._robot, self._motors, self._tracker, self._person = robot, motors, tracker, person
+        self._robot, self._motors, self._sight, self._person = robot, motors, sight, person
         self._rows, self._options, self._clock, self._shown = rows, options, clock, shown
         self._model = MovingModel(robot)
         self._force = np.full(3, np.nan)
-        self._last_frame: TrackedFrame | None = None
-        self.lateness = Lateness()  # of frames, from the tracker's answer to here
 
     def run(self, steps: list[Step]) -> Progress:
         """Raises DeviceFault or InputError where it cannot go on; what has been measured is in the file."""
@@ -80,6 +73,9 @@ class Session:
             self._rows.append(self._measured(step))
             self.progress.done += 1
         self._motors.halt()
+        if steps and np.nan_to_num(self._force).any():  # whoever measures next begins without a weight
+            self._doing("weight")
+            self._person.hang(np.zeros(3))
         return self.progress
 
     def _measured(self, step: Step) -> list[Array]:
@@ -90,10 +86,9 @@ class Session:
             self._follow()
         self._doing(f"row {step.row}: reading")
         for frame in self._seen_frames(end):
-            position, quaternion = np.array(frame.reading.position), np.array(frame.reading.quaternion)
-            quaternion *= (1 if quaternion[0] >= 0 else -1) / np.linalg.norm(quaternion)
-            rows.append(self._row(step, frame.t, np.concatenate([position, quaternion])))
-            self.progress.errors_mm.append(1e3 * float(np.linalg.norm(position - self._model.reading()[0])))
+            pose = pose_of(frame)
+            rows.append(self._row(step, frame.t, pose))
+            self.progress.errors_mm.append(1e3 * float(np.linalg.norm(pose[:3] - self._model.reading()[0])))
         return rows
 
     def _come_to(self, step: Step) -> list[Array]:
@@ -120,38 +115,21 @@ class Session:
 
     def _seen_frames(self, after: float):
         """As many frames as a row needs, later than `after`, in which the tracker sees the sensor."""
-        count, patience = 0, time.monotonic() + self._options.patience_s
+        count, patience = 0, time.monotonic() + self._sight.patience_s
         while count < self._options.readings:
             frame = self._follow()
-            if frame and frame.t > after and _is_seen(frame):
+            if frame and frame.t > after and is_seen(frame):
                 count += 1
                 yield frame
             elif time.monotonic() > patience:
-                raise self._blind()
-
-    def _blind(self) -> DeviceFault:
-        if self._tracker.faults and (
-            not self._last_frame or self._tracker.faults[-1][0] > self._last_frame.t
-        ):
-            return self._tracker.faults[-1][1]
-        out = self._last_frame and self._last_frame.reading.out_of_volume
-        what = (
-            "the sensor is outside of the tracker's volume" if out else "the tracker does not see the sensor"
-        )
-        remedy = "look at the sensor, its cable and the field generator, then run the same command again: it goes on"
-        return DeviceFault("tracker", f"{what} for {self._options.patience_s:g} s", remedy)
+                raise self._sight.blind()
 
     def _follow(self) -> TrackedFrame | None:
-        """Waits for the next frame, for one and a half of its periods at most, and lets the model follow the joints."""
-        frame = self._tracker.next(1.5 / 40)
-        now = time.monotonic()
-        if frame:
-            self._last_frame = frame
-            self.lateness.add(now - frame.t)
+        """Waits for the next frame, for a short time, and lets the model follow the joints."""
+        frame, now = self._sight.next(), time.monotonic()
         n, joints = self._robot.n_tubes, self._motors.joints
         self._model.move(now, joints[:n], joints[n:], self._force)
-        last = self._last_frame
-        self.progress.seen = bool(last and now - last.t < STALE_S and _is_seen(last))
+        self.progress.seen = self._sight.is_now
         self._shown(self.progress)
         if self._motors.state["stopped"]:
             self._motors.wait()  # says why
@@ -160,7 +138,3 @@ class Session:
     def _doing(self, text: str) -> None:
         self.progress.doing = text
         self._shown(self.progress)
-
-
-def _is_seen(frame: TrackedFrame) -> bool:
-    return frame.reading.position is not None and not frame.reading.out_of_volume

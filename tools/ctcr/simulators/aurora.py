@@ -11,6 +11,7 @@ import numpy as np
 from ctcr.devices import ndi_protocol as ndi
 from ctcr.devices.lateness import wish_real_time
 from ctcr.errors import InputError, Problem
+from ctcr.frames import base_to_tracker
 from ctcr.simulators.aurora_device import RATE_HZ, AuroraDevice, Sight
 from ctcr.simulators.control import ControlSocket
 from ctcr.simulators.faults import Faults, Scenario
@@ -21,6 +22,7 @@ from ctcr.simulators.serial_line import SerialLine
 NAME = "aurora"
 PRIORITY = 40
 SENSOR = 0x0A  # the handle of the coil at the robot's tip
+PROBE = 0x0C  # the handle of the coil in the probe
 STILL = (np.array([0.05, 0.0, -0.2]), np.array([1.0, 0.0, 0.0, 0.0]))  # where the other coils lie
 RESET_S = 0.2  # from a break to the device's message
 BREAK_S = 0.3  # silence of a host that has just fallen back to the rate after a reset
@@ -47,6 +49,7 @@ class AuroraSimulator:
         self._scenario = Scenario.load(scenario, self.faults) if scenario else Scenario()
         self._random = random.Random(seed)
         self._device = AuroraDevice(self._see)
+        self._probe = STILL
         self._control = ControlSocket(folder, NAME, self._asked)
         self.line = SerialLine(folder / NAME)
         self._motors, self._input = shared_motors(folder), b""
@@ -130,6 +133,8 @@ class AuroraSimulator:
         if self._random.random() < self.faults.missing:
             return Sight(None)
         pose = self.robot.reading() if handle == SENSOR else STILL
+        if handle == PROBE:
+            pose = self.robot.as_read(*self._probe)
         return Sight(pose, self.faults.out_of_volume)
 
     def _follow_motors(self) -> None:
@@ -147,10 +152,15 @@ class AuroraSimulator:
         if "faults" in request:
             self._set(request["faults"])
         if "force" in request:
-            force = request["force"]
-            if not isinstance(force, list) or len(force) != 3:
-                raise InputError(Problem("needs three numbers [N]", field="force"))
-            self.robot.force = np.array(force, dtype=float)
+            self.robot.force = _three(request, "force", "N")
+        if "probe" in request:
+            place = _three(request, "probe", "m, base frame")
+            self._probe = base_to_tracker(self.robot.robot.tracker, place, STILL[1])
+        if "fasten" in request:
+            tube = request["fasten"]
+            if tube is not None and tube not in range(self.robot.robot.n_tubes):
+                raise InputError(Problem("needs the number of a tube from 0, or null", field="fasten"))
+            self.robot.fasten(tube)
         if request.get("break"):
             self._break()
         return {
@@ -168,3 +178,10 @@ class AuroraSimulator:
             self.line.baud = ndi.RESET_BAUD
         if self.faults.wrong_baud:
             self.line.baud = ndi.RESET_BAUD
+
+
+def _three(request: dict[str, Any], name: str, unit: str) -> np.ndarray:
+    value = request[name]
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(Problem(f"needs three numbers [{unit}]", field=name))
+    return np.array(value, dtype=float)

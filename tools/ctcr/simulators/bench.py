@@ -1,10 +1,10 @@
-"""Both simulators around one robot, for as long as a program runs."""
+"""Both simulators around one robot, for as long as something is done beside them."""
 
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -19,13 +19,16 @@ READY_S = 20.0
 
 
 def run(
-    program: list[str],
+    work: Callable[[], int],
     robot: SimulatedRobot,
     folder: Path,
-    scenarios: tuple[str | None, str | None],
-    seed: int,
+    scenarios: tuple[str | None, str | None] = (None, None),
+    seed: int = 1,
 ) -> int:
-    """The exit code of `program` (a shell where it is empty), run beside the simulators."""
+    """What `work` returns, done beside the simulators of tracker and bus; `scenarios` are theirs.
+
+    The command line is run again in a network of its own, where that is permitted: call this before anything else.
+    """
     os.environ[VARIABLE] = str(folder.resolve())
     if network.is_permitted():
         network.in_own_network(sys.argv[1:])
@@ -42,10 +45,7 @@ def run(
             problem = ready.recv() if ready.poll(READY_S) else InputError([])
             if problem:
                 raise problem
-        return subprocess.run(program or [os.environ.get("SHELL", "sh")]).returncode
-    except FileNotFoundError:
-        print(f"{program[0]}: no such command", file=sys.stderr)
-        return 1
+        return work()
     finally:
         for process, _ in served:
             process.terminate()

@@ -14,21 +14,27 @@ from ctcr.track.scene import scene
 from ctcr.track.summary import COLUMNS, by_mass, rows, summary
 
 
-def write(runs: list[Run], scenario: Scenario, robot: Robot, target: str | Path, source: str) -> None:
-    """Writes the page; source says what was run. Raises InputError where the file cannot be written."""
+def write(
+    runs: list[Run], scenario: Scenario, robot: Robot, target: str | Path, source: str, measured: bool = False
+) -> None:
+    """Writes the page; source says what was run. Raises InputError where the file cannot be written.
+
+    `measured`: tips are those that a tracker read.
+    """
     with atomic_writer(target) as file:
-        file.write(page(runs, scenario, robot, source))
+        file.write(page(runs, scenario, robot, source, measured))
 
 
-def page(runs: list[Run], scenario: Scenario, robot: Robot, source: str) -> str:
+def page(runs: list[Run], scenario: Scenario, robot: Robot, source: str, measured: bool = False) -> str:
     """The whole HTML text."""
     numbers = summary(runs)
     worst = [_worst(group) for group in by_mass(runs).values()]
     sections = [
         _opening(numbers, scenario),
         '<h2>The path</h2><div id="view"></div>'
-        '<p class="soft">The tip without noise, the worst run of each weight. Drag to turn, scroll to zoom.</p>',
-        _errors(runs, numbers, scenario),
+        f'<p class="soft">The tip {"as measured" if measured else "without noise"}, the worst run of each weight. '
+        "Drag to turn, scroll to zoom.</p>",
+        _errors(runs, numbers, scenario, measured),
         *(_one(run, scenario, robot) for run in _shown(worst)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
@@ -73,7 +79,7 @@ def _opening(numbers: dict, scenario: Scenario) -> str:
     )
 
 
-def _errors(runs: list[Run], numbers: dict, scenario: Scenario) -> str:
+def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) -> str:
     text = (
         "Distance between the tip and its reference; boxes are quartiles, whiskers reach to all values, diamonds are "
         f"means. Left out: references nearer than {1e3 * FAR:g} mm to the obstacle, where the tip has to deviate."
@@ -83,9 +89,10 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario) -> str:
         "weight",
         *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS),
     ]
+    noise = "as measured, with noise" if measured else f"noise {scenario.noise_mm:g} mm a reading and axis"
     note = (
         f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
-        f"{scenario.repetitions} runs a weight, noise {scenario.noise_mm:g} mm a reading and axis.</p>"
+        f"{scenario.repetitions} runs a weight, {noise}.</p>"
     )
     return f"<h2>Tracking errors</h2>{told}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ctcr import _core, effects, free_parameters
 from ctcr.errors import InputError, Problem
 from ctcr.robot import Robot
+from ctcr.track.device import Device
 from ctcr.track.scenario import TASKS, Scenario, radians
 
 Array = NDArray[np.float64]
@@ -114,20 +115,22 @@ def system_values(robot: Robot, steps: int = 1) -> _core.SystemValues:
 def run_once(
     scenario: Scenario,
     controller: _core.SystemValues,
-    plant: _core.SystemValues,
+    plant: _core.SystemValues | Device,
     mass_g: float,
     seed: int = 1,
 ) -> Run:
-    """One run. `seed` is that of the noise."""
+    """One run, on a simulated plant or a device. `seed` is that of the noise. Raises what the device raises."""
     s, tasks, limits, obstacle = scenario, scenario.tasks, scenario.limits, scenario.obstacle
     n = len(s.start.beta_mm)
 
     def per_tube(values: list[float] | None, scale: float, default: float) -> Array:
         return np.full(n, default) if values is None else scale * np.array(values)
 
+    simulated = isinstance(plant, _core.SystemValues)
     result = _core.closed_loop(
         controller=controller,
-        plant=plant,
+        plant=plant if simulated else controller,
+        device=None if simulated else plant,
         tasks=_core.TaskValues(
             weights=np.array([getattr(tasks, name.replace(" ", "_")) for name in TASKS]),
             gain=tasks.feedback_per_s, correction=1e-3 * tasks.fastest_feedback_mm_s, tracking_tolerance=1e-3,
@@ -151,16 +154,20 @@ def run_once(
         tip_force=s.load.controller, noise_position=1e-3 * s.noise_mm, noise_rotation=np.radians(s.noise_deg),
         seed=seed,
     )  # fmt: skip
-    far, clearance = np.ones(len(result.time), bool), np.inf
-    if obstacle:
-        centre, radius = 1e-3 * np.array(obstacle.centre_mm), 1e-3 * obstacle.radius_mm
-        far = np.linalg.norm(result.wanted - centre, axis=1) > radius + FAR
-        if len(result.tip):
-            clearance = float(np.linalg.norm(result.tip - centre, axis=1).min()) - radius
     return Run(
         mass_g, seed, result.status, result.settled, result.time, result.joints, result.tip, result.wanted,
-        result.shortfall, result.held, result.force, result.stability, far, clearance,
+        result.shortfall, result.held, result.force, result.stability,
+        *beside_obstacle(s, result.tip, result.wanted),
     )  # fmt: skip
+
+
+def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[NDArray[np.bool_], float]:
+    """Run.far and Run.clearance."""
+    if not scenario.obstacle:
+        return np.ones(len(wanted), bool), np.inf
+    centre, radius = 1e-3 * np.array(scenario.obstacle.centre_mm), 1e-3 * scenario.obstacle.radius_mm
+    clearance = float(np.linalg.norm(tip - centre, axis=1).min()) - radius if len(tip) else np.inf
+    return np.linalg.norm(wanted - centre, axis=1) > radius + FAR, clearance
 
 
 def run_all(

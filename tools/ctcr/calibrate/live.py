@@ -1,0 +1,206 @@
+"""The tables of the calibration procedures, made on the bench: row by row as read, and gone on with where they end."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.calibrate.still_reading import StillReading, still_reading
+from ctcr.calibrate.tables import Table
+from ctcr.devices.bench_file import Bench
+from ctcr.devices.motors import Motors
+from ctcr.devices.person import Person
+from ctcr.devices.sight import Sight
+from ctcr.devices.tracker import Tracker
+from ctcr.devices.transmission import turns_of_joints
+from ctcr.errors import InputError, Problem
+from ctcr.record.row_file import RowFile
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+
+PATIENCE_S = 30.0
+STILL_M = 0.5e-3  # what a hand and the tracker's noise move a probe that is held still
+POSITION_COLUMNS = ("x_mm", "y_mm", "z_mm", "scatter_mm", "readings")
+ROTATION_COLUMNS = ("tube", "motor_angle_deg", "direction", *POSITION_COLUMNS)
+POINT_COLUMNS = ("point", "cad_x_mm", "cad_y_mm", "cad_z_mm", *POSITION_COLUMNS)
+FLUSH_M = 0.2e-3  # a tip that stands out no farther is flush
+OTHER_DEG = 3.0  # of a motor, between rows that are meant to be at one angle
+RUN_UP = np.deg2rad(10.0)  # a way comes to its first angle already turning
+
+
+@dataclass(frozen=True)
+class Circles:
+    """How the tubes turn."""
+
+    step: float  # [rad] of a tube, between readings
+    frames: int  # of a reading
+    deployed: float | None = None  # [m] that a tube stands out; None: its curved length
+
+
+@dataclass(frozen=True)
+class Desk:
+    """Who and what works at a bench; `place`: where its processes meet."""
+
+    bench: Bench
+    place: Path
+    person: Person
+    say: Callable[[str], None]
+
+
+def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles) -> None:
+    """Turns one tube after the other, alone out of the plate, forward and backward; a row an angle.
+
+    Ref: Boyer et al., Section V.B. Raises InputError where the robot cannot do so within the limits of the bench,
+    DeviceFault where the devices stop. In the end the sensor is back on its tube, which stands out.
+    """
+    with (
+        closing(RowFile(Path(path), ROTATION_COLUMNS)) as rows,
+        Tracker(desk.bench, desk.place) as tracker,
+        Motors(desk.bench, robot, desk.place, one_by_one=True) as motors,
+    ):
+        turner = _Turner(robot, motors, Sight(tracker, PATIENCE_S), desk.person, circles)
+        turner.check()
+        turner.check_last(rows)
+        done, angles = divmod(rows.groups, len(turner.jobs))
+        if done < robot.n_tubes:
+            motors.connect()
+            tracker.connect()
+            turner.look()
+        for tube in range(done, robot.n_tubes):
+            desk.say(f"tube {tube + 1}: alone out of the plate, turning both ways")
+            turner.take_out(tube)
+            turner.turn(tube, rows, angles)
+            angles = 0
+        if done < robot.n_tubes:
+            turner.take_out(robot.tracker.sensor_on_tube - 1)
+
+
+def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds: int) -> None:
+    """Has each named point touched with the probe, in `rounds` rounds; a row a touch.
+
+    `points`: a table of CAD_POINTS. Raises DeviceFault where the tracker stops.
+    """
+    names = list(dict.fromkeys(points["point"]))
+    first = [points["point"].index(name) for name in names]
+    cad = points.stacked("cad_x", "cad_y", "cad_z")[first]
+    touches = list(zip(names, cad, strict=True)) * rounds
+    section = desk.bench.tracker
+    probe = section.model_copy(update={"tool": section.probe or section.tool})
+    bench = desk.bench.model_copy(update={"tracker": probe})
+    with closing(RowFile(Path(path), POINT_COLUMNS)) as rows, Tracker(bench, desk.place) as tracker:
+        left = touches[rows.groups :]
+        if left:
+            tracker.connect()
+        for name, where in left:
+            desk.person.touch(name, where)
+            reading = still_reading(Sight(tracker, PATIENCE_S), frames, STILL_M)
+            rows.append([[name, *1e3 * where, *_fields(reading)]])
+            x, y, z = 1e3 * reading.position
+            desk.say(f"{name}: {x:.2f}, {y:.2f}, {z:.2f} mm, scatter {1e3 * reading.scatter:.3f} mm")
+
+
+def _fields(reading: StillReading) -> list[float]:
+    return [*1e3 * reading.position, 1e3 * reading.scatter, reading.frames]
+
+
+class _Turner:
+    def __init__(self, robot: Robot, motors: Motors, sight: Sight, person: Person, circles: Circles):
+        self._robot, self._motors, self._sight, self._person = robot, motors, sight, person
+        self._circles, self._limits = circles, motors.settings.axes.limits
+        self.jobs = self._jobs()
+        self._worn: int | None = None  # the tube with the sensor on it
+
+    def _jobs(self) -> list[tuple[float, int]]:
+        """Angles [rad] with the direction in which they are come to: one turn forward, one backward."""
+        low, high = self._limits.rotation[:, 0].max() + RUN_UP, self._limits.rotation[:, 1].min() - RUN_UP
+        low, high = max(low, -np.pi), min(high, np.pi)
+        angles = np.linspace(low, high, 1 + max(2, round((high - low) / self._circles.step)))
+        return [*((angle, 1) for angle in angles), *((angle, -1) for angle in angles[::-1])]
+
+    def check(self) -> None:
+        """Raises InputError where a tube cannot stand out alone."""
+        problems = []
+        for tube in range(self._robot.n_tubes):
+            if problem := self._limits.problem(self._alone(tube)):
+                text = f"tube {tube + 1} cannot stand out alone: {problem}; widen the limits, or take the tubes in the "
+                problems.append(
+                    Problem(f"{text}way out of the robot and make the table by hand", field="limits")
+                )
+        if problems:
+            raise InputError(problems)
+
+    def check_last(self, rows: RowFile) -> None:
+        """Raises InputError where the rows that are there were made at other angles."""
+        if not rows.last:
+            return
+        tube, job = divmod(rows.groups - 1, len(self.jobs))
+        number, motor, sign = (float(field) for field in rows.last[:3])
+        if tube < self._robot.n_tubes:
+            angle, wanted = self.jobs[job]
+            if (
+                number == tube + 1
+                and sign == wanted
+                and abs(motor - self._motor_deg(tube, self._alone(tube, angle))) < OTHER_DEG
+            ):
+                return
+        text = "holds rows at other angles: choose another name, or the --step-deg and limits of those rows"
+        raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
+
+    def _motor_deg(self, tube: int, joints: Array) -> float:
+        """What the rotation motor of a tube has turned since home."""
+        return 360 * float(turns_of_joints(self._robot, joints)[self._robot.n_tubes + tube])
+
+    def look(self) -> None:
+        """Which tube has the sensor: the one that is out alone, or else its usual one."""
+        tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
+        out = np.flatnonzero(tips > FLUSH_M)
+        self._worn = (
+            int(out[0]) if len(out) == 1 else self._robot.tracker.sensor_on_tube - 1 if len(out) else None
+        )
+
+    def take_out(self, tube: int) -> None:
+        """This tube alone out of the plate with the sensor on it. The sensor does not fit into another tube."""
+        tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
+        ordered = (
+            tube == 0 or (np.delete(tips, tube) <= FLUSH_M).all()
+        )  # the straight way keeps to the limits
+        if self._worn != tube or not ordered:
+            if self._worn is not None:
+                self._person.fasten(None)
+            self._worn = None
+            self._go(self._flush())
+        self._go(self._alone(tube))
+        if self._worn is None:
+            self._person.fasten(tube)
+        self._worn = tube
+
+    def turn(self, tube: int, rows: RowFile, done: int) -> None:
+        """Both ways, without the first `done` angles."""
+        before = 0
+        for angle, sign in self.jobs[done:]:
+            if sign != before:
+                self._go(self._alone(tube, angle - sign * RUN_UP))
+            before = sign
+            self._go(self._alone(tube, angle))
+            reading = still_reading(self._sight, self._circles.frames, STILL_M)
+            motor = self._motor_deg(tube, self._motors.joints)
+            rows.append([[str(tube + 1), motor, sign, *_fields(reading)]])
+        self._go(self._alone(tube))
+
+    def _go(self, joints: Array) -> None:
+        self._motors.move(joints)
+        self._motors.wait()
+
+    def _flush(self) -> Array:
+        """Joints (2N,) with all tips flush with the plate."""
+        return np.concatenate([-self._limits.length, np.zeros(self._robot.n_tubes)])
+
+    def _alone(self, tube: int, angle: float = 0.0) -> Array:
+        joints, deployed = self._flush(), self._circles.deployed
+        joints[tube] += self._robot.tubes[tube].curved_length if deployed is None else deployed
+        joints[self._robot.n_tubes + tube] = angle
+        return joints

@@ -1,0 +1,48 @@
+"""`ctcr demo`: what the tools do together."""
+
+import click
+
+from ctcr.commands.sim import folder_option
+
+
+@click.group(name="demo")
+def command() -> None:
+    """Demonstrations that need no hardware."""
+
+
+@command.command(name="bench")
+@click.option(
+    "-o", "--output", "target", default="build/bench_demo", show_default=True, metavar="FOLDER",
+    help="For all that is measured and found, and the report; what is there is removed.",
+)  # fmt: skip
+@click.option("--short", is_flag=True, help="Leave out what only shows more.")
+@folder_option
+def bench(target, short, folder) -> int:
+    """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.
+
+    Each step is a command, shown as you would type it, which meets the robot through the protocols of tracker and
+    motors. Some minutes; writes report.html.
+    """
+    from ctcr import robot_file
+    from ctcr.demo import bench_story
+    from ctcr.demo.hidden_robot import hidden_robot
+    from ctcr.devices.private_folder import private_folder
+    from ctcr.simulators import bench as simulated
+    from ctcr.simulators.robot import SimulatedRobot
+
+    hidden = hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
+    return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), private_folder(folder))
+
+
+def _tell(target, hidden, short) -> int:
+    from ctcr import output
+    from ctcr.demo import bench_report, bench_story
+    from ctcr.demo.story import Story, new_folder
+    from ctcr.demo.terminal import Teller
+
+    console, report = output.console(), f"{target}/report.html"
+    story = Story(new_folder(target), Teller(console))
+    bench_story.tell(story, short)
+    console.print(bench_report.write(story, hidden, report), markup=False)
+    console.print(f"Report: {report}", markup=False)
+    return 0

@@ -1,0 +1,22 @@
+"""`ctcr join`: recordings of one session as one table."""
+
+import click
+
+
+@click.command(name="join")
+@click.argument("robot")
+@click.argument("tables", nargs=-1, required=True, metavar="MEASUREMENTS...")
+@click.option("-o", "--output", "target", required=True, metavar="TABLE", help="The table to write.")
+def command(robot, tables, target) -> None:
+    """Put MEASUREMENTS of ROBOT, in the order in which they were recorded, into one table.
+
+    For recordings between which the joints stayed where they were, such as a first one and the one that ctcr next
+    proposed. Runs are numbered on; times go on by what the recordings' session.json say.
+    """
+    from ctcr import measurements, output, robot_file, simulation
+    from ctcr.record.joined import joined, start_of
+
+    n = robot_file.load(robot).n_tubes
+    whole = joined([measurements.load(table, n) for table in tables], [start_of(table) for table in tables])
+    simulation.write(whole, target, n)
+    output.console().print(f"{len(whole)} rows of {len(tables)} tables: {target}", markup=False)

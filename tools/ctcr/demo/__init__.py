@@ -1,0 +1,1 @@
+"""Demonstrations: what the tools do together, told as one story."""

@@ -1,0 +1,224 @@
+"""The story at the bench as one HTML page that needs nothing else."""
+
+import html
+import json
+import re
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import history, html_page, measurements, robot_file
+from ctcr.demo import bench_figures
+from ctcr.demo.bench_figures import Driven
+from ctcr.demo.bench_story import ROBOTS, cube
+from ctcr.demo.hidden_robot import EFFECT, VALUE
+from ctcr.demo.story import Story
+from ctcr.frames import tracker_to_base
+from ctcr.html_page import cards, figure, table
+from ctcr.output import atomic_writer
+from ctcr.record.folder import ABOUT, TABLE
+from ctcr.robot import Robot
+from ctcr.track import scenario
+from ctcr.track.recording import runs_of
+
+Array = NDArray[np.float64]
+
+TITLE = "A hidden effect, found on the bench"
+SHOWN = ("actuation.home_rotation_deg", "tracker.position_mm")  # of the calibrated parameters
+
+
+def write(story: Story, hidden: Robot, target) -> str:
+    """The end of the story in words. `hidden` is what stood on the bench. Raises InputError where it cannot write."""
+    drives = _drives(story.folder)
+    with atomic_writer(target) as file:
+        file.write(page(story, hidden, drives))
+    return _summary(story, drives)
+
+
+def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
+    """The whole HTML text; without `drives` the story ended before the cube."""
+    folder = story.folder
+    known, found = robot_file.load(folder / "robot.yaml"), robot_file.load(folder / "with_effect.yaml")
+    sections = [
+        _opening(story, found, drives),
+        _bench(),
+        _steps(story),
+        _first_look(story, known.n_tubes),
+        _model(found),
+        _cube(drives),
+        _truth(story, known, found, hidden),
+        _wires(story),
+    ]
+    drawing = bench_figures.scene(drives) if drives else None
+    return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench", drawing)
+
+
+def _summary(story: Story, drives: dict[str, Driven]) -> str:
+    rms = story.answers["added"]["rms_mm"]
+    lines = [
+        f"The error of the model fell from {rms['nominal']:.2f} to {rms['calibrated']:.2f} mm by calibration, and to "
+        f"{rms[EFFECT]:.2f} mm with {EFFECT}."
+    ]
+    if drives:
+        without, with_it = drives.values()
+        lines.append(
+            f"Driven blindly along a cube, the tip was off by {without.blind.mean():.2f} mm before and "
+            f"{with_it.blind.mean():.2f} mm after; under control by {without.controlled.mean():.2f} and "
+            f"{with_it.controlled.mean():.2f} mm."
+        )
+    return "\n".join(lines)
+
+
+def _drives(folder: Path) -> dict[str, Driven]:
+    """Along the cube, by what the model knew; empty where the story ended before."""
+    if not list(folder.glob("track_*")):
+        return {}
+    seen_by, places, found = robot_file.load(folder / "calibrated.yaml"), cube(folder), {}
+
+    def in_base(points):
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
+        return 1e3 * tracker_to_base(seen_by.tracker, points, upright)[0]
+
+    for robot, name in ROBOTS.items():
+        table = measurements.load(folder / f"blind_{robot}" / TABLE, seen_by.n_tubes)
+        path, error = _controlled(folder / f"track_{robot}", robot_file.load(folder / f"{robot}.yaml"))
+        tips = table.position[-len(places) :]
+        found[name] = Driven(in_base(places), in_base(tips), path, error)
+    return found
+
+
+def _controlled(recording: Path, robot: Robot) -> tuple[Array, Array]:
+    """Time along the path (R,) [s], and errors (R,) [mm]."""
+    about = json.loads((recording / ABOUT).read_text(encoding="utf-8"))
+    wanted = scenario.load(recording / "scenario.yaml", robot.n_tubes)
+    (run,) = runs_of(SimpleNamespace(path=recording, about=about), wanted, robot)
+    return run.time, 1e3 * run.error
+
+
+def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
+    rms = story.answers["added"]["rms_mm"]
+    minutes, seconds = divmod(round(sum(step.seconds for step in story.steps)), 60)
+    numbers = [
+        ("error", f"{rms['nominal']:.2f} mm", "error of the model before, where it was found"),
+        ("error", f"{rms['calibrated']:.2f} mm", "the best that calibration can do"),
+        ("good", f"{rms[EFFECT]:.2f} mm", f"with {EFFECT}, on a run that no fit saw"),
+    ]
+    if drives:
+        without, with_it = drives.values()
+        text = f"{without.blind.mean():.2f} → {with_it.blind.mean():.2f}"
+        numbers.append(("good", text, "mm off a cube that was driven blindly"))
+    return (
+        f"<h1>{TITLE}</h1>"
+        f'<p class="lead">A robot stands on a simulated bench. It is off its file in {len(_calibrated(found))} '
+        f"calibrated parameters, and {EFFECT} acts between its tubes, of which no file says a word. The commands "
+        f"below met it through the devices' own protocols only, and took {minutes} min {seconds} s.</p>{cards(numbers)}"
+    )
+
+
+def _calibrated(robot: Robot) -> list[str]:
+    from ctcr import free_parameters
+
+    return free_parameters.expand("standard", robot)
+
+
+def _bench() -> str:
+    text = (
+        "Blue: the same processes as on a real bench. Brown: simulated; it answers in the bytes of the real devices, "
+        "so that one line of the bench file replaces each by the real one."
+    )
+    return "<h2>The bench</h2>" + figure(bench_figures.bench, None, 10.4, 2.7, text, wide=True)
+
+
+def _steps(story: Story) -> str:
+    rows = "".join(
+        f'<li><b>{html.escape(step.why)}</b> <span class="soft">{step.seconds:.0f} s</span><br>'
+        f"<code>{html.escape(step.command)}</code><br>{html.escape(step.found)}</li>"
+        for step in story.steps
+    )
+    return f'<h2>What was done</h2><ol class="steps">{rows}</ol>'
+
+
+def _first_look(story: Story, n_tubes: int) -> str:
+    folder = story.folder
+    loop = bench_figures.Loop(
+        measurements.load(folder / "both.csv", n_tubes),
+        {
+            "calibrated": robot_file.load(folder / "calibrated.yaml"),
+            f"calibrated, with {EFFECT}": robot_file.load(folder / "with_effect.yaml"),
+        },
+    )
+    text = (
+        "The error of the model where the same joints were reached from both sides, in its main direction. Without "
+        "friction no model can be right on both ways."
+    )
+    return "<h2>The same joints, out and back</h2>" + figure(
+        bench_figures.out_and_return, loop, 10.4, 3.6, text, wide=True
+    )
+
+
+def _model(found: Robot) -> str:
+    stages = history.waterfall(found)
+    return "<h2>The error of the model falls</h2>" + figure(
+        history.draw_waterfall, stages, 8.4, 3.8, "RMS error on a run that no fit saw."
+    )
+
+
+def _cube(drives: dict[str, Driven]) -> str:
+    if not drives:
+        return ""
+    without, with_it = drives.values()
+    helps = with_it.controlled.mean() < without.controlled.mean()
+    text = (
+        "The tip along the edges of a cube of 10 mm. Blind: joints planned with the model and driven without a look at "
+        "the tracker, so that the error is that of the model. Controlled: the tracker corrects what the model does not "
+        f"know; there, knowing {EFFECT} {'helps too' if helps else 'does not help'}."
+    )
+    return (
+        "<h2>The error in tracking</h2>"
+        + figure(bench_figures.tracking, drives, 10.4, 3.8, text, wide=True)
+        + '<div id="view"></div><p class="soft">The cube, and the corners where the blind robot came to; base frame. '
+        "Drag to turn, click a name to hide it.</p>"
+    )
+
+
+def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
+    parameters = story.answers["added"]["parameters"]
+    rows = [
+        [name.removeprefix("effects."), "0", f"{p['value']:.4f}", f"{p['sd']:.4f}", f"{VALUE:.4f}"]
+        for name, p in parameters.items()
+        if ".coefficient." in name
+    ]
+    for change in found.history[-1]["changes"]:
+        if change["field"].startswith(SHOWN):
+            true = _at(hidden, change["field"])
+            before = _at(known, change["field"])
+            numbers = [f"{v:.2f}" for v in (before, change["new"], change["sd"], true)]
+            rows.append([f"{change['field']}", *numbers])
+    columns = ["", "robot file", "found", "standard deviation", "true"]
+    return "<h2>What was found, and what was there</h2>" + table("", columns, rows, 1)
+
+
+def _at(robot: Robot, path: str) -> float:
+    """The value at a path of the robot file, such as tubes[0].length_mm."""
+    value: Any = robot
+    for name, index in re.findall(r"(\w+)|\[(\d+)\]", path):
+        value = value[int(index)] if index else getattr(value, name)
+    return value
+
+
+def _wires(story: Story) -> str:
+    rows = []
+    for path in sorted(story.folder.glob("*/session.json"), key=lambda path: path.stat().st_mtime):
+        about = json.loads(path.read_text(encoding="utf-8"))["sittings"][-1]
+        bus, tracker = about["bus"], about["tracker"]
+        rows.append([
+            path.parent.name, str(tracker["frames"]), str(tracker["missed"]), f"{about['frames_late']['p99_ms']:.2f}",
+            str(bus["cycles"]), str(bus["bad_cycles"]), f"{bus['p99_late_ms']:.2f}", f"{bus['worst_late_ms']:.2f}",
+            "yes" if bus["real_time_priority"] else "no",
+        ])  # fmt: skip
+    columns = ["recording", "frames", "missed", "99 % late, ms", "bus cycles", "bad", "99 % late, ms", "worst, ms",
+               "real-time"]  # fmt: skip
+    return "<h2>How steady the loops were</h2>" + table("", columns, rows, 1)

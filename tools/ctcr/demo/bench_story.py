@@ -1,0 +1,201 @@
+"""The story of `ctcr demo bench`: from a robot that nobody knows to one that does what its model says."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import measurements, robot_file, simulation
+from ctcr.demo import blind_drive
+from ctcr.demo.story import Story
+from ctcr.record.folder import TABLE
+from ctcr.track import scenario
+
+Array = NDArray[np.float64]
+
+FILES = Path(__file__).parent / "bench"
+BENCH = "--bench bench.yaml"
+KNOWN = "known.yaml"  # the robot file as the procedures leave it
+ROBOTS = {"calibrated": "without friction", "with_effect": "with friction"}  # in the model
+
+
+def tell(story: Story, short: bool = False) -> None:
+    """Runs the story in its folder, beside the simulators. `short` leaves out what only shows more."""
+    for file in FILES.iterdir():
+        shutil.copy(file, story.folder)
+    _find_the_joints(story, short)
+    _find_the_effect(story, short)
+    _add_the_effect(story, short)
+    if not short:
+        _track(story)
+
+
+def _find_the_joints(story: Story, short: bool) -> None:
+    if not short:
+        story.do("See which devices answer", f"devices {BENCH}", _devices, "devices")
+    home = "--at-home" if short else "--home"
+    found = (
+        "taken from their marks"
+        if short
+        else "each tube flush with the plate in turn: its length says where it is"
+    )
+    story.do("Find the joints", f"move robot.yaml {BENCH} {home}", lambda _: found)
+    story.do(
+        "Touch six points with the probe: where the tracker stands",
+        f"calibrate registration points.csv --live --cad cad.csv {BENCH} --readings 5 --robot robot.yaml "
+        "-o registered.yaml", _registered, "registration",
+    )  # fmt: skip
+    if short:
+        shutil.copy(story.folder / "registered.yaml", story.folder / KNOWN)
+        return
+    story.do(
+        "Turn one tube after the other, alone: how they stand at home",
+        f"calibrate rotation-offset circles.csv --live {BENCH} --readings 2 --step-deg 60 --robot registered.yaml "
+        f"-o {KNOWN}", _turned, "circles",
+    )  # fmt: skip
+
+
+def _find_the_effect(story: Story, short: bool) -> None:
+    record = _record(KNOWN, 0.05 if short else 0.2)
+    story.do("Measure: all tubes turn by 40 degrees and back", record.format("first"), _recorded, "first")
+    if not short:
+        story.do("How wrong is the model?", f"compare {KNOWN} first/measurements.csv", _compared, "compared")
+    story.do(
+        "Which effect is missing?", f"diagnose {KNOWN} first/measurements.csv", _diagnosed, "first_diagnosis"
+    )  # fmt: skip
+    story.do(
+        "Ask for the runs that decide",
+        f"next {KNOWN} first/measurements.csv --runs 2 -o second.csv", _proposed, "proposal",
+    )  # fmt: skip
+    if not story.answers["proposal"]["runs"]:  # the first recording has decided
+        shutil.copy(story.folder / "first" / TABLE, story.folder / "both.csv")
+        shutil.copy(story.folder / "first_diagnosis.json", story.folder / "diagnosis.json")
+        return
+    story.do("Measure them", record.format("second"), _recorded, "second")
+    story.do(
+        "Put both recordings together",
+        f"join {KNOWN} first/measurements.csv second/measurements.csv -o both.csv", lambda _: "both.csv",
+    )  # fmt: skip
+    story.do("Which effect is missing?", f"diagnose {KNOWN} both.csv", _diagnosed, "diagnosis")
+
+
+def _add_the_effect(story: Story, short: bool) -> None:
+    table = "both.csv"
+    if not short:
+        story.do(
+            "Measure all over the workspace",
+            _record(KNOWN).format("workspace"),
+            _recorded,
+            "workspace",
+        )
+        table = "all.csv"
+        story.do(
+            "Put it to the others",
+            f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", lambda _: table,
+        )  # fmt: skip
+    story.do(
+        "Calibrate alone, to compare",
+        f"calibrate fit {KNOWN} {table} -o calibrated.yaml", _calibrated, "calibrated",
+    )  # fmt: skip
+    story.do(
+        "Add what was found",
+        f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml", _added, "added",
+    )  # fmt: skip
+
+
+def _track(story: Story) -> None:
+    """Along the edges of a cube, first by the model alone, then with the tracker's help."""
+    places = cube(story.folder)
+    for robot, name in ROBOTS.items():
+        blind = f"blind_{robot}"
+        loaded = robot_file.load(story.folder / f"{robot}.yaml")
+        plan = blind_drive.drive(loaded, start(story.folder), places)
+        simulation.write(plan, story.folder / f"{blind}.csv", loaded.n_tubes)
+        story.do(
+            f"Drive along a cube blindly, by the model {name}", _record(f"{robot}.yaml").format(blind),
+            lambda _, blind=blind: f"{blind_errors(story.folder, blind).mean():.2f} mm off the cube", blind,
+        )  # fmt: skip
+    for robot, name in ROBOTS.items():
+        story.do(
+            f"Track the cube at 40 Hz, by the model {name}",
+            f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}", _tracked, f"track_{robot}",
+        )  # fmt: skip
+
+
+def _record(robot: str, dwell: float = 0.2) -> str:
+    return f"record {robot} {{0}}.csv {BENCH} --dwell {dwell} -o {{0}}"
+
+
+def cube(folder: Path) -> Array:
+    """Corners of the cube (P, 3) [m] in the order of its tour, in the tracker frame that calibration alone found."""
+    robot = robot_file.load(folder / "calibrated.yaml")
+    path = scenario.load(folder / "cube.yaml", robot.n_tubes).trajectory
+    return blind_drive.in_tracker(robot, path.points)
+
+
+def start(folder: Path) -> Array:
+    """Joints (2N,) [m], [rad] where tracking begins."""
+    begin = scenario.load(folder / "cube.yaml", robot_file.load(folder / "robot.yaml").n_tubes).start
+    return np.concatenate([1e-3 * np.array(begin.beta_mm), np.deg2rad(begin.alpha_deg)])
+
+
+def blind_errors(folder: Path, recording: str) -> Array:
+    """How far the tip was from each place of the cube (P,) [mm]."""
+    table = measurements.load(folder / recording / TABLE, robot_file.load(folder / "robot.yaml").n_tubes)
+    places = cube(folder)
+    return 1e3 * np.linalg.norm(table.position[-len(places) :] - places, axis=1)
+
+
+# ---- what the commands found, in words
+
+
+def _devices(told) -> str:
+    return f"{len(told['devices'])} devices and tools answer"
+
+
+def _recorded(told) -> str:
+    return f"{told['rows']} poses, {told['rms_mm']:.2f} mm RMS off the model"
+
+
+def _registered(told) -> str:
+    origin = [value for value in told["values"] if value["name"].startswith("origin")]
+    moved = np.linalg.norm([value["value"] - value["old"] for value in origin])
+    return f"{moved:.1f} mm from where the file says"
+
+
+def _turned(told) -> str:
+    offsets = [value for value in told["values"] if value["name"].endswith("rotation offset")]
+    return (
+        ", ".join(f"{value['value']:.1f} ± {value['sd']:.1f}" for value in offsets) + " deg from their marks"
+    )
+
+
+def _compared(told) -> str:
+    noise = told["noise"]["rms_mm"]
+    return f"by {told['position_mm']['rms']:.2f} mm RMS, where noise alone would be {noise:.2f} mm"
+
+
+def _diagnosed(told) -> str:
+    named = " and ".join(" or ".join(effect["class"]) for effect in told["effects"]) or "nothing"
+    return f"{told['verdict'].replace('_', ' ')}: {named.replace('_', ' ')}"
+
+
+def _proposed(told) -> str:
+    masses = ", ".join(f"{1e3 * run['mass_kg']:g} g" for run in told["runs"])
+    rivals = " and ".join(told["rivals"]).replace("_", " ")
+    return f"{len(told['runs'])} runs tell {rivals} apart (weights at the tip: {masses})"
+
+
+def _calibrated(told) -> str:
+    return f"{told['rms_mm']['held_out']:.2f} mm RMS on runs that the fit has not seen"
+
+
+def _tracked(told) -> str:
+    (figures,) = told["weights"].values()
+    return f"{figures['mean_mm']:.2f} mm mean, {figures['max_mm']:.2f} mm largest error"
+
+
+def _added(told) -> str:
+    (name,) = told["added"]
+    return f"{told['rms_mm'][name]:.2f} mm RMS on runs that the fit has not seen"

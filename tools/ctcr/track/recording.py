@@ -1,0 +1,61 @@
+"""Runs on the bench as files: the measurements, and beside them what the controller wanted and found, row by row."""
+
+import numpy as np
+
+from ctcr import measurements
+from ctcr.frames import tracker_to_base
+from ctcr.number_table import read_columns
+from ctcr.record.folder import TABLE, Folder
+from ctcr.robot import Robot
+from ctcr.track.runs import Run, beside_obstacle
+from ctcr.track.scenario import TASKS, Scenario
+
+CONTROL = "control.csv"
+COLUMNS = (
+    "t_s", "run", "path_s", "wanted_x_m", "wanted_y_m", "wanted_z_m",
+    *(f"shortfall_{task.replace(' ', '_')}" for task in TASKS),
+    "held_base_gaps", "held_tip_gaps", "held_travel", "held_speed",
+    "model_fx_N", "model_fy_N", "model_fz_N", "stability",
+)  # fmt: skip
+
+
+def control_row(t: float, run: int, result, row: int) -> list[float | str]:
+    """A row of COLUMNS: row `row` of a LoopResult, whose reading came at `t` [s]."""
+    wanted = map(repr, result.wanted[row].tolist())  # exact: whether a row counts must not hang on rounding
+    columns = (result.shortfall, result.held, result.force)
+    return [
+        t,
+        run,
+        result.time[row],
+        *wanted,
+        *(v for column in columns for v in column[row]),
+        result.stability[row],
+    ]
+
+
+def finished(folder: Folder) -> list[dict]:
+    """What is noted of the runs that came to their end."""
+    return [entry for entry in folder.about.get("runs", []) if entry["ended"] == "finished"]
+
+
+def runs_of(folder: Folder, scenario: Scenario, robot: Robot) -> list[Run]:
+    """The finished runs; tips are those measured. Raises InputError where a table is damaged."""
+    table = measurements.load(folder.path / TABLE, robot.n_tubes)
+    control = read_columns(folder.path / CONTROL, COLUMNS)
+    _, measured, controlled = np.intersect1d(table.t, control[:, 0], return_indices=True)
+    joints = np.hstack(robot.joints_of_table(table.beta[measured], table.alpha[measured]))
+    tip, _ = tracker_to_base(robot.tracker, table.position[measured], table.quaternion[measured])
+    control, number = control[controlled], table.run[measured]
+    return [_run(entry, scenario, *(part[number == entry["run"]] for part in (joints, tip, control)))
+            for entry in finished(folder)]  # fmt: skip
+
+
+def _run(entry: dict, scenario: Scenario, joints, tip, control) -> Run:
+    path, wanted, shortfall, held, force, stability = np.split(control[:, 2:], _ENDS, axis=1)
+    return Run(
+        entry["mass_g"], entry["repetition"], entry["status"], entry["settled_m"], path[:, 0], joints, tip, wanted,
+        shortfall, held.astype(np.int32), force, stability[:, 0], *beside_obstacle(scenario, tip, wanted),
+    )  # fmt: skip
+
+
+_ENDS = np.cumsum([1, 3, len(TASKS), 4, 3])
