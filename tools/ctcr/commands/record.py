@@ -52,7 +52,7 @@ def command(
     Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
     first with `ctcr move --home`.
     """
-    from contextlib import nullcontext
+    from contextlib import nullcontext, suppress
     from dataclasses import asdict
 
     import numpy as np
@@ -64,6 +64,7 @@ def command(
     from ctcr.devices.private_folder import private_folder
     from ctcr.devices.sight import Sight
     from ctcr.devices.tracker import Tracker
+    from ctcr.errors import InputError
     from ctcr.record.display import Display
     from ctcr.record.folder import TABLE, Folder
     from ctcr.record.live_page import LivePage
@@ -104,15 +105,13 @@ def command(
             who = _Paused(person.person_of(bench, place), display)
             sight = Sight(tracker, patience)
             session = Session(loaded, motors, sight, who, recording.rows, options, recording.clock, shown)
-            ended = "interrupted"
             try:
                 done = session.run(steps)
-                ended = "finished"
-            except Exception as error:
-                ended = str(error)
+            except BaseException as error:
+                with suppress(InputError):  # a full disk must not hide what ended it
+                    recording.note(motors, tracker, sight.lateness, str(error) or "interrupted")
                 raise
-            finally:
-                recording.note(motors, tracker, sight.lateness, ended)
+            recording.note(motors, tracker, sight.lateness, "finished")
     path = recording.path / TABLE
     console.print(
         f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",
