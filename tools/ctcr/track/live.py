@@ -140,7 +140,7 @@ class _Tracking:
     def _one(self, mass: float, repetition: int) -> Run:
         motors, entries = self._motors, self._folder.about.setdefault("runs", [])
         motors.move(self._start())
-        motors.wait()
+        motors.wait(self.sight.next)  # frames that nobody fetches would be missed
         entry = {"run": len(entries) + 1, "mass_g": mass, "repetition": repetition, "ended": "interrupted"}
         entries.append(entry)
         self._folder.save()  # rows of a run that is cut off keep their number
@@ -153,7 +153,7 @@ class _Tracking:
             )  # fmt: skip
             run = run_once(self._scenario, values, device, mass, repetition)
         motors.halt()
-        motors.wait()
+        motors.wait(self.sight.next)
         for rows in (self._folder.rows, self._control):
             rows.sync()
         entry |= {"ended": "finished", "status": run.status, "settled_m": run.settled}
