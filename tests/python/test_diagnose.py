@@ -187,14 +187,30 @@ def test_linear_gain_is_the_evidence_of_a_linear_model():
         assert gain.log_evidence == pytest.approx(log_evidence(np.hstack([A, B])) - log_evidence(A), abs=1e-9)
 
 
-def test_rows_are_locked_by_run(robot):
+def measured_session(robot):
     table = session(robot, np.random.default_rng(0))
+    return dataclasses.replace(table, position=np.zeros((len(table), 3)))
+
+
+def test_rows_are_locked_by_run(robot):
+    table = measured_session(robot)
     locked = locked_rows(table)
     assert 0.2 <= locked.mean() <= 0.3
     for run in np.unique(table.run):
         assert np.ptp(locked[table.run == run].astype(int)) == 0
     one = dataclasses.replace(table, run=np.zeros_like(table.run))
     assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)
+
+
+def test_what_is_locked_holds_poses(robot):
+    """Rows without a pose, such as way points, make no group of their own."""
+    table = measured_session(robot)
+    for part in (table, dataclasses.replace(table, run=np.zeros_like(table.run))):
+        for turn in range(4):
+            seen = ~locked_rows(part, turn)
+            blind = dataclasses.replace(part, position=np.where(seen[:, None], part.position, np.nan))
+            for again in range(4):
+                assert (locked_rows(blind, again) & seen).any(), (turn, again)
 
 
 @pytest.mark.parametrize(("scores", "kept"), [([40.0, 33.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])

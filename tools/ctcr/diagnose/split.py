@@ -12,12 +12,15 @@ FOLDS = 4
 
 def groups(measurements: Measurements) -> NDArray[np.int64]:
     """The group of each row (M,), numbered from 0 in the order of measuring: its run, or a block of time where there
-    are hardly any runs."""
-    runs, group = np.unique(measurements.run, return_inverse=True)
+    are hardly any runs. Rows and runs without a pose do not count: each group holds something measured."""
+    if measurements.position is None:
+        return np.zeros(len(measurements), int)
+    measured = np.isfinite(measurements.position).all(axis=1)
+    runs, first = np.unique(measurements.run[measured], return_index=True)
     if len(runs) >= FEWEST_RUNS:
-        first = np.array([np.flatnonzero(group == i)[0] for i in range(len(runs))])
-        return np.argsort(np.argsort(first))[group]
-    return np.arange(len(measurements)) * BLOCKS // max(len(measurements), 1)
+        order = {run: i for i, run in enumerate(runs[np.argsort(first)])}
+        return np.array([order.get(run, 0) for run in measurements.run])
+    return np.maximum(np.cumsum(measured) - 1, 0) * BLOCKS // max(np.sum(measured), 1)
 
 
 def locked_rows(measurements: Measurements, turn: int = 0) -> NDArray[np.bool_]:
