@@ -48,6 +48,14 @@ OPTIONS = ("--dwell", "0.05", "--patience", "1.5")
 LONGEST_S = 60.0
 
 
+def near_the_plate(robot: Path, bench: Path) -> None:
+    """Writes the files of a bench on which homing is short."""
+    short = robot_file.load(ROOT / "examples" / "data" / "demo" / "robot.yaml")
+    short.actuation.home_translation_mm = HOME_MM
+    robot_file.save(short, robot)
+    bench.write_text(BENCH, encoding="utf-8")
+
+
 class Wires:
     """A simulated bench, with recordings of one plan on it."""
 
@@ -332,10 +340,7 @@ def main() -> int:
         return beside_the_simulators(given.beside, given.output, given.only, given.kills)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        robot = robot_file.load(ROOT / "examples" / "data" / "demo" / "robot.yaml")
-        robot.actuation.home_translation_mm = HOME_MM
-        robot_file.save(robot, folder / "robot.yaml")
-        (folder / "bench.yaml").write_text(BENCH, encoding="utf-8")
+        near_the_plate(folder / "robot.yaml", folder / "bench.yaml")
         command = [
             sys.executable, "-m", "ctcr", "sim", "bench", folder / "robot.yaml", "--noise", "none",
             "--folder", folder / "wires", "--", sys.executable, __file__, "--beside", folder,

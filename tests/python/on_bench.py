@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr import robot_file
-from ctcr.devices import bench_file, bus_lock, emergency_stop, homing
+from ctcr.devices import bus_lock, emergency_stop, homing
 from ctcr.devices.bus import Bus
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.health import health_of
@@ -23,26 +22,11 @@ from ctcr.simulators.control import request
 from ctcr.simulators.network import MASTER
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ctcr, mended_bench  # noqa: E402
+from simulated_bench import ctcr  # noqa: E402
 
 ROBOT = os.environ["ROBOT_FILE"]
 BENCH = os.environ["BENCH_FILE"]
 OP = 8  # state of a terminal
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROBOT)
-
-
-@pytest.fixture(scope="module")
-def bench():
-    return bench_file.load(BENCH)
-
-
-@pytest.fixture
-def folder():
-    return mended_bench()
 
 
 @pytest.fixture(scope="class")

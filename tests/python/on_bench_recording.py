@@ -11,32 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import measurements, robot_file, simulation
-from ctcr.devices import bench_file
 from ctcr.devices.motors import Motors
 from ctcr.devices.transmission import joints_of_turns
 from ctcr.simulators.control import request
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ctcr, mended_bench  # noqa: E402
+from simulated_bench import ctcr  # noqa: E402
 
 ROBOT = os.environ["ROBOT_FILE"]
 BENCH = os.environ["BENCH_FILE"]
 OP = 8  # state of a terminal
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROBOT)
-
-
-@pytest.fixture(scope="module")
-def bench():
-    return bench_file.load(BENCH)
-
-
-@pytest.fixture
-def folder():
-    return mended_bench()
 
 
 @pytest.fixture

@@ -30,6 +30,24 @@ def skip_without_bench() -> None:
         pytest.importorskip(package, reason=f"{package} is not installed")
 
 
+def run_on_bench(bench: list, tests: list, **environment: Path) -> None:
+    """Runs pytest beside the simulators that `ctcr sim bench` starts with `bench`; tests find what they need in the
+    environment, and the fixtures of bench_fixtures.py."""
+    skip_without_bench()
+    command = ctcr(
+        "sim", "bench", *bench, "--", sys.executable, "-m", "pytest", "-q", "--durations=9",
+        "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "bench_fixtures", *tests,
+    )  # fmt: skip
+    known = {"PYTHONPATH": Path(__file__).parent, **environment}
+    done = subprocess.run(
+        command, capture_output=True, text=True, cwd=ROOT, timeout=900,
+        env=os.environ | {name: str(value) for name, value in known.items()},
+    )  # fmt: skip
+    print(done.stdout)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " passed" in done.stdout
+
+
 @contextmanager
 def running(*command):
     """A process that says on its standard output when it is ready; ended when the block ends."""

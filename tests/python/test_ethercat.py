@@ -15,7 +15,10 @@ from ctcr.simulators.slave_controller import SlaveController
 from ctcr.simulators.stepper_terminal import Coupler, StepperTerminal
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROBOT, ROOT, ctcr, skip_without_bench  # noqa: E402
+from simulated_bench import ROOT, run_on_bench, skip_without_bench  # noqa: E402
+
+sys.path.insert(0, str(ROOT / "tools"))
+from bench_faults import near_the_plate  # noqa: E402
 
 ON_BENCH = [Path(__file__).parent / f"on_bench{name}.py" for name in ("_masters", "_doors", "", "_recording")]
 
@@ -215,44 +218,10 @@ def test_too_much_current_burns_the_motor():
 
 
 def on_bench(tmp_path, *options):
-    skip_without_bench()
     robot, bench = tmp_path / "robot.yaml", tmp_path / "bench.yaml"
-    text = ROBOT.read_text()
-    for far, near in (
-        ("-298.0", "-449.0"),
-        ("-220.5", "-320.5"),
-        ("-145.0", "-193.0"),
-    ):  # tips near the plate
-        text = text.replace(far, near)
-    robot.write_text(text)
-    bench.write_text(BENCH)
-    command = ctcr(
-        "sim", "bench", robot, "--noise", "none", "--folder", tmp_path / "folder", "--",
-        sys.executable, "-m", "pytest", "-q", "--durations=9", "-p", "no:cacheprovider", "-p", "no:xdist",
-        *ON_BENCH, *options,
-    )  # fmt: skip
-    environment = os.environ | {"ROBOT_FILE": str(robot), "BENCH_FILE": str(bench)}
-    done = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, timeout=900)
-    print(done.stdout)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert " passed" in done.stdout
-
-
-BENCH = """
-tracker: {port: simulated}
-motors:
-  interface: simulated
-  translation_terminals: [1, 2, 3]
-  rotation_terminals: [4, 5, 6]
-  speed_mm_s: 18
-  speed_deg_s: 180
-  lag_mm: 0.4
-limits:
-  translation_mm: [[-465, -430], [-335, -310], [-200, -185]]
-  rotation_deg: [[-400, 400], [-400, 400], [-400, 400]]
-  clearance_mm: 5
-person: simulated
-"""
+    near_the_plate(robot, bench)
+    around = [robot, "--noise", "none", "--folder", tmp_path / "folder"]
+    run_on_bench(around, [*ON_BENCH, *options], ROBOT_FILE=robot, BENCH_FILE=bench)
 
 
 def test_on_the_simulated_bench(tmp_path):

@@ -1,8 +1,6 @@
 """Control and calibration with the devices: what needs a running bench is in on_bench_live.py."""
 
 import io
-import os
-import subprocess
 import sys
 from contextlib import closing
 from dataclasses import replace
@@ -29,7 +27,7 @@ from ctcr.track.runs import run_once, system_values
 from ruamel.yaml import YAML
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import HOMES, ROBOT, ROOT, T_REF, ctcr, skip_without_bench  # noqa: E402
+from simulated_bench import HOMES, ROBOT, ROOT, T_REF, run_on_bench  # noqa: E402
 
 ON_BENCH = Path(__file__).parent / "on_bench_live.py"
 DATA = ROOT / "examples" / "data"
@@ -231,29 +229,13 @@ def test_scatter_of_means_is_their_noise(robot, tmp_path):
 
 def on_bench(tmp_path, *options):
     """The tests of ON_BENCH around a robot whose homes and tracker frame are not those of the file that they use."""
-    skip_without_bench()
     document, known, real = YAML().load(ROBOT), tmp_path / "known.yaml", tmp_path / "real.yaml"
     document["actuation"]["translation_mm_per_rev"] = 20.0  # tubes are in and out in a second
     YAML().dump(document, known)
     document["actuation"]["home_rotation_deg"] = HOMES
     document["tracker"]["position_mm"], document["tracker"]["rotation_vector_rad"] = T_REF
     YAML().dump(document, real)
-    command = ctcr(
-        "sim", "bench", real, "--folder", tmp_path / "folder", "--",
-        sys.executable, "-m", "pytest", "-q", "-s", "--durations=9", "-p", "no:cacheprovider", "-p", "no:xdist",
-        ON_BENCH, *options,
-    )  # fmt: skip
-    done = subprocess.run(
-        command,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=900,
-        env=os.environ | {"ROBOT_FILE": str(known)},
-    )
-    print(done.stdout)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert " passed" in done.stdout
+    run_on_bench([real, "--folder", tmp_path / "folder"], ["-s", ON_BENCH, *options], ROBOT_FILE=known)
 
 
 def test_on_the_simulated_bench(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.devices.fault import DeviceFault
-from ctcr.devices.sight import PERIOD_S, Sight
+from ctcr.devices.sight import RATE_HZ, Sight
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,6 @@ def still_reading(sight: Sight, frames: int, within: float) -> StillReading:
         if len(seen) == frames and np.linalg.norm(off, axis=1).max() <= within:
             scatter = float(np.sqrt((off**2).sum() / (3 * max(1, frames - 1))))
             return StillReading(places.mean(axis=0), scatter, frames)
-        if time.monotonic() > end + frames * PERIOD_S:
+        if time.monotonic() > end + frames / RATE_HZ:
             text = f"it has not rested within {1e3 * within:g} mm for {sight.patience_s:g} s"
             raise DeviceFault("tracker", text, "hold it still, or look for what shakes it")

@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.group(name="calibrate")
 def command() -> None:
@@ -38,9 +40,7 @@ _tube = click.option(
 def _live(function):
     """The options of procedures that the bench can carry out."""
     for option in (
-        click.option(
-            "--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's."
-        ),
+        folder_option,
         click.option(
             "--readings",
             type=click.IntRange(2),

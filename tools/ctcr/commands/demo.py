@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.sim import folder_option
+from ctcr.bench_options import folder_option
 
 
 @click.group(name="demo")

@@ -2,12 +2,14 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.command(name="devices")
 @click.option(
     "--bench", "bench_path", required=True, metavar="BENCH.yaml", help="Where the devices are connected."
 )
-@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@folder_option
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 def command(bench_path: str, folder: str | None, json_target: str | None) -> int:
     """Show which devices of a bench answer, their versions, and what is wrong with them. Nothing moves."""

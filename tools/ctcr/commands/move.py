@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.command(name="move")
 @click.argument("robot")
@@ -19,7 +21,7 @@ import click
 @click.option(
     "--speed", type=click.FloatRange(0.01, 1.0), default=0.5, show_default=True, help="Share of the highest."
 )
-@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@folder_option
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
     """Move the joints of ROBOT in a straight line of joint space; those not given stay.
 

@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.command(name="record")
 @click.argument("robot")
@@ -40,7 +42,7 @@ import click
 @click.option(
     "--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew."
 )
-@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@folder_option
 @click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
 def command(
     robot, plan, target, bench_path, dwell, readings, speed, approach, approach_mm, approach_deg, patience, own,

@@ -2,13 +2,10 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 NOISES = ["none", "jitter", "realistic"]
 
-folder_option = click.option(
-    "--folder",
-    metavar="FOLDER",
-    help="Where the processes of one bench meet (mode 0700); one of this user's.",
-)
 scenario_option = click.option(
     "--scenario",
     metavar="FILE.yaml",

@@ -2,10 +2,12 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.command(name="stop")
 @click.option("--release", is_flag=True, help="Release the stop, after its cause has been mended.")
-@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@folder_option
 def command(release: bool, folder: str | None) -> None:
     """Stop all motors of the bench at once; they stay stopped until `ctcr stop --release`.
 

@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.bench_options import folder_option
+
 
 @click.command(name="track")
 @click.argument("robot")
@@ -23,7 +25,7 @@ import click
     "--most-error-mm", type=click.FloatRange(1), default=20.0, show_default=True,
     help="Stop where the tip is farther from its reference.",
 )  # fmt: skip
-@click.option("--folder", metavar="FOLDER", help="Where the processes of the bench meet; one of this user's.")
+@folder_option
 @click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
 @click.option(
     "--json", "json_target", metavar="FILE", help="Write the numbers as JSON; - for standard output."

@@ -10,7 +10,7 @@ from ctcr.devices.lateness import Lateness
 from ctcr.devices.tracker import Tracker
 from ctcr.devices.tracker_process import TrackedFrame
 
-PERIOD_S = 1 / 40
+RATE_HZ = 40.0  # of the tracker
 STALE_S = 0.25  # without a new frame: the pose is no longer that of now
 
 
@@ -24,7 +24,7 @@ class Sight:
 
     def next(self) -> TrackedFrame | None:
         """The next frame, seen or not; None where it does not come within one and a half of its periods."""
-        frame = self.tracker.next(1.5 * PERIOD_S)
+        frame = self.tracker.next(1.5 / RATE_HZ)
         if frame:
             self.last = frame
             self.lateness.add(time.monotonic() - frame.t)

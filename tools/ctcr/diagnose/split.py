@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr.identify import measured_rows
 from ctcr.measurements import Measurements
 
 FEWEST_RUNS = 4
@@ -13,9 +14,7 @@ FOLDS = 4
 def groups(measurements: Measurements) -> NDArray[np.int64]:
     """The group of each row (M,), numbered from 0 in the order of measuring: its run, or a block of time where there
     are hardly any runs. Rows and runs without a pose do not count: each group holds something measured."""
-    if measurements.position is None:
-        return np.zeros(len(measurements), int)
-    measured = np.isfinite(measurements.position).all(axis=1)
+    measured = measured_rows(measurements)
     runs, first = np.unique(measurements.run[measured], return_index=True)
     if len(runs) >= FEWEST_RUNS:
         order = {run: i for i, run in enumerate(runs[np.argsort(first)])}

@@ -13,7 +13,7 @@ from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import Person, person_of
 from ctcr.devices.private_folder import private_folder
-from ctcr.devices.sight import Sight
+from ctcr.devices.sight import RATE_HZ, Sight
 from ctcr.devices.tracker import Tracker
 from ctcr.errors import InputError, Problem
 from ctcr.output import Progress
@@ -28,7 +28,6 @@ from ctcr.track.scenario import Scenario
 
 PATIENCE_S = 2.0
 MOST_ERROR_MM = 20.0
-RATE_HZ = 40.0  # of the tracker
 MOST_FEEDBACK = (
     0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
 )
