@@ -5,57 +5,12 @@
 #include <numbers>
 
 #include "ctcr/mechanics/shape.hpp"
-#include "support/catalogue_cases.hpp"
+#include "support/walk.hpp"
 
 namespace ctcr {
 namespace history_test {
 
-using test::effect, test::Random;
-
-/// A path through joints [rad], [m], at times [s]; motors are joints.
-template <int N>
-struct Walk {
-  System<N, Catalogue> system;
-  std::vector<RecordedRow<N>> rows;
-
-  explicit Walk(const Robot<N>& robot, const Catalogue::On<N>& effects = {})
-    : system{{1, 1, VecN<N>::Zero(), VecN<N>::Zero()}, Model<N, Catalogue>(robot, effects), {}, {.tolerance = 1e-12}} {}
-
-  Walk& to(const Joints<N>& q, double time = 0) {
-    rows.push_back({{q.beta, q.alpha}, {}, {.time = time}});
-    return *this;
-  }
-  /// What E remembers of the last row.
-  template <template <int, class> class E>
-  [[nodiscard]] auto remembered() const {
-    auto effects = system.model.effects();
-    effects.remember(memories<N, Catalogue>(system, rows).back());
-    return effect<E, N>(effects).past.state;
-  }
-  [[nodiscard]] Solution<N> solution() const {
-    Workspace<N> ws;
-    RecordedPrediction<N, Catalogue> p;
-    EXPECT_EQ(test::predict_last(system, rows, ws, p), Status::ok);
-    return p.solution;
-  }
-};
-
-const Robot<2>& two_tubes() {
-  static const Robot<2> robot{{test::paper_robot().tubes[0], test::paper_robot().tubes[1]}, Vec3::Zero()};
-  return robot;
-}
-Joints<2> at(double alpha_1, double alpha_2, double beta_1 = -0.35, double beta_2 = -0.25) {
-  Joints<2> q;
-  q.alpha << alpha_1, alpha_2;
-  q.beta << beta_1, beta_2;
-  return q;
-}
-
-Catalogue::On<2> with_friction(double coefficient, double insertion = 0, double law = 0) {
-  Catalogue::On<2> effects;
-  effect<Friction, 2>(effects).values = {coefficient, coefficient, 0, 0.3, insertion, law};
-  return effects;
-}
+using test::at, test::effect, test::Random, test::two_tubes, test::Walk, test::with_friction;
 
 TEST(Friction, FollowsTheDirectionOfTheLastRotation) {
   const auto h = Walk<2>(two_tubes(), with_friction(0.03)).to(at(0, 0)).to(at(5, 0)).remembered<Friction>();
@@ -109,8 +64,8 @@ TEST(Friction, AlongTheLengthWindsTheInnerTubeUp) {
 TEST(Friction, FollowsWhatTheTwistLeavesOfARotation) {
   Walk<2> walk(two_tubes(), with_friction(0.03, 0, 1)), straight = walk;
   walk.to(at(0, 0)).to(at(0.12, 0)).to(at(0.2, 0));
-  walk.rows[1].twist = {-0.06, 0};  // half of it
-  walk.rows[2].twist = {-0.14, 0};  // no more motion at the tip
+  walk.rows[1].twist = {{-0.06, 0}};  // half of it
+  walk.rows[2].twist = {{-0.14, 0}};  // no more motion at the tip
   EXPECT_NEAR(walk.remembered<Friction>()[0], straight.to(at(0, 0)).to(at(0.06, 0)).remembered<Friction>()[0], 1e-12);
 }
 
@@ -121,8 +76,8 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
   rows[0].theta.translation[0] = -1;  // unsolvable
   rows[20].theta.translation[0] = -1;
   add_twist<2>(system, rows);
-  EXPECT_EQ(rows[0].twist, rows[1].twist);
-  EXPECT_EQ(rows[20].twist, rows[19].twist);
+  EXPECT_EQ(rows[0].twist.back(), rows[1].twist.front());
+  EXPECT_EQ(rows[20].twist.back(), rows[20].twist[rows[20].twist.size() - 2]);
   Workspace<2> ws;
   Solution<2> solution;
   double largest = 0;
@@ -134,9 +89,10 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
               Status::ok);
     const double at_tip = here[0].tube[0].angle - here[0].tube[1].angle;
     const double at_base = row.theta.rotation[0] - row.theta.rotation[1];
-    EXPECT_NEAR(std::remainder(row.twist[0] - (at_tip - at_base), 2 * std::numbers::pi), 0, 1e-5);
-    EXPECT_EQ(row.twist[1], 0);
-    largest = std::max(largest, std::abs(row.twist[0]));
+    const auto& twist = row.twist.back();
+    EXPECT_NEAR(std::remainder(twist[0] - (at_tip - at_base), 2 * std::numbers::pi), 0, 1e-5);
+    EXPECT_EQ(twist[1], 0);
+    largest = std::max(largest, std::abs(twist[0]));
   }
   EXPECT_GT(largest, 0.2);
 }

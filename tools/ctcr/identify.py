@@ -24,6 +24,8 @@ Mask = NDArray[np.bool_]
 
 FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or more
 COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
+WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
+WINDINGS = 3  # and at most so often
 Noise = _core.Noise
 expand = free_parameters.expand
 parameter_names = free_parameters.names_of
@@ -249,14 +251,22 @@ def identify_with(
     (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
     residual means not measured. Nominal is where x is `mean`. Raises InputError where no fit is possible."""
     began = perf_counter()
+    wind_up = getattr(predict, "wind_up", lambda x: 0.0)
     try:
-        core, excluded = _core.identify(
-            predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
-            places=np.asarray(places, dtype=float), robust=robust,
-            admit_model_error=admit_model_error, weights=weights,
-            inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start, starts=starts,
-            max_iterations=max_iterations, tolerance=tolerance, known=list(known), within=list(within),
-        )  # fmt: skip
+        if start is not None:
+            wind_up(start)
+        for left in reversed(range(WINDINGS if tolerance < COARSE else 1)):
+            core, excluded = _core.identify(
+                predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
+                places=np.asarray(places, dtype=float), robust=robust,
+                admit_model_error=admit_model_error, weights=weights,
+                inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start,
+                starts=starts, max_iterations=max_iterations, tolerance=tolerance, known=list(known),
+                within=list(within),
+            )  # fmt: skip
+            start, starts = core.values, 1
+            if not left or wind_up(start) < WOUND:
+                break
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
     return Fit(

@@ -95,6 +95,11 @@ class Predictor:
     def active(self) -> list[bool]:
         return self._active.tolist()
 
+    def wind_up(self, x: Array) -> float:
+        """As Recording.wind_up."""
+        values = self._nominal | dict(zip(self._names, map(float, x), strict=True))
+        return self._prepared(values).wind_up(np.array([values[name] for name in self._inner]))
+
     def unsolved(self) -> list[int]:
         """Active rows that could not be solved at the last call, and those that never can."""
         return np.flatnonzero(self._active & ~self._solved).tolist()

@@ -8,6 +8,7 @@
 
 #include "ctcr/parallel/batch.hpp"
 #include "ctcr/pipeline/recorded_derivatives.hpp"
+#include "ctcr/pipeline/wind_up.hpp"
 
 namespace ctcr {
 
@@ -86,6 +87,16 @@ public:
     for (std::size_t i = 0; i < rows_.size(); ++i)
       if (failed[i]) unsolved_.push_back(int(i));
     return unsolved_.empty();
+  }
+
+  /// Lets the tubes wind each other up in all rows by what they rub at x (see ctcr::wind_up); residuals and derivatives
+  /// keep that twist until the next call. @return its largest change [rad]; 0 where nothing rubs
+  double wind_up(const Eigen::VectorXd& x) {
+    if constexpr (Fx::template On<N>::follows_twist) {
+      const System<N, Fx> rubbing = system(x);
+      if (rubbing.model.effects().wind_up()) return ctcr::wind_up<N, Fx>(rubbing, rows_);
+    }
+    return 0;
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.

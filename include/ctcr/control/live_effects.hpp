@@ -38,10 +38,7 @@ public:
     times_[count_] = time;
     at_.time = time;
     const std::size_t row = count_++;
-    const Path<N, double> path{{rows_.data(), count_}, {times_.data(), count_}};
-    effects_.for_each([&](auto& effect, int) {
-      if constexpr (requires { effect.remember(path, row); }) effect.remember(path, row);
-    });
+    effects_.remember({{rows_.data(), count_}, {times_.data(), count_}}, row);
     auto [beta, alpha, twist] = rows_[row];
     effects_.actuate(at_, beta, alpha);
     return {Eigen::Map<const VecN<N>>(beta.data()), Eigen::Map<const VecN<N>>(alpha.data())};

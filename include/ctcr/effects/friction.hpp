@@ -80,7 +80,8 @@ inline constexpr std::array parameters{
 
 /// Torque exchanged where the bending moment of the tubes inside a contact jumps, C |jump| h, and all along the overlap
 /// of two tubes, so much per length times h. h in [-1, 1] follows the tube's rotation in the next outer one (in the guide,
-/// for the outermost), as far as their twist leaves of that of their bases, so that the tube lags its base.
+/// for the outermost), as far as their twist leaves of that of their bases, so that the tube lags its base. That twist is
+/// one of what they rub, too: see wind_up.hpp.
 /// State: h of each tube, then with the second law the share of the limit that insertion takes.
 template <int N, class P = double>
 struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {

@@ -142,6 +142,13 @@ struct EffectList {
       }(std::index_sequence_for<E<N, P>...>{});
     }
 
+    /// What the motion to a row of the path leaves behind, after that to the row before.
+    void remember(const Path<N, P>& path, std::size_t row) noexcept {
+      for_each([&](auto& effect, int) {
+        if constexpr (requires { effect.remember(path, row); }) effect.remember(path, row);
+      });
+    }
+
     /// The same effects with the scalar S; value(x, place) gives a parameter's value its derivatives, and those of what
     /// the past left behind follow.
     /// @param transmission  transmission(k): 0, with the derivatives of the transmission's parameter k
@@ -168,28 +175,23 @@ struct EffectList {
 
     /// Whether any effect changes the equilibrium of the rod; the others act on joints, load and readings.
     [[nodiscard]] bool act_on_rod() const noexcept {
-      bool any = false;
-      for_each([&](const auto& e, int) {
-        if constexpr (ActsOnRod<std::remove_cvref_t<decltype(e)>, P, N>) any = any || acts(e);
-      });
-      return any;
+      return any([](const auto& e) { return ActsOnRod<std::remove_cvref_t<decltype(e)>, P, N> && acts(e); });
     }
-
     /// Whether an effect that is active has something to do where tubes end or start to curve.
     [[nodiscard]] bool acts_at_stations() const noexcept {
-      bool any = false;
-      for_each([&](const auto& e, int) {
-        if constexpr (HasStation<std::remove_cvref_t<decltype(e)>, P, N>) any = any || e.active;
-      });
-      return any;
+      return any([](const auto& e) { return HasStation<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
     /// Whether an effect that is active changes what tubes are made of.
     [[nodiscard]] bool acts_on_material() const noexcept {
-      bool any = false;
-      for_each([&](const auto& e, int) {
-        if constexpr (HasMaterial<std::remove_cvref_t<decltype(e)>, P>) any = any || e.active;
+      return any([](const auto& e) { return HasMaterial<std::remove_cvref_t<decltype(e)>, P> && e.active; });
+    }
+
+    /// Whether any effect that follows the twist of the tubes acts.
+    [[nodiscard]] bool wind_up() const noexcept {
+      return any([](const auto& e) {
+        if constexpr (requires { e.follows_twist; }) return acts(e);
+        return false;
       });
-      return any;
     }
 
     /// Calls f(effect, place of its first value) for each.
@@ -254,6 +256,12 @@ struct EffectList {
     }
 
   private:
+    [[nodiscard]] bool any(const auto& holds) const noexcept {
+      bool found = false;
+      for_each([&](const auto& effect, int) { found = found || holds(effect); });
+      return found;
+    }
+
     /// Whether an amplitude differs from its neutral value or has derivatives.
     template <class Effect>
     static bool acts(const Effect& effect) noexcept {

@@ -29,10 +29,35 @@ void joints_of(const Transmission<N>& t, const MotorAngles<N>& theta, const auto
   }
 }
 
+/// The path that the joints went, place after place on the way to each row.
+/// @param seed  gives values of the transmission derivatives, by their place in ParameterVector<N>
+template <int N, class P>
+struct RecordedPath {
+  std::vector<typename Path<N, P>::Row> q;
+  std::vector<double> time;      ///< [s]; empty where it is not known of each row
+  std::vector<std::size_t> end;  ///< place of each row
+
+  RecordedPath(const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows, const auto& seed) {
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      for (std::size_t place = 0; place < rows[row].places(); ++place) {
+        const RecordedRow<N> here = on_the_way<N>(rows, row, place);
+        auto& now = q.emplace_back();
+        joints_of<N, P>(transmission, here.theta, seed, now.beta, now.alpha);
+        if (!rows[row].twist.empty()) now.twist = rows[row].twist[place];
+        if (std::isfinite(here.at.time)) time.push_back(here.at.time);
+      }
+      end.push_back(q.size() - 1);
+    }
+    if (time.size() < q.size()) time.clear();
+  }
+
+  operator Path<N, P>() const noexcept { return {q, time}; }
+};
+
 /// What one effect remembers of each row, by the motion before it.
 template <int N, template <int, class> class E>
 void remember(const E<N, double>& effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
-              std::span<const double> time, const auto& keep) {
+              const auto& keep) {
   using V = ParameterVector<N>;
   constexpr int count = E<N, double>::count, slopes = count + E<N, double>::transmission_count;
   using P = Dual<lane_groups(slopes)>;
@@ -41,18 +66,13 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
     p.d[lane / lane_count] = unit_lane(lane % lane_count);
     return p;
   };
-  std::vector<typename Path<N, P>::Row> q(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    q[i].twist = rows[i].twist;
-    joints_of<N, P>(
-        transmission, rows[i].theta,
-        [&](double x, int index) { return seeded(x, count + index - V::index(Parameter::translation_ratio)); },
-        q[i].beta, q[i].alpha);
-  }
+  const RecordedPath<N, P> path(transmission, rows, [&](double x, int index) {
+    return seeded(x, count + index - V::index(Parameter::translation_ratio));
+  });
   E<N, P> dual;
   for (int k = 0; k < count; ++k) dual.values[std::size_t(k)] = seeded(effect.values[std::size_t(k)], k);
-  for (std::size_t row = 0; row < rows.size(); ++row) {
-    dual.remember(Path<N, P>{q, time}, row);
+  for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
+    for (; place <= path.end[row]; ++place) dual.remember(path, place);
     auto& past = keep(row);
     for (std::size_t i = 0; i < past.state.size(); ++i) {
       past.state[i] = dual.past.state[i].v;
@@ -70,15 +90,11 @@ template <int N, class Fx>
 std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
                                                           std::span<const RecordedRow<N>> rows) {
   std::vector<typename Fx::template On<N>::Memory> memory(rows.size());
-  std::vector<double> time;
-  for (const RecordedRow<N>& row : rows)
-    if (std::isfinite(row.at.time)) time.push_back(row.at.time);
-  if (time.size() < rows.size()) time.clear();
   const auto& list = system.model.effects().list;
   [&]<std::size_t... I>(std::index_sequence<I...>) {
     [[maybe_unused]] const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
       if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty())
-        detail::remember<N>(std::get<J>(list), system.transmission, rows, time,
+        detail::remember<N>(std::get<J>(list), system.transmission, rows,
                             [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); });
     };
     (fill(std::integral_constant<std::size_t, I>{}), ...);

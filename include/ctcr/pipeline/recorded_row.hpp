@@ -1,5 +1,9 @@
 #pragma once
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <span>
+#include <vector>
 
 #include "ctcr/effects/hooks.hpp"
 #include "ctcr/mechanics/tip_twist.hpp"
@@ -13,25 +17,57 @@ struct RecordedRow {
   MotorAngles<N> theta;
   TipLoad load;
   Occasion at;
-  std::array<double, N> twist{};  ///< by add_twist(); 0: tubes count as stiff in torsion [rad]
+  /// The twist_between() of the tubes at evenly spaced places of the way from the row before, the last of them in this
+  /// row, as add_twist() and wind_up() give it; none: tubes count as stiff in torsion [rad].
+  std::vector<std::array<double, std::size_t(N)>> twist{};
+
+  [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), 1); }
 };
 
-/// Gives each row the twist_between() of a robot without effects in its equilibrium there; a row without one keeps that
-/// of the row before. Real time: no.
+/// What stands at a place on the way to a row, from 0 to places() - 1: joints and time on a straight line, the load of the
+/// row. A first row has no way. Real time: no (allocates).
+template <int N>
+RecordedRow<N> on_the_way(std::span<const RecordedRow<N>> rows, std::size_t row, std::size_t place) {
+  const RecordedRow<N>& end = rows[row];
+  RecordedRow<N> here{end.theta, end.load, end.at};
+  if (row == 0 || place + 1 >= end.places()) return here;
+  const RecordedRow<N>& start = rows[row - 1];
+  const double left = 1 - double(place + 1) / double(end.places());
+  here.theta.translation += left * (start.theta.translation - end.theta.translation);
+  here.theta.rotation += left * (start.theta.rotation - end.theta.rotation);
+  here.at.time += left * (start.at.time - end.at.time);
+  return here;
+}
+
+/// Gives each row the twist of a robot without effects in its equilibrium on the way there; a place without one keeps that
+/// of the place before. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
 template <int N>
 void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
+  constexpr double most_rotation = 0.175, most_translation = 5e-3;  // of a part [rad], [m]
   Workspace<N> ws;
   Solution<N> solution;
   std::array<double, N> twist{};
-  std::size_t known = 0;
+  bool known = false;
   for (std::size_t row = 0; row < rows.size(); ++row) {
-    const Joints<N> q = joints(system.transmission, rows[row].theta);
-    if (solve(system.model, q, rows[row].load, ws, solution, system.settings) == Status::ok) {
-      twist = twist_between(ws, twist);
-      for (; known < row; ++known) rows[known].twist = twist;  // of the first that is known
-      known = rows.size();
+    double parts = 1;
+    if (row > 0) {
+      const Joints<N> from = joints(system.transmission, rows[row - 1].theta),
+                      to = joints(system.transmission, rows[row].theta);
+      parts = std::max({parts, (to.alpha - from.alpha).cwiseAbs().maxCoeff() / most_rotation,
+                        (to.beta - from.beta).cwiseAbs().maxCoeff() / most_translation});
     }
-    rows[row].twist = twist;
+    rows[row].twist.resize(std::size_t(std::ceil(parts)));
+    for (std::size_t place = 0; place < rows[row].twist.size(); ++place) {
+      const RecordedRow<N> here = on_the_way<N>(rows, row, place);
+      if (solve(system.model, joints(system.transmission, here.theta), here.load, ws, solution, system.settings) ==
+          Status::ok) {
+        twist = twist_between(ws, twist);
+        if (!known)
+          for (RecordedRow<N>& earlier : rows.first(row + 1)) std::ranges::fill(earlier.twist, twist);
+        known = true;
+      }
+      rows[row].twist[place] = twist;
+    }
   }
 }
 

@@ -51,6 +51,9 @@ void bind_recording(nb::module_& m) {
             (*self).activate(rows);
           },
           "rows"_a, "Rows to solve from now on.")
+      .def(
+          "wind_up", [](const BoundRecording& self, const Eigen::VectorXd& x) { return (*self).wind_up(x); }, "x"_a,
+          "Lets tubes that rub wind each other up as they do at x; returns the largest change of a twist [rad].")
       .def("active", [](const BoundRecording& self) { return (*self).active(); })
       .def(
           "unsolved", [](const BoundRecording& self) { return (*self).unsolved(); },

@@ -69,11 +69,14 @@ public:
   explicit RecordingOf(const Table& table)
     : pool_(table.threads),
       profiles_(profiles_of<N>(table)),
-      recording_(system(table, profiles_), rows_of<N>(table), measured_of(table), table.free, pool_) {}
+      recording_(system(table, profiles_), rows_of<N>(table), measured_of(table), table.free, pool_) {
+    recording_.wind_up(recording_.nominal());
+  }
 
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) override {
     return recording_(x, residual, jacobian);
   }
+  double wind_up(const Eigen::VectorXd& x) override { return recording_.wind_up(x); }
   Eigen::VectorXd nominal() const override { return recording_.nominal(); }
   const std::vector<int>& unsolved() const override { return recording_.unsolved(); }
   const std::vector<bool>& active() const override { return recording_.active(); }

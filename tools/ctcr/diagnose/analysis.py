@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side, sensor_roll
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates
+from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.race import Entry, Progress, Round
@@ -231,9 +231,13 @@ def _with_shapes(
     if not shapes:
         return fit
     progress(f"freeing the shape of {last.id}")
-    entry = replace(last, candidate=replace(last.candidate, names=(*last.candidate.names, *shapes)))
-    names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
-    freed = engine.fit_like(fit, names, start=dict(last.candidate.shape) | values_of(fit), fixed=fixed)
+    tried = []
+    for form in forms(effect, last.candidate):
+        entry = replace(last, candidate=replace(form, names=(*last.candidate.names, *shapes)))
+        names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
+        start = dict(form.shape) | values_of(fit)
+        tried.append((entry, engine.fit_like(fit, names, start=start, fixed=fixed)))
+    entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
     accepted[-1].entry = replace(entry, fit=freed)

@@ -3,7 +3,7 @@
 An effect may enter in several variants, from few parameters to all; the evidence pays for the parameters that it needs.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,6 +65,18 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
                 shape = tuple((f"effects.{effect.id}.{name}", value) for name, value in form.items())
                 found.append(Candidate(effect.id, tuple(names), shape))
     return found, left_out
+
+
+def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
+    """The candidate under each law that the effect offers; itself first."""
+    laws = {name for p in effect.parameters if p.kind == "choice" for name in p.full_names}
+    rest = {name: value for name, value in candidate.shape if name not in laws}
+    shapes = [candidate.shape]
+    for form in ({}, *FORMS.get(effect.id, ())):
+        full = {f"effects.{effect.id}.{name}": value for name, value in form.items()}
+        law = {name: value for name, value in full.items() if name in laws}
+        shapes.append(tuple((rest | law).items()))
+    return [replace(candidate, shape=shape) for shape in dict.fromkeys(shapes)]
 
 
 def _unseen(effect: effects.Effect, robot: Robot, measurements: Measurements) -> str | None:

@@ -1,0 +1,75 @@
+"""Tubes that rub wind each other up: in predictions, and in fits, which are repeated until they say so themselves."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import (
+    effect_fit,
+    effects,
+    identify,
+    measurements,
+    robot_file,
+    simulation,
+    user_effects,
+)
+from ctcr.diagnose.candidates import Candidate, forms
+
+ROOT = Path(__file__).parents[2]
+FREE = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
+LAW = "effects.friction.law"
+TRUE = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)} | {
+    "effects.friction.slip_angle": 0.03,
+    LAW: 1.0,
+}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
+
+
+@pytest.fixture(scope="module")
+def plan(robot):
+    """80 rows in 8 runs, out and back."""
+    table = measurements.load(ROOT / "examples" / "data" / "demo" / "measurements.csv", robot.n_tubes)
+    kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
+    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+    return replace(table, **{name: getattr(table, name)[kept] for name in names})
+
+
+def test_stiff_friction_is_found(robot, plan):
+    made = simulation.simulate(effect_fit.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=1)
+    added = effect_fit.add(robot, made, ["friction"], fixed={LAW: 1.0}, free=FREE)
+    found = added.parameters()
+    for i in (1, 2):
+        name = f"effects.friction.coefficient.{i}"
+        assert abs(found[name]["value"] - 0.03) < 0.02 * 0.03, found[name]
+    # Without what the tubes wind each other up the fit needs several times this angle.
+    assert found["effects.friction.slip_angle"]["value"] < 0.06
+    rms = added.rms("rms_mm")
+    assert rms["friction"] < 1.5 * rms["noise_floor"] < 0.2 * rms["calibrated"]
+
+
+def test_what_is_predicted_is_wound_up(robot, plan):
+    rubbing = effect_fit.with_values(robot, ["friction"], TRUE)
+    table = user_effects.recording_of(rubbing, plan, list(TRUE))
+    assert table.wind_up(table.nominal()) < identify.WOUND  # it was, when it was made
+    table.residual(table.nominal())
+    wound = table.predicted()[0]
+    assert table.wind_up(0 * table.nominal()) == 0  # nothing rubs: nothing changes
+    table.residual(table.nominal())
+    np.testing.assert_array_equal(table.predicted()[0], wound)
+    simulated = simulation.simulate(rubbing, plan, "none").position
+    np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
+
+
+def test_every_law_is_tried():
+    effect = effects.get("friction", 3)
+    held = Candidate("friction", tuple(effect.amplitudes), (("effects.friction.insertion", 0.0),))
+    shapes = [dict(form.shape) for form in forms(effect, held)]
+    assert shapes == [{"effects.friction.insertion": 0.0}, {"effects.friction.insertion": 0.0, LAW: 1.0}]
+    softening = effects.get("softening", 3)
+    alone = Candidate("softening", tuple(softening.amplitudes))
+    assert forms(softening, alone) == [alone]
