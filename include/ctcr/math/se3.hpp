@@ -13,23 +13,25 @@ struct ExpCoefficients {
   double B, C, dB, dC;
 };
 
+/// Coefficients of z^k in B, C, dB, dC: (-1)^k/(2k+2)!, (-1)^k/(2k+3)! and (k+1) times those of z^(k+1).
+inline constexpr double exp_series[7][4] = {
+    {0.5, 0.16666666666666666, -0.041666666666666664, -0.008333333333333333},
+    {-0.041666666666666664, -0.008333333333333333, 0.002777777777777778, 0.0003968253968253968},
+    {0.001388888888888889, 0.0001984126984126984, -7.440476190476191e-05, -8.267195767195768e-06},
+    {-2.48015873015873e-05, -2.7557319223985893e-06, 1.1022927689594355e-06, 1.0020843354176688e-07},
+    {2.755731922398589e-07, 2.505210838544172e-08, -1.043837849393405e-08, -8.029521918410807e-10},
+    {-2.08767569878681e-09, -1.6059043836821613e-10, 6.882447358637835e-11, 4.58829823909189e-12},
+    {1.1470745597729725e-11, 7.647163731819816e-13, -3.3456341326711696e-13, -1.9680200780418645e-14}};
+
 /// Series up to t = 1 rad (error below 1e-13), closed forms beyond. Real time: yes.
 CTCR_INLINE ExpCoefficients exp_coefficients(double z) noexcept {
   if (z > 1.0) [[unlikely]] {
     const double t = std::sqrt(z), s = std::sin(t) / t, B = (1.0 - std::cos(t)) / z, C = (1.0 - s) / z;
     return {B, C, (s - 2.0 * B) / (2.0 * z), (B - 3.0 * C) / (2.0 * z)};
   }
-  // Coefficients of z^k: (-1)^k/(2k+2)!, (-1)^k/(2k+3)! and, for the derivatives, (k+1) times those of z^(k+1).
-  static constexpr double series[7][4] = {
-      {0.5, 0.16666666666666666, -0.041666666666666664, -0.008333333333333333},
-      {-0.041666666666666664, -0.008333333333333333, 0.002777777777777778, 0.0003968253968253968},
-      {0.001388888888888889, 0.0001984126984126984, -7.440476190476191e-05, -8.267195767195768e-06},
-      {-2.48015873015873e-05, -2.7557319223985893e-06, 1.1022927689594355e-06, 1.0020843354176688e-07},
-      {2.755731922398589e-07, 2.505210838544172e-08, -1.043837849393405e-08, -8.029521918410807e-10},
-      {-2.08767569878681e-09, -1.6059043836821613e-10, 6.882447358637835e-11, 4.58829823909189e-12},
-      {1.1470745597729725e-11, 7.647163731819816e-13, -3.3456341326711696e-13, -1.9680200780418645e-14}};
-  Lanes r{series[6][0], series[6][1], series[6][2], series[6][3]};
-  for (int k = 5; k >= 0; --k) r = r * z + Lanes{series[k][0], series[k][1], series[k][2], series[k][3]};
+  Lanes r{exp_series[6][0], exp_series[6][1], exp_series[6][2], exp_series[6][3]};
+  for (int k = 5; k >= 0; --k)
+    r = r * z + Lanes{exp_series[k][0], exp_series[k][1], exp_series[k][2], exp_series[k][3]};
   return {r[0], r[1], r[2], r[3]};
 }
 
@@ -118,6 +120,12 @@ CTCR_INLINE void move(Frame<double>& g, const Exponential& x) noexcept {
   g.x = a * x.E[0][0] + b * x.E[1][0] + c * x.E[2][0];
   g.y = a * x.E[0][1] + b * x.E[1][1] + c * x.E[2][1];
   g.z = a * x.E[0][2] + b * x.E[1][2] + c * x.E[2][2];
+}
+
+/// g <- g moved along its z axis: the values.
+template <class H>
+CTCR_INLINE void move_along(Frame<double>& g, const H& h) noexcept {
+  g.p += g.z * value(h);
 }
 
 /// Body twist (rotation f, translation t) of one column group after g <- g exp, exactly: rotation E^T (f + D dO),

@@ -45,6 +45,32 @@ CTCR_INLINE void sincos(double x, double& s, double& c) noexcept {
   c = std::bit_cast<double>(std::bit_cast<std::uint64_t>(b) ^ (((quadrant + 1u) & 2u) << 62));
 }
 
+/// Of four angles at once. Real time: yes.
+CTCR_INLINE void sincos(const Lanes& x, Lanes& s, Lanes& c) noexcept {
+#if defined(CTCR_VECTOR_LANES)
+  using namespace detail;
+  typedef std::uint64_t Bits __attribute__((vector_size(32)));
+  typedef std::int64_t Choice __attribute__((vector_size(32)));
+  const Lanes t = x * quarter_turns + round_to_integer;
+  const Lanes k = t - round_to_integer;
+  const Lanes r = (x - k * quarter_turn[0]) - k * quarter_turn[1];
+  const Lanes z = r * r;
+  Lanes ps = z * sincos_series[5][0] + sincos_series[4][0], pc = z * sincos_series[5][1] + sincos_series[4][1];
+  for (int i = 3; i >= 0; --i) {
+    ps = ps * z + sincos_series[i][0];
+    pc = pc * z + sincos_series[i][1];
+  }
+  ps = r + r * z * ps;
+  pc = 1.0 - 0.5 * z + z * z * pc;
+  const Bits quadrant = std::bit_cast<Bits>(t);
+  const Choice swap = std::bit_cast<Choice>(quadrant << 63) < 0;
+  s = std::bit_cast<Lanes>(std::bit_cast<Bits>(swap ? pc : ps) ^ ((quadrant >> 1) << 63));
+  c = std::bit_cast<Lanes>(std::bit_cast<Bits>(swap ? ps : pc) ^ (((quadrant + 1) >> 1) << 63));
+#else
+  for (std::size_t i = 0; i < lane_count; ++i) sincos(x[i], s[i], c[i]);
+#endif
+}
+
 /// {sin x, cos x, sin y, cos y} for little more than one of them. Real time: yes.
 CTCR_INLINE Lanes sincos_pair(double x, double y) noexcept {
 #if defined(CTCR_VECTOR_LANES)

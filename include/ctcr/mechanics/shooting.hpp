@@ -31,6 +31,12 @@ template <int N>
 struct TubeTips {
   std::array<Frame<double>, N - 1> frame;
   std::array<double, N - 1> psi;
+
+  template <class S>
+  CTCR_INLINE void keep(int tube, const Frame<S>& at, const S& angle) noexcept {
+    frame[std::size_t(tube - 1)] = at;
+    psi[std::size_t(tube - 1)] = value(angle);
+  }
 };
 
 /// Observer that records nothing.
@@ -78,12 +84,13 @@ public:
   /// @param steps   integration steps per segment, >= 1
   /// @param y       in: state at the tip; out: at the front plate
   /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
+  /// @param tips    tips.keep(tube, frame, angle) at the tip of each tube but the first
   /// @param record  record(s, tubes, state, frame, u) at both ends of every step
   /// @return tubes of the last segment
   /// Real time: yes (2N segments, `steps` steps each).
-  template <class Place, class Record = NoRecord>
+  template <class Place, class Tips, class Record = NoRecord>
   static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const Place& place, int steps,
-                                   State& y, Frame<S>& frame, TubeTips<N>& tips, const Record& record = {}) noexcept {
+                                   State& y, Frame<S>& frame, Tips& tips, const Record& record = {}) noexcept {
     SegmentTubes<N> tubes;
     set_identity(frame);
     H here = place(events.id[0], events.s[0]);
@@ -91,10 +98,7 @@ public:
       const int id = events.id[e];
       if (id < N) {
         tubes.add(id, c.curved[std::size_t(id)]);
-        if (id > 0) {
-          tips.frame[std::size_t(id - 1)] = frame;
-          tips.psi[std::size_t(id - 1)] = value(y.psi[std::size_t(id)]);
-        }
+        if (id > 0) tips.keep(id, frame, y.psi[std::size_t(id)]);
       } else {
         tubes.straighten(id - N);
       }
@@ -145,12 +149,13 @@ public:
   }
 
 private:
+  using Values = std::conditional_t<is_dual<S>, Frame<double>, Frame<S>>;
   static constexpr bool replayed = is_dual<S> && !is_dual<P> && Stepper::replayed;
   static constexpr TangentOf of =
       Col::jacobian ? TangentOf::frame : (Loaded ? TangentOf::rotation : TangentOf::nothing);
 
   static CTCR_INLINE void set_identity(Frame<S>& frame) noexcept {
-    static_cast<Frame<double>&>(frame) = Frame<double>{};
+    static_cast<Values&>(frame) = Values{};
     if constexpr (is_dual<S>)
       for (int i = 0; i < 3; ++i)
         for (std::size_t g = 0; g < std::size_t(groups_of<S>); ++g) {
@@ -351,7 +356,7 @@ private:
   }
 
   static CTCR_INLINE void move_straight(Frame<S>& g, const H& k) noexcept {
-    g.p += g.z * value(k);
+    move_along(g, k);
     if constexpr (is_dual<S>) {
       constexpr int G = int(sizeof(g.rotation_twist[0]) / sizeof(Lanes));
       for (int i = 0; i < G; ++i) {

@@ -27,14 +27,14 @@ CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::arr
 template <class S, int NC>
 CTCR_INLINE void sincos_of_two(const std::array<S, std::size_t(NC)>& a, const std::array<S, std::size_t(NC)>& b,
                           RodRates<S, NC>& at_a, RodRates<S, NC>& at_b) noexcept {
-  if constexpr (is_dual<S>) {
-    sincos(a, at_a.sin, at_a.cos);
-    sincos(b, at_b.sin, at_b.cos);
-  } else {
+  if constexpr (std::is_same_v<S, double>) {
     for (std::size_t i = 0; i < NC; ++i) {
       const Lanes r = sincos_pair(a[i], b[i]);
       at_a.sin[i] = r[0], at_a.cos[i] = r[1], at_b.sin[i] = r[2], at_b.cos[i] = r[3];
     }
+  } else {
+    sincos(a, at_a.sin, at_a.cos);
+    sincos(b, at_b.sin, at_b.cos);
   }
 }
 

@@ -24,14 +24,14 @@ def command(quick: bool, report: str, json_target: str | None) -> None:
     samples, points = (2000, 3) if quick else (1_000_000, 11)
     start, clock = time.process_time(), time.monotonic()
     with output.Progress("integration schemes", designs) as progress:
-        errors, seconds = model.integration_errors(designs, configurations, progress.advance)
+        errors, others, seconds = model.integration_errors(designs, configurations, progress.advance)
     with output.Progress("scenarios", 24 * repetitions) as progress:
         runs = control.scenarios(repetitions, progress.advance)
     with output.Progress("sensitivity", samples + 2 * (30 * points + 1 + 12 * 3 + 1)) as progress:
         found = influence.study(samples, points, progress.advance)
     claims = [
         *model.rates(2000 if quick else 20_000),
-        *model.integration_claims(errors, seconds),
+        *model.integration_claims(errors, others, seconds),
         *control.tracking_claims(runs),
         *influence.claims(found),
     ]

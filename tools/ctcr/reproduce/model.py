@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 SCHEMES = {"RK3": "ssprk3", "RK4": "rk4", "RK8": "rk8", "ours": "default"}
 # Of RK8 a segment: the paper takes 100, which differ from these by less than 1e-12 of the length.
 REFERENCE_STEPS = 4
+# Distance of the tips, relative to the length, and relative difference of det B_u beyond which two answers are
+# different equilibria of one robot. Of 10^6 RK4 has two so far apart (4.8 % and 0.29, 3.6 % and 0.68): a fine
+# integration that starts where RK4 ended stays there. All others are within 0.22 %.
+OTHER = (0.01, 0.15)
 _RATES = (("unloaded", 0.0, False, 154), ("loaded", 0.3, False, 41), ("loaded, J and C", 0.3, True, 14))
 
 
@@ -34,11 +38,12 @@ def rates(count: int) -> list[Claim]:
 
 def integration_errors(
     designs: int, configurations: int, advance: Callable[[float], None]
-) -> tuple[dict[str, Array], dict[str, float]]:
-    """Tip errors of each scheme relative to the deployed length, and its processor seconds (Figure 2)."""
+) -> tuple[dict[str, Array], dict[str, int], dict[str, float]]:
+    """Of each scheme: tip errors relative to the deployed length (Figure 2); how often it ended in another stable
+    equilibrium than the reference, which is no error of integration; processor seconds."""
     random = np.random.default_rng(2)
     errors: dict[str, list[Array]] = {name: [] for name in SCHEMES}
-    seconds = dict.fromkeys(SCHEMES, 0.0)
+    others, seconds = dict.fromkeys(SCHEMES, 0), dict.fromkeys(SCHEMES, 0.0)
     for _ in range(designs):
         robot = random_design(random)
         beta, alpha, force = random_rows(robot, configurations, random, 0.3)
@@ -49,21 +54,33 @@ def integration_errors(
             answer = Model(robot, integrator=scheme).predict(beta, alpha, force)
             seconds[name] += time.process_time() - start
             good = reference.solved & answer.solved
-            error = np.linalg.norm(answer.position - reference.position, axis=1)[good] / length[good]
-            errors[name].append(error[error < 0.2])  # beyond: another equilibrium of a robot that snaps
+            error = np.linalg.norm(answer.position - reference.position, axis=1) / length
+            det = np.abs(answer.stability / reference.stability - 1)
+            other = good & (error > OTHER[0]) & (det > OTHER[1])
+            others[name] += int(other.sum())
+            errors[name].append(error[good & ~other])
         advance(1)
-    return {name: np.concatenate(parts) for name, parts in errors.items()}, seconds
+    return {name: np.concatenate(parts) for name, parts in errors.items()}, others, seconds
 
 
-def integration_claims(errors: dict[str, Array], seconds: dict[str, float]) -> list[Claim]:
+def integration_claims(
+    errors: dict[str, Array], others: dict[str, int], seconds: dict[str, float]
+) -> list[Claim]:
     designs = (
         "the paper does not list the ranges of its designs: ours end at the curvature (10 1/m) and curved length (50 "
         "mm) of its own robot; with 2 to 12 1/m and 20 to 80 mm the mean is 12 times as large"
     )
-    worst = "rare ones in 10^6 lie far above the others: the largest error of RK4 in 10^5 is 0.18 %"
+
+    def worst(scheme: str) -> str:
+        return (
+            "largest where the innermost tube alone crosses 110 to 120 mm in one step under 0.3 N; left out: "
+            f"{others[scheme]} of {others[scheme] + errors[scheme].size} answers, up to 5 % away, which are another "
+            "stable equilibrium of the same robot; the start decides between the two, not the exactness of the step"
+        )
+
     return [
-        Claim("Fig. 2", "RK3, largest error, of the length", 1.0, 100 * errors["RK3"].max(), "%", worst),
-        Claim("Fig. 2", "RK4, largest error", 0.1, 100 * errors["RK4"].max(), "%", worst),
+        Claim("Fig. 2", "RK3, largest error, of the length", 1.0, 100 * errors["RK3"].max(), "%", worst("RK3")),
+        Claim("Fig. 2", "RK4, largest error", 0.1, 100 * errors["RK4"].max(), "%", worst("RK4")),
         Claim("Fig. 2", "RK4, mean error", 0.003, 100 * errors["RK4"].mean(), "%", designs),
         Claim("Fig. 2", "ours (Magnus, 4th order), mean error", 0.003, 100 * errors["ours"].mean(), "%",
               "against the paper's RK4"),

@@ -71,7 +71,7 @@ class Tasks(Section):
     obstacle_avoidance: Weight = [10.0, 0.0]
     stability_margin: Weight = [0.0, 0.0]
     posture: Weight = [0.0, 0.0]
-    feedback_per_s: Annotated[float, Quantity("1/s", usual=(0.1, 80), above=0)] = 30.0
+    feedback_per_s: Annotated[float, Quantity("1/s", usual=(0.1, 80), above=0)] = 32.0
     fastest_feedback_mm_s: Annotated[float, Quantity("mm/s", usual=(0.1, 500), above=0)] = 20.0
     limit_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 1e4), least=0)] = 100.0
     obstacle_strength_m3_s: Annotated[float, Quantity("m^3/s", usual=(1e-6, 100), least=0)] = 0.1
