@@ -273,9 +273,8 @@ def test_lateness():
 @pytest.mark.parametrize(
     ("effect", "strength", "shares", "off"),
     [
-        ("friction", "coefficient", (), 1e-6),
-        # Told of the way, it knows the twist of the tubes better than from row to row.
-        ("friction", "coefficient", (0.25, 0.5, 0.75), 1e-4),
+        ("friction", "coefficient", (), 1e-5),
+        ("friction", "coefficient", (0.25, 0.5, 0.75), 1e-5),
         ("backlash_rotation", "play", (0.25, 0.5, 0.75), 1e-6),
     ],
 )

@@ -46,8 +46,8 @@ def test_stiff_friction_is_found(robot, plan):
     for i in (1, 2):
         name = f"effects.friction.coefficient.{i}"
         assert abs(found[name]["value"] - 0.03) < 0.02 * 0.03, found[name]
-    # Without what the tubes wind each other up the fit needs several times this angle.
-    assert found["effects.friction.slip_angle"]["value"] < 0.06
+    # Without what the tubes wind each other up it would be 0.18, and the error ten times as large.
+    assert found["effects.friction.slip_angle"]["value"] < 0.1
     rms = added.rms("rms_mm")
     assert rms["friction"] < 1.5 * rms["noise_floor"] < 0.2 * rms["calibrated"]
 
