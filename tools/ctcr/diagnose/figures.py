@@ -6,6 +6,7 @@ import numpy as np
 
 from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
 from ctcr.diagnose.race import Entry, imitated
+from ctcr.html_page import short
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -24,10 +25,12 @@ def waterfall(figure, d: "Diagnosis") -> None:
         bars.append((f"+ {names}", rms["with_effects"], GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
-        axes.text(i, value, f" {value:.3g} mm", ha="center", va="bottom", weight="bold")
+        axes.text(i, value, f" {short(value)} mm", ha="center", va="bottom", weight="bold")
     axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
     last = len(bars) - 0.6
-    axes.text(last, rms["noise_floor"], f"noise floor\n{rms['noise_floor']:.2g} mm", color=NOISE, va="bottom")
+    axes.text(
+        last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom"
+    )
     axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", " ") for name, _, _ in bars])
     axes.set_ylabel("RMS error on locked runs, mm")

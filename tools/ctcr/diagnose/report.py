@@ -9,7 +9,7 @@ import numpy as np
 
 from ctcr import effects, free_parameters, html_page
 from ctcr.diagnose import figures
-from ctcr.html_page import cards, figure, table
+from ctcr.html_page import cards, figure, short, table
 from ctcr.output import atomic_writer
 
 if TYPE_CHECKING:
@@ -44,12 +44,12 @@ def page(d: "Diagnosis", source: str) -> str:
 def _opening(d: "Diagnosis", title: str) -> str:
     rms = d.rms_mm
     numbers = [
-        ("error", f"{rms['nominal']:.3g} mm", "RMS error with the robot file"),
-        ("error", f"{rms['calibrated']:.3g} mm", "after calibration"),
+        ("error", f"{short(rms['nominal'])} mm", "RMS error with the robot file"),
+        ("error", f"{short(rms['calibrated'])} mm", "after calibration"),
     ]
     if d.accepted:
-        numbers.append(("back", f"{rms['with_effects']:.3g} mm", "with the effects found"))
-    numbers.append(("noise", f"{rms['noise_floor']:.2g} mm", "noise floor"))
+        numbers.append(("back", f"{short(rms['with_effects'])} mm", "with the effects found"))
+    numbers.append(("noise", f"{short(rms['noise_floor'])} mm", "noise floor"))
     verdict = d.verdict.word.replace("_", " ")
     lead = " ".join(d.verdict.sentences)
     return (
@@ -57,7 +57,7 @@ def _opening(d: "Diagnosis", title: str) -> str:
         f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
         f"{cards(numbers)}"
         f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw. Even of a right '
-        f"model the tracker's stated accuracy and uncertain parameters allow {d.expected_mm:.2g} mm there.</p>"
+        f"model the tracker's stated accuracy and uncertain parameters allow {short(d.expected_mm)} mm there.</p>"
     )
 
 
