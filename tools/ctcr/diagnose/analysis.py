@@ -214,10 +214,10 @@ def _grow(
         accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, entry.share))
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
-        if racing.is_rejected(engine, fit):
-            fit = _with_shapes(engine, accepted, fit, progress)
-            if accepted[0].share < EXPLAINED:
-                break  # no effect is stacked on one that hardly explains anything
+        rejected = racing.is_rejected(engine, fit)
+        fit = _with_shapes(engine, accepted, fit, progress)
+        if rejected and accepted[0].share < EXPLAINED:
+            break  # no effect is stacked on one that hardly explains anything
     return fit, True
 
 
