@@ -68,11 +68,17 @@ def test_a_length_bounded_on_both_sides_is_left_alone_and_an_open_side_is_told()
     inside = fit_of(0.042, 0.0, random)
     assert open_side.widened(inside) is inside
     outside = [fit_of(0.054, 0.0, random) for _ in range(40)]
-    told = [wide for fit in outside if (wide := open_side.widened(fit)) is not fit]
+    told = [(fit, wide) for fit in outside if (wide := open_side.widened(fit)) is not fit]
     assert len(told) > 5
-    for wide in told:
+    shown = 0
+    for fit, wide in told:
+        slope = wide.jacobian_all.reshape(len(Kinked.REACH), 6, 2)[:, :3, 0]
+        open_to = np.sum(slope**2, axis=1) * (wide.sd[0] ** 2 - fit.sd[0] ** 2)
+        np.testing.assert_allclose(wide.expected_square[:, 0], fit.expected_square[:, 0] + open_to)
+        shown += wide.floor_mm() > 1.1 * fit.floor_mm()
         assert "how much longer" in wide.warnings[-1] and wide.ratio[0] > 0.3
         assert wide.covariance[0, 0] == pytest.approx(wide.sd[0] ** 2)
+    assert shown > 5
 
 
 def test_a_value_without_prior_has_no_share_of_one_left():

@@ -88,8 +88,13 @@ class Fit:
 
     @property
     def expected_square(self) -> Array:
-        """(M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open."""
-        return self._report[3]
+        """(M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open, also to a side that
+        the readings do not bound (see open_side)."""
+        wider = self.covariance - self.core.covariance
+        if not wider.any():
+            return self._report[3]
+        slopes = self.jacobian_all.reshape(len(self.weights), 2, 3, -1)
+        return self._report[3] + np.einsum("mkai,ij,mkaj->mk", slopes, wider, slopes)
 
     @cached_property
     def nominal_residual(self) -> Array:

@@ -180,7 +180,7 @@ def _diagnose(
     before = racing.predictive(engine, calibrated, [], progress)
     after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
     return Diagnosis(
-        robot, measurements, locked, unseen, before, after, open_side.widened(fit),
+        robot, measurements, locked, unseen, before, open_side.widened(after), open_side.widened(fit),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
         judge(before, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
