@@ -32,7 +32,7 @@ def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -
         "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
         "legend": {"orientation": "h", "y": 0, "x": 0},
         "scene": {
-            "aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.5, "z": 0.8}},
+            "aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": -1.62, "z": 0.86}},
             **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
         },
     }  # fmt: skip
