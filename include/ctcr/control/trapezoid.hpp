@@ -5,8 +5,8 @@
 
 namespace ctcr {
 
-/// Speeds up at `acceleration`, travels at `speed`, slows down at `acceleration`; a line too short for that speed has no
-/// travel at it. Without speed or acceleration it rests at the start. Exact at any time. Real time: yes.
+/// Speeds up at `acceleration`, travels at `speed`, slows down at `acceleration`; a line too short for that speed has
+/// no travel at it. Without speed or acceleration it rests at the start. Exact at any time. Real time: yes.
 class Trapezoid {
 public:
   struct Point {
