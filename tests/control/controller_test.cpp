@@ -63,6 +63,27 @@ TEST(Controller, ReachesATargetWhateverTheForce) {
   }
 }
 
+TEST(Controller, ReachesAFullPose) {
+  Loop loop;
+  Joints<3> there = home;
+  there.beta += Vec3(3e-3, -5e-3, 4e-3);
+  there.alpha += Vec3(0.3, -0.25, 0.35);
+  const SimulatedRobot<3> goal(loop.system, motor_angles(loop.system.transmission, there), {});
+  Controller<3> controller(loop.system, {}, period);
+  controller.tasks.get<Tracking>().weight = {1e7, 1e5};
+  controller.tasks.get<LimitAvoidance>().weight = {};
+  SimulatedRobot<3> robot(loop.system, loop.start, {});
+  Measurement<3> measured;
+  MotorAngles<3> v;
+  for (int k = 0; k < 1200; ++k) {
+    ASSERT_EQ(robot.measure(measured), Status::ok);
+    ASSERT_EQ(controller.advance(measured, {goal.tip()}, {}, v).status, Status::ok);
+    ASSERT_EQ(robot.move(v, period), Status::ok);
+  }
+  EXPECT_LT((robot.tip().position - goal.tip().position).norm(), 1e-7);
+  EXPECT_LT(rotation_vector(goal.tip().rotation * robot.tip().rotation.transpose()).norm(), 1e-6);
+}
+
 TEST(Controller, StandsStillOnWhatItCannotUse) {
   Loop loop;
   Controller<3> controller(loop.system, {}, period);

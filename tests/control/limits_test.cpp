@@ -67,6 +67,31 @@ TEST(Limits, AStepInsideIsTheMinimumItself) {
   }
 }
 
+TEST(Limits, TheWayBackKeepsToTheSpeed) {
+  const Robot<3> robot = test::paper_robot();
+  const Limits<3> limits{.base_gap = 20e-3};
+  const AllowedPositions<3> allowed(robot, limits);
+  LeastSquares<3> goals;  // tubes turn, and stay where they are
+  JointVelocity<3> wanted = JointVelocity<3>::Zero();
+  wanted.tail<3>().setConstant(1);
+  goals.add_joint_goal(wanted, {1, 1});
+  Vec3 beta(-0.205, -0.202, -0.1);
+  double missing = (allowed.clamped(beta) - beta).norm();
+  for (int k = 0; k < 20; ++k) {
+    JointVelocity<3> v;
+    LimitReport report;
+    ASSERT_EQ(limited_minimum(goals, allowed, limits, beta, period, AtLimits::hold, v, report), Status::ok);
+    EXPECT_LE(v.head<3>().cwiseAbs().maxCoeff(), limits.translation_speed * (1 + 1e-9));
+    EXPECT_NEAR(v[3], 1, 1e-12);
+    EXPECT_EQ(report.base_gaps, allowed.contain(beta) ? 0 : 1);
+    beta += period * v.head<3>();
+    const double left = (allowed.clamped(beta) - beta).norm();
+    EXPECT_TRUE(left < missing || left < 1e-12);
+    missing = left;
+  }
+  EXPECT_TRUE(allowed.contain(beta));
+}
+
 TEST(Limits, TheReportNamesTheGap) {
   const Robot<3> robot = test::paper_robot();
   const Limits<3> limits{.base_gap = 5e-3, .tip_gap = 4e-3};

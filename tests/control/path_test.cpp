@@ -53,6 +53,22 @@ TEST(Trapezoid, DurationAndSymmetryInClosedForm) {
   EXPECT_EQ(Trapezoid(0, 1, 1).duration(), 0);
 }
 
+TEST(Paths, WithoutSpeedTheyRestAtTheirStart) {
+  const std::vector<Vec3> points{{0, 0, 0.1}, {0.01, 0, 0.1}, {0.02, 0.01, 0.1}, {0.03, 0.01, 0.12}};
+  for (const auto& [speed, acceleration] :
+       {std::pair{0.0, 1.0}, {1.0, 0.0}, {-1.0, 1.0}, {1.0, -1.0}, {std::nan(""), 1.0}, {1.0, std::nan("")}}) {
+    const Polyline line(points, speed, acceleration);
+    const SplinePath curve(points, speed, acceleration);
+    EXPECT_EQ(line.duration(), 0);
+    EXPECT_EQ(curve.duration(), 0);
+    for (const double t : {-1.0, 0.0, 1.0, 1e6})
+      for (const Reference& r : {line.at(t), curve.at(t)}) {
+        EXPECT_LT((r.pose.position - points.front()).norm(), 1e-12);
+        EXPECT_EQ(r.velocity.norm(), 0);
+      }
+  }
+}
+
 TEST(Polyline, RestsAtEachCornerOnTime) {
   const std::vector<Vec3> corners{{0, 0, 0.1}, {0.03, 0, 0.1}, {0.03, 0.03, 0.1}, {0.03, 0.03, 0.13}};
   const Polyline path(corners, 5e-3, 2.5e-3);

@@ -1,6 +1,7 @@
 """The sensitivity study: against the model itself, on other workers, after interruptions, and what it advises."""
 
 import json
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from ctcr.model import Model
 from ctcr.sensitivity import closed_loop, open_loop
 from ctcr.sensitivity.advice import advise, grouped
 from ctcr.sensitivity.ranges import all_varied, together
+from ctcr.sensitivity.work import workers
 from ctcr.track import scenario as scenario_file
 
 ROOT = Path(__file__).parents[2]
@@ -127,6 +129,22 @@ def test_an_interrupted_study_goes_on(robot, varied, whole, tmp_path, monkeypatc
     kept.write_text("no json")
     with pytest.raises(InputError, match="not the progress"):
         open_loop.study(robot, varied, COUNT, keep=str(kept))
+
+
+def test_what_has_not_begun_is_left_when_interrupted():
+    begun, first = [], threading.Event()
+
+    def work(job: int) -> int:
+        begun.append(job)
+        if job:
+            first.wait(10)
+        return job
+
+    with pytest.raises(KeyboardInterrupt), workers(None, threads=2) as in_order:
+        for _ in in_order(work, range(100)):
+            threading.Timer(0.2, first.set).start()
+            raise KeyboardInterrupt
+    assert len(begun) <= 3
 
 
 def test_memory_does_not_grow():

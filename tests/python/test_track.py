@@ -48,7 +48,7 @@ def test_errors_are_at_most_the_papers(robot):
     for name in ("S3", "S4"):
         loaded = outcome(robot, name, 20.0)
         assert loaded["failed"] == 0
-        assert loaded["mean_mm"] - free["mean_mm"] <= 0.012  # 0.0098 over ten repetitions
+        assert loaded["mean_mm"] - free["mean_mm"] <= 0.012  # 0.0095 over ten repetitions
         assert loaded["max_mm"] - free["max_mm"] <= 0.3
         assert loaded["max_mm"] <= 1.22 and loaded["below_1_mm_percent"] >= 99.8
         assert min(free["obstacle_mm"], loaded["obstacle_mm"]) > 0
@@ -129,6 +129,10 @@ FAULTS = [
     ("speed_mm_s: 5\n", "speed_mm_s: 0\n", ["trajectory.speed_mm_s", "> 0"]),
     ("speed_mm_s: 5\n", "speed_mm_s: 0.005\n", ["trajectory.speed_mm_s", "is this m/s?"]),
     ("corner_mm: [-18, 9, 170]", "corner_mm: [-0.018, 0.009, 0.17]", ["trajectory.corner_mm", "is this m?"]),
+    ("centre_mm: [12, 24, 170]", "centre_mm: [0.012, 0.024, 0.17]", ["obstacle.centre_mm", "is this m?"]),
+    ("beta_mm: [-298, -220.5, -145]", "beta_mm: [-0.298, -0.2205, -0.145]", ["start.beta_mm", "is this m?"]),
+    ("direction: [0, -1, 0]", "direction: [0, 0, 0]", ["load.direction", "no length"]),
+    ("tracking: [1.0e+7, 0]", "tracking: [0, 10]", ["tasks.tracking", "above 0"]),
     ("  kind: cube\n", "", ["trajectory.kind", "missing"]),
     ("  radius_mm: 5", "  radius_mm: 0.005", ["obstacle.radius_mm", "is this m?"]),
     ("centre_mm: [12, 24, 170]", "centre_mm: [-17, 9, 170]", ["obstacle lies on the start"]),
@@ -175,6 +179,12 @@ def test_a_start_out_of_reach_is_named(robot):
         match=r"S2.yaml, line \d+, trajectory: the start of the path is not reached, the tip stays .* mm away",
     ):
         run_all(load("S2", trajectory={"corner_mm": [-18.0, 9.0, 600.0]}), robot, robot)
+    with pytest.raises(InputError, match=r"the obstacle is only 1\.0 mm from it"):
+        run_all(load("S2", obstacle={"centre_mm": [-18.0, 3.0, 170.0]}), robot, robot)
+    noisy = load("S2")
+    noisy.noise_mm = 5.0
+    with pytest.raises(InputError, match="noise of 5 mm alone"):
+        run_all(noisy, robot, robot)
 
 
 def test_a_path_out_of_reach_fails_in_words(robot):

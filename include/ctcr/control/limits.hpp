@@ -98,7 +98,7 @@ enum class AtLimits : std::uint8_t {
 };
 
 /// The minimum of the goals that keeps the limits over one period.
-/// @param beta      positions now [m], allowed
+/// @param beta      positions now [m]; where they are not allowed, the step leads back to what is, within the speed
 /// @param velocity  q'; 0 where there is no minimum
 /// @return as LeastSquares::minimum(). Real time: yes, at most N + 1 minima.
 template <int N>
@@ -137,6 +137,12 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
   }
   const VecN<N> planned = beta + period * velocity.template head<N>();
   velocity.template head<N>() = (allowed.clamped(planned, &report) - beta) / period;
+  // From outside the allowed positions the way back takes several periods.
+  const double hurry = velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed;
+  if (hurry > 1 + 1e-9) {
+    velocity.template head<N>() /= hurry;
+    report.speed = true;
+  }
   return status;
 }
 

@@ -19,9 +19,10 @@ public:
     for (std::size_t i = 1; i < corners.size(); ++i) {
       const Vec3 way = corners[i] - corners[i - 1];
       const double length = way.norm();
-      if (!(length > 0)) continue;
-      edges_.push_back({corners[i - 1], way / length, {length, speed, acceleration}, duration_});
-      duration_ += edges_.back().motion.duration();
+      const Trapezoid motion(length, speed, acceleration);
+      if (!(motion.duration() > 0)) continue;  // no way, or no speed: it rests where it is
+      edges_.push_back({corners[i - 1], way / length, motion, duration_});
+      duration_ += motion.duration();
     }
   }
 

@@ -13,8 +13,8 @@
 
 namespace ctcr {
 
-/// A task has a name, add(situation, goals), and shortfall(situation, q'), which says how far a step falls short of what
-/// it wants: above 1 it gave way. All calls are real time.
+/// A task has a name, add(situation, goals), and shortfall(situation, q'), which says how far a step falls short of
+/// what it wants: above 1 it gave way. All calls are real time.
 template <class... Task>
 struct TaskList {
   static constexpr int size = int(sizeof...(Task));

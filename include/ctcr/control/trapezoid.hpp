@@ -5,8 +5,8 @@
 
 namespace ctcr {
 
-/// Speeds up at `acceleration`, travels at `speed`, slows down at `acceleration`; a line too short for that speed has no
-/// travel at it. Exact at any time. Real time: yes.
+/// Speeds up at `acceleration`, travels at `speed`, slows down at `acceleration`; a line too short for that speed has
+/// no travel at it. Without speed or acceleration it rests at the start. Exact at any time. Real time: yes.
 class Trapezoid {
 public:
   struct Point {
@@ -15,10 +15,13 @@ public:
 
   Trapezoid() noexcept = default;
   /// @param length  [m], >= 0   @param speed  [m/s], > 0   @param acceleration  [m/s^2], > 0
-  Trapezoid(double length, double speed, double acceleration) noexcept
-    : length_(length), speed_(std::min(speed, std::sqrt(length * acceleration))), acceleration_(acceleration) {
+  Trapezoid(double length, double speed, double acceleration) noexcept {
+    if (!(length > 0 && speed > 0 && acceleration > 0)) return;
+    length_ = length;
+    speed_ = std::min(speed, std::sqrt(length * acceleration));
+    acceleration_ = acceleration;
     ramp_ = speed_ / acceleration;
-    duration_ = speed_ > 0 ? length / speed_ + ramp_ : 0;
+    duration_ = length / speed_ + ramp_;
   }
 
   /// Time from start to end [s].

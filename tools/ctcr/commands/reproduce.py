@@ -4,7 +4,7 @@ import click
 
 
 @click.command(name="reproduce")
-@click.option("--quick", is_flag=True, help="Fewer designs, configurations and repetitions: a minute or two.")
+@click.option("--quick", is_flag=True, help="Fewer designs, configurations and repetitions: under a minute.")
 @click.option(
     "--report", metavar="FILE.html", default="reproduction.html", show_default=True, help="The page."
 )

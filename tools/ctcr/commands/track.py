@@ -70,7 +70,7 @@ def command(
         page.write(runs, wanted, loaded, report, f"{scenario} with {robot}{on}", measured=live)
     if json_target:
         output.write_json({"robot": loaded.name, "scenario": wanted.name, "weights": numbers}, json_target)
-    title = f"{wanted.name}: tracking errors of {loaded.name} in mm, {wanted.repetitions} runs a weight"
+    title = f"{wanted.name}: tracking errors of {loaded.name} in mm, runs a weight: {wanted.repetitions}"
     console.print(output.table(title, ["weight", *COLUMNS], rows(numbers)))
     for weight, figures in numbers.items():
         console.print(f"{weight:>6}  {figures['verdict']}", markup=False)

@@ -44,6 +44,7 @@ def tracking_claims(s: Scenarios) -> list[Claim]:
     usual = [runs for (name, mass), runs in s.runs.items() if name in ("S2", "S3", "S4") and mass <= 20]
     errors = errors_mm([run for runs in usual for run in runs])
     simulated = "ours are simulated; the paper's are of its robot, whose model is not exact"
+    nearly = min(run.counted.max() for run in s.runs["S3", 25.0])
     added = [20.0, "S3"]
     feedback = (
         f"{PLACES}; ours: a feedback of {shipped('S3').tasks.feedback_per_s:g} 1/s, with which each ten of 40 "
@@ -55,7 +56,9 @@ def tracking_claims(s: Scenarios) -> list[Claim]:
         Claim("IV.D", "S3 and S4 up to 20 g: runs that fail", 0,
               failed("S3", [0.0, 5, 10, 15, 20]) + failed("S4", [0.0, 5, 10, 15, 20]), "%"),
         Claim("IV.D", "S3 and S4 above 20 g: runs that fail", 100,
-              0.5 * (failed("S3", [25.0, 30]) + failed("S4", [25.0, 30])), "%"),
+              0.5 * (failed("S3", [25.0, 30]) + failed("S4", [25.0, 30])), "%",
+              "all are held at a limit; a run counts as failed above 1 mm, and the least of the largest errors at 25 g "
+              f"unknown is {1e3 * nearly:.2f} mm, by its noise"),
         Claim("IV.D", "S5 (beyond the paper) at 25 and 27 g: runs that fail", 100, failed("S5", [25.0, 27]), "%",
               "force estimated, other joints take over from one at its limit, tubes turned against the weight"),
         Claim("IV.D", "S5 at 30 g: runs that fail", 100, failed("S5", [30.0]), "%",

@@ -79,7 +79,7 @@ def write(
     ]
     with atomic_writer(target) as file:
         file.write(html_page.page("The paper and this library", sections, "ctcr reproduce", "ctcr reproduce",
-                                  scene(runs, wanted)))  # fmt: skip
+                                  scene(runs, wanted, ["S2, 0 g", "S3, 20 g", "S4, 20 g"])))  # fmt: skip
 
 
 def _robot(robot) -> str:

@@ -21,9 +21,12 @@ def workers(address: str | None, threads: int | None = None) -> Iterator[Map]:
     if address is None:
         count = threads or os.cpu_count() or 1
         with ThreadPoolExecutor(count) as pool:
-            yield lambda function, jobs: _in_order(
-                pool.submit, function, jobs, 2 * count, lambda f: f.result()
-            )
+            try:
+                yield lambda function, jobs: _in_order(
+                    pool.submit, function, jobs, 2 * count, lambda f: f.result()
+                )
+            finally:
+                pool.shutdown(cancel_futures=True)  # an interruption does not wait for what has not begun
         return
     client = _client(address)
     try:

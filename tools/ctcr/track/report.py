@@ -72,7 +72,7 @@ def _opening(numbers: dict, scenario: Scenario) -> str:
         shown.append(
             ("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle")
         )
-    shown.append(("error" if failed else "good", str(len(failed)), f"of {len(numbers)} weights failed"))
+    shown.append(("error" if failed else "good", str(len(failed)), f"weights failed, of {len(numbers)}"))
     lead = f"<p class='lead'>{html.escape(scenario.about)}</p>" if scenario.about else ""
     return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}" + bullets(
         f"{weight}: {f['verdict']}" for weight, f in numbers.items()
@@ -92,7 +92,7 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) 
     noise = "as measured, with noise" if measured else f"noise {scenario.noise_mm:g} mm a reading and axis"
     note = (
         f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
-        f"{scenario.repetitions} runs a weight, {noise}.</p>"
+        f"Runs a weight: {scenario.repetitions}; {noise}.</p>"
     )
     return f"<h2>Tracking errors</h2>{told}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
 

@@ -189,9 +189,21 @@ def run_all(
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         runs = list(pool.map(work, jobs))
     if not any(run.started for run in runs):
-        text = f"{runs[0].verdict().removeprefix('failed: ')}: move trajectory or start, or settle longer"
+        text = f"{runs[0].verdict().removeprefix('failed: ')}: {_remedy(scenario)}"
         raise InputError(scenario.problem(text, "trajectory"))
     return runs
+
+
+def _remedy(scenario: Scenario) -> str:
+    """What helps where the start of the path is not reached."""
+    if scenario.obstacle:
+        centre = np.array(scenario.obstacle.centre_mm)
+        left = np.linalg.norm(1e3 * scenario.trajectory.points[0] - centre) - scenario.obstacle.radius_mm
+        if left < 1e3 * FAR:
+            return f"the obstacle is only {left:.1f} mm from it: move one of them"
+    if scenario.noise_mm > 1e3 * UNSETTLED:
+        return f"noise of {scenario.noise_mm:g} mm alone is more than the {1e3 * UNSETTLED:g} mm that count as reached"
+    return "move trajectory or start, or settle longer"
 
 
 def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:

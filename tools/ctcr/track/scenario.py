@@ -2,7 +2,7 @@
 
 Fields carry their unit in their name; the properties and `ctcr.track.runs` give SI units. Positions are those of the
 sensor in the base frame of the robot that is controlled: they stand in space, and a controller with another T_ref sees
-them elsewhere. Defaults are the paper's scenario S2 (Boyer et al., Section IV).
+them elsewhere. Defaults of the tasks are the paper's (Boyer et al., Section IV).
 """
 
 from importlib.resources import files
@@ -63,7 +63,10 @@ class Start(Section):
 
 
 class Tasks(Section):
-    """Weights [of translation, of rotation] and settings; a weight of 0 leaves a task out. Paper, Section IV.B."""
+    """Weights [of translation, of rotation] and settings; a weight of 0 leaves a task out. Paper, Section IV.B.
+
+    The second weight of tracking asks for the orientation of the base: the tip points along its z, unturned.
+    """
 
     tracking: Weight = [1e7, 0.0]
     damping: Weight = [1e6, 10.0]
@@ -227,14 +230,22 @@ def _relations(s: Scenario, n: int):
         yield ("tasks", "posture"), "needs posture_beta_mm and posture_alpha_deg"
     if not (any(s.tasks.damping) and s.tasks.damping[0] > 0 and s.tasks.damping[1] > 0):
         yield ("tasks", "damping"), "both weights must be above 0: without damping the step is not determined"
-    if any(s.load.mass_g) and not np.linalg.norm(s.load.direction) > 0:
+    if not s.tasks.tracking[0] > 0:
+        yield ("tasks", "tracking"), "its first weight must be above 0: nothing else follows the path"
+    if not np.linalg.norm(s.load.direction) > 0:
         yield ("load", "direction"), "has no length"
     if s.tasks.feedback_per_s > 2 * s.rate_Hz:
         text = f"{s.tasks.feedback_per_s:g} 1/s is unstable at {s.rate_Hz:g} Hz: at most twice the rate"
         yield ("tasks", "feedback_per_s"), text
     given = t.corner_mm if t.kind == "cube" else t.points_mm
-    if given and np.abs(given).max() < 1:
-        yield ("trajectory", "corner_mm" if t.kind == "cube" else "points_mm"), "all below 1 mm: is this m?"
+    places = {
+        ("trajectory", "corner_mm" if t.kind == "cube" else "points_mm"): given,
+        ("start", "beta_mm"): s.start.beta_mm,
+        ("obstacle", "centre_mm"): s.obstacle and s.obstacle.centre_mm,
+    }
+    for path, values in places.items():
+        if values and np.abs(values).max() < 1:
+            yield path, "all below 1 mm: is this m?"
     if s.obstacle and given:
         inside = np.linalg.norm(1e3 * t.points[0] - s.obstacle.centre_mm) <= s.obstacle.radius_mm
         if inside:

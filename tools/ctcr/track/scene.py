@@ -12,13 +12,14 @@ MOST_POINTS = 3000
 COLOURS = (MEASURED, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
 
 
-def scene(runs: list[Run], scenario: Scenario) -> str:
-    """JSON text {"data", "layout"}; mm, base frame. `runs`: one a weight."""
+def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -> str:
+    """JSON text {"data", "layout"}; mm, base frame. `names` of the runs; None: one run a weight, named by it."""
+    names = names or [f"{run.mass_g:g} g" for run in runs]
     data = [_line(1e3 * runs[0].wanted, "wanted", "#8794a0", 3, "dash")]
-    for run, colour in zip(runs, COLOURS * 3, strict=False):
+    for run, name, colour in zip(runs, names, COLOURS * 3, strict=False):
         if run.started:
             failed = " (failed)" if run.failed else ""
-            data.append(_line(1e3 * run.tip, f"{run.mass_g:g} g{failed}", colour, 4, "solid"))
+            data.append(_line(1e3 * run.tip, name + failed, colour, 4, "solid"))
     if scenario.obstacle:
         data.append(_ball(np.array(scenario.obstacle.centre_mm), scenario.obstacle.radius_mm))
     data.append(
@@ -31,7 +32,7 @@ def scene(runs: list[Run], scenario: Scenario) -> str:
         "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
         "legend": {"orientation": "h", "y": 0, "x": 0},
         "scene": {
-            "aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.5, "z": 0.8}},
+            "aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": -1.62, "z": 0.86}},
             **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
         },
     }  # fmt: skip
