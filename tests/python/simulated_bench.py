@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
 T_REF = [-59.6, 20.3, -180.5], [0.004, 1.203, 0.297]  # [mm], [rad]
+BUS_STARVED = "no frame came back whole"
 ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
 
 
@@ -30,20 +31,26 @@ def skip_without_bench() -> None:
         pytest.importorskip(package, reason=f"{package} is not installed")
 
 
-def run_on_bench(bench: list, tests: list, **environment: Path) -> None:
+def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) -> None:
     """Runs pytest beside the simulators that `ctcr sim bench` starts with `bench`; tests find what they need in the
-    environment, and the fixtures of bench_fixtures.py."""
+    environment, and the fixtures of bench_fixtures.py. Processes of different folders do not meet.
+
+    Simulators have no real-time priority in a network of their own: a computer busy with other tests may let them sleep
+    until the bus stops. Only then all is run once more."""
     skip_without_bench()
-    command = ctcr(
-        "sim", "bench", *bench, "--", sys.executable, "-m", "pytest", "-q", "--durations=9",
-        "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "bench_fixtures", *tests,
-    )  # fmt: skip
     known = {"PYTHONPATH": Path(__file__).parent, **environment}
-    done = subprocess.run(
-        command, capture_output=True, text=True, cwd=ROOT, timeout=900,
-        env=os.environ | {name: str(value) for name, value in known.items()},
-    )  # fmt: skip
-    print(done.stdout)
+    for attempt in (1, 2):
+        command = ctcr(
+            "sim", "bench", *bench, "--folder", folder / str(attempt), "--", sys.executable, "-m", "pytest", "-q",
+            "--durations=9", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "bench_fixtures", *tests,
+        )  # fmt: skip
+        done = subprocess.run(
+            command, capture_output=True, text=True, cwd=ROOT, timeout=900,
+            env=os.environ | {name: str(value) for name, value in known.items()},
+        )  # fmt: skip
+        print(done.stdout)
+        if done.returncode == 0 or BUS_STARVED not in done.stdout:
+            break
     assert done.returncode == 0, done.stdout + done.stderr
     assert " passed" in done.stdout
 

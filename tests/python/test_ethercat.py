@@ -220,8 +220,8 @@ def test_too_much_current_burns_the_motor():
 def on_bench(tmp_path, *options):
     robot, bench = tmp_path / "robot.yaml", tmp_path / "bench.yaml"
     near_the_plate(robot, bench)
-    around = [robot, "--noise", "none", "--folder", tmp_path / "folder"]
-    run_on_bench(around, [*ON_BENCH, *options], ROBOT_FILE=robot, BENCH_FILE=bench)
+    around = [robot, "--noise", "none"]
+    run_on_bench(tmp_path / "bench", around, [*ON_BENCH, *options], ROBOT_FILE=robot, BENCH_FILE=bench)
 
 
 def test_on_the_simulated_bench(tmp_path):

@@ -235,7 +235,7 @@ def on_bench(tmp_path, *options):
     document["actuation"]["home_rotation_deg"] = HOMES
     document["tracker"]["position_mm"], document["tracker"]["rotation_vector_rad"] = T_REF
     YAML().dump(document, real)
-    run_on_bench([real, "--folder", tmp_path / "folder"], ["-s", ON_BENCH, *options], ROBOT_FILE=known)
+    run_on_bench(tmp_path / "bench", [real], ["-s", ON_BENCH, *options], ROBOT_FILE=known)
 
 
 def test_on_the_simulated_bench(tmp_path):
