@@ -257,9 +257,7 @@ struct EffectList {
 
   private:
     [[nodiscard]] bool any(const auto& holds) const noexcept {
-      bool found = false;
-      for_each([&](const auto& effect, int) { found = found || holds(effect); });
-      return found;
+      return std::apply([&](const auto&... effect) { return (false || ... || holds(effect)); }, list);
     }
 
     /// Whether an amplitude differs from its neutral value or has derivatives.

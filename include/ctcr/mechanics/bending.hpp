@@ -87,7 +87,7 @@ template <class T, class S>
 Response<T> response(const Material<S>& m, const T& dx, const T& dy) noexcept {
   const std::array<T, 2> e = weighed(m, dx, dy);
   T k = as<T>(m.bending_stiffness);
-  if (vanishes(as<T>(m.softening))) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
+  if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
   const T z = dx * e[0] + dy * e[1];
   const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness));
   const double loss = 2 * value(m.bending_stiffness) * left.by_z, x = value(e[0]), y = value(e[1]);
