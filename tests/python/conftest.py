@@ -1,5 +1,27 @@
-"""One BLAS thread a process: the tests run in parallel processes, whose BLAS threads would only wait for each other."""
+"""What all tests share.
+
+One BLAS thread a process: the tests run in parallel processes, whose BLAS threads would only wait for each other.
+"""
 
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from dataclasses import replace  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "demo" / "measurements.csv"
+
+
+@pytest.fixture(scope="module")
+def plan():
+    """80 rows in 8 runs of the demonstration, out and back, with loads."""
+    from ctcr import measurements
+
+    table = measurements.load(DEMO, 3)
+    kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
+    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+    return replace(table, **{name: getattr(table, name)[kept] for name in names})

@@ -32,15 +32,6 @@ def robot():
     return robot_file.load(ROBOT)
 
 
-@pytest.fixture(scope="module")
-def plan(robot):
-    """80 rows in 8 runs, out and back, with loads."""
-    table = measurements.load(DEMO, robot.n_tubes)
-    kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
-    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
-    return replace(table, **{name: getattr(table, name)[kept] for name in names})
-
-
 @pytest.fixture
 def table(plan, tmp_path):
     path = tmp_path / "plan.csv"

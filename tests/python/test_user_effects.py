@@ -12,7 +12,6 @@ from ctcr import (
     effect_fit,
     effect_model,
     effects,
-    measurements,
     recording,
     robot_file,
     simulation,
@@ -63,13 +62,8 @@ def robot():
 
 
 @pytest.fixture(scope="module")
-def readings(robot):
-    plan = measurements.load(ROOT / "examples" / "data" / "demo" / "measurements.csv", robot.n_tubes)
-    kept = np.flatnonzero((plan.run < 8) & (np.arange(len(plan)) % 4 == 0))
-    return replace(plan, **{
-        name: getattr(plan, name)[kept]
-        for name in ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
-    })  # fmt: skip
+def readings(plan):
+    return plan
 
 
 @pytest.fixture

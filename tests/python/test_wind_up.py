@@ -1,6 +1,5 @@
 """Tubes that rub wind each other up: in predictions, and in fits, which are repeated until they say so themselves."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ from ctcr import (
     effect_fit,
     effects,
     identify,
-    measurements,
     robot_file,
     simulation,
     user_effects,
@@ -28,15 +26,6 @@ TRUE = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)} | {
 @pytest.fixture(scope="module")
 def robot():
     return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
-
-
-@pytest.fixture(scope="module")
-def plan(robot):
-    """80 rows in 8 runs, out and back."""
-    table = measurements.load(ROOT / "examples" / "data" / "demo" / "measurements.csv", robot.n_tubes)
-    kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
-    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
-    return replace(table, **{name: getattr(table, name)[kept] for name in names})
 
 
 def test_stiff_friction_is_found(robot, plan):

@@ -97,7 +97,7 @@ class Predictor:
 
     def wind_up(self, x: Array) -> float:
         """As Recording.wind_up."""
-        values = self._nominal | dict(zip(self._names, map(float, x), strict=True))
+        values = self._values(x)
         return self._prepared(values).wind_up(np.array([values[name] for name in self._inner]))
 
     def unsolved(self) -> list[int]:
@@ -118,7 +118,7 @@ class Predictor:
 
     def residual(self, x: Array, derivatives: bool = False) -> tuple[Array, Array, bool]:
         """(residual (6 M,), its derivative (6 M, n) or empty, whether every row was solved that ever can be)."""
-        values = self._nominal | dict(zip(self._names, map(float, x), strict=True))
+        values = self._values(x)
         inner = self._prepared(values)
         wanted = self._active & ~self._left_out
         inner.activate(wanted.tolist())
@@ -142,6 +142,10 @@ class Predictor:
         return (error, jacobian) if solved else None
 
     # ---- before and behind the model
+
+    def _values(self, x: Array) -> dict[str, float]:
+        """Of all parameters by name, these at x."""
+        return self._nominal | dict(zip(self._names, map(float, x), strict=True))
 
     def _prepared(self, values: dict[str, float]):
         """The compiled recording of the rows as the user's effects change them."""

@@ -94,7 +94,7 @@ public:
   double wind_up(const Eigen::VectorXd& x) {
     if constexpr (Fx::template On<N>::follows_twist) {
       const System<N, Fx> rubbing = system(x);
-      if (rubbing.model.effects().wind_up()) return ctcr::wind_up<N, Fx>(rubbing, rows_);
+      if (rubbing.model.effects().act_by_twist()) return ctcr::wind_up<N, Fx>(rubbing, rows_);
     }
     return 0;
   }

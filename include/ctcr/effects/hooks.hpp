@@ -187,7 +187,7 @@ struct EffectList {
     }
 
     /// Whether any effect that follows the twist of the tubes acts.
-    [[nodiscard]] bool wind_up() const noexcept {
+    [[nodiscard]] bool act_by_twist() const noexcept {
       return any([](const auto& e) {
         if constexpr (requires { e.follows_twist; }) return acts(e);
         return false;
