@@ -20,8 +20,8 @@ ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
 robot file and measurements alone. Thresholds were set on the tuning half. `jitter`: noise of single readings;
-`realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise. Written by
-`tools/dev score --keep`."""
+`realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which the unequal lags
+of single readings belong where a delay is hidden. Written by `tools/dev score --keep`."""
 VISIBLE = (
     30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 )
@@ -82,7 +82,7 @@ def judged(said: dict | None, truth: dict) -> dict[str, bool]:
         if len(hidden) > 1:
             scores["pairs: both found"] = all(found)
     if said and hidden:
-        floor = math.hypot(truth["rms_mm"]["jitter"], truth["rms_mm"]["field"])
+        floor = math.hypot(*(truth["rms_mm"][part] for part in ("jitter", "field", "chance")))
         limit = 1.1 if truth["noise"] == "jitter" else 1.25
         scores["locked error within its limit of the floor"] = said["rms_mm"]["with_effects"] <= limit * floor
     return scores

@@ -194,7 +194,7 @@ def measured_session(robot):
 
 def test_rows_are_locked_by_run(robot):
     table = measured_session(robot)
-    locked = locked_rows(table)
+    locked = locked_rows(robot, table)
     assert 0.2 <= locked.mean() <= 0.3
     for run in np.unique(table.run):
         assert np.ptp(locked[table.run == run].astype(int)) == 0
@@ -207,10 +207,10 @@ def test_what_is_locked_holds_poses(robot):
     table = measured_session(robot)
     for part in (table, dataclasses.replace(table, run=np.zeros_like(table.run))):
         for turn in range(4):
-            seen = ~locked_rows(part, turn)
+            seen = ~locked_rows(robot, part, turn)
             blind = dataclasses.replace(part, position=np.where(seen[:, None], part.position, np.nan))
             for again in range(4):
-                assert (locked_rows(blind, again) & seen).any(), (turn, again)
+                assert (locked_rows(robot, blind, again) & seen).any(), (turn, again)
 
 
 @pytest.mark.parametrize(("scores", "kept"), [([40.0, 33.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])

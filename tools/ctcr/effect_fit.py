@@ -90,7 +90,7 @@ def add(
     readings, said = sensor_roll.positions_alone(robot, readings)
     base, fixed = identify.expand(list(free), robot), dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], fixed)
-    held = locked_rows(readings)
+    held = locked_rows(robot, readings)
     fitted = [*robot_before(robot, ids).effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, base, fixed)

@@ -19,6 +19,7 @@ class Cause:
     streamed: bool = False  # needs readings in motion
     absorbed: bool = False  # calibration swallows it: nothing is missing
     slow: bool = False  # the robot goes in small moves
+    uneven: bool = False  # has a part that is chance, from reading to reading
 
 
 CAUSES: dict[str, Cause] = {}

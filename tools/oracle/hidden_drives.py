@@ -23,11 +23,12 @@ def _add_play(setup: Setup, joint: np.ndarray, half: np.ndarray, rng: np.random.
     return {"half_gap": half}
 
 
-@cause("delay", streamed=True)
+@cause("delay", streamed=True, uneven=True)
 def delay(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
     mean, smear = 0.05 * size, rng.uniform(0.0, 0.5)
     reading = np.random.default_rng(rng.integers(1 << 32))
-    setup.lags = lambda: mean * (1 + 0.1 * reading.normal()) * np.array([1 - smear, 1 + smear])
+    setup.lags = mean * np.array([1 - smear, 1 + smear])
+    setup.lag_noise = lambda: 1 + 0.1 * reading.normal()
     return {"delay_s": mean}
 
 

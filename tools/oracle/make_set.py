@@ -71,8 +71,11 @@ class Session:
         ]
 
 
-def measure(order: Order) -> Session:
-    """Simulate the session. Bench, plan, noise and hidden causes are drawn apart: with other causes the rest stays."""
+def measure(order: Order, *, even: bool = False) -> Session:
+    """Simulate the session. Bench, plan, noise and hidden causes are drawn apart: with other causes the rest stays.
+
+    even: without the chance in what is hidden (readings that lag unequally), which is noise to every model.
+    """
     bench_rng, plan_rng, noise_rng, *hidden_rng = (
         np.random.default_rng([order.seed, part]) for part in range(3 + len(order.effects))
     )
@@ -85,6 +88,8 @@ def measure(order: Order) -> Session:
     truths = [
         hide(setup, name, size, rng) for (name, size), rng in zip(order.effects, hidden_rng, strict=True)
     ]
+    if even:
+        setup.lag_noise = Setup.lag_noise
     poses = list(run_session(setup))
     position, rotation = np.array([p for p, _ in poses]), Rotation.concatenate([r for _, r in poses])
     noise = draw_noise(description["tracker"], position, order.noise, noise_rng)
@@ -105,6 +110,7 @@ def answer(order: Order, session: Session) -> dict:
     in_catalogue = sorted({i for name in ids for i in ids[name]})
     missing = [name for name in ids if not CAUSES[name].absorbed]
     strange = [name for name in missing if not ids[name]]
+    uneven = any(CAUSES[name].uneven for name in ids)
     return {
         "verdict": "not_in_catalogue" if strange else "identified" if in_catalogue else "nothing_missing",
         "classes": in_catalogue,
@@ -125,6 +131,7 @@ def answer(order: Order, session: Session) -> dict:
             "effect_after_calibration": left.after_calibration_mm,
             "jitter": _rms_mm(session.noise.position[inliers]),
             "field": _rms_mm(session.noise.field_position),
+            "chance": _rms_mm(session.position - measure(order, even=True).position) if uneven else 0.0,
         },
         "chi_square_after_calibration": left.chi_square,
         "bench": bench_facts(session.bench),

@@ -103,7 +103,8 @@ class Setup:
     drives: list[Drive] = field(default_factory=list)
     sensings: list[Sensing] = field(default_factory=list)  # in the base frame
     tracker_sensings: list[Sensing] = field(default_factory=list)  # in the tracker frame
-    lags: Callable[[], np.ndarray] = lambda: np.zeros(1)  # [s], averaged, of one reading
+    lags: np.ndarray = field(default_factory=lambda: np.zeros(1))  # [s], averaged, of a reading
+    lag_noise: Callable[[], float] = lambda: 1.0  # times these, of one reading: no model can know it
     load_scale: float = 1.0
 
     def true_joints(self, joints: np.ndarray) -> np.ndarray:
@@ -123,7 +124,7 @@ def run_session(setup: Setup) -> Iterator[tuple[np.ndarray, Rotation]]:
         specimen.settle(*np.split(setup.true_joints(wanted), 2), np.zeros(3))
     for time, mass in zip(plan.time, plan.mass, strict=True):
         force = setup.load_scale * mass * gravity
-        lags = setup.lags()
+        lags = setup.lag_noise() * setup.lags
         seen = time - lags.mean()
         smear = np.mean([plan.at(time - lag) for lag in lags], axis=0) - plan.at(seen)
         for corner in plan.way(last, seen):

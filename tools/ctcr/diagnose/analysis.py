@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side, sensor_roll
+from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.race import Entry, Progress, Round
-from ctcr.diagnose.split import locked_rows
+from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import EXPLAINED, Verdict, judge
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
@@ -117,22 +118,44 @@ def diagnose(
     """Which effects are missing. Raises InputError where no fit is possible.
 
     What is found in three quarters of the runs is judged on the last quarter. Where nothing was found and that quarter
-    has errors which the others do not, it changes places with another one, and all begins anew.
+    has errors which the others do not, it changes places with another one, and all begins anew; so it does where a frame
+    jumped within it.
     """
     began = perf_counter()
     measurements, notices = sensor_roll.positions_alone(robot, measurements)
     for turn in range(TURNS):
-        locked = locked_rows(measurements, turn)
-        result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
-        if result.hides_in_outliers:
-            # What an effect does to a few readings looks like outliers, until they count.
-            other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
-            result = max(result, other, key=lambda r: r.final.log_evidence)
+        locked = locked_rows(robot, measurements, turn)
+        result = _of_these(robot, measurements, locked, progress, threads)
+        hidden = _rows_that_hide_a_jump(result)
+        if hidden.any():
+            locked = locked_rows(robot, measurements, turn, groups(measurements)[hidden])
+            result = _of_these(robot, measurements, locked, progress, threads)
         if result.accepted or not _surprises(result):
             break
     result.notices = notices
     result.seconds = perf_counter() - began
     return result
+
+
+def _of_these(
+    robot: Robot, measurements: Measurements, locked: NDArray[np.bool_], progress: Progress, threads: int
+) -> Diagnosis:
+    result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
+    if not result.hides_in_outliers:
+        return result
+    # What an effect does to a few readings looks like outliers, until they count.
+    other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
+    return max(result, other, key=lambda r: r.final.log_evidence)
+
+
+def _rows_that_hide_a_jump(result: Diagnosis) -> NDArray[np.bool_]:
+    """Locked rows (M,) of which it is not known whether they come before or after a jump that was found."""
+    hidden = np.zeros_like(result.locked)
+    for a in result.accepted:
+        if a.entry.id == "frame_jump":
+            when = dict(a.entry.candidate.shape)[jump.WHEN]
+            hidden |= jump.uncertain_rows(result.measurements, ~result.locked, when)
+    return hidden
 
 
 def _surprises(result: Diagnosis) -> bool:

@@ -1,25 +1,48 @@
-"""When the tracker frame may have jumped: between runs, or at a longer pause."""
+"""When the tracker frame may have jumped: at the start of a run or at any row near the best of these."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import recording
 from ctcr.diagnose.candidates import Candidate
+from ctcr.measurements import Measurements
 
 WHEN = "effects.frame_jump.when"
-MOST = 40  # moments that are tried
+MOST = 40  # moments that are tried at a time
+
+Option = tuple[Candidate, NDArray]
 
 
-def moments(engine, candidate: Candidate, columns: NDArray) -> list[tuple[Candidate, NDArray]]:
-    """The candidate at each moment, with its slopes; `columns` are those of a frame displaced in all rows."""
-    part = recording.session_part(engine.measurements)
-    starts = np.flatnonzero(np.diff(engine.measurements.run)) + 1
-    if len(starts) < 3:
-        starts = np.linspace(0, len(part), MOST + 2, dtype=int)[1:-1]
-    starts = starts[np.linspace(0, len(starts) - 1, min(MOST, len(starts)), dtype=int)]
-    options = []
-    for start in np.unique(starts):
-        when = 0.5 * (part[start - 1] + part[start])
-        after = (part > when)[:, None, None]
-        options.append((Candidate(candidate.id, candidate.names, ((WHEN, float(when)),)), columns * after))
-    return options
+def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDArray], float]) -> list[Option]:
+    """The candidate at the best moment, with its slopes; none where no moment brings anything.
+
+    `columns` are the slopes of a frame displaced in all rows, `worth` says what slopes bring.
+    """
+    measurements, best, gain = engine.measurements, None, 0.0
+    part, last = recording.session_part(measurements), len(measurements)
+    rows = np.flatnonzero(np.diff(measurements.run)) + 1
+    if len(rows) < 3:
+        rows = np.arange(1, last)
+    while len(rows):
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST).astype(int))]
+        gains = [worth(columns * (np.arange(last) >= row)[:, None, None]) for row in rows]
+        if max(gains) <= gain:
+            break
+        k = int(np.argmax(gains))
+        best, gain = int(rows[k]), gains[k]
+        low, high = (rows[j] if 0 <= j < len(rows) else end for j, end in ((k - 1, 0), (k + 1, last)))
+        rows = np.setdiff1d(np.arange(low + 1, high), rows)
+    if best is None:
+        return []
+    when = float(0.5 * (part[best - 1] + part[best]))
+    after = (np.arange(last) >= best)[:, None, None]
+    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),)), columns * after)]
+
+
+def uncertain_rows(measurements: Measurements, fitted: NDArray[np.bool_], when: float) -> NDArray[np.bool_]:
+    """Rows (M,) between the last one that was fitted before a jump and the first one after it."""
+    part = recording.session_part(measurements)
+    before, after = part[fitted & (part < when)], part[fitted & (part > when)]
+    return (part > before.max(initial=-1.0)) & (part < after.min(initial=2.0))

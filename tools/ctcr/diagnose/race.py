@@ -235,7 +235,9 @@ def screen(
         if candidate.shape:
             own = engine.slopes(before, candidate.names, fixed | dict(candidate.shape))
         if candidate.id == "frame_jump":
-            options = jump.moments(engine, candidate, own)
+            options = jump.moment(
+                engine, candidate, own, lambda slopes: linear.gain(before.whiten(slopes)).log_evidence
+            )
         elif candidate.id == "contact":
             tip = slopes[:, :, [place[name] for name in contact.FORCE]] / engine.priors(contact.FORCE)[1]
             options = contact.planes(engine, candidate, tip)

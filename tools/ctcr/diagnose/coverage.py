@@ -1,0 +1,59 @@
+"""What some runs leave open in others, by joints, loads and model alone: nothing that was read of a pose is used."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import free_parameters, identify, user_effects
+from ctcr.measurements import Measurements
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Coverage:
+    """Of groups of rows, `group` (M,) numbered from 0."""
+
+    def __init__(self, robot: Robot, measurements: Measurements, group: NDArray[np.int64]) -> None:
+        self._worlds = [
+            _informations(slopes, group) for slopes in _slopes(robot, measurements, identify.measured_rows(measurements))
+        ]
+
+    def left_open(self, locked: Iterable[int]) -> Array:
+        """Mean square error of the position in each locked group that the calibration by the others leaves, over that
+        of the tracker's jitter."""
+        locked = sorted(locked)
+        return np.max([_left_open(*world, locked) for world in self._worlds], axis=0)
+
+
+def _left_open(information: Array, of_position: Array, locked: list[int]) -> Array:
+    known = np.eye(information.shape[1]) + information.sum(axis=0) - information[locked].sum(axis=0)
+    return np.einsum("ij,gji->g", np.linalg.inv(known), of_position[locked]) / 3
+
+
+def _informations(slopes: Array, group: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Information of each group on the parameters (G, k, k), and the mean of that by a position."""
+    whole, position = np.zeros((2, group.max() + 1, *2 * slopes.shape[-1:]))
+    for k in range(len(whole)):
+        own = slopes[group == k]
+        whole[k] = np.einsum("mai,maj->ij", own, own)
+        position[k] = np.einsum("mai,maj->ij", own[:, :3], own[:, :3]) / max(1, np.sum(own.any(axis=(1, 2))))
+    return whole, position
+
+
+def _slopes(robot: Robot, measurements: Measurements, rows: NDArray[np.bool_]) -> Iterable[Array]:
+    """Of poses (M, 6, k) by the calibration parameters, in units of jitter and prior; with curves as stated, and longer and
+    shorter ones: where a curve starts near the plate, that decides which readings know its length."""
+    names = free_parameters.expand("standard", robot)
+    mean, sd, low, high = free_parameters.priors(robot, names)
+    noise = identify.noise_of_readings(robot, measurements, field=False)
+    jitter = np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
+    table = user_effects.recording_of(robot, measurements, names)
+    few = identify.few_of(rows)
+    table.activate((rows if few is None else few).tolist())
+    curves = np.array([name.endswith(".curved_length") for name in names])
+    for way in (0.0, 1.0, -1.0):
+        at = np.clip(mean + way * curves * sd, low, high)
+        jacobian = table.residual(at, True)[1].reshape(len(measurements), 6, len(names))
+        yield np.where(np.isfinite(jacobian), jacobian, 0.0) * sd / jitter[:, None]
