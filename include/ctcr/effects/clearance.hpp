@@ -25,6 +25,7 @@ inline constexpr std::array parameters{
                     .per_tube = true,
                     .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
     leaning_moment,
+    leaning_compliance,
 };
 }  // namespace clearance
 
@@ -34,7 +35,9 @@ struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
   void station(Station<P, N>& s) const noexcept {
-    if (s.kind == Station<P, N>::Kind::tube_tip) lean(s, this->template get<0>(s.tube), this->template get<1>());
+    if (s.kind != Station<P, N>::Kind::tube_tip) return;
+    const auto turn = lean(s.moment, this->template get<0>(s.tube), this->template get<1>(), this->template get<2>());
+    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + turn[i];
   }
 };
 

@@ -24,6 +24,8 @@ inline constexpr std::array parameters{
                     .hard_high = 0.2,
                     .meaning = "largest tilt"},
     leaning_moment,
+    leaning_compliance,
+    pivot_depth,
 };
 }  // namespace entry_clearance
 
@@ -33,7 +35,10 @@ struct EntryClearance : EffectValues<entry_clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = entry_clearance::info;
 
   void station(Station<P, N>& s) const noexcept {
-    if (s.kind == Station<P, N>::Kind::plate) lean(s, this->template get<0>(), this->template get<1>());
+    if (s.kind != Station<P, N>::Kind::plate) return;
+    const P& depth = this->template get<3>();
+    const auto moment = moment_about(s, depth);
+    kink_about(s, lean(moment, this->template get<0>(), this->template get<1>(), this->template get<2>()), depth);
   }
 };
 

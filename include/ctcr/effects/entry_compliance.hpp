@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/effects/hooks.hpp"
+#include "ctcr/effects/lean.hpp"
 
 namespace ctcr {
 namespace entry_compliance {
@@ -23,6 +23,7 @@ inline constexpr std::array parameters{
                     .hard_low = -5,
                     .hard_high = 50,
                     .meaning = "of the entry against bending"},
+    pivot_depth,
 };
 }  // namespace entry_compliance
 
@@ -33,7 +34,9 @@ struct EntryCompliance : EffectValues<entry_compliance::parameters, N, P> {
 
   void station(Station<P, N>& s) const noexcept {
     if (s.kind != Station<P, N>::Kind::plate) return;
-    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + this->template get<0>() * s.moment[i];
+    const P &compliance = this->template get<0>(), &depth = this->template get<1>();
+    const auto moment = moment_about(s, depth);
+    kink_about(s, {compliance * moment[0], compliance * moment[1]}, depth);
   }
 };
 

@@ -55,9 +55,11 @@ struct Station {
   int tube;                 ///< whose tip or curve start; -1 at the plate
   int far, near;            ///< tubes present on the side of the robot tip, and on that of the base
   std::array<P, 2> moment;  ///< bending moment of all tubes on the far side [N m]
+  std::array<P, 2> force;   ///< shear force there, Bishop frame [N]
   std::array<std::array<P, 2>, N> far_moment, near_moment;  ///< bending moment of each tube on both sides [N m]
   std::array<P, N> torque{};  ///< out: added to the torque of each tube towards the base [N m]
   std::array<P, 2> kink{};    ///< out: turn of the far side against the near one, along `moment` [rad]
+  std::array<P, 2> shift{};   ///< out: displacement of the far side against the near one [m]; at the plate alone
 };
 
 /// When a row was measured, and how.

@@ -45,6 +45,28 @@ inline constexpr std::array parameters{
                     .hard_high = 1000,
                     .role = Role::shape,
                     .meaning = "periods per turn of the tube"},
+    EffectParameter{.name = "cosine_twice",
+                    .unit = "rad",
+                    .neutral = 0,
+                    .sigma = 0.002,
+                    .soft_low = -0.02,
+                    .soft_high = 0.02,
+                    .hard_low = -0.3,
+                    .hard_high = 0.3,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of what returns twice as often"},
+    EffectParameter{.name = "sine_twice",
+                    .unit = "rad",
+                    .neutral = 0,
+                    .sigma = 0.002,
+                    .soft_low = -0.02,
+                    .soft_high = 0.02,
+                    .hard_low = -0.3,
+                    .hard_high = 0.3,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of what returns twice as often"},
 };
 }  // namespace periodic_rotation
 
@@ -57,7 +79,10 @@ struct PeriodicRotation : EffectValues<periodic_rotation::parameters, N, P> {
     for (std::size_t i = 0; i < N; ++i) {
       P s, c;
       sincos(this->template get<2>() * alpha[i], s, c);
-      alpha[i] = alpha[i] + this->template get<0>(int(i)) * c + this->template get<1>(int(i)) * s;
+      const P &cosine = this->template get<3>(int(i)), &sine = this->template get<4>(int(i));
+      P error = this->template get<0>(int(i)) * c + this->template get<1>(int(i)) * s;
+      if (!vanishes(cosine) || !vanishes(sine)) error = error + cosine * (c * c - s * s) + sine * (2.0 * (s * c));
+      alpha[i] = alpha[i] + error;
     }
   }
 };

@@ -43,6 +43,28 @@ inline constexpr std::array parameters{
                     .hard_high = 0.1,
                     .role = Role::shape,
                     .meaning = "translation per turn of the screw"},
+    EffectParameter{.name = "cosine_twice",
+                    .unit = "m",
+                    .neutral = 0,
+                    .sigma = 8e-06,
+                    .soft_low = -0.0001,
+                    .soft_high = 0.0001,
+                    .hard_low = -0.002,
+                    .hard_high = 0.002,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of what returns twice as often"},
+    EffectParameter{.name = "sine_twice",
+                    .unit = "m",
+                    .neutral = 0,
+                    .sigma = 8e-06,
+                    .soft_low = -0.0001,
+                    .soft_high = 0.0001,
+                    .hard_low = -0.002,
+                    .hard_high = 0.002,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of what returns twice as often"},
 };
 }  // namespace periodic_translation
 
@@ -57,7 +79,10 @@ struct PeriodicTranslation : EffectValues<periodic_translation::parameters, N, P
     for (std::size_t i = 0; i < N; ++i) {
       P s, c;
       sincos(rate * beta[i], s, c);
-      beta[i] = beta[i] + this->template get<0>(int(i)) * c + this->template get<1>(int(i)) * s;
+      const P &cosine = this->template get<3>(int(i)), &sine = this->template get<4>(int(i));
+      P error = this->template get<0>(int(i)) * c + this->template get<1>(int(i)) * s;
+      if (!vanishes(cosine) || !vanishes(sine)) error = error + cosine * (c * c - s * s) + sine * (2.0 * (s * c));
+      beta[i] = beta[i] + error;
     }
   }
 };

@@ -1,5 +1,6 @@
 #pragma once
 #include "ctcr/effects/hooks.hpp"
+#include "ctcr/effects/legendre.hpp"
 
 namespace ctcr {
 namespace precurvature_profile {
@@ -44,19 +45,42 @@ inline constexpr std::array parameters{
                     .hard_high = 1.5,
                     .per_tube = true,
                     .meaning = "of third order"},
+    EffectParameter{.name = "quartic",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.07,
+                    .soft_low = -0.5,
+                    .soft_high = 0.5,
+                    .hard_low = -1.5,
+                    .hard_high = 1.5,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of fourth order"},
+    EffectParameter{.name = "quintic",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.07,
+                    .soft_low = -0.5,
+                    .soft_high = 0.5,
+                    .hard_low = -1.5,
+                    .hard_high = 1.5,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of fifth order"},
 };
 }  // namespace precurvature_profile
 
-/// kappa (1 + a P1 + b P2 + c P3), Legendre polynomials over the curved part: the mean stays that of the data sheet.
+/// kappa (1 + a P1 + b P2 + ...), Legendre polynomials over the curved part: the mean stays that of the data sheet.
 template <int N, class P = double>
 struct PrecurvatureProfile : EffectValues<precurvature_profile::parameters, N, P> {
   static constexpr const EffectInfo& info = precurvature_profile::info;
 
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     if (!place.curved) return;
-    const P x = 2.0 * place.part - 1.0, xx = x * x;
-    const P change = this->template get<0>(place.tube) * x + this->template get<1>(place.tube) * (1.5 * xx - 0.5) +
-                     this->template get<2>(place.tube) * (x * (2.5 * xx - 1.5));
+    const int i = place.tube;
+    const P change = legendre_sum<P, 5>(2.0 * place.part - 1.0,
+                                        {this->template get<0>(i), this->template get<1>(i), this->template get<2>(i),
+                                         this->template get<3>(i), this->template get<4>(i)});
     m.curvature[0] = m.curvature[0] + m.curvature[0] * change;
   }
 };

@@ -1,5 +1,6 @@
 #pragma once
 #include "ctcr/effects/hooks.hpp"
+#include "ctcr/effects/legendre.hpp"
 
 namespace ctcr {
 namespace straight_curvature {
@@ -33,18 +34,48 @@ inline constexpr std::array parameters{
                     .hard_high = 5,
                     .per_tube = true,
                     .meaning = "across it"},
+    EffectParameter{.name = "slope",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.3,
+                    .soft_low = -1,
+                    .soft_high = 1,
+                    .hard_low = -3,
+                    .hard_high = 3,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "relative change of the bend from the middle of the straight part to its end"},
+    EffectParameter{.name = "bow",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.3,
+                    .soft_low = -1,
+                    .soft_high = 1,
+                    .hard_low = -3,
+                    .hard_high = 3,
+                    .per_tube = true,
+                    .role = Role::shape,
+                    .meaning = "of the ends against the middle"},
 };
 }  // namespace straight_curvature
 
-/// Precurvature of the part that should be straight.
+/// Precurvature of the part that should be straight, with Legendre polynomials where it is uneven.
 template <int N, class P = double>
 struct StraightCurvature : EffectValues<straight_curvature::parameters, N, P> {
   static constexpr const EffectInfo& info = straight_curvature::info;
 
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     if (place.curved) return;
-    m.curvature[0] = m.curvature[0] + this->template get<0>(place.tube);
-    m.curvature[1] = m.curvature[1] + this->template get<1>(place.tube);
+    const int i = place.tube;
+    P x = this->template get<0>(i), y = this->template get<1>(i);
+    const P &slope = this->template get<2>(i), &bow = this->template get<3>(i);
+    if (!vanishes(slope) || !vanishes(bow)) {
+      const P uneven = legendre_sum<P, 2>(2.0 * place.part - 1.0, {slope, bow});
+      x = x + x * uneven;
+      y = y + y * uneven;
+    }
+    m.curvature[0] = m.curvature[0] + x;
+    m.curvature[1] = m.curvature[1] + y;
   }
 };
 

@@ -315,12 +315,17 @@ private:
           .far = far.present,
           .near = near.present,
           .moment = {y.m(0), y.m(1)},
+          .force = {y.n(0), y.n(1)},
           .far_moment = moments(far, y),
           .near_moment = kind == Station<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
       for (std::size_t i = 0; i < N; ++i) s.torque[i] = 0.0;
-      s.kink = {0.0, 0.0};
+      s.kink = s.shift = {0.0, 0.0};
       in_.effects.station(s);
       for (int i = 0; i < near.present; ++i) y.torque(i) = y.torque(i) + s.torque[std::size_t(i)];
+      if (!vanishes(s.shift[0]) || !vanishes(s.shift[1])) {
+        const S straight[3] = {0.0, 0.0, 0.0};
+        move_by_exponential(frame, straight, S(-s.shift[0]), S(-s.shift[1]), S(0.0));
+      }
       kink(s.kink, near.present, y, frame);
     }
   }

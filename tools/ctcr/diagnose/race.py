@@ -33,7 +33,7 @@ MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
 # Another noise must predict other runs so much better to be preferred to that of the most evidence.
 BETTER = 0.95
-MUCH_BETTER = 0.6  # where the model explains the readings as it is
+MUCH_BETTER = 0.9  # where the model explains the readings as it is
 SOUND = 1.05  # inflation of the noise up to which it does
 FITS = 1.2  # ... and beyond which it certainly does not
 OUTLIER = 0.3  # weight below which a reading is taken for one

@@ -13,6 +13,7 @@ from ctcr.robot import Robot
 FEWEST_RUNS = 4
 BLOCKS = 12  # of a single run, in time
 FOLDS = 4
+PLACE = (2, 3, 1, 0)  # of what is locked among each four groups: runs often alternate in direction, speed or load
 OPEN = 0.1  # mean square error that the fitted groups may leave open in a locked one, over that of the jitter
 EXCHANGES = 12  # of locked groups, at most
 
@@ -31,14 +32,14 @@ def groups(measurements: Measurements) -> NDArray[np.int64]:
 def locked_rows(
     robot: Robot, measurements: Measurements, turn: int = 0, fitted: Collection[int] = ()
 ) -> NDArray[np.bool_]:
-    """Every fourth group (M,); `turn` 0 to 3 says which. None of the groups `fitted`.
+    """One of every four groups (M,); `turn` 0 to 3 says which. None of the groups `fitted`.
 
     A group that goes where no other one went cannot judge a model: what it shows, the others do not determine. It is
     exchanged for one that they cover. Joints, loads and the model decide that; poses are not looked at.
     """
     group = groups(measurements)
     known = np.unique(group)
-    locked = [k for k in known if k % FOLDS == FOLDS - 1 - turn]
+    locked = [k for k in known if k % FOLDS == (PLACE[k // FOLDS % len(PLACE)] + turn) % FOLDS]
     coverage = Coverage(robot, measurements, group)
     for _ in range(EXCHANGES if locked else 0):
         left = coverage.left_open(locked)
