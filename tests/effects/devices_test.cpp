@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <string>
 
 #include "support/catalogue_cases.hpp"
 
@@ -34,6 +36,19 @@ TEST(PeriodicRotation, RepeatsWithEveryTurn) {
   EXPECT_EQ(at(0.7).first, JointArray{});
 }
 
+TEST(PeriodicErrors, MayReturnTwiceAsOftenToo) {
+  for (const double turn : {0.0, 0.4, 2.9}) {
+    PeriodicRotation<2> rotation;
+    rotation.values = {0.01, 0, 0.02, 0, 1, 0.003, 0, -0.004, 0};
+    const double expected = 0.01 * std::cos(turn) + 0.02 * std::sin(turn) + 0.003 * std::cos(2 * turn) -
+                            0.004 * std::sin(2 * turn);
+    EXPECT_NEAR(added(rotation, {-0.2, -0.1}, {turn, 0.3}).second[0], expected, 1e-15);
+    PeriodicTranslation<2> translation;
+    translation.values = {0.01, 0, 0.02, 0, 2 * std::numbers::pi, 0.003, 0, -0.004, 0};
+    EXPECT_NEAR(added(translation, {turn, -0.1}, {0.7, 0.3}).first[0], expected, 1e-15);
+  }
+}
+
 TEST(PeriodicTranslation, RepeatsWithThePitch) {
   PeriodicTranslation<2> effect;
   effect.values = {3e-5, 0, 2e-5, 1e-5, 0.002};
@@ -54,6 +69,31 @@ Pose sensed(const E& effect, const Occasion& at, const Pose& pose) {
 
 Pose random_pose(Random& random) {
   return {rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.3)};
+}
+
+TEST(FieldDistortion, IsAPolynomialOfThePlace) {
+  Random random(5);
+  for (int n = 0; n < test::cases(20); ++n) {
+    FieldDistortion<2> effect;
+    std::map<std::string, double> c;
+    for (std::size_t k = 0; k < effect.values.size(); ++k)
+      c[std::string(effect.parameters[k].name)] = effect.values[k] = test::uniform(random, -1e-3, 1e-3);
+    const Pose pose = random_pose(random);
+    const Vec3 centre = test::random_vector(random, 0.1), v = pose.position - centre;
+    Vec3 by = c["scale"] * v, turn = Vec3::Zero();
+    c["z_z"] = -c["x_x"] - c["y_y"];
+    c["y_x"] = c["x_y"], c["z_x"] = c["x_z"], c["z_y"] = c["y_z"];
+    for (const auto& [name, value] : c) {
+      const std::size_t bar = name.rfind('_');
+      if (bar == std::string::npos) continue;
+      double product = value;
+      for (const char axis : name.substr(bar + 1)) product *= v[axis - 'x'] / 0.05;
+      (name.starts_with("turn") ? turn : by)[name[bar - 1] - 'x'] += product;
+    }
+    const Pose read = sensed(effect, {.centre = centre}, pose);
+    EXPECT_LE((read.position - pose.position - by).norm(), 1e-15);
+    EXPECT_LE((read.rotation - rotation_matrix(turn) * pose.rotation).norm(), 1e-14);
+  }
 }
 
 TEST(SensorOffset, IsALeverArm) {

@@ -63,10 +63,34 @@ TEST(EntryCompliance, TurnsTheRobotByTheMomentAtThePlate) {
   expect_pose(s.pose(), Pose{turn, Vec3::Zero()} * plain.pose(), 1e-11);
 }
 
+// What lies beyond the plate is displaced as well, by the depth times the turn.
+TEST(EntryCompliance, TurnsTheRobotAboutItsPivot) {
+  OneTube tube(0);
+  Catalogue::On<1> effects;
+  constexpr double compliance = 0.8, depth = 0.02;
+  effect<EntryCompliance>(effects).values = {compliance, depth};
+  const TipLoad load{.force = Vec3(0.1, 0.2, -0.3), .moment = Vec3::Zero()};
+  const Solution<1> s = solved(tube.robot, effects, tube.q, load, 64);
+  const auto entry = [&](const Vec3& by) {
+    return Pose{rotation_matrix(by), Vec3::Zero()} * Pose{Mat3::Identity(), depth * by.cross(Vec3::UnitZ())};
+  };
+  Vec3 by = Vec3::Zero();
+  for (int k = 0; k < 50; ++k) {
+    const Vec3 pivot = (entry(by) * Pose{Mat3::Identity(), {0, 0, -depth}}).position;
+    by = compliance * (s.position - pivot).cross(load.force);
+  }
+  const TipLoad seen{.force = entry(by).rotation.transpose() * load.force, .moment = Vec3::Zero()};
+  const Solution<1> plain = test::solved<Derivatives::none>(tube.robot, tube.q, seen, 64);
+  expect_pose(s.pose(), entry(by) * plain.pose(), 1e-11);
+}
+
 /// A tube that hardly bends, under a side force: what leans is the entry or the joint between tubes.
-double lean(double size, double moment, double force, double length) {
+double lean(double size, double moment, double force, double length, double compliance = 0) {
   double angle = 0;
-  for (int k = 0; k < 100; ++k) angle = size * std::tanh(force * length * std::cos(angle) / moment);
+  for (int k = 0; k < 200; ++k) {
+    const double carried = force * length * std::cos(angle);
+    angle = size * std::tanh(carried / moment) + compliance * carried;
+  }
   return angle;
 }
 
@@ -85,6 +109,18 @@ TEST(EntryClearance, LeansAndSaturates) {
   }
 }
 
+TEST(EntryClearance, GivesWayAboutItsPivot) {
+  OneTube tube(0);
+  tube.robot.tubes[0].bending_stiffness = 1e9;
+  Catalogue::On<1> effects;
+  effect<EntryClearance>(effects).values = {0.02, 0.01, 0.3, 0.015};
+  for (const double force : {1e-3, 0.1, 0.3, 1.0}) {
+    const Solution<1> s = solved(tube.robot, effects, tube.q, {.force = {force, 0, 0}, .moment = Vec3::Zero()});
+    const double angle = lean(0.02, 0.01, force, tube.deployed + 0.015, 0.3);
+    EXPECT_NEAR(s.position.x(), tube.deployed * std::sin(angle) + 0.015 * angle * std::cos(angle), 1e-9);
+  }
+}
+
 TEST(Clearance, KinksTheRobotWhereAnOuterTubeEnds) {
   Robot<2> robot;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -95,12 +131,13 @@ TEST(Clearance, KinksTheRobotWhereAnOuterTubeEnds) {
   Joints<2> q;
   q.beta << 0.1 - robot.tubes[0].length, 0.04 - robot.tubes[1].length;
   Catalogue::On<2> effects;
-  effect<Clearance, 2>(effects).values = {0.5, 0.015, 0.01};  // that of the innermost tube is not felt
-  for (const double force : {1e-3, 0.1, 10.0}) {
-    const Solution<2> s = solved(robot, effects, q, {.force = {0, force, 0}, .moment = Vec3::Zero()});
-    EXPECT_NEAR(s.position.y(), 0.06 * std::sin(lean(0.015, 0.01, force, 0.06)), 1e-9);
-    EXPECT_LE((s.tube_tips[1].position - Vec3(0, 0, 0.04)).norm(), 1e-9);
-  }
+  for (const double compliance : {0.0, 0.2})
+    for (const double force : {1e-3, 0.1, 1.0}) {
+      effect<Clearance, 2>(effects).values = {0.5, 0.015, 0.01, compliance};  // that of the innermost tube is not felt
+      const Solution<2> s = solved(robot, effects, q, {.force = {0, force, 0}, .moment = Vec3::Zero()});
+      EXPECT_NEAR(s.position.y(), 0.06 * std::sin(lean(0.015, 0.01, force, 0.06, compliance)), 1e-9);
+      EXPECT_LE((s.tube_tips[1].position - Vec3(0, 0, 0.04)).norm(), 1e-9);
+    }
 }
 
 TEST(TipWeight, IsATipLoad) {
@@ -177,6 +214,28 @@ TEST(StraightCurvature, BendsTheStraightPartAlone) {
   effect<StraightCurvature>(effects).values = {0.4, -0.3};
   const Pose expected = arc({0.4, -0.3, 0}, tube.deployed - tube.curved) * arc({6, 0, 0}, tube.curved);
   expect_pose(solved(tube.robot, effects, tube.q, {}).pose(), expected, 1e-11);
+}
+
+TEST(StraightCurvature, MayBeUneven) {
+  OneTube tube(0);
+  tube.q.alpha << 0;
+  Catalogue::On<1> effects;
+  effect<StraightCurvature>(effects).values = {0.4, 0, 0.5, -0.3};
+  const double straight = tube.robot.tubes[0].length - tube.curved;
+  const double x0 = 1 - 2 * (tube.deployed - tube.curved) / straight;  // from -1 to 1 along the straight part
+  const auto integral = [](double x) { return x + 0.5 * x * x / 2 - 0.3 * (x * x * x - x) / 2; };
+  const double turn = 0.4 * straight / 2 * (integral(1) - integral(x0));
+  EXPECT_NEAR(rotation_vector(solved(tube.robot, effects, tube.q, {}).rotation).x(), turn, 1e-12);
+}
+
+TEST(LegendreSum, IsThatOfThePolynomials) {
+  const std::array<double, 5> c{0.3, -0.2, 0.15, 0.4, -0.7};
+  for (const double x : {-1.0, -0.3, 0.0, 0.8, 1.0}) {
+    double sum = 0;
+    for (unsigned k = 1; k <= 5; ++k) sum += c[k - 1] * std::legendre(k, x);
+    EXPECT_NEAR(legendre_sum(x, c), sum, 1e-14);
+    EXPECT_NEAR((legendre_sum<double, 3>(x, {0.3, 0.0, 0.0})), 0.3 * x, 1e-15);
+  }
 }
 
 TEST(PrecurvatureProfile, KeepsTheTurnOfTheWholeCurve) {

@@ -21,8 +21,8 @@ Array = NDArray[np.float64]
 class EffectParameter:
     """A parameter of an effect.
 
-    Its kind: a strength changes nothing at its neutral value, a shape only says of what form, a choice which of several
-    forms; a choice is never fitted.
+    Its kind: a strength changes nothing at its neutral value, nor does a detail, which is fitted after the strengths; a
+    shape only says of what form, a choice which of several forms, and is never fitted.
     """
 
     name: str
@@ -33,7 +33,7 @@ class EffectParameter:
     soft: tuple[float, float]  # beyond: hardly this physics
     hard: tuple[float, float]  # beyond: impossible
     per_tube: bool
-    kind: str  # strength, shape, choice
+    kind: str  # strength, detail, shape, choice
     full_names: tuple[str, ...]  # one, or one a tube
 
 
@@ -61,7 +61,8 @@ class Effect:
 
     @property
     def shapes(self) -> list[str]:
-        return [name for p in self.parameters if p.kind == "shape" for name in p.full_names]
+        """Shapes and details: what is fitted once the strengths are."""
+        return [name for p in self.parameters if p.kind in ("detail", "shape") for name in p.full_names]
 
 
 @cache

@@ -12,15 +12,15 @@
 
 namespace ctcr {
 
-/// Whether a parameter says how strong an effect is, only of what shape, or which of several forms it has: a choice has no
-/// derivatives and is never fitted.
-enum class Role { amplitude, shape, choice };
+/// Whether a parameter says how strong an effect is, adds a detail, which is fitted after these, says only of what shape an
+/// effect is, or which of several forms it has: a choice has no derivatives and is never fitted.
+enum class Role { amplitude, detail, shape, choice };
 
 /// One named parameter of an effect.
 struct EffectParameter {
   std::string_view name;               ///< snake_case
   std::string_view unit{};             ///< SI; empty: a pure number
-  double neutral = 0;                  ///< changes nothing (amplitude), or the usual value (shape)
+  double neutral = 0;                  ///< changes nothing (amplitude, detail), or the usual value (shape)
   double sigma = 1;                    ///< plausible standard deviation about it, before any measurement
   double soft_low = 0, soft_high = 0;  ///< beyond: explains the data, but hardly by this physics
   double hard_low = -std::numeric_limits<double>::infinity(),

@@ -262,13 +262,13 @@ struct EffectList {
       return std::apply([&](const auto&... effect) { return (false || ... || holds(effect)); }, list);
     }
 
-    /// Whether an amplitude differs from its neutral value or has derivatives.
+    /// Whether an amplitude or a detail differs from its neutral value or has derivatives.
     template <class Effect>
     static bool acts(const Effect& effect) noexcept {
       if constexpr (requires { effect.profiles; }) return effect.profiles != nullptr && !effect.profiles->empty();
       for (int k = 0; k < int(effect.parameters.size()); ++k) {
         const EffectParameter& parameter = effect.parameters[std::size_t(k)];
-        if (parameter.role != Role::amplitude) continue;
+        if (parameter.role != Role::amplitude && parameter.role != Role::detail) continue;
         for (int i = 0; i < effect.size(k); ++i) {
           if (!vanishes(effect.values[std::size_t(effect.place(k, i))] - parameter.neutral)) return true;
         }

@@ -26,7 +26,7 @@ inline constexpr EffectParameter leaning_compliance{.name = "contact_compliance"
                                                     .soft_high = 0.2,
                                                     .hard_low = -1,
                                                     .hard_high = 5,
-                                                    .role = Role::shape,
+                                                    .role = Role::detail,
                                                     .meaning = "of the contact, added to the tilt"};
 
 /// Where the bundle turns in the front plate.

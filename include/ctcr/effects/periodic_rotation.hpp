@@ -54,7 +54,7 @@ inline constexpr std::array parameters{
                     .hard_low = -0.3,
                     .hard_high = 0.3,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of what returns twice as often"},
     EffectParameter{.name = "sine_twice",
                     .unit = "rad",
@@ -65,7 +65,7 @@ inline constexpr std::array parameters{
                     .hard_low = -0.3,
                     .hard_high = 0.3,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of what returns twice as often"},
 };
 }  // namespace periodic_rotation

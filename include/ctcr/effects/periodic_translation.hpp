@@ -52,7 +52,7 @@ inline constexpr std::array parameters{
                     .hard_low = -0.002,
                     .hard_high = 0.002,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of what returns twice as often"},
     EffectParameter{.name = "sine_twice",
                     .unit = "m",
@@ -63,7 +63,7 @@ inline constexpr std::array parameters{
                     .hard_low = -0.002,
                     .hard_high = 0.002,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of what returns twice as often"},
 };
 }  // namespace periodic_translation

@@ -54,7 +54,7 @@ inline constexpr std::array parameters{
                     .hard_low = -1.5,
                     .hard_high = 1.5,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of fourth order"},
     EffectParameter{.name = "quintic",
                     .unit = "",
@@ -65,7 +65,7 @@ inline constexpr std::array parameters{
                     .hard_low = -1.5,
                     .hard_high = 1.5,
                     .per_tube = true,
-                    .role = Role::shape,
+                    .role = Role::detail,
                     .meaning = "of fifth order"},
 };
 }  // namespace precurvature_profile

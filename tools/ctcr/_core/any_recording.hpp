@@ -63,7 +63,7 @@ struct CatalogueParameter {
   std::string effect, name, unit, meaning;
   double neutral, sigma, soft_low, soft_high, hard_low, hard_high;
   bool per_tube;
-  std::string kind;  ///< strength, shape or choice
+  std::string kind;  ///< strength, detail, shape or choice
   int first;         ///< place of its first value among those of the catalogue
 };
 /// An effect in words.

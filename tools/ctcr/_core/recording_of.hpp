@@ -153,7 +153,7 @@ ParameterNames parameter_names() {
 
 template <int N>
 std::vector<CatalogueParameter> catalogue_parameters() {
-  constexpr std::array kinds{"strength", "shape", "choice"};  // as Role
+  constexpr std::array kinds{"strength", "detail", "shape", "choice"};  // as Role
   std::vector<CatalogueParameter> out;
   typename Catalogue::On<N>{}.for_each([&](const auto& effect, int first) {
     for (int k = 0; k < int(effect.parameters.size()); ++k) {

@@ -22,6 +22,7 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 
 TURNS = 2  # quarters that are locked away in turn, where that is needed
+MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 SURPRISE = 3.0  # times its expected size, from which an error says that a reading is far off
 
 
@@ -118,17 +119,17 @@ def diagnose(
     """Which effects are missing. Raises InputError where no fit is possible.
 
     What is found in three quarters of the runs is judged on the last quarter. Where nothing was found and that quarter
-    has errors which the others do not, it changes places with another one, and all begins anew; so it does where a frame
-    jumped within it.
+    has errors which the others do not, it changes places with another one, and all begins anew; so do runs that the others
+    turn out to leave open.
     """
     began = perf_counter()
     measurements, notices = sensor_roll.positions_alone(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(robot, measurements, turn)
         result = _of_these(robot, measurements, locked, progress, threads)
-        hidden = _rows_that_hide_a_jump(result)
-        if hidden.any():
-            locked = locked_rows(robot, measurements, turn, groups(measurements)[hidden])
+        beyond = _beyond_judging(result)
+        if beyond:
+            locked = locked_rows(robot, measurements, turn, beyond)
             result = _of_these(robot, measurements, locked, progress, threads)
         if result.accepted or not _surprises(result):
             break
@@ -148,14 +149,17 @@ def _of_these(
     return max(result, other, key=lambda r: r.final.log_evidence)
 
 
-def _rows_that_hide_a_jump(result: Diagnosis) -> NDArray[np.bool_]:
-    """Locked rows (M,) of which it is not known whether they come before or after a jump that was found."""
-    hidden = np.zeros_like(result.locked)
+def _beyond_judging(result: Diagnosis) -> set[int]:
+    """Locked groups that the fitted ones turned out to leave open: what they would show is not known by any model."""
+    fit, group = result.with_effects, groups(result.measurements)
+    expected = fit.expected_square[:, 0]
+    usual = np.nanmean(expected[~result.locked])
+    beyond = {k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
     for a in result.accepted:
-        if a.entry.id == "frame_jump":
+        if a.entry.id == "frame_jump":  # before or after it?
             when = dict(a.entry.candidate.shape)[jump.WHEN]
-            hidden |= jump.uncertain_rows(result.measurements, ~result.locked, when)
-    return hidden
+            beyond |= set(group[jump.uncertain_rows(result.measurements, ~result.locked, when)])
+    return beyond
 
 
 def _surprises(result: Diagnosis) -> bool:

@@ -149,15 +149,19 @@ def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> iden
     return engine.fit_like(before, names, start=values_of(fit), fixed=fixed)
 
 
-def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> float:
-    """Mean square position error [mm^2] of runs left out in turn, of the model linearised at a fit."""
-    fold = split.groups(engine.measurements) % split.FOLDS  # one of them is locked away
+def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
+    """Mean square position errors [mm^2] of runs, each left out with a few others, of the model linearised at a fit."""
+    group = split.groups(engine.measurements)
     plain, squares = fit.weights[:, 0] > OUTLIER, []
-    for out in (engine.rows & (fold == k) for k in np.unique(fold[engine.rows])):
+    for fold in range(split.FOLDS):
+        out = engine.rows & (group % split.FOLDS == fold)
+        if not out.any():
+            continue
         inflation = fit.inflation if noise is None else None  # another noise has its own
         trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=inflation)
-        squares.append(np.nan_to_num(trial.rms_mm(out & plain)) ** 2)
-    return float(np.mean(squares))
+        errors = (trial.rms_mm(out & plain & (group == k)) for k in np.unique(group[out]))
+        squares += [error**2 for error in errors if error > 0]
+    return np.array(squares)
 
 
 def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
@@ -166,7 +170,8 @@ def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progres
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
     progress("prediction of other runs")
-    errors = {part: held_out(engine, fit, engine.noise_with(part)) for part in FIELDS}
+    # Of the typical run: one that goes where no other went would outweigh all.
+    errors = {part: np.exp(np.log(held_out(engine, fit, engine.noise_with(part))).mean()) for part in FIELDS}
     part = min(errors, key=lambda part: errors[part])
     usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
     needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
@@ -216,7 +221,7 @@ def race(
 def _predicts(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:
     """Whether a further effect makes errors of runs left out smaller by its share of what noise does not explain."""
     jitter = 3e6 * engine.noise.position_jitter**2
-    old, new = held_out(engine, before), held_out(engine, after)
+    old, new = held_out(engine, before).mean(), held_out(engine, after).mean()
     return old - new >= HELD_OUT_SHARE * max(old - jitter, 0.0)
 
 
