@@ -7,11 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import effect_fit, effects, identify, recording, robot_file
-from ctcr.diagnose import diagnose
+from ctcr import effect_fit, effects, free_parameters, identify, recording, robot_file
+from ctcr.diagnose import diagnose, jump
 from ctcr.diagnose import race as racing
+from ctcr.diagnose.coverage import Coverage
 from ctcr.diagnose.engine import Linear
-from ctcr.diagnose.split import groups, locked_rows
+from ctcr.diagnose.split import OPEN, groups, locked_rows
 from ctcr.diagnose.verdict import judge
 from ctcr.measurements import Measurements
 
@@ -55,9 +56,8 @@ def session(robot, random, runs=8, stops=6):
     )
 
 
-def measured(robot, random, hidden, calibration=0.5):
+def measured(robot, random, hidden, calibration=0.5, fixed=None):
     """Readings of a robot that differs from its file as its uncertainties say, and has a hidden effect."""
-    from ctcr import free_parameters
     from ctcr.frames import product, quaternion_from_rotation_vector
 
     names = free_parameters.expand("standard", robot)
@@ -65,7 +65,7 @@ def measured(robot, random, hidden, calibration=0.5):
     truth = mean + calibration * sd * random.normal(size=len(names))
     table = session(robot, random)
     centred = dataclasses.replace(table, position=np.zeros((len(table), 3)))
-    core = recording.recording_of(robot, centred, [*names, *hidden], steps=4)
+    core = recording.recording_of(robot, centred, [*names, *hidden], fixed=fixed, steps=4)
     core.residual(np.array([*truth, *hidden.values()]))
     position, quaternion = core.predicted()
     jitter = quaternion_from_rotation_vector(
@@ -200,6 +200,90 @@ def test_rows_are_locked_by_run(robot):
         assert np.ptp(locked[table.run == run].astype(int)) == 0
     one = dataclasses.replace(table, run=np.zeros_like(table.run))
     assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)
+
+
+def test_what_is_locked_follows_no_plan_that_alternates(robot):
+    table = session(robot, np.random.default_rng(0), runs=16)
+    table = dataclasses.replace(table, position=np.zeros((len(table), 3)))
+    for turn in range(4):
+        runs = np.unique(table.run[locked_rows(robot, table, turn)])
+        assert len(runs) == 4
+        for period in (2, 4):
+            assert len(set(runs % period)) > 1, (turn, period)
+
+
+def with_one_odd_run(robot, odd):
+    """Only in the run `odd` the outermost tube shows where its curve starts."""
+    table = session(robot, np.random.default_rng(0), runs=12)
+    length = robot.tubes[2].length
+    shown = np.where(table.run == odd, 0.06, np.minimum(table.beta[:, 2] + length, 0.044))
+    beta = np.column_stack([table.beta[:, :2], shown - length])
+    return dataclasses.replace(table, beta=beta, position=np.zeros((len(table), 3)))
+
+
+def test_a_run_that_goes_where_no_other_went_judges_nothing(robot):
+    odd = np.unique(session(robot, np.random.default_rng(0), runs=12).run)[2]
+    table = with_one_odd_run(robot, odd)
+    coverage = Coverage(robot, table, groups(table))
+    assert coverage.left_open([odd])[0] > 100 * OPEN
+    locked = locked_rows(robot, table)
+    assert not locked[table.run == odd].any() and len(np.unique(table.run[locked])) == 3
+    assert coverage.left_open(np.unique(table.run[locked])).max() <= OPEN
+    # What was read has no say.
+    moved = np.random.default_rng(1).normal(size=(len(table), 3))
+    np.testing.assert_array_equal(locked, locked_rows(robot, dataclasses.replace(table, position=moved)))
+
+
+def test_what_is_left_open_is_the_variance_of_a_prediction(robot):
+    """Against that of fits to readings with noise alone."""
+    random, table = np.random.default_rng(5), with_one_odd_run(robot, 3)
+    names = free_parameters.expand("standard", robot)
+    mean, sd, low, high = free_parameters.priors(robot, names)
+    noise = identify.noise_of_readings(robot, table, field=False)
+    core = recording.recording_of(robot, table, names)
+    core.activate([True] * len(table))
+    slopes = np.nan_to_num(core.residual(mean, True)[1]).reshape(len(table), 6, -1)
+    fitted, jitter = table.run != 7, np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
+    A = (slopes[fitted] / jitter[:, None]).reshape(-1, len(names)) * sd
+    seen = []
+    for _ in range(400):
+        truth, error = random.normal(size=len(names)), random.normal(size=len(A))
+        found = np.linalg.solve(A.T @ A + np.eye(len(names)), A.T @ (A @ truth + error))
+        missed = slopes[~fitted][:, :3] @ (sd * (found - truth))
+        seen.append(np.mean(np.sum(missed**2, axis=1)))
+    open_ = Coverage(robot, table, groups(table)).left_open([7])[0]
+    part = np.mean(seen) / (3 * noise.position_jitter**2) / open_
+    assert 0.6 < part < 1.15, part  # open_ is the worst of three lengths of the curves
+
+
+@pytest.mark.parametrize(
+    "when", [0.30, 0.40]
+)  # within a run that would be locked, and within one that would not
+def test_a_frame_that_jumps_within_a_run_is_followed_to_the_row(robot, when):
+    by = {"x": 8e-4, "y": -5e-4, "turn_y": 2e-3}
+    hidden = {f"effects.frame_jump.{name}": value for name, value in by.items()}
+    table = measured(robot, np.random.default_rng(7), hidden, fixed={jump.WHEN: when})
+    at = np.searchsorted(recording.session_part(table), when)
+    run = table.run[at]
+    assert table.run[at - 1] == run and locked_rows(robot, table)[at] == (when == 0.30)
+    result = diagnose(robot, table)
+    assert [a.ids for a in result.accepted] == [["frame_jump"]]
+    assert result.verdict.word == "identified"
+    found = dict(result.accepted[0].entry.candidate.shape)[jump.WHEN]
+    assert abs(np.searchsorted(recording.session_part(table), found) - at) <= 1
+    assert not result.locked[table.run == run].any() or when != 0.30
+    assert result.rms_mm["with_effects"] < 1.15 * result.rms_mm["noise_floor"]
+
+
+def test_rows_between_fitted_ones_may_hide_a_jump(robot):
+    table = session(robot, np.random.default_rng(0))
+    part = recording.session_part(table)
+    fitted = np.ones(len(table), bool)
+    fitted[10:15] = False
+    np.testing.assert_array_equal(
+        np.flatnonzero(jump.uncertain_rows(table, fitted, part[11] + 1e-6)), np.arange(10, 15)
+    )
+    assert not jump.uncertain_rows(table, fitted, 0.5 * (part[3] + part[4])).any()
 
 
 def test_what_is_locked_holds_poses(robot):

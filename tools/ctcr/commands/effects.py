@@ -74,19 +74,31 @@ def _tell(console, effect) -> None:
         ("what happens", effect.physics), ("how it looks", effect.signature), ("what to measure", effect.measure),
         ("the data need", needs), ("looks like", ", ".join(effect.look_alikes) or "no other"),
         ("reference", effect.reference),
-        *((_shown_name(p), p.meaning) for p in effect.parameters),
+        *((name, p.meaning) for name, p in _families(effect)),
     ):  # fmt: skip
         if text:
             facts.add_row(title, text)
     console.print(facts)
     rows = [
-        [_shown_name(p), p.unit or "-", p.kind, f"{p.neutral:.4g}", f"{p.sigma:.3g}",
-         _interval(p.soft), _interval(p.hard)]
-        for p in effect.parameters
+        [name, p.unit or "-", p.kind, f"{p.neutral:.4g}", f"{p.sigma:.3g}", _interval(p.soft), _interval(p.hard)]
+        for name, p in _families(effect)
     ]  # fmt: skip
     columns = ["parameter (SI)", "unit", "kind", "neutral", "sd", "usual", "possible"]
     console.print()
     console.print(table("", columns, rows, 3))
+
+
+def _families(effect):
+    """Parameters that differ in nothing but their names, together: what they are called, and the first of them."""
+    from dataclasses import replace
+    from itertools import groupby
+
+    for _, alike in groupby(effect.parameters, lambda p: replace(p, name="", full_names=())):
+        first, *others = alike
+        name = _shown_name(first)
+        yield (f"{name} ... {_shown_name(others[-1])}" if len(others) > 1 else name), first
+        if len(others) == 1:
+            yield _shown_name(others[0]), others[0]
 
 
 def _shown_name(p) -> str:

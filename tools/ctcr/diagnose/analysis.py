@@ -154,7 +154,9 @@ def _beyond_judging(result: Diagnosis) -> set[int]:
     fit, group = result.with_effects, groups(result.measurements)
     expected = fit.expected_square[:, 0]
     usual = np.nanmean(expected[~result.locked])
-    beyond = {k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
+    beyond = {
+        k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual
+    }
     for a in result.accepted:
         if a.entry.id == "frame_jump":  # before or after it?
             when = dict(a.entry.candidate.shape)[jump.WHEN]

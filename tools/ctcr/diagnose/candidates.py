@@ -22,8 +22,8 @@ VARIANTS = {
     ),
     "straight_curvature": (("bend_x",), ("bend_x", "bend_y")),
     "sensor_offset": (("x", "y", "z"), ("x", "y", "z", "turn_x", "turn_y", "turn_z")),
-    "field_distortion": (("scale",), None),
-}  # None: all amplitudes
+    "field_distortion": (("scale",), None, ()),
+}  # None: all amplitudes; (): all parameters
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
 FORMS = {"friction": ({"law": 1.0}, {"insertion": 0.0})}
 
@@ -52,14 +52,11 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
             left_out[effect.id] = reason
             continue
         for variant in VARIANTS.get(effect.id, (None,)):
-            names = effect.names(*variant) if variant else effect.amplitudes
+            names = effect.amplitudes if variant is None else effect.names(*variant)
             if effect.id == "contact":
                 names = effect.names("stiffness")
-            if (
-                measurements.quaternion is None
-                and variant
-                and any(name.startswith("turn") for name in variant)
-            ):
+            turns = variant is not None and any(".turn_" in name for name in names)
+            if turns and measurements.quaternion is None:
                 continue
             for form in ({}, *FORMS.get(effect.id, ())):
                 shape = tuple((f"effects.{effect.id}.{name}", value) for name, value in form.items())

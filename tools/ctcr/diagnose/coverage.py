@@ -17,7 +17,8 @@ class Coverage:
 
     def __init__(self, robot: Robot, measurements: Measurements, group: NDArray[np.int64]) -> None:
         self._worlds = [
-            _informations(slopes, group) for slopes in _slopes(robot, measurements, identify.measured_rows(measurements))
+            _informations(slopes, group)
+            for slopes in _slopes(robot, measurements, identify.measured_rows(measurements))
         ]
 
     def left_open(self, locked: Iterable[int]) -> Array:
