@@ -20,8 +20,8 @@ ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
 robot file and measurements alone. Thresholds were set on the tuning half. `jitter`: noise of single readings;
-`realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which the unequal lags
-of single readings belong where a delay is hidden. Written by `tools/dev score --keep`."""
+`realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which
+the unequal lags of single readings belong where a delay is hidden. Written by `tools/dev score --keep`."""
 VISIBLE = (
     30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 )

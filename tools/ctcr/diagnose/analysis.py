@@ -119,8 +119,8 @@ def diagnose(
     """Which effects are missing. Raises InputError where no fit is possible.
 
     What is found in three quarters of the runs is judged on the last quarter. Where nothing was found and that quarter
-    has errors which the others do not, it changes places with another one, and all begins anew; so do runs that the others
-    turn out to leave open.
+    has errors which the others do not, it changes places with another one, and all begins anew; so do runs that the
+    others turn out to leave open.
     """
     began = perf_counter()
     measurements, notices = sensor_roll.positions_alone(robot, measurements)

@@ -16,10 +16,8 @@ class Coverage:
     """Of groups of rows, `group` (M,) numbered from 0."""
 
     def __init__(self, robot: Robot, measurements: Measurements, group: NDArray[np.int64]) -> None:
-        self._worlds = [
-            _informations(slopes, group)
-            for slopes in _slopes(robot, measurements, identify.measured_rows(measurements))
-        ]
+        rows = identify.measured_rows(measurements)
+        self._worlds = [_informations(slopes, group) for slopes in _slopes(robot, measurements, rows)]
 
     def left_open(self, locked: Iterable[int]) -> Array:
         """Mean square error of the position in each locked group that the calibration by the others leaves, over that
@@ -44,8 +42,8 @@ def _informations(slopes: Array, group: NDArray[np.int64]) -> tuple[Array, Array
 
 
 def _slopes(robot: Robot, measurements: Measurements, rows: NDArray[np.bool_]) -> Iterable[Array]:
-    """Of poses (M, 6, k) by the calibration parameters, in units of jitter and prior; with curves as stated, and longer and
-    shorter ones: where a curve starts near the plate, that decides which readings know its length."""
+    """Of poses (M, 6, k) by the calibration parameters, in units of jitter and prior; with curves as stated, longer and
+    shorter: where a curve starts near the plate, that decides which readings know its length."""
     names = free_parameters.expand("standard", robot)
     mean, sd, low, high = free_parameters.priors(robot, names)
     noise = identify.noise_of_readings(robot, measurements, field=False)
