@@ -110,7 +110,8 @@ TEST(SensorOffset, IsALeverArm) {
 TEST(FieldDistortion, DependsOnThePositionAlone) {
   Random random(2);
   FieldDistortion<1> effect;
-  for (double& x : effect.values) x = test::uniform(random, -1e-3, 1e-3);
+  for (std::size_t k = 0; k < effect.values.size(); ++k)
+    if (effect.parameters[k].role == Role::amplitude) effect.values[k] = test::uniform(random, -1e-3, 1e-3);
   const Vec3 centre(0.1, 0.2, -0.1);
   const auto shift = [&](const Pose& pose) -> Vec3 {
     const Pose read = sensed(effect, {.centre = centre}, pose);

@@ -186,7 +186,7 @@ def test_what_the_data_cannot_say_is_said(robot, plan):
     one_run = replace(timeless, run=0 * plan.run)
     added = effect_fit.add(robot, one_run, ["delay"], free=["tracker.position.*"])
     assert any("say nothing of delay" in notice for notice in added.notices)
-    assert added.held_out == "every fourth block of time" and np.isfinite(added.rms("rms_mm")["delay"])
+    assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
 
 
 def test_remove_undoes_add(run, robot, plan, table, tmp_path):

@@ -19,6 +19,8 @@ from ctcr import (
     user_effects,
 )
 from ctcr.calibrate import parameters
+from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.race import noise_for_prediction
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.measurements import Measurements
@@ -112,7 +114,7 @@ def add(
             fit = stage(fitted, fitted, np.ones(len(readings), bool), start)
         progress.advance(1)
     fit = open_side.widened(fit)
-    stages.append(Stage("noise_floor", *identify.noise_floor(fit, stage.noise, stage.places)))
+    stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.places)))
     return Added(
         _applied(robot, fit),
         list(ids),
@@ -252,11 +254,26 @@ class _Fitter:
         plain, with_effects = identify.priors(self.robot, self.base), effects.priors(self.robot, own)
         mean, sd, low, high = (np.concatenate(pair) for pair in zip(plain, with_effects, strict=True))
         first = np.clip(np.array([start[name] for name in names]), low, high)
-        fit = identify.identify_with(
-            recorded, names, mean, sd, low, high, self.noise, self.places, start=first, starts=1,
-            known=free_parameters.known_directions(self.robot, names),
-            within=free_parameters.admissible(self.robot, self.readings.beta[rows], names),
-        )  # fmt: skip
+        options = {
+            "known": free_parameters.known_directions(self.robot, names),
+            "within": free_parameters.admissible(self.robot, self.readings.beta[rows], names),
+        }
+
+        def fitted(noise: identify.Noise, start: Array, weights: Array | None = None) -> identify.Fit:
+            return identify.identify_with(
+                recorded, names, mean, sd, low, high, noise, self.places, start=start, starts=1, weights=weights,
+                robust=weights is None, **options,
+            )  # fmt: skip
+
+        fit = fitted(self.noise, first)
+        noise = identify.likeliest_field(fit, low, high, self.places)
+        if noise is not fit.noise:
+            fit = fitted(noise, fit.values)
+        # The robot is to predict; how sure its values are is another question.
+        noise = noise_for_prediction(Engine(self.robot, self.readings, self.noise, rows), fit)
+        if noise is not fit.noise:
+            likely, fit = fit, fitted(noise, fit.values, fit.weights)
+            fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
         return replace(fit, units=[parameters.field_of(name).unit for name in names])
 
 
@@ -265,7 +282,7 @@ def _in_words(readings: Measurements, held: Mask) -> str:
         return ""
     runs = np.unique(readings.run[held])
     if np.isin(readings.run[~held], runs).any():
-        return "every fourth block of time"
+        return "one of every four blocks of time"
     return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
 
 

@@ -26,6 +26,7 @@ FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or 
 COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
 WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
 WINDINGS = 2  # and at most so often
+FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
 Noise = _core.Noise
 expand = free_parameters.expand
 parameter_names = free_parameters.names_of
@@ -290,6 +291,50 @@ def identify_with(
             )
         },
     )  # fmt: skip
+
+
+def linear_fit(
+    at: Fit,
+    low: Array,
+    high: Array,
+    places: Array,
+    *,
+    noise: Noise | None = None,
+    rows: Mask | None = None,
+    weights: Array | None = None,
+    inflation: ArrayLike | None = None,
+) -> Fit:
+    """As identify_with() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or
+    weights (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any."""
+    shown = at.residual if weights is not None or rows is None else np.where(rows[:, None], at.residual, nan)
+    residual = shown.ravel()
+
+    def predict(x: Array, _: bool) -> tuple[Array, Array]:
+        return residual + at.jacobian_all @ (x - at.values), at.jacobian_all
+
+    return identify_with(
+        predict, at.names, at.prior_mean, at.prior_sd, low, high, noise or at.noise, places,
+        robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
+        start=at.values, starts=1,
+    )  # fmt: skip
+
+
+def with_field(noise: Noise, part: float) -> Noise:
+    """The tracker's noise with a part of its stated field error."""
+    return Noise(
+        position_jitter=noise.position_jitter, rotation_jitter=noise.rotation_jitter,
+        position_field=part * noise.position_field, rotation_field=part * noise.rotation_field,
+        correlation_length=noise.correlation_length,
+    )  # fmt: skip
+
+
+def likeliest_field(fit: Fit, low: Array, high: Array, places: Array) -> Noise:
+    """The noise of a fit with the part of its field error that makes the readings likeliest, by the fit's slopes."""
+    others = [
+        linear_fit(fit, low, high, places, noise=with_field(fit.noise, part), weights=fit.weights)
+        for part in FIELDS[1:]
+    ]
+    return max([fit, *others], key=lambda tried: tried.log_evidence).noise
 
 
 def measured_rows(measurements: Measurements) -> Mask:

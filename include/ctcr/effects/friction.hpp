@@ -46,7 +46,7 @@ inline constexpr std::array parameters{
                     .unit = "rad",
                     .neutral = 6 * 0.017453292519943295,
                     .sigma = 0.1,
-                    .soft_low = 0.01,
+                    .soft_low = 0.005,
                     .soft_high = 0.5,
                     .hard_low = 0.005,
                     .hard_high = 3,

@@ -88,7 +88,7 @@ class Diagnosis:
 
         Far above the noise floor where these rows are unlike those that were fitted.
         """
-        return self.with_effects.floor_mm(self.locked)
+        return max(self.with_effects.floor_mm(self.locked), self.noise_floor_mm)
 
     def parameters(self, accepted: Accepted) -> dict[str, float]:
         """Fitted values, and those of its choices, by name without the id."""

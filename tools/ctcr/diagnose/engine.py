@@ -78,12 +78,7 @@ class Engine:
 
     def noise_with(self, part: float) -> Any:
         """The tracker's noise with a part of its stated field error."""
-        n = self.noise
-        return identify.Noise(
-            position_jitter=n.position_jitter, rotation_jitter=n.rotation_jitter,
-            position_field=part * n.position_field, rotation_field=part * n.rotation_field,
-            correlation_length=n.correlation_length,
-        )  # fmt: skip
+        return identify.with_field(self.noise, part)
 
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
         own = [name for name in names if not name.startswith("effects.")]
@@ -144,18 +139,10 @@ class Engine:
         inflation: Array | None = None,
     ) -> identify.Fit:
         """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap."""
-        fitted = at.residual if weights is not None else np.where(self.rows[:, None], at.residual, np.nan)
-        residual = fitted.ravel()
         _, _, low, high = self.priors(at.names)
-
-        def predict(x: Array, _: bool) -> tuple[Array, Array]:
-            return residual + at.jacobian_all @ (x - at.values), at.jacobian_all
-
-        return identify.identify_with(
-            predict, at.names, at.prior_mean, at.prior_sd, low, high, noise or at.noise, self.places,
-            robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at.values, starts=1,
-        )  # fmt: skip
+        return identify.linear_fit(
+            at, low, high, self.places, noise=noise, rows=self.rows, weights=weights, inflation=inflation
+        )
 
     def as_stated(self, fit: identify.Fit) -> identify.Fit:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""

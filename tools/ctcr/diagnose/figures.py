@@ -25,7 +25,10 @@ def waterfall(figure, d: "Diagnosis") -> None:
         bars.append((f"+ {names}", rms["with_effects"], GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
-        axes.text(i, value, f" {short(value)} mm", ha="center", va="bottom", weight="bold")
+        axes.text(
+            i, 1.04 * value, f"{short(value)} mm", ha="center", va="bottom", weight="bold",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
+        )  # fmt: skip
     axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
     last = len(bars) - 0.6
     axes.text(

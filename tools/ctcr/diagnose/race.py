@@ -38,7 +38,6 @@ SOUND = 1.05  # inflation of the noise up to which it does
 FITS = 1.2  # ... and beyond which it certainly does not
 OUTLIER = 0.3  # weight below which a reading is taken for one
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
-FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
 
 
 @dataclass(frozen=True)
@@ -132,12 +131,10 @@ def baseline(
     progress("calibration")
     names, fixed = parameters(accepted)
     full = engine.fit(names, start=start, fixed=fixed)
-    others = [
-        engine.linear_fit(full, noise=engine.noise_with(part), weights=full.weights) for part in FIELDS[1:]
-    ]
-    best = max([full, *others], key=lambda fit: fit.log_evidence)
+    _, _, low, high = engine.priors(full.names)
+    noise = identify.likeliest_field(full, low, high, engine.places)
     # From the full model's place: what effects do far from there, slopes do not tell.
-    return full if best is full else engine.fit(names, start=values_of(full), fixed=fixed, noise=best.noise)
+    return full if noise is full.noise else engine.fit(names, start=values_of(full), fixed=fixed, noise=noise)
 
 
 def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> identify.Fit:
@@ -164,24 +161,30 @@ def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
     return np.array(squares)
 
 
-def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
-    """The same parameters fitted for prediction: with the part of the field error that predicts other runs best.
+def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
+    """The noise of a fit, or that with the part of the field error that predicts other runs better.
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
-    progress("prediction of other runs")
+    tried = {part: engine.noise_with(part) for part in identify.FIELDS}
     # Of the typical run: one that goes where no other went would outweigh all.
-    errors = {part: np.exp(np.log(held_out(engine, fit, engine.noise_with(part))).mean()) for part in FIELDS}
+    errors = {part: np.exp(np.log(held_out(engine, fit, noise)).mean()) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
-    usual = min(FIELDS, key=lambda p: abs(engine.noise_with(p).position_field - fit.noise.position_field))
+    usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
     needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
-    if errors[part] > needed**2 * errors[usual]:
+    return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
+
+
+def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
+    """The same parameters fitted for prediction."""
+    progress("prediction of other runs")
+    noise = noise_for_prediction(engine, fit)
+    if noise is fit.noise:
         return fit
     names, fixed = parameters(accepted)
     return engine.fit(
-        names, start=values_of(fit), fixed=fixed, noise=engine.noise_with(part), weights=fit.weights,
-        tolerance=identify.COARSE,
-    )  # fmt: skip
+        names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, tolerance=identify.COARSE
+    )
 
 
 def race(

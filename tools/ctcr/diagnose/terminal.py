@@ -55,7 +55,7 @@ def _errors(result: "Diagnosis") -> Any:
     }
     runs = len(set(result.measurements.run[result.locked].tolist()))
     rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
-    rows.append(["allowed by the stated accuracy and uncertain parameters", f"{result.expected_mm:.3f}"])
+    rows.append(["allowed by the tracker and uncertain parameters", f"{result.expected_mm:.3f}"])
     title = f"Position error (RMS) on {result.locked.sum()} readings of {runs} run(s) that no fit saw"
     return output.table(title, ["model", "mm"], rows)
 
