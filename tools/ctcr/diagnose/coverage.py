@@ -26,19 +26,19 @@ class Coverage:
         return np.max([_left_open(*world, locked) for world in self._worlds], axis=0)
 
 
-def _left_open(information: Array, of_position: Array, locked: list[int]) -> Array:
-    known = np.eye(information.shape[1]) + information.sum(axis=0) - information[locked].sum(axis=0)
-    return np.einsum("ij,gji->g", np.linalg.inv(known), of_position[locked]) / 3
+def _left_open(together: Array, information: Array, of_position: Array, locked: list[int]) -> Array:
+    covariance = np.linalg.inv(together - information[locked].sum(axis=0))
+    return np.einsum("ij,gji->g", covariance, of_position[locked]) / 3
 
 
-def _informations(slopes: Array, group: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Information of each group on the parameters (G, k, k), and the mean of that by a position."""
+def _informations(slopes: Array, group: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Information on the parameters, prior included (k, k), that of each group (G, k, k), and of its mean position."""
     whole, position = np.zeros((2, group.max() + 1, *2 * slopes.shape[-1:]))
     for k in range(len(whole)):
         own = slopes[group == k]
         whole[k] = np.einsum("mai,maj->ij", own, own)
         position[k] = np.einsum("mai,maj->ij", own[:, :3], own[:, :3]) / max(1, np.sum(own.any(axis=(1, 2))))
-    return whole, position
+    return np.eye(slopes.shape[-1]) + whole.sum(axis=0), whole, position
 
 
 def _slopes(robot: Robot, measurements: Measurements, rows: NDArray[np.bool_]) -> Iterable[Array]:

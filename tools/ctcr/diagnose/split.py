@@ -13,12 +13,8 @@ from ctcr.robot import Robot
 FEWEST_RUNS = 4
 BLOCKS = 12  # of a single run, in time
 FOLDS = 4
-PLACE = (
-    2,
-    3,
-    1,
-    0,
-)  # of what is locked among each four groups: runs often alternate in direction, speed or load
+# What is locked of each four groups: not always the same, as runs often alternate in direction, speed or load.
+PLACE = (2, 3, 1, 0)
 OPEN = 0.1  # mean square error that the fitted groups may leave open in a locked one, over that of the jitter
 EXCHANGES = 12  # of locked groups, at most
 
