@@ -93,8 +93,9 @@ struct EffectValues {
 
   static constexpr std::array<P, std::size_t(count)> neutral() noexcept {
     std::array<P, std::size_t(count)> v{};
+    auto next = v.begin();
     for (int k = 0; k < int(List.size()); ++k)
-      for (int i = 0; i < size(k); ++i) v[std::size_t(place(k, i))] = List[std::size_t(k)].neutral;
+      for (int i = 0; i < size(k); ++i) *next++ = List[std::size_t(k)].neutral;
     return v;
   }
 };

@@ -266,11 +266,12 @@ struct EffectList {
     template <class Effect>
     static bool acts(const Effect& effect) noexcept {
       if constexpr (requires { effect.profiles; }) return effect.profiles != nullptr && !effect.profiles->empty();
+      auto next = effect.values.begin();
       for (int k = 0; k < int(effect.parameters.size()); ++k) {
         const EffectParameter& parameter = effect.parameters[std::size_t(k)];
-        if (parameter.role != Role::amplitude && parameter.role != Role::detail) continue;
-        for (int i = 0; i < effect.size(k); ++i) {
-          if (!vanishes(effect.values[std::size_t(effect.place(k, i))] - parameter.neutral)) return true;
+        const bool counts = parameter.role == Role::amplitude || parameter.role == Role::detail;
+        for (int i = 0; i < effect.size(k); ++i, ++next) {
+          if (counts && !vanishes(*next - parameter.neutral)) return true;
         }
       }
       return false;
