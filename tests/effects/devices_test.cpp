@@ -40,8 +40,8 @@ TEST(PeriodicErrors, MayReturnTwiceAsOftenToo) {
   for (const double turn : {0.0, 0.4, 2.9}) {
     PeriodicRotation<2> rotation;
     rotation.values = {0.01, 0, 0.02, 0, 1, 0.003, 0, -0.004, 0};
-    const double expected = 0.01 * std::cos(turn) + 0.02 * std::sin(turn) + 0.003 * std::cos(2 * turn) -
-                            0.004 * std::sin(2 * turn);
+    const double expected =
+        0.01 * std::cos(turn) + 0.02 * std::sin(turn) + 0.003 * std::cos(2 * turn) - 0.004 * std::sin(2 * turn);
     EXPECT_NEAR(added(rotation, {-0.2, -0.1}, {turn, 0.3}).second[0], expected, 1e-15);
     PeriodicTranslation<2> translation;
     translation.values = {0.01, 0, 0.02, 0, 2 * std::numbers::pi, 0.003, 0, -0.004, 0};

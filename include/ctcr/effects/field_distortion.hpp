@@ -32,18 +32,19 @@ consteval EffectParameter coefficient(std::string_view name, double sigma, Role 
                           : "displacement along the first axis at 50 mm from the centre, by the product of the others"};
 }
 
-inline constexpr std::string_view quadratic[] = {
-    "x_xx", "x_yy", "x_zz", "x_xy", "x_xz", "x_yz", "y_xx", "y_yy", "y_zz",
-    "y_xy", "y_xz", "y_yz", "z_xx", "z_yy", "z_zz", "z_xy", "z_xz", "z_yz"};
+inline constexpr std::string_view quadratic[] = {"x_xx", "x_yy", "x_zz", "x_xy", "x_xz", "x_yz",
+                                                 "y_xx", "y_yy", "y_zz", "y_xy", "y_xz", "y_yz",
+                                                 "z_xx", "z_yy", "z_zz", "z_xy", "z_xz", "z_yz"};
 inline constexpr std::string_view shear[] = {"x_x", "y_y", "x_y", "x_z", "y_z"};
-inline constexpr std::string_view cubic[] = {
-    "x_xxx", "x_yyy", "x_zzz", "x_xxy", "x_xxz", "x_xyy", "x_yyz", "x_xzz", "x_yzz", "x_xyz",
-    "y_xxx", "y_yyy", "y_zzz", "y_xxy", "y_xxz", "y_xyy", "y_yyz", "y_xzz", "y_yzz", "y_xyz",
-    "z_xxx", "z_yyy", "z_zzz", "z_xxy", "z_xxz", "z_xyy", "z_yyz", "z_xzz", "z_yzz", "z_xyz"};
+inline constexpr std::string_view cubic[] = {"x_xxx", "x_yyy", "x_zzz", "x_xxy", "x_xxz", "x_xyy", "x_yyz", "x_xzz",
+                                             "x_yzz", "x_xyz", "y_xxx", "y_yyy", "y_zzz", "y_xxy", "y_xxz", "y_xyy",
+                                             "y_yyz", "y_xzz", "y_yzz", "y_xyz", "z_xxx", "z_yyy", "z_zzz", "z_xxy",
+                                             "z_xxz", "z_xyy", "z_yyz", "z_xzz", "z_yzz", "z_xyz"};
 inline constexpr std::string_view turn[] = {
-    "turn_x_x",  "turn_x_y",  "turn_x_z",  "turn_y_x",  "turn_y_y",  "turn_y_z",  "turn_z_x",  "turn_z_y",  "turn_z_z",
-    "turn_x_xx", "turn_x_yy", "turn_x_zz", "turn_x_xy", "turn_x_xz", "turn_x_yz", "turn_y_xx", "turn_y_yy", "turn_y_zz",
-    "turn_y_xy", "turn_y_xz", "turn_y_yz", "turn_z_xx", "turn_z_yy", "turn_z_zz", "turn_z_xy", "turn_z_xz", "turn_z_yz"};
+    "turn_x_x",  "turn_x_y",  "turn_x_z",  "turn_y_x",  "turn_y_y",  "turn_y_z",  "turn_z_x",
+    "turn_z_y",  "turn_z_z",  "turn_x_xx", "turn_x_yy", "turn_x_zz", "turn_x_xy", "turn_x_xz",
+    "turn_x_yz", "turn_y_xx", "turn_y_yy", "turn_y_zz", "turn_y_xy", "turn_y_xz", "turn_y_yz",
+    "turn_z_xx", "turn_z_yy", "turn_z_zz", "turn_z_xy", "turn_z_xz", "turn_z_yz"};
 
 consteval auto all() {
   std::array<EffectParameter, 1 + std::size(quadratic) + std::size(shear) + std::size(cubic) + std::size(turn)> list;
