@@ -187,8 +187,8 @@ def test_linear_gain_is_the_evidence_of_a_linear_model():
         assert gain.log_evidence == pytest.approx(log_evidence(np.hstack([A, B])) - log_evidence(A), abs=1e-9)
 
 
-def measured_session(robot):
-    table = session(robot, np.random.default_rng(0))
+def measured_session(robot, runs=8):
+    table = session(robot, np.random.default_rng(0), runs)
     return dataclasses.replace(table, position=np.zeros((len(table), 3)))
 
 
@@ -203,8 +203,7 @@ def test_rows_are_locked_by_run(robot):
 
 
 def test_what_is_locked_follows_no_plan_that_alternates(robot):
-    table = session(robot, np.random.default_rng(0), runs=16)
-    table = dataclasses.replace(table, position=np.zeros((len(table), 3)))
+    table = measured_session(robot, runs=16)
     for turn in range(4):
         runs = np.unique(table.run[locked_rows(robot, table, turn)])
         assert len(runs) == 4
@@ -214,11 +213,11 @@ def test_what_is_locked_follows_no_plan_that_alternates(robot):
 
 def with_one_odd_run(robot, odd):
     """Only in the run `odd` the outermost tube shows where its curve starts."""
-    table = session(robot, np.random.default_rng(0), runs=12)
+    table = measured_session(robot, runs=12)
     length = robot.tubes[2].length
     shown = np.where(table.run == odd, 0.06, np.minimum(table.beta[:, 2] + length, 0.044))
     beta = np.column_stack([table.beta[:, :2], shown - length])
-    return dataclasses.replace(table, beta=beta, position=np.zeros((len(table), 3)))
+    return dataclasses.replace(table, beta=beta)
 
 
 def test_a_run_that_goes_where_no_other_went_judges_nothing(robot):

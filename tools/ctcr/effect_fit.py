@@ -227,6 +227,7 @@ class _Fitter:
         self.steps = recording.steps_for(robot, readings, self.noise)
         if not self.measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
+        self._engine = Engine(robot, readings, self.noise, self.measured)
 
     def shapes(self, identity: str) -> list[str]:
         return [name for name in effects.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]
@@ -270,7 +271,8 @@ class _Fitter:
         if noise is not fit.noise:
             fit = fitted(noise, fit.values)
         # The robot is to predict; how sure its values are is another question.
-        noise = noise_for_prediction(Engine(self.robot, self.readings, self.noise, rows), fit)
+        self._engine.rows = rows
+        noise = noise_for_prediction(self._engine, fit)
         if noise is not fit.noise:
             likely, fit = fit, fitted(noise, fit.values, fit.weights)
             fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))

@@ -141,6 +141,7 @@ def diagnose(
 def _of_these(
     robot: Robot, measurements: Measurements, locked: NDArray[np.bool_], progress: Progress, threads: int
 ) -> Diagnosis:
+    """With these rows locked."""
     result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
     if not result.hides_in_outliers:
         return result

@@ -22,12 +22,16 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
     """
     measurements, best, gain = engine.measurements, None, 0.0
     part, last = recording.session_part(measurements), len(measurements)
+
+    def jumped(row: int) -> NDArray:
+        return columns * (np.arange(last) >= row)[:, None, None]
+
     rows = np.flatnonzero(np.diff(measurements.run)) + 1
     if len(rows) < 3:
         rows = np.arange(1, last)
     while len(rows):
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST).astype(int))]
-        gains = [worth(columns * (np.arange(last) >= row)[:, None, None]) for row in rows]
+        gains = [worth(jumped(row)) for row in rows]
         if max(gains) <= gain:
             break
         k = int(np.argmax(gains))
@@ -37,8 +41,7 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
     if best is None:
         return []
     when = float(0.5 * (part[best - 1] + part[best]))
-    after = (np.arange(last) >= best)[:, None, None]
-    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),)), columns * after)]
+    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),)), jumped(best))]
 
 
 def uncertain_rows(measurements: Measurements, fitted: NDArray[np.bool_], when: float) -> NDArray[np.bool_]:
