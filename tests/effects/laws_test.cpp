@@ -228,13 +228,26 @@ TEST(StraightCurvature, MayBeUneven) {
   EXPECT_NEAR(rotation_vector(solved(tube.robot, effects, tube.q, {}).rotation).x(), turn, 1e-12);
 }
 
+TEST(StraightCurvature, DoesNothingToATubeThatIsCurvedAllAlong) {
+  OneTube tube(9);
+  tube.robot.tubes[0].curved_length = tube.robot.tubes[0].length;
+  Catalogue::On<1> effects;
+  for (const double beta : {0.0, -0.03}) {
+    tube.q.beta << beta;
+    const Pose plain = solved(tube.robot, effects, tube.q, {}).pose();
+    Catalogue::On<1> bent;
+    effect<StraightCurvature>(bent).values = {0.4, 0.3, 0.5, -0.3};
+    expect_pose(solved(tube.robot, bent, tube.q, {}).pose(), plain, 1e-12);
+  }
+}
+
 TEST(LegendreSum, IsThatOfThePolynomials) {
-  const std::array<double, 5> c{0.3, -0.2, 0.15, 0.4, -0.7};
+  constexpr std::array c{0.3, -0.2, 0.15, 0.4, -0.7};
   for (const double x : {-1.0, -0.3, 0.0, 0.8, 1.0}) {
     double sum = 0;
     for (unsigned k = 1; k <= 5; ++k) sum += c[k - 1] * std::legendre(k, x);
-    EXPECT_NEAR(legendre_sum(x, c), sum, 1e-14);
-    EXPECT_NEAR((legendre_sum<double, 3>(x, {0.3, 0.0, 0.0})), 0.3 * x, 1e-15);
+    EXPECT_NEAR(legendre_sum(x, c[0], c[1], c[2], c[3], c[4]), sum, 1e-14);
+    EXPECT_NEAR(legendre_sum(x, 0.3, 0.0, 0.0), 0.3 * x, 1e-15);
   }
 }
 

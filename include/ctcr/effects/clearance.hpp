@@ -36,8 +36,7 @@ struct Clearance : EffectValues<clearance::parameters, N, P> {
 
   void station(Station<P, N>& s) const noexcept {
     if (s.kind != Station<P, N>::Kind::tube_tip) return;
-    const auto turn = lean(s.moment, this->template get<0>(s.tube), this->template get<1>(), this->template get<2>());
-    for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + turn[i];
+    kink(s, lean(s.moment, this->template get<0>(s.tube), this->template get<1>(), this->template get<2>()));
   }
 };
 

@@ -117,10 +117,27 @@ concept ActsOnJoints =
 /// Numbers without derivatives.
 struct Constant {};
 
+template <template <int, class> class... E>
+struct EffectList;
+
+namespace detail {
+/// Kept, and those of E that change the equilibrium of the rod.
+template <class Kept, template <int, class> class... E>
+struct WithThoseOnRod {
+  using List = Kept;
+};
+template <template <int, class> class... Kept, template <int, class> class E, template <int, class> class... Rest>
+struct WithThoseOnRod<EffectList<Kept...>, E, Rest...>
+  : WithThoseOnRod<std::conditional_t<ActsOnRod<E<2, double>, double, 2>, EffectList<Kept..., E>, EffectList<Kept...>>,
+                   Rest...> {};
+}  // namespace detail
+
 /// Effects that act together, in their order.
 template <template <int, class> class... E>
 struct EffectList {
   static constexpr bool none = sizeof...(E) == 0;
+  /// Those that change the equilibrium of the rod, in the same order.
+  using OnRod = typename detail::WithThoseOnRod<EffectList<>, E...>::List;
 
   template <int N, class P = double>
   struct On {
@@ -163,6 +180,14 @@ struct EffectList {
               transmission),
          ...);
       }(std::index_sequence_for<E<N, P>...>{});
+      return r;
+    }
+
+    /// Those alone that change the equilibrium of the rod.
+    [[nodiscard]] typename OnRod::template On<N, P> on_rod() const noexcept {
+      typename OnRod::template On<N, P> r;
+      std::apply([&](auto&... effect) { ((effect = std::get<std::remove_cvref_t<decltype(effect)>>(list)), ...); },
+                 r.list);
       return r;
     }
 

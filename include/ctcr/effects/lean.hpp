@@ -55,10 +55,16 @@ template <class P, int N>
   return {s.moment[0] - depth * s.force[1], s.moment[1] + depth * s.force[0]};
 }
 
-/// Kinks a station by `turn` [rad] about a pivot so deep behind it [m].
+/// Kinks a station by `turn` [rad].
+template <class P, int N>
+void kink(Station<P, N>& s, const std::array<P, 2>& turn) noexcept {
+  for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + turn[i];
+}
+
+/// The same about a pivot so deep behind it [m].
 template <class P, int N>
 void kink_about(Station<P, N>& s, const std::array<P, 2>& turn, const P& depth) noexcept {
-  for (std::size_t i = 0; i < 2; ++i) s.kink[i] = s.kink[i] + turn[i];
+  kink(s, turn);
   s.shift[0] = s.shift[0] + depth * turn[1];
   s.shift[1] = s.shift[1] - depth * turn[0];
 }

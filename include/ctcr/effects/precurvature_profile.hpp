@@ -78,9 +78,8 @@ struct PrecurvatureProfile : EffectValues<precurvature_profile::parameters, N, P
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     if (!place.curved) return;
     const int i = place.tube;
-    const P change = legendre_sum<P, 5>(2.0 * place.part - 1.0,
-                                        {this->template get<0>(i), this->template get<1>(i), this->template get<2>(i),
-                                         this->template get<3>(i), this->template get<4>(i)});
+    const P change = legendre_sum(2.0 * place.part - 1.0, this->template get<0>(i), this->template get<1>(i),
+                                  this->template get<2>(i), this->template get<3>(i), this->template get<4>(i));
     m.curvature[0] = m.curvature[0] + m.curvature[0] * change;
   }
 };

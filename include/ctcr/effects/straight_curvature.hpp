@@ -67,15 +67,10 @@ struct StraightCurvature : EffectValues<straight_curvature::parameters, N, P> {
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     if (place.curved) return;
     const int i = place.tube;
-    P x = this->template get<0>(i), y = this->template get<1>(i);
-    const P &slope = this->template get<2>(i), &bow = this->template get<3>(i);
-    if (!vanishes(slope) || !vanishes(bow)) {
-      const P uneven = legendre_sum<P, 2>(2.0 * place.part - 1.0, {slope, bow});
-      x = x + x * uneven;
-      y = y + y * uneven;
-    }
-    m.curvature[0] = m.curvature[0] + x;
-    m.curvature[1] = m.curvature[1] + y;
+    const P &x = this->template get<0>(i), &y = this->template get<1>(i);
+    const P uneven = 1.0 + legendre_sum(2.0 * place.part - 1.0, this->template get<2>(i), this->template get<3>(i));
+    m.curvature[0] = m.curvature[0] + x * uneven;
+    m.curvature[1] = m.curvature[1] + y * uneven;
   }
 };
 

@@ -14,7 +14,7 @@ struct RodInputs {
   std::array<TubeParameters<S>, N> tubes;
   std::array<S, N> beta, alpha;             ///< [m], [rad]
   std::array<S, 3> force, moment, gravity;  ///< base frame [N], [N m], [m/s^2]
-  typename Fx::template On<N, S> effects;
+  typename Fx::OnRod::template On<N, S> effects;
 };
 
 /// Carried along the rod; body vectors in the Bishop frame.
@@ -188,7 +188,7 @@ private:
     }
     std::array<double, 2> u = slope.inverted() * moment;
     double left = linear ? 0 : 1;  // (relative change)^2
-    for (int k = 0; k < softening_iterations && left > 1e-10; ++k) {
+    for (int k = 0; k < softening_iterations && left > 1e-8; ++k) {
       Tubes<double> ignored;
       const auto change = newton_step(place, y, b, u, ignored);
       u = {u[0] + change[0], u[1] + change[1]};

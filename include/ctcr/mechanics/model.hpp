@@ -15,13 +15,13 @@ inline Coefficients<N> with_all_curves(const Robot<N>& robot) noexcept {
   return c;
 }
 
-/// The numbers that the general path needs of a robot, and its effects.
+/// The numbers that the general path needs of a robot, and its effects on the rod.
 template <int N, class Fx>
 struct EffectCoefficients {
   std::array<TubeParameters<double>, N> tubes;
   Coefficients<N> plain;  ///< without effects: where tubes end and curve
   Vec3 gravity;           ///< base frame [m/s^2]
-  typename Fx::template On<N> effects;
+  typename Fx::OnRod::template On<N> effects;
   bool on_rod;  ///< whether effects change the equilibrium of the rod: else `plain` has the same
 };
 
@@ -43,7 +43,8 @@ public:
     if constexpr (Fx::none)
       coefficients_ = make_coefficients(robot);
     else
-      coefficients_ = {tube_parameters(robot), with_all_curves(robot), robot.gravity, effects, effects.act_on_rod()};
+      coefficients_ = {tube_parameters(robot), with_all_curves(robot), robot.gravity, effects.on_rod(),
+                       effects.act_on_rod()};
   }
 
   [[nodiscard]] const Robot<N>& robot() const noexcept { return robot_; }

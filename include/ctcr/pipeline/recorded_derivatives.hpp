@@ -136,8 +136,9 @@ private:
     for (Window window; window.first < count; window.first += window.size) {
       const auto seed = seeding(window);
       RodInputs<N, S, Fx> in;
-      in.effects = effects(seed);
-      find_joints(seed, in.effects, in.beta, in.alpha);
+      const auto all = effects(seed);
+      in.effects = all.on_rod();
+      find_joints(seed, all, in.beta, in.alpha);
       for (int i = 0; i < N; ++i) in.tubes[std::size_t(i)] = tube_of<N, S>(robot.tubes[std::size_t(i)], i, seed);
       for (int i = 0; i < 3; ++i) {
         const auto k = std::size_t(i);
