@@ -16,6 +16,7 @@ from ctcr import (
     recording,
     robot_update,
     sensor_roll,
+    unrecorded,
     user_effects,
 )
 from ctcr.calibrate import parameters
@@ -90,6 +91,7 @@ def add(
     that give the errors; the values are those of a fit to all rows. Raises InputError where no fit is possible.
     """
     readings, said = sensor_roll.positions_alone(robot, readings)
+    readings, ways = unrecorded.completed(robot, readings)
     base, fixed = identify.expand(list(free), robot), dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], fixed)
     held = locked_rows(robot, readings)
@@ -121,7 +123,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*said, *_notices(robot, fit, ids)],
+        [*said, *ways, *_notices(robot, fit, ids)],
     )
 
 

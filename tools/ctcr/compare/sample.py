@@ -92,7 +92,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
         tube_lengths=lengths,
         lever=lever,
         motion=motion.rows(keep),
-        not_measured=np.asarray(measurements.row)[~measured_row],
+        not_measured=np.setdiff1d(measurements.row[~measured_row], measurements.row[measured_row]),
         not_solved=np.asarray(measurements.row)[measured_row & ~solved_row],
     )
 

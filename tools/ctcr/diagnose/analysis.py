@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, open_side, sensor_roll
+from ctcr import effects, identify, open_side, sensor_roll, unrecorded
 from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
@@ -124,6 +124,7 @@ def diagnose(
     """
     began = perf_counter()
     measurements, notices = sensor_roll.positions_alone(robot, measurements)
+    measurements, ways = unrecorded.completed(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(robot, measurements, turn)
         result = _of_these(robot, measurements, locked, progress, threads)
@@ -133,7 +134,7 @@ def diagnose(
             result = _of_these(robot, measurements, locked, progress, threads)
         if result.accepted or not _surprises(result):
             break
-    result.notices = notices
+    result.notices = [*notices, *ways]
     result.seconds = perf_counter() - began
     return result
 
