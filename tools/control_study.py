@@ -54,8 +54,8 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     known = {"robot file": robot, "calibrated": identify.fit(robot, session).apply(robot)}
     result = diagnose(robot, session)
     if result.accepted:
-        ids, fixed = effect_settings.found(result.as_json(), robot)
-        known["with the effects found"] = effect_fit.add(robot, session, ids, fixed=fixed).robot
+        ids, fixed, start = effect_settings.found(result.as_json(), robot)
+        known["with the effects found"] = effect_fit.add(robot, session, ids, fixed=fixed, start=start).robot
     return known, f"{result.verdict.word}: {' + '.join(a.entry.id for a in result.accepted) or 'nothing'}"
 
 

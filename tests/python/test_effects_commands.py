@@ -181,6 +181,20 @@ def test_a_hidden_effect_is_found(robot, plan, given):
     assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
 
 
+def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan):
+    """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
+    true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")
+    made = simulation.simulate(true, plan, "jitter", seed=1)
+    there = {name: value for name, value in effects.value_of(true).items() if ".softening." in name}
+    alone, begun = (
+        effect_fit.add(robot, made, ["softening"], start=start, free=CALIBRATION) for start in (None, there)
+    )
+    for name in ("nominal", "calibrated"):
+        assert begun.rms("rms_mm")[name] == pytest.approx(alone.rms("rms_mm")[name], rel=1e-9)
+    for name, found in begun.parameters().items():
+        assert abs(found["value"] - alone.parameters()[name]["value"]) < 0.5 * found["sd"], name
+
+
 def test_what_the_data_cannot_say_is_said(robot, plan):
     timeless = replace(simulation.simulate(robot, plan, "jitter"), t=np.full(len(plan), np.nan))
     one_run = replace(timeless, run=0 * plan.run)

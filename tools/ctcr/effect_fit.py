@@ -82,38 +82,40 @@ def add(
     ids: Sequence[str],
     *,
     fixed: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
     free: Sequence[str] = ("standard",),
 ) -> Added:
     """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
 
     Of each effect the amplitudes are fitted first, then its shape parameters are freed too. `fixed` parameters, by
-    full name in SI, keep their value. Every fourth run (where there are few: block of time) is kept out of the fits
-    that give the errors; the values are those of a fit to all rows. Raises InputError where no fit is possible.
+    full name in SI, keep their value, those of `start` begin at one. Every fourth run (where there are few: block of
+    time) is kept out of the fits that give the errors; the values are those of a fit to all rows. Raises InputError
+    where no fit is possible.
     """
     readings, said = sensor_roll.positions_alone(robot, readings)
     readings, ways = unrecorded.completed(robot, readings)
     base, fixed = identify.expand(list(free), robot), dict(fixed or {})
-    robot = with_values(robot, [*robot.effects, *ids], fixed)
-    held = locked_rows(robot, readings)
-    fitted = [*robot_before(robot, ids).effects]
+    robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
+    before = robot_before(robot, ids)
+    held, fitted = locked_rows(before, readings), [*before.effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, base, fixed)
-        start = stage.values()
-        fit = stage(fitted, fitted, ~held, start)
+        now = stage.values()
+        fit = stage(fitted, fitted, ~held, now)
         progress.advance(1)
         judged = held if held.any() else np.ones(len(readings), bool)
         stages = [Stage("nominal", *_rms(stage.nominal()[judged])), _stage("calibrated", fit, judged)]
         for identity in ids:
             fitted.append(identity)
             for shaped in (fitted[:-1], fitted):
-                start |= dict(zip(fit.names, fit.values, strict=True))
+                now |= dict(zip(fit.names, fit.values, strict=True))
                 if shaped is not fitted or stage.shapes(identity):
-                    fit = stage(fitted, shaped, ~held, start)
+                    fit = stage(fitted, shaped, ~held, now)
                 progress.advance(1)
             stages.append(_stage(identity, fit, judged))
         if held.any():
-            start |= dict(zip(fit.names, fit.values, strict=True))
-            fit = stage(fitted, fitted, np.ones(len(readings), bool), start)
+            now |= dict(zip(fit.names, fit.values, strict=True))
+            fit = stage(fitted, fitted, np.ones(len(readings), bool), now)
         progress.advance(1)
     fit = open_side.widened(fit)
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.places)))
@@ -250,7 +252,8 @@ class _Fitter:
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
         names = [*self.base, *own]
-        recorded = user_effects.recording_of(self.robot, self.readings, names, steps=self.steps)
+        robot = _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
+        recorded = user_effects.recording_of(robot, self.readings, names, steps=self.steps)
         if not hasattr(self, "_nominal"):
             self._nominal = recorded.residual(recorded.nominal())[0].reshape(-1, 6)
         recorded.activate((self.measured & rows).tolist())
@@ -273,7 +276,7 @@ class _Fitter:
         if noise is not fit.noise:
             fit = fitted(noise, fit.values)
         # The robot is to predict; how sure its values are is another question.
-        self._engine.rows = rows
+        self._engine.robot, self._engine.rows = robot, rows
         noise = noise_for_prediction(self._engine, fit)
         if noise is not fit.noise:
             likely, fit = fit, fitted(noise, fit.values, fit.weights)

@@ -29,7 +29,7 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
     return found
 
 
-def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float]]:
+def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
     """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
     try:
         return found(json.loads(Path(path).read_text(encoding="utf-8")), robot)
@@ -39,17 +39,19 @@ def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, floa
         raise InputError(Problem("is not what ctcr diagnose writes with --json", path)) from None
 
 
-def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float]]:
-    """The effects of a diagnosis (its as_json()), the first of each class, and the values of their choices."""
-    ids, values = [], {}
+def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
+    """The effects of a diagnosis (its as_json()), the first of each class, the values of their choices, and those of
+    their other parameters."""
+    ids, choices, values = [], {}, {}
     for entry in answer["effects"]:
-        identity, parameters = entry["class"][0], dict(entry["parameters"])
-        effect = effects.get(identity, robot.n_tubes)
+        effect, parameters = effects.get(entry["class"][0], robot.n_tubes), dict(entry["parameters"])
         ids.append(effect.id)
         for parameter in effect.parameters:
-            if parameter.kind == "choice" and parameter.name in parameters:
-                values |= dict.fromkeys(parameter.full_names, float(parameters[parameter.name]))
-    return ids, values
+            for name in parameter.full_names:
+                value = parameters.get(name.removeprefix(f"effects.{effect.id}."))
+                if value is not None:
+                    (choices if parameter.kind == "choice" else values)[name] = float(value)
+    return ids, choices, values
 
 
 def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:

@@ -41,7 +41,7 @@ def command(robot, names, diagnosis, measurements, given, free, own, target, in_
     target = outcome.check_target(loaded, target, in_place)
     if not target:
         raise InputError(Problem("give -o: the robot file to write"))
-    found, choices = diagnosed(diagnosis, loaded) if diagnosis else ([], {})
+    found, choices, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})
     ids = list(dict.fromkeys(effects.get(name, loaded.n_tubes).id for name in [*names, *found]))
     if not ids:
         raise InputError(
@@ -59,7 +59,7 @@ def command(robot, names, diagnosis, measurements, given, free, own, target, in_
             output.write_json({"effects": after.effects}, json_target)
         return
     readings = table.load(measurements, loaded.n_tubes)
-    added = effect_fit.add(loaded, readings, ids, fixed=fixed, free=free.split(","))
+    added = effect_fit.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
     effect_fit.write_added(loaded, added, target, measurements, in_place)
     if json_target:
         output.write_json(_as_data(added), json_target)
