@@ -288,4 +288,36 @@ TEST(IdentifyReadings, LeavesOutRowsThatStandInTheWay) {
   EXPECT_NEAR(fit.values[1] - readings.nominal()[1], 1e-3, 4 * fit.sd[1]);
 }
 
+TEST(IdentifyReadings, RowsInTheWayOneBehindTheOtherDoNotHoldItUp) {
+  test::Random random(6);
+  ThreadPool pool(1);
+  const System<2> nominal = bench();
+  auto table = path(nominal, changed(nominal, P::index(Parameter::home_translation, 1), 1e-3), 60, random);
+  add_noise(table, {.position_jitter = 5e-5, .rotation_jitter = 5e-4}, random);
+  const std::vector<int> blocking{7, 11, 23, 31, 44};
+  for (const int row : blocking) {
+    auto& recorded = table.rows[std::size_t(row)];
+    const double beta = joints(nominal.transmission, recorded.theta).beta[0];
+    recorded.theta.translation =
+        motor_angles(nominal.transmission, {VecN<2>(beta, -2e-5 * row), VecN<2>(0, 0)}).translation;
+  }
+  const std::vector<int> homes{P::index(Parameter::home_translation, 0), P::index(Parameter::home_translation, 1)};
+  struct Counted : Recording<2> {
+    using Recording<2>::Recording;
+    int calls = 0;
+    bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
+      ++calls;
+      return Recording<2>::operator()(x, residual, jacobian);
+    }
+  } readings(nominal, table.rows, table.measured, homes, pool);
+  const Free free = free_parameters(readings.nominal(), homes);
+  std::vector<int> excluded;
+  const Identification fit =
+      identify_readings(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
+  EXPECT_TRUE(fit.converged) << fit.status;
+  EXPECT_EQ(excluded, blocking);
+  EXPECT_NEAR(fit.values[1] - readings.nominal()[1], 1e-3, 4 * fit.sd[1]);
+  EXPECT_LT(readings.calls, 30);
+}
+
 }  // namespace recording_test

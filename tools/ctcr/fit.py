@@ -31,6 +31,7 @@ class Fit:
     correlations: list[tuple[str, str, float]]  # beyond 0.9, strongest first
     directions: list[Any]  # undetermined combinations: .text, .ratio, .coefficients in prior sd
     chi_square: float  # under the noise as stated
+    admitted_chi_square: float  # under the noise as the fit had to admit it
     shift_square: float
     observations: int
     bulk_observations: float  # without outliers: degrees of freedom of chi_square + shift_square
@@ -136,17 +137,20 @@ class Fit:
         return free_parameters.applied(robot, self.names, self.values)
 
     def whiten(self, columns: ArrayLike) -> Array:
-        """Columns (M, 6) or (M, 6, k) with the noise of the fit made independent and of unit variance, (6 M, k).
-
-        Rows that were not fitted become 0.
-        """
+        """Columns (M, 6) or (M, 6, k) with the noise of the fit made independent and of unit variance, (K, k), of the K
+        numbers that were fitted."""
         columns = np.asarray(columns, dtype=float)
-        return self.core.whiten(columns.reshape(6 * len(columns), -1))
+        return self.core.whiten(columns.reshape(6 * len(columns), -1))[self._fitted_numbers]
 
     def whitened(self) -> tuple[Array, Array]:
-        """Whitened residual (6 M,) and its derivative (6 M, n) by the parameters; the prior is not in it."""
-        both = self.core.whiten(np.column_stack([self.residual.ravel(), self.jacobian_all]))
+        """Whitened residual (K,) and its derivative (K, n) by the parameters; the prior is not in it."""
+        slopes = self.jacobian_all.reshape(*self.residual.shape, -1)
+        both = self.whiten(np.concatenate([self.residual[:, :, None], slopes], axis=2))
         return both[:, 0], both[:, 1:]
+
+    @cached_property
+    def _fitted_numbers(self) -> NDArray[np.int64]:
+        return np.flatnonzero(np.repeat(self.weights > 0, 3, axis=1))
 
     def _floor(self, kind: int, rows: Mask | None) -> float:
         known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)

@@ -202,10 +202,21 @@ def _with_frame(
 
 
 def identify_rows(
-    table: Any, rows: Mask, *arguments: Any, start: Array, starts: int = 1, **options: Any
+    table: Any,
+    rows: Mask,
+    *arguments: Any,
+    start: Array,
+    starts: int = 1,
+    few_first: bool = True,
+    weights: Array | None = None,
+    **options: Any,
 ) -> Fit:
-    """identify_with() of some rows of a Recording. Where they are many, the starts are compared on a few of them."""
-    few = few_of(rows)
+    """identify_with() of some rows of a Recording. Where they are many, the starts are compared on a few of them, with
+    few_first."""
+    options["weights"] = weights
+    if weights is not None:
+        rows = rows & (weights > 0).any(axis=1)
+    few = few_of(rows) if few_first else None
     if few is None:
         table.activate(rows.tolist())
         return identify_with(table, *arguments, start=start, starts=starts, **options)
@@ -216,10 +227,10 @@ def identify_rows(
     return replace(fitted, starts=first.starts)
 
 
-def few_of(rows: Mask) -> Mask | None:
-    """FEW_ROWS or more of many rows (M,), evenly spread; None where they are few."""
+def few_of(rows: Mask, least: int | None = None) -> Mask | None:
+    """At least so many (FEW_ROWS) of many rows (M,), evenly spread; None where they are few."""
     chosen = np.flatnonzero(rows)
-    every = len(chosen) // FEW_ROWS
+    every = len(chosen) // (least or FEW_ROWS)
     if every < 2:
         return None
     few = np.zeros_like(rows)
@@ -285,9 +296,9 @@ def identify_with(
         **{
             name: getattr(core, name)
             for name in (
-                "values", "sd", "covariance", "shift", "ratio", "directions", "chi_square", "shift_square",
-                "observations", "bulk_observations", "effective_parameters", "reduced_chi_square", "log_evidence",
-                "inflation", "weights", "converged", "status", "starts", "iterations", "evaluations",
+                "values", "sd", "covariance", "shift", "ratio", "directions", "chi_square", "admitted_chi_square",
+                "shift_square", "observations", "bulk_observations", "effective_parameters", "reduced_chi_square",
+                "log_evidence", "inflation", "weights", "converged", "status", "starts", "iterations", "evaluations",
             )
         },
     )  # fmt: skip
@@ -303,6 +314,7 @@ def linear_fit(
     rows: Mask | None = None,
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
+    max_iterations: int = 50,
 ) -> Fit:
     """As identify_with() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or
     weights (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any."""
@@ -315,7 +327,7 @@ def linear_fit(
     return identify_with(
         predict, at.names, at.prior_mean, at.prior_sd, low, high, noise or at.noise, places,
         robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-        start=at.values, starts=1,
+        start=at.values, starts=1, max_iterations=max_iterations,
     )  # fmt: skip
 
 

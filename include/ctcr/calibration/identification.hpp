@@ -53,6 +53,7 @@ struct Identification {
   std::vector<Direction> directions;  ///< undetermined ones
 
   double chi_square = 0;            ///< of the residuals under the noise as stated, outliers counting for little
+  double admitted_chi_square = 0;   ///< the same under the noise as the fit had to admit it
   double shift_square = 0;          ///< sum of the squared shifts
   Eigen::Index observations = 0;    ///< numbers fitted
   double bulk_observations = 0;     ///< without the outliers: degrees of freedom of chi_square + shift_square

@@ -22,6 +22,41 @@ inline RowWeights measured(const Eigen::VectorXd& residual) {
 /// Rows that count, an outlier by the share of it that is none.
 inline double bulk_rows(const RowWeights& weights, int kind) { return weights.col(kind).array().min(1.0).sqrt().sum(); }
 
+/// Rows of a table that are fitted, taken out of columns of six entries a row: the others may be many.
+class FittedRows {
+public:
+  explicit FittedRows(const RowWeights& use) {
+    for (Eigen::Index i = 0; i < use.rows(); ++i)
+      if ((use.row(i).array() > 0).any()) rows_.push_back(i);
+    for (const Eigen::Index i : rows_)
+      for (Eigen::Index entry = 6 * i; entry < 6 * i + 6; ++entry) entries_.push_back(entry);
+  }
+
+  [[nodiscard]] Predictor predictor(const Predictor& predict) const {
+    return [this, &predict, residual = Eigen::VectorXd(), jacobian = Eigen::MatrixXd()](
+               const Eigen::VectorXd& x, Eigen::VectorXd& some, Eigen::MatrixXd* slopes) mutable {
+      if (!predict(x, residual, slopes ? &jacobian : nullptr)) return false;
+      some = of(residual);
+      if (slopes) *slopes = of(jacobian);
+      return true;
+    };
+  }
+  [[nodiscard]] Eigen::MatrixXd of(const Eigen::MatrixXd& columns) const { return columns(entries_, Eigen::all); }
+  [[nodiscard]] SmoothField field(const SmoothField& field) const {
+    return {field.factor(rows_, Eigen::all), field.rest(rows_)};
+  }
+  [[nodiscard]] RowWeights weights(const RowWeights& weights) const { return weights(rows_, Eigen::all); }
+  /// Weights of all rows, 0 where they are not fitted.
+  [[nodiscard]] RowWeights among(Eigen::Index rows, const RowWeights& weights) const {
+    RowWeights all = RowWeights::Zero(rows, 2);
+    all(rows_, Eigen::all) = weights;
+    return all;
+  }
+
+private:
+  std::vector<Eigen::Index> rows_, entries_;
+};
+
 /// The factor of the field error at the places of a table, fine enough for its noise.
 inline SmoothField field_at(const Eigen::MatrixX3d& places, const Noise& noise) {
   constexpr double negligible = 0.01;  // of the jitter's variance
@@ -58,28 +93,34 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   if (residual.size() != 6 * places.rows() || jacobian.rows() != residual.size() || jacobian.cols() != n)
     throw std::invalid_argument("the predictor, the parameters and the places do not fit together");
   const RowWeights is_measured = detail::measured(residual);
-  const RowWeights use = options.weights ? is_measured.cwiseProduct(*options.weights) : is_measured;
-  if (!(use.array() > 0).any())
+  const RowWeights given = options.weights ? is_measured.cwiseProduct(*options.weights) : is_measured;
+  if (!(given.array() > 0).any())
     throw std::invalid_argument("no reading is left to fit: nothing was measured or solved");
+  const detail::FittedRows fitted(given);
+  const RowWeights use = fitted.weights(given);
+  const Predictor predict_fitted = fitted.predictor(predict);
+  residual = fitted.of(residual), jacobian = fitted.of(jacobian);
 
   const bool smooth = noise.position_field > 0 || noise.rotation_field > 0;
-  const SmoothField field = smooth
-                                ? detail::field_at(places, noise)
-                                : SmoothField{Eigen::MatrixXd(places.rows(), 0), Eigen::VectorXd::Zero(places.rows())};
+  const SmoothField field_everywhere =
+      smooth ? detail::field_at(places, noise)
+             : SmoothField{Eigen::MatrixXd(places.rows(), 0), Eigen::VectorXd::Zero(places.rows())};
+  const SmoothField field = fitted.field(field_everywhere);
   Identification out;
   out.weights = use;
   if (options.inflation) out.inflation = *options.inflation;
-  const auto set_whitening = [&] {
-    RowWeights inflated = out.weights;
-    for (int kind = 0; kind < 2; ++kind) inflated.col(kind) /= out.inflation[kind] * out.inflation[kind];
-    out.whitening = Whitening(noise, field, inflated);
+  const auto inflated = [&] {
+    RowWeights weights = out.weights;
+    for (int kind = 0; kind < 2; ++kind) weights.col(kind) /= out.inflation[kind] * out.inflation[kind];
+    return weights;
   };
+  const auto set_whitening = [&] { out.whitening = Whitening(noise, field, inflated()); };
   set_whitening();
   // Without a prior a parameter is scaled by what the readings say of it.
   out.whitening.apply(jacobian);
   for (Eigen::Index k = 0; k < n; ++k)
     if (!std::isfinite(sd[k])) sd[k] = jacobian.col(k).norm() > 0 ? 1 / jacobian.col(k).norm() : 1.0;
-  detail::Objective objective(predict, parameters, sd);
+  detail::Objective objective(predict_fitted, parameters, sd);
   objective.set_whitening(out.whitening);
   const detail::Bounds bounds(parameters, options.within, sd);
 
@@ -190,6 +231,7 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   residual = objective.at(z)->residual;
   Whitening(noise, field, out.weights).apply(residual);
   out.chi_square = residual.squaredNorm();
+  out.admitted_chi_square = here.chi_square;
   out.shift_square = z.cwiseProduct(objective.prior()).squaredNorm();
   out.observations = out.whitening.observations();
   out.effective_parameters = posterior.effective_parameters();
@@ -207,6 +249,8 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
                              : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
                                    detail::number(left) + " standard deviations is left";
   detail::add_warnings(parameters, posterior, here.information.diagonal(), bounds.reached(z), use, out);
+  out.whitening = Whitening(noise, field_everywhere, fitted.among(places.rows(), inflated()));
+  out.weights = fitted.among(places.rows(), out.weights);
   return out;
 }
 

@@ -10,8 +10,9 @@ namespace ctcr {
 
 /// Fits the active rows of a table such as Recording: a Predictor with unsolved(), active() and activate().
 ///
-/// Rows that cannot be solved at the start are left out of the whole fit. So are, once a descent gets stuck for their
-/// sake, those that cannot be solved where it wants to go, if they are few; it then goes on without them.
+/// Rows that cannot be solved at the start are left out of the whole fit. Few of the others do not hold up a descent: one
+/// that cannot be solved at a trial keeps the residual it had where it last could be, without slopes. Those that cannot be
+/// solved where the descent ends are left out then, and it goes on without them.
 /// @param excluded  receives the rows left out
 /// @return and throws as identify(); on return the table's active rows are those that were fitted
 template <class Table>
@@ -24,28 +25,34 @@ Identification identify_readings(Table& table, const std::vector<FreeParameter>&
     table.activate(active);
     excluded.insert(excluded.end(), rows.begin(), rows.end());
   };
-  Eigen::VectorXd x(Eigen::Index(parameters.size())), residual;
+  Eigen::VectorXd x(Eigen::Index(parameters.size())), solved;
   for (Eigen::Index k = 0; k < x.size(); ++k)
     x[k] = options.start ? (*options.start)[k] : parameters[std::size_t(k)].mean;
-  if (!table(x, residual, nullptr)) exclude(table.unsolved());
+  if (!table(x, solved, nullptr)) exclude(table.unsolved());
+  const auto active = std::count(table.active().begin(), table.active().end(), true);
 
   for (int round = 1;; ++round) {
-    std::vector<int> blocked;
+    std::size_t blocked = 0;
     const Predictor predict = [&](const Eigen::VectorXd& at, Eigen::VectorXd& out, Eigen::MatrixXd* jacobian) {
-      const bool solved = table(at, out, jacobian);
-      if (!solved) blocked = table.unsolved();
-      return solved;
+      (void)table(at, out, jacobian);
+      const std::vector<int>& unsolved = table.unsolved();
+      const bool few = round < rounds && 10 * std::ssize(unsolved) <= active;
+      if (!few && !unsolved.empty()) {
+        blocked = unsolved.size();
+        return false;
+      }
+      for (const int row : unsolved) out.segment<6>(6 * row) = solved.segment<6>(6 * row);
+      solved = out;
+      return true;
     };
     Identification fit = identify(predict, parameters, noise, places, options);
-    const auto active = std::count(table.active().begin(), table.active().end(), true);
-    const bool few = 10 * std::ssize(blocked) <= active;
-    if (fit.converged || blocked.empty() || !few || round == rounds) {
-      if (!fit.converged && !blocked.empty())
-        fit.status += "; " + std::to_string(blocked.size()) + " readings cannot be solved where it leads";
+    if (table(fit.values, solved, nullptr) || round == rounds) {
+      if (!fit.converged && blocked > 0)
+        fit.status += "; " + std::to_string(blocked) + " readings cannot be solved where it leads";
       std::sort(excluded.begin(), excluded.end());
       return fit;
     }
-    exclude(blocked);
+    exclude(table.unsolved());
     options.start = fit.values;
   }
 }

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <array>
 #include <type_traits>
+#include <vector>
 
 #include "ctcr/calibration/dense.hpp"
 #include "ctcr/calibration/noise.hpp"
@@ -30,29 +31,30 @@ class ThreeAxes {
 public:
   ThreeAxes() = default;
   ThreeAxes(double jitter, double field_sd, const SmoothField& field, const Eigen::VectorXd& weight)
-    : field_(field_sd * field.factor),
-      jitter_variance_(jitter * jitter),
-      variance_(jitter_variance_ + field_sd * field_sd) {
+    : jitter_variance_(jitter * jitter), variance_(jitter_variance_ + field_sd * field_sd) {
     const Eigen::ArrayXd variance = jitter * jitter + field_sd * field_sd * field.rest.array();
     scale_ = (weight.array() / variance).sqrt();
-    used_ = (weight.array() > 0).count();
+    for (Eigen::Index i = 0; i < weight.size(); ++i)
+      if (weight[i] > 0) rows_.push_back(i);
+    field_ = field_sd * field.factor.leftCols(field_sd > 0 && !rows_.empty() ? field.factor.cols() : 0);
     log_determinant_ = -2 * (scale_.array() > 0).select(scale_.array().log(), 0.0).sum();
     if (field_.cols() == 0) return;
-    const Eigen::MatrixXd A = scale_.asDiagonal() * field_;
+    const Eigen::MatrixXd A = scale_(rows_).asDiagonal() * field_(rows_, Eigen::all);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(transposed_product(A, A));
     const Eigen::ArrayXd t = eigen.eigenvalues().array().max(0.0);
-    field_ = product(field_, eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal());
+    const Eigen::MatrixXd to_posterior = eigen.eigenvectors() * (1 + t).rsqrt().matrix().asDiagonal();
+    field_ = product(field_, to_posterior);
+    scaled_field_ = product(A, to_posterior);
     shrink_ = (1 + t).sqrt() / (1 + (1 + t).sqrt());
     strength_ = t;
     log_determinant_ += (1 + t).log().sum();
   }
 
-  /// @param y  (rows, any)
+  /// @param y  (rows of weight above 0, any)
   void whiten(Eigen::MatrixXd& y) const {
-    y = scale_.asDiagonal() * y;
-    if (field_.cols() == 0) return;
-    const Eigen::MatrixXd small = shrink_.matrix().asDiagonal() * transposed_product(field_, scale_.asDiagonal() * y);
-    y -= scale_.asDiagonal() * product(field_, small);
+    y = scale_(rows_).asDiagonal() * y;
+    if (scaled_field_.cols() == 0) return;
+    y -= product(scaled_field_, shrink_.matrix().asDiagonal() * transposed_product(scaled_field_, y));
   }
   /// Posterior mean of the field error at every row, given residuals (rows, any).
   [[nodiscard]] Eigen::MatrixXd field_mean(const Eigen::MatrixXd& residual) const {
@@ -84,14 +86,15 @@ public:
   [[nodiscard]] double variance() const { return variance_; }            ///< of one reading, jitter and field, per axis
   [[nodiscard]] double jitter_variance() const { return jitter_variance_; }
   [[nodiscard]] double log_determinant() const { return 3 * log_determinant_; }
-  [[nodiscard]] Eigen::Index used() const { return used_; }  ///< rows of weight above 0
+  [[nodiscard]] const std::vector<Eigen::Index>& rows() const { return rows_; }  ///< of weight above 0
 
 private:
-  Eigen::MatrixXd field_;  ///< its posterior covariance is field_ field_^T
+  Eigen::MatrixXd field_;         ///< its posterior covariance is field_ field_^T
+  Eigen::MatrixXd scaled_field_;  ///< its rows of weight above 0, scaled
   Eigen::VectorXd scale_;
   Eigen::ArrayXd shrink_, strength_;
   double jitter_variance_ = 0, variance_ = 0, log_determinant_ = 0;
-  Eigen::Index used_ = 0;
+  std::vector<Eigen::Index> rows_;
 };
 
 }  // namespace detail
@@ -113,17 +116,21 @@ public:
     constexpr Eigen::Index panel = 16;  // columns at a time: bounds the memory
     for (Eigen::Index first = 0; first < columns.cols(); first += panel) {
       auto some = columns.middleCols(first, std::min(panel, columns.cols() - first));
+      std::array<Eigen::MatrixXd, 2> y;
       for (int kind = 0; kind < 2; ++kind) {
-        Eigen::MatrixXd y = gathered(some, kind);
-        axes_[std::size_t(kind)].whiten(y);
-        scatter(y, kind, some);
+        y[std::size_t(kind)] = gathered(some, kind, axes(kind).rows());
+        axes(kind).whiten(y[std::size_t(kind)]);
       }
+      some.setZero();
+      for (int kind = 0; kind < 2; ++kind) scatter(y[std::size_t(kind)], kind, axes(kind).rows(), some);
     }
   }
   /// log |Sigma| of the rows of weight above 0.
   [[nodiscard]] double log_determinant() const { return axes_[0].log_determinant() + axes_[1].log_determinant(); }
   /// Numbers of weight above 0.
-  [[nodiscard]] Eigen::Index observations() const { return 3 * (axes_[0].used() + axes_[1].used()); }
+  [[nodiscard]] Eigen::Index observations() const {
+    return 3 * Eigen::Index(axes_[0].rows().size() + axes_[1].rows().size());
+  }
   /// Posterior mean of the field error given a residual (6 rows): what of it the tracker's field explains. Defined at
   /// rows of weight 0 too, from the others.
   [[nodiscard]] Eigen::VectorXd field(const Eigen::VectorXd& residual) const {
@@ -148,6 +155,25 @@ public:
   }
 
 private:
+  /// The same of some rows, and back.
+  static Eigen::MatrixXd gathered(const Eigen::Ref<const Eigen::MatrixXd>& columns, int kind,
+                                  const std::vector<Eigen::Index>& some) {
+    Eigen::MatrixXd y(Eigen::Index(some.size()), 3 * columns.cols());
+    for (Eigen::Index k = 0; k < columns.cols(); ++k)
+      for (int a = 0; a < 3; ++a)
+        for (Eigen::Index i = 0; i < y.rows(); ++i) {
+          const double x = columns(6 * some[std::size_t(i)] + 3 * kind + a, k);
+          y(i, 3 * k + a) = std::isfinite(x) ? x : 0.0;
+        }
+    return y;
+  }
+  static void scatter(const Eigen::MatrixXd& y, int kind, const std::vector<Eigen::Index>& some,
+                      Eigen::Ref<Eigen::MatrixXd> columns) {
+    for (Eigen::Index k = 0; k < columns.cols(); ++k)
+      for (int a = 0; a < 3; ++a)
+        for (Eigen::Index i = 0; i < y.rows(); ++i)
+          columns(6 * some[std::size_t(i)] + 3 * kind + a, k) = y(i, 3 * k + a);
+  }
   static void scatter(const Eigen::MatrixXd& y, int kind, Eigen::Ref<Eigen::MatrixXd> columns) {
     for (Eigen::Index k = 0; k < columns.cols(); ++k)
       for (int a = 0; a < 3; ++a)

@@ -129,6 +129,7 @@ void bind_identify(nb::module_& m) {
       .def_ro("correlations", &Identification::correlations)
       .def_ro("directions", &Identification::directions)
       .def_ro("chi_square", &Identification::chi_square)
+      .def_ro("admitted_chi_square", &Identification::admitted_chi_square)
       .def_ro("shift_square", &Identification::shift_square)
       .def_ro("observations", &Identification::observations)
       .def_ro("bulk_observations", &Identification::bulk_observations)
