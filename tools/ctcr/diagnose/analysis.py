@@ -190,15 +190,16 @@ def _diagnose(
 
     rounds: list[Round] = []
     accepted: list[Accepted] = []
-    start, settled = {}, False
+    before, start, settled = {}, {}, False
     few = identify.few_of(engine.fitted)
     if few is not None:
         progress("a part of the readings first")
         part, more = replace(engine, rows=few), np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
+        before = values_of(first)
         first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
         start = values_of(first)
-    calibrated = fit = racing.baseline(engine, [], start, progress)
+    calibrated = fit = racing.baseline(engine, [], before, progress)
     if accepted:
         engine.robust = True
         fit = racing.baseline(engine, [a.entry for a in accepted], start, progress)
@@ -208,12 +209,12 @@ def _diagnose(
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
-    before = racing.predictive(engine, calibrated, [], progress)
-    after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else before
+    alone = racing.predictive(engine, calibrated, [], progress)
+    after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else alone
     return Diagnosis(
-        robot, measurements, locked, unseen, before, open_side.widened(after), open_side.widened(fit),
+        robot, measurements, locked, unseen, alone, open_side.widened(after), open_side.widened(fit),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
-        judge(before, after, accepted, rounds, leftover, locked),
+        judge(alone, after, accepted, rounds, leftover, locked),
     )  # fmt: skip
 
 
@@ -267,7 +268,7 @@ def _with_shapes(
         entry = replace(last, candidate=replace(form, names=(*last.candidate.names, *shapes)))
         names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
         start = dict(form.shape) | values_of(fit)
-        tried.append((entry, engine.fit_like(fit, names, start=start, fixed=fixed)))
+        tried.append((entry, engine.fit_like(fit, names, start=start, fixed=fixed, near=True)))
     entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit

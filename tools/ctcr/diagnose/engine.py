@@ -1,7 +1,7 @@
 """Fits and linearisations of a robot with any effects, at one table of measurements, one noise and one split."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
+SLOPES = 1500  # rows by whose slopes candidates are screened where there are twice as many or more
 CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 
@@ -106,8 +107,10 @@ class Engine:
         noise: Any = None,
         max_iterations: int = 50,
         tolerance: float = 0.02,
+        near: bool = False,
     ) -> identify.Fit:
-        """Calibration and `added` parameters of effects together.
+        """Calibration and `added` parameters of effects together. `near`: the start is where a like fit ended, so that
+        a fit of few of many rows would teach nothing.
 
         Frozen `weights` of outliers and `inflation` of the noise make evidences comparable; without them both follow
         the fit: where the model is wrong, the noise is inflated so that calibration stays plausible.
@@ -122,7 +125,7 @@ class Engine:
         return identify.identify_rows(
             table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, max_iterations=max_iterations, tolerance=tolerance,
+            start=at, max_iterations=max_iterations, tolerance=tolerance, few_first=not near,
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 
@@ -137,12 +140,23 @@ class Engine:
         noise: Any = None,
         weights: Array | None = None,
         inflation: Array | None = None,
+        max_iterations: int = 50,
     ) -> identify.Fit:
         """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap."""
         _, _, low, high = self.priors(at.names)
         return identify.linear_fit(
-            at, low, high, self.places, noise=noise, rows=self.rows, weights=weights, inflation=inflation
-        )
+            at, low, high, self.places, noise=noise, rows=self.rows, weights=weights, inflation=inflation,
+            max_iterations=max_iterations,
+        )  # fmt: skip
+
+    def thinned(self, fit: identify.Fit) -> tuple["Engine", identify.Fit]:
+        """Itself and a fit, or where rows are many both with fewer of them, each of which counts for its neighbours."""
+        few = identify.few_of(self.fitted, SLOPES)
+        if few is None:
+            return self, fit
+        weights = fit.weights * few[:, None] * (np.sum(self.fitted) / np.sum(few))
+        thin = self.linear_fit(fit, weights=weights, inflation=fit.inflation, max_iterations=0)
+        return replace(self, rows=few), thin
 
     def as_stated(self, fit: identify.Fit) -> identify.Fit:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""

@@ -78,6 +78,9 @@ class Round:
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
+    is_stand_in: bool = (
+        False  # whether the best candidate surely removes too little, however many readings there are
+    )
 
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
@@ -87,22 +90,25 @@ class Round:
 
 def misfit(fit: identify.Fit) -> float:
     """Chi-square of residual and prior, in units of the fit's inflated noise."""
-    return float(np.sum(fit.whiten(fit.residual) ** 2)) + fit.shift_square
+    return fit.admitted_chi_square + fit.shift_square
 
 
 def explained(fit: identify.Fit) -> float:
     """Chi-square that the noise as stated explains, in the units of misfit()."""
     position, rotation = fit.inflation
-    used = (fit.weights > 0) & np.isfinite(fit.residual[:, ::3])
-    return float(3 * (used[:, 0].sum() / position**2 + used[:, 1].sum() / rotation**2))
+    used = (fit.weights > 0).sum(axis=0)
+    return float(3 * (used[0] / position**2 + used[1] / rotation**2))
+
+
+def excess(fit: identify.Fit) -> float:
+    """Chi-square beyond what the noise as stated explains, at least its usual scatter."""
+    return max(misfit(fit) - explained(fit), np.sqrt(2 * fit.observations))
 
 
 def share_of(before: identify.Fit, after: identify.Fit, added: int) -> float:
     """Part of the excess that `added` parameters remove, at the same weights and noise."""
-    whole = misfit(before)
-    removed = whole - misfit(after) - added
-    spread = np.sqrt(2 * before.observations)
-    return float(removed / max(whole - explained(before), spread, removed, 1.0))
+    removed = misfit(before) - misfit(after) - added
+    return float(removed / max(excess(before), removed, 1.0))
 
 
 def outliers(fit: identify.Fit) -> float:
@@ -130,11 +136,13 @@ def baseline(
     """Calibration and the accepted effects, outliers weighted; the part of the field error that the data ask for."""
     progress("calibration")
     names, fixed = parameters(accepted)
-    full = engine.fit(names, start=start, fixed=fixed)
+    full = engine.fit(names, start=start, fixed=fixed, near=bool(start))
     _, _, low, high = engine.priors(full.names)
     noise = identify.likeliest_field(full, low, high, engine.places)
     # From the full model's place: what effects do far from there, slopes do not tell.
-    return full if noise is full.noise else engine.fit(names, start=values_of(full), fixed=fixed, noise=noise)
+    if noise is full.noise:
+        return full
+    return engine.fit(names, start=values_of(full), fixed=fixed, noise=noise, near=True)
 
 
 def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> identify.Fit:
@@ -143,7 +151,7 @@ def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> iden
     if fit.converged:
         return fit
     names, fixed = parameters(accepted)
-    return engine.fit_like(before, names, start=values_of(fit), fixed=fixed)
+    return engine.fit_like(before, names, start=values_of(fit), fixed=fixed, near=True)
 
 
 def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
@@ -197,7 +205,7 @@ def race(
     """One round: screens all candidates by their slopes, refits the best, and decides."""
     progress("screening all candidates")
     _, fixed = parameters(accepted)
-    screened = screen(engine, before, candidates, fixed)
+    screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
         return Round(before, [], {}, reason="no effect is left to try")
     worth = [entry for entry in screened if entry.linear > max(1.0, NEAR * screened[0].linear)]
@@ -267,7 +275,7 @@ def _in_reach(
         return chosen
     small = replace(engine, rows=few)
     added = [name for name in before.names if name.startswith("effects.")]
-    base = small.fit_like(before, added, start=values_of(before), fixed=fixed)
+    base = small.fit_like(before, added, start=values_of(before), fixed=fixed, near=True)
     tried = [refit(small, base, entry, fixed, progress) for entry in chosen]
     best = max(entry.score for entry in tried)
     reach = min(best, IN_REACH * best)  # the best itself always is
@@ -290,7 +298,7 @@ def refit(
         try:
             fit = engine.fit_like(
                 before, [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape),
-                max_iterations=ITERATIONS, tolerance=identify.COARSE,
+                max_iterations=ITERATIONS, tolerance=identify.COARSE, near=entry.fit is not None,
             )  # fmt: skip
             break
         except InputError:
