@@ -208,7 +208,7 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
 
     Each with words for where it just is, and as the least value of a sum of changes of the parameters: tubes are
     grasped behind the plate and one behind the other, tips are in front of it and one before the other, and no tube is
-    longer curved than it is long. Nine rows in ten stay possible; where fewer are, none more become impossible.
+    longer curved than it is long. 99 rows in 100 stay possible; where fewer are, none more become impossible.
     """
     beta = beta + robot.actuation.translation_correction
     tip, tubes = beta + [tube.length for tube in robot.tubes], range(1, robot.n_tubes + 1)
@@ -234,7 +234,7 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
         change = {kind.format(i): float(sign) for kind, signs in parts.items() for i, sign in signs.items()}
         row = np.array([change.get(name, 0.0) for name in names])
         if row.any() and len(room):
-            limits.append((text, row, -max(0.0, float(np.quantile(room, 0.1)))))
+            limits.append((text, row, -max(0.0, float(np.quantile(room, 0.01)))))
     return limits
 
 
