@@ -154,6 +154,9 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
     assert round_.is_hopeless(2) and not round_.is_hopeless(3)
     round_ = decided(100.0, 0.01, is_further=True, is_rejected=True)
     assert round_.accepted is None and not round_.is_hopeless(1.5)
+    share = racing.SHARE - 0.05
+    assert decided(100.0, share, True, True, spread=0.02).is_hopeless(1.5)
+    assert not decided(100.0, share, True, True, spread=0.03).is_hopeless(1.5)
     assert racing.Round("a fit", [], {}).is_hopeless(1e6)
 
 
@@ -311,10 +314,10 @@ def test_of_many_rows_the_best_candidate_is_always_refitted(monkeypatch, scores,
 blank = racing.Entry(candidate=None, gain=None)
 
 
-def decided(score, share, is_further, is_rejected):
+def decided(score, share, is_further, is_rejected, spread=np.inf):
     """The round of one candidate among 21."""
     only = dataclasses.replace(
-        blank, candidate=SimpleNamespace(id="delay"), refit=score, share=share, fit="a fit"
+        blank, candidate=SimpleNamespace(id="delay"), refit=score, share=share, spread=spread, fit="a fit"
     )
     round_ = racing.Round("a fit", [only], {})
     racing.decide(round_, 21, is_further, is_rejected)

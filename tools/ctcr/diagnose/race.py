@@ -48,6 +48,7 @@ class Entry:
     gain: Gain  # over none, by slopes
     refit: float | None = None  # log evidence after a joint refit; None: too far behind to be refitted
     share: float = 0.0  # of the excess chi-square that it removes
+    spread: float = np.inf  # standard deviation of that share
     fit: identify.Fit | None = None
     implausible: tuple[str, ...] = ()  # what its values, or those of the calibration, would have to be
 
@@ -85,7 +86,7 @@ class Round:
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
         best = max((entry.score for entry in self.entries), default=-np.inf)
-        return self.accepted is None and more * best < self.needed
+        return self.accepted is None and (self.is_stand_in or more * best < self.needed)
 
 
 def misfit(fit: identify.Fit) -> float:
@@ -305,10 +306,13 @@ def refit(
             continue  # the model has no solution there
     else:
         return replace(entry, fit=None)
+    share = share_of(before, fit, len(candidate.names))
     return replace(
         entry,
         refit=fit.log_evidence - before.log_evidence,
-        share=share_of(before, fit, len(candidate.names)),
+        share=share,
+        # A chi-square removed has a standard deviation of twice its root.
+        spread=2 * np.sqrt(max(share, 0.0) / max(excess(before), 1.0)),
         fit=fit,
         implausible=tuple(implausible(engine, fit, candidate)),
     )
@@ -357,6 +361,7 @@ def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> No
         return
     needed = SHARE if is_further else FIRST_SHARE
     if best.share < needed:
+        round_.is_stand_in = best.share + 2 * best.spread < needed
         share = f"{best.share:.0%} of what is left: below {needed:.0%}"
         round_.reason = f"the best candidate, {best.id}, removes {share}, as stand-ins do"
         return
