@@ -79,9 +79,7 @@ class Round:
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
-    is_stand_in: bool = (
-        False  # whether the best candidate surely removes too little, however many readings there are
-    )
+    is_stand_in: bool = False  # whether the best candidate surely removes too little of the excess
 
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
