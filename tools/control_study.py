@@ -25,19 +25,17 @@ from ctcr.track import runs, scenario
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "control_effects.md"
-# The strength that is hidden, in standard deviations of its prior. At 2 friction would hold the tubes so fast that no
-# controller gets the tip to rest: insertion releases it, and the tip leaps by millimetres.
-HIDDEN = {"friction": ("coefficient", 0.5), "softening": ("gamma", 2.0), "clearance": ("tilt", 2.0)}
+# The strength that is hidden, in standard deviations of its prior.
+HIDDEN = {"friction": ("coefficient", 2.0), "softening": ("gamma", 2.0), "clearance": ("tilt", 2.0)}
 SEED = 7
-REPETITIONS = 10  # in closed loop: under friction the tracker's noise decides where the tip is held
+REPETITIONS = 10  # in closed loop
 ABOUT = """A simulated robot differs from its file (Table II) in every calibrated parameter, drawn with half the file's
-uncertainty, and in one hidden effect: friction with a coefficient of 0.01, or softening or clearance of two prior
-standard deviations. It was measured along `examples/data/plan.csv` with realistic noise, calibrated, diagnosed, and
+uncertainty, and in one hidden effect of two prior standard deviations: friction (a coefficient of 0.04), softening or
+clearance. It was measured along `examples/data/plan.csv` with realistic noise, calibrated, diagnosed, and
 then driven along the path of scenario S2. *Open loop*: the robot replays the joints that the controller planned on
 what it knows. *Closed loop*: the tracker corrects at 40 Hz, in ten runs that differ in its noise; behind the mean, in
 brackets, that of the best and of the worst run. Distances of the tip from the path; what lies near the obstacle is left
-out. What friction remembers from before the start of the path is unknown to all, and the controller's
-Jacobian takes friction as it stands: it does not foresee that insertion releases it. Written by
+out. What friction remembers from before the start of the path is unknown to all. Written by
 `tools/control_study.py`."""
 
 

@@ -3,10 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include "ctcr/control/closed_loop.hpp"
+#include "ctcr/control/path.hpp"
 #include "ctcr/effects/backlash_rotation.hpp"
 #include "ctcr/effects/delay.hpp"
 #include "ctcr/effects/friction.hpp"
+#include "ctcr/pipeline/wind_up.hpp"
+#include "ctcr/simulation/simulated_robot.hpp"
 #include "random_control.hpp"
+#include "support/no_alloc.hpp"
 
 namespace ctcr {
 namespace live_effects_test {
@@ -43,6 +48,75 @@ TEST(LiveEffects, RememberWhatRecordedRowsDo) {
     check(std::integral_constant<std::size_t, 1>{});
     check(std::integral_constant<std::size_t, 2>{});
   }
+}
+
+using Rubbing = EffectList<Friction>;
+
+/// Friction whose feedback by the twist is so strong that a twist of the period before would change sides each period.
+System<3, Rubbing> rubbing_robot(double coefficient = 0.02) {
+  Rubbing::On<3> effects;
+  std::get<0>(effects.list).values = {coefficient, coefficient, coefficient, 0, 0.1, 1, 0};
+  return {{2e-3 / (2 * std::numbers::pi), -1, {-0.298, -0.2205, -0.145}, Vec3::Zero()},
+          Model<3, Rubbing>(test::paper_robot(), effects),
+          {}};
+}
+
+TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
+  const System<3, Rubbing> system = rubbing_robot();
+  test::Random random(42);
+  std::vector<RecordedRow<3>> rows;
+  Joints<3> q{{-0.298, -0.2205, -0.145}, Vec3::Zero()};
+  for (int k = 0; k < 200; ++k) {
+    for (int i = 0; i < 3; ++i) {
+      q.beta[i] += test::uniform(random, -1e-4, 1e-4);
+      q.alpha[i] += test::uniform(random, -0.03, 0.05);
+    }
+    rows.push_back({motor_angles(system.transmission, q), {}, {.time = 0.025 * k}});
+  }
+  add_twist<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
+  EXPECT_GT(wind_up(system, std::span(rows)), 0.05);
+  const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
+  LiveEffects<3, Rubbing> live(system.model.effects());
+  Workspace<3> ws;
+  Solution<3> solution;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    (void)live.advance(joints(system.transmission, rows[k].theta), rows[k].at.time, ws,
+                       [&](const auto& effects, const Joints<3>& tubes) {
+                         const Model<3, Rubbing> model(system.model.robot(), effects);
+                         return step<Derivatives::none>(model, tubes, {}, ws, solution, system.settings) == Status::ok;
+                       });
+    const auto& now = std::get<0>(live.effects().list).past.state;
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(now[i], std::get<0>(recorded[k]).state[i], 5e-3) << "row " << k;
+  }
+}
+
+TEST(LiveEffects, FrictionThatIsKnownIsFollowedInClosedLoop) {
+  constexpr double period = 0.025;
+  const System<3, Rubbing> real = rubbing_robot();
+  const MotorAngles<3> start = motor_angles(real.transmission, Joints<3>{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}});
+  double mean[2];
+  for (const bool known : {false, true}) {
+    SimulatedRobot<3, Rubbing> robot(real, start, {});
+    Controller<3, PaperTasks, Rubbing> controller(known ? real : rubbing_robot(0), {}, period);
+    const Vec3 at = robot.tip().position, side(8e-3, 0, 0), up(0, 0, 8e-3);
+    const Polyline path(std::vector<Vec3>{at, at + side, at, at + up, at}, 10e-3, 60e-3);
+    double sum = 0, last = 0, largest_jump = 0;
+    long count = 0;
+    const test::HeapGuard guard;
+    const Status status = run(controller, robot, path, period, {}, [&](const auto& row) {
+      const double error = (robot.tip().position - row.reference.pose.position).norm();
+      if (count > 0) largest_jump = std::max(largest_jump, std::abs(error - last));
+      sum += last = error;
+      ++count;
+      return true;
+    });
+    EXPECT_EQ(guard.uses(), 0);
+    EXPECT_EQ(status, Status::ok);
+    EXPECT_LT(largest_jump, 0.25e-3) << "a robot that moves by 0.25 mm a period does not leap";
+    mean[known] = sum / double(count);
+  }
+  EXPECT_LT(mean[true], mean[false]);
+  EXPECT_LT(mean[true], 0.1e-3);
 }
 
 }  // namespace live_effects_test

@@ -29,8 +29,19 @@ def path(robot):
     return scenario.load(ROOT / "examples/data/scenarios/S2.yaml", robot.n_tubes)
 
 
-def test_open_loop_of_a_known_robot_stays_on_the_path(study, robot, path):
-    assert study.open_loop(path, robot, robot).mean() < 0.05
+@pytest.mark.parametrize("hidden", [None, "friction", "softening"])
+def test_open_loop_of_a_known_robot_stays_on_the_path(study, robot, path, hidden):
+    """The joints that the controller planned period by period are right when the whole motion is simulated at once."""
+    known = study.hidden_robot(robot, hidden, np.random.default_rng(study.SEED)) if hidden else robot
+    assert study.open_loop(path, known, known).mean() < 0.05
+
+
+def test_a_controller_that_knows_friction_keeps_nearer_to_the_path(study, robot, path):
+    plant = study.hidden_robot(robot, "friction", np.random.default_rng(study.SEED))
+    without = plant.model_copy(update={"effects": {}})
+    lacking, knowing = (np.concatenate(study.closed_loop(path, known, plant)) for known in (without, plant))
+    assert knowing.mean() < lacking.mean() < 0.1
+    assert knowing.max() < 0.5 * lacking.max()
 
 
 @pytest.mark.slow

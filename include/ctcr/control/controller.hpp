@@ -5,6 +5,7 @@
 #include "ctcr/control/limits.hpp"
 #include "ctcr/control/live_effects.hpp"
 #include "ctcr/control/task_list.hpp"
+#include "ctcr/pipeline/predict.hpp"
 
 namespace ctcr {
 
@@ -51,8 +52,7 @@ public:
       limits_(limits),
       allowed_(system.model.robot(), limits),
       period_(period),
-      live_(system.model.effects()),
-      model_(system.model) {}
+      now_{LiveEffects<N, Fx>(system.model.effects()), system.model, {}, {}} {}
 
   /// Whether the robot may be controlled from these motor angles.
   /// @return ok; joints_out_of_order: the limits exclude them, or allow no joints at all; else as solve()
@@ -73,37 +73,34 @@ public:
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
     velocity = {};
-    const Joints<N> motors = joints(system_.transmission, measured.theta);
-    Joints<N> q = motors;
-    if constexpr (!Fx::none) {
-      q = live_.advance(motors, time_, ws_);
-      time_ += period_;
-      model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
-    }
     const Pose tip = tip_of(system_.sensor, measured.reading);
     TipLoad acting = load;
     if (tip_force != TipForce::known)
       acting.force = tip_force == TipForce::estimated ? estimate.force : Vec3(Vec3::Zero());
     report.force = acting.force;
-    if (tip_force == TipForce::estimated) {
-      report.status = step<Derivatives::compliance>(model_, q, acting, ws_, solution_, system_.settings);
-      if (report.status == Status::ok || report.status == Status::singular)
-        estimate.update(solution_.compliance.template topLeftCorner<3, 3>(), tip.position - solution_.position);
-    } else {
-      report.status = step<Derivatives::jacobian>(model_, q, acting, ws_, solution_, system_.settings);
-    }
-    report.stability = solution_.stability;
-    const bool usable = report.status == Status::ok || report.status == Status::singular;
+    const Joints<N> motors = joints(system_.transmission, measured.theta);
+    const Joints<N> q = tip_force == TipForce::estimated ? settle<Derivatives::compliance>(now_, motors, acting)
+                                                         : settle<Derivatives::jacobian>(now_, motors, acting);
+    time_ += period_;
+    report.status = now_.solution.status;
+    report.stability = now_.solution.stability;
+    const bool usable = has_equilibrium(report.status);
+    if (tip_force == TipForce::estimated && usable)
+      estimate.update(now_.solution.compliance.template topLeftCorner<3, 3>(), tip.position - now_.solution.position);
     if (!usable || !tip.position.allFinite()) {
       if (usable) report.status = Status::not_finite;
-      ws_.reset();
+      now_.ws.reset();
       return report;
     }
-    const Situation<N, Fx> situation{model_, system_.settings, acting, q, tip, reference, ws_, solution_};
-    LeastSquares<N> goals;
-    tasks.add(situation, goals);
+    Situation<N, Fx> situation{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
     JointVelocity<N> v;
-    const Status found = limited_minimum(goals, allowed_, limits_, motors.beta, period_, at_limits, v, report.limits);
+    Status found = minimum(situation, motors, v, report.limits);
+    if constexpr (Fx::template On<N>::follows_twist) {
+      if (found == Status::ok && now_.model.effects().act_by_twist()) {
+        situation.reference.velocity.template head<3>() += missing(motors, v, acting);
+        found = minimum(situation, motors, v, report.limits);
+      }
+    }
     report.shortfall = tasks.shortfalls(situation, v);
     if (found != Status::ok) {
       report.status = found;
@@ -115,17 +112,58 @@ public:
   }
 
   /// The model at the last period. Real time: yes.
-  [[nodiscard]] const Solution<N>& solution() const noexcept { return solution_; }
+  [[nodiscard]] const Solution<N>& solution() const noexcept { return now_.solution; }
 
 private:
+  /// The model on its way.
+  struct Moving {
+    LiveEffects<N, Fx> live;
+    Model<N, Fx> model;
+    Workspace<N> ws;
+    Solution<N> solution;
+  };
+
+  static bool has_equilibrium(Status status) noexcept { return status == Status::ok || status == Status::singular; }
+
+  /// Moves on to the joints of the motors; returns those of the tubes.
+  template <Derivatives D>
+  Joints<N> settle(Moving& to, const Joints<N>& motors, const TipLoad& load) const noexcept {
+    Joints<N> q = motors;
+    if constexpr (!Fx::none) {
+      q = to.live.advance(motors, time_, to.ws, [&](const auto& effects, const Joints<N>& tubes) {
+        to.model = Model<N, Fx>(system_.model.robot(), effects);
+        return has_equilibrium(step<Derivatives::none>(to.model, tubes, load, to.ws, to.solution, system_.settings));
+      });
+      to.model = Model<N, Fx>(system_.model.robot(), to.live.effects());
+    }
+    (void)step<D>(to.model, q, load, to.ws, to.solution, system_.settings);
+    return q;
+  }
+
+  Status minimum(const Situation<N, Fx>& situation, const Joints<N>& motors, JointVelocity<N>& v,
+                 LimitReport& limits) const noexcept {
+    LeastSquares<N> goals;
+    tasks.add(situation, goals);
+    limits = {};
+    return limited_minimum(goals, allowed_, limits_, motors.beta, period_, at_limits, v, limits);
+  }
+
+  /// Velocity [m/s] that the tip lacks in a period of v beside that by the Jacobian, which takes friction as it stands: what
+  /// turns back has to overcome it first.
+  [[nodiscard]] Vec3 missing(const Joints<N>& motors, const JointVelocity<N>& v, const TipLoad& load) const noexcept {
+    Moving next = now_;
+    const Joints<N> then{motors.beta + period_ * v.template head<N>(), motors.alpha + period_ * v.template tail<N>()};
+    (void)settle<Derivatives::none>(next, then, load);
+    if (!has_equilibrium(next.solution.status)) return Vec3::Zero();
+    return now_.solution.jacobian.template topRows<3>() * v -
+           (next.solution.position - now_.solution.position) / period_;
+  }
+
   System<N, Fx> system_;
   Limits<N> limits_;
   AllowedPositions<N> allowed_;
   double period_, time_ = 0;
-  LiveEffects<N, Fx> live_;
-  Model<N, Fx> model_;
-  Workspace<N> ws_;
-  Solution<N> solution_;
+  Moving now_;
 };
 
 }  // namespace ctcr

@@ -2,7 +2,7 @@
 // A system's effects while it moves: what the past left behind in them, period after period.
 #include <array>
 
-#include "ctcr/pipeline/recorded.hpp"
+#include "ctcr/pipeline/twist_balance.hpp"
 
 namespace ctcr {
 
@@ -16,9 +16,41 @@ public:
   explicit LiveEffects(const Effects& effects) noexcept : effects_(effects) {}
 
   /// Takes the next joints of the motors, and their time [s]; returns the joints that the tubes have.
-  /// @param before  the equilibrium of the period before; none: tubes count as stiff in torsion
-  /// Real time: yes.
-  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& before = {}) noexcept {
+  /// @param equilibrium  equilibrium(effects, joints of the tubes) -> bool: whether there is one, left in ws
+  /// Real time: as `equilibrium`, which is called `most` times, and once more a state that follows the twist.
+  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, const auto& equilibrium) noexcept {
+    const std::size_t row = add(motors, time);
+    const auto remembered = [&](const VecN<N>& twist) {
+      Effects now = effects_;
+      VecN<N>::Map(rows_[row].twist.data()) = twist;
+      now.remember({{rows_.data(), count_}, {times_.data(), count_}}, row);
+      return now;
+    };
+    if constexpr (Effects::follows_twist) {
+      if (effects_.act_by_twist()) {
+        effects_ = balance_.solve([&](const Effects& with) { return equilibrium(with, tubes(with, motors)); },
+                                  remembered, ws, twist_, most);
+        VecN<N>::Map(rows_[row].twist.data()) = twist_;
+        return tubes(effects_, motors);
+      }
+    }
+    effects_ = remembered(twist_);
+    return tubes(effects_, motors);
+  }
+
+  /// The same of tubes that are stiff in torsion. Real time: yes.
+  Joints<N> advance(const Joints<N>& motors, double time) noexcept {
+    return advance(motors, time, {}, [](const Effects&, const Joints<N>&) { return false; });
+  }
+
+  /// With the past of now.
+  [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
+  [[nodiscard]] const Occasion& occasion() const noexcept { return at_; }
+
+private:
+  static constexpr int most = 8;  // equilibria of a period
+
+  std::size_t add(const Joints<N>& motors, double time) noexcept {
     if (count_ == window) {
       std::copy(rows_.begin() + 1, rows_.end(), rows_.begin());
       std::copy(times_.begin() + 1, times_.end(), times_.begin());
@@ -28,33 +60,24 @@ public:
       rows_[count_].beta[i] = motors.beta[Eigen::Index(i)];
       rows_[count_].alpha[i] = motors.alpha[Eigen::Index(i)];
     }
-    if constexpr (Effects::follows_twist) {
-      twist_ = twist_between(before, twist_);
-      if (before.warm && !knows_twist_)
-        for (std::size_t k = 0; k < count_; ++k) rows_[k].twist = twist_;
-      knows_twist_ = knows_twist_ || before.warm;
-      rows_[count_].twist = twist_;
-    }
-    times_[count_] = time;
-    at_.time = time;
-    const std::size_t row = count_++;
-    effects_.remember({{rows_.data(), count_}, {times_.data(), count_}}, row);
-    auto [beta, alpha, twist] = rows_[row];
-    effects_.actuate(at_, beta, alpha);
-    return {Eigen::Map<const VecN<N>>(beta.data()), Eigen::Map<const VecN<N>>(alpha.data())};
+    at_.time = times_[count_] = time;
+    return count_++;
   }
 
-  /// With the past of now.
-  [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
-  [[nodiscard]] const Occasion& occasion() const noexcept { return at_; }
+  Joints<N> tubes(const Effects& effects, const Joints<N>& motors) const noexcept {
+    std::array<double, N> beta, alpha;
+    VecN<N>::Map(beta.data()) = motors.beta;
+    VecN<N>::Map(alpha.data()) = motors.alpha;
+    effects.actuate(at_, beta, alpha);
+    return {VecN<N>::Map(beta.data()), VecN<N>::Map(alpha.data())};
+  }
 
-private:
   Effects effects_;
   std::array<typename Path<N, double>::Row, window> rows_{};
   std::array<double, window> times_{};
   std::size_t count_ = 0;
-  std::array<double, N> twist_{};
-  bool knows_twist_ = false;
+  VecN<N> twist_ = VecN<N>::Zero();
+  TwistBalance<N, Fx> balance_;
   Occasion at_;
 };
 

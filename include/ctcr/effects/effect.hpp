@@ -88,7 +88,8 @@ struct EffectValues {
   /// Parameter K; that of a tube, from 0, if it is per tube.
   template <int K>
   [[nodiscard]] constexpr const P& get(int tube = 0) const noexcept {
-    return values[std::size_t(place(K, tube))];
+    constexpr int first = place(K);
+    return values[std::size_t(first + tube)];
   }
 
   static constexpr std::array<P, std::size_t(count)> neutral() noexcept {

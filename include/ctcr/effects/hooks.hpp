@@ -155,6 +155,9 @@ struct EffectList {
 
     /// What the past left behind in each effect.
     using Memory = std::tuple<typename E<N, P>::Past...>;
+    [[nodiscard]] Memory memory() const noexcept {
+      return std::apply([](const auto&... effect) { return Memory{effect.past...}; }, list);
+    }
     void remember(const Memory& memory) noexcept {
       [&]<std::size_t... I>(std::index_sequence<I...>) {
         ((std::get<I>(list).past = std::get<I>(memory)), ...);

@@ -4,6 +4,8 @@
 
 #include "ctcr/control/device.hpp"
 #include "ctcr/control/live_effects.hpp"
+#include "ctcr/math/frame_algebra.hpp"
+#include "ctcr/pipeline/predict.hpp"
 
 namespace ctcr {
 
@@ -65,7 +67,11 @@ private:
   void settle() noexcept {
     Joints<N> q = joints(system_.transmission, theta_);
     if constexpr (!Fx::none) {
-      q = live_.advance(q, time_, ws_);
+      q = live_.advance(q, time_, ws_, [this](const auto& effects, const Joints<N>& tubes) {
+        model_ = Model<N, Fx>(system_.model.robot(), effects);
+        const Status found = solve(model_, tubes, load_, ws_, solution_, system_.settings);
+        return found == Status::ok || found == Status::singular;
+      });
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }
     (void)solve<Derivatives::jacobian>(model_, q, load_, ws_, solution_, system_.settings);
