@@ -11,7 +11,9 @@ Array = NDArray[np.float64]
 
 Row = tuple[float, Array, Array]  # t, joints (2N,), force (3,)
 
-REMEMBERED = 200  # places where a joint turned back; older ones have been overwritten by newer motion
+# Places where a joint turned back: older ones have been overwritten by newer motion (0.2 um of a tip under control), and
+# each is solved anew at every reading, which must keep up with the tracker.
+REMEMBERED = 60
 RECENT_S = 0.5  # longer than any delay between motion and reading
 SMALLEST = 1e-7  # [m], [rad]: motion below it is none
 SESSION_S = 1800.0  # after which effects that grow in a session are at their full size
