@@ -119,5 +119,48 @@ TEST(LiveEffects, FrictionThatIsKnownIsFollowedInClosedLoop) {
   EXPECT_LT(mean[true], 0.1e-3);
 }
 
+/// Readings that are two periods old, beside motor angles of now.
+struct Late {
+  SimulatedRobot<3, Rubbing>& robot;
+  std::array<Pose, 3> readings{};
+  int count = 0;
+
+  Status measure(Measurement<3>& out) noexcept {
+    const Status status = robot.measure(out);
+    std::copy_backward(readings.begin(), readings.end() - 1, readings.end());
+    readings[0] = out.reading;
+    if (count++ == 0) readings.fill(out.reading);
+    out.reading = readings[2];
+    return status;
+  }
+  Status move(const MotorAngles<3>& velocity, double by) noexcept { return robot.move(velocity, by); }
+};
+
+TEST(LiveEffects, TheModelMakesUpForLateReadings) {
+  constexpr double period = 0.025;
+  const System<3, Rubbing> real = rubbing_robot();
+  const MotorAngles<3> start = motor_angles(real.transmission, Joints<3>{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}});
+  double mean[2];
+  for (const bool told : {false, true}) {
+    SimulatedRobot<3, Rubbing> robot(real, start, {});
+    Late late{robot};
+    Controller<3, PaperTasks, Rubbing> controller(real, {}, period);
+    controller.tasks.get<Tracking>().gain = 12;
+    controller.reading_age = told ? 2 * period : 0;
+    const Vec3 at = robot.tip().position;
+    const Polyline path(std::vector<Vec3>{at, at + Vec3(8e-3, 0, 0), at}, 10e-3, 60e-3);
+    double sum = 0;
+    long count = 0;
+    const Status status = run(controller, late, path, period, {}, [&](const auto& row) {
+      sum += (robot.tip().position - row.reference.pose.position).norm();
+      ++count;
+      return true;
+    });
+    EXPECT_EQ(status, Status::ok);
+    mean[told] = sum / double(count);
+  }
+  EXPECT_LT(mean[true], 0.3 * mean[false]);
+}
+
 }  // namespace live_effects_test
 }  // namespace ctcr

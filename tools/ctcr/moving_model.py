@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 Row = tuple[float, Array, Array]  # t, joints (2N,), force (3,)
 
-# Places where a joint turned back: older ones have been overwritten by newer motion (0.2 um of a tip under control), and
+# Places where a joint turned back: newer motion has overwritten older ones (0.2 um of the tip when it tracks), and
 # each is solved anew at every reading, which must keep up with the tracker.
 REMEMBERED = 60
 RECENT_S = 0.5  # longer than any delay between motion and reading

@@ -1,5 +1,8 @@
 #pragma once
 // The paper's control scheme: one call a period, measured tip in, motor velocities out.
+#include <algorithm>
+#include <array>
+
 #include "ctcr/control/device.hpp"
 #include "ctcr/control/force_estimate.hpp"
 #include "ctcr/control/limits.hpp"
@@ -44,6 +47,9 @@ public:
   AtLimits at_limits = AtLimits::hold;
   TipForce tip_force = TipForce::unknown;
   ForceEstimate estimate;
+  /// How much older tracker readings are than the motor angles that come with them [s], up to 8 periods: the model says
+  /// what the tip has done since. Ref: Smith's predictor.
+  double reading_age = 0;
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s]
   Controller(const System<N, Fx>& system, const Limits<N>& limits, double period, const Tasks& wanted = {}) noexcept
@@ -73,7 +79,7 @@ public:
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
     velocity = {};
-    const Pose tip = tip_of(system_.sensor, measured.reading);
+    Pose tip = tip_of(system_.sensor, measured.reading);
     TipLoad acting = load;
     if (tip_force != TipForce::known)
       acting.force = tip_force == TipForce::estimated ? estimate.force : Vec3(Vec3::Zero());
@@ -90,8 +96,10 @@ public:
     if (!usable || !tip.position.allFinite()) {
       if (usable) report.status = Status::not_finite;
       now_.ws.reset();
+      count_ = 0;
       return report;
     }
+    tip.position += moved_since_reading();
     Situation<N, Fx> situation{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
     JointVelocity<N> v;
     Status found = minimum(situation, motors, v, report.limits);
@@ -140,6 +148,17 @@ private:
     return q;
   }
 
+  /// What the tip has done in the last `reading_age`, by the model [m].
+  Vec3 moved_since_reading() noexcept {
+    std::copy_backward(past_.begin(), past_.end() - 1, past_.end());
+    past_[0] = now_.solution.position;
+    count_ = std::min(count_ + 1, past_.size());
+    const double periods = std::clamp(reading_age / period_, 0.0, double(count_ - 1));
+    const auto k = std::min(std::size_t(periods), count_ - 1);
+    const Vec3 &later = past_[k], &earlier = past_[std::min(k + 1, count_ - 1)];
+    return past_[0] - (later + (periods - double(k)) * (earlier - later));
+  }
+
   Status minimum(const Situation<N, Fx>& situation, const Joints<N>& motors, JointVelocity<N>& v,
                  LimitReport& limits) const noexcept {
     LeastSquares<N> goals;
@@ -164,6 +183,8 @@ private:
   AllowedPositions<N> allowed_;
   double period_, time_ = 0;
   Moving now_;
+  std::array<Vec3, 9> past_{};  ///< positions of the model's tip, the newest first
+  std::size_t count_ = 0;       ///< of those that are known
 };
 
 }  // namespace ctcr

@@ -109,14 +109,15 @@ void bind_control(nb::module_& m) {
          const RowMajor& points, bool spline, double speed, double acceleration, double period, double settle,
          const Eigen::VectorXd& beta, const Eigen::VectorXd& alpha, const Eigen::Vector3d& force,
          const std::string& tip_force, double noise_position, double noise_rotation, std::uint64_t seed,
-         const nb::object& device) {
-        LoopRequest r{controller, plant, tasks, limits, points,    spline,         speed,          acceleration, period,
-                      settle,     beta,  alpha, force,  tip_force, noise_position, noise_rotation, seed};
+         double reading_age, const nb::object& device) {
+        LoopRequest r{controller, plant,        tasks,          limits,         points, spline,
+                      speed,      acceleration, period,         settle,         beta,   alpha,
+                      force,      tip_force,    noise_position, noise_rotation, seed,   reading_age};
         return device.is_none() ? any_closed_loop(r) : closed_loop_on(device, r);
       },
       nb::kw_only(), "controller"_a, "plant"_a, "tasks"_a, "limits"_a, "points"_a, "spline"_a, "speed"_a,
       "acceleration"_a, "period"_a, "settle"_a, "beta"_a, "alpha"_a, "force"_a, "tip_force"_a, "noise_position"_a,
-      "noise_rotation"_a, "seed"_a, "device"_a = nb::none(),
+      "noise_rotation"_a, "seed"_a, "reading_age"_a = 0.0, "device"_a = nb::none(),
       "Runs one scenario once. Releases the GIL. With a device, of ctcr.track.device.Device, that is controlled "
       "instead of "
       "a simulated plant.");

@@ -102,6 +102,7 @@ LoopResult closed_loop(const LoopRequest& r) {
   controller.tip_force = r.tip_force == "known"       ? TipForce::known
                          : r.tip_force == "estimated" ? TipForce::estimated
                                                       : TipForce::unknown;
+  controller.reading_age = r.reading_age;
   if (const Status status = controller.check_start(home); status != Status::ok) {
     out.status = to_string(status);
     return out;

@@ -28,6 +28,7 @@ from ctcr.track.scenario import Scenario
 
 PATIENCE_S = 2.0
 MOST_ERROR_MM = 20.0
+READING_AGE_S = 0.036  # of the tracker against the encoders, as on the simulated bench
 MOST_FEEDBACK = (
     0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
 )
@@ -150,7 +151,7 @@ class _Tracking:
                 self._robot, motors, self.sight, self._folder.clock, self._folder.rows, self._control, entry["run"],
                 self._scenario.force(mass), self._most_error, progress.advance,
             )  # fmt: skip
-            run = run_once(self._scenario, values, device, mass, repetition)
+            run = run_once(self._scenario, values, device, mass, repetition, READING_AGE_S)
         motors.halt()
         motors.wait(self.sight.next)
         for rows in (self._folder.rows, self._control):

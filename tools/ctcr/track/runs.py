@@ -118,8 +118,12 @@ def run_once(
     plant: _core.SystemValues | Device,
     mass_g: float,
     seed: int = 1,
+    reading_age: float = 0.0,
 ) -> Run:
-    """One run, on a simulated plant or a device. `seed` is that of the noise. Raises what the device raises."""
+    """One run, on a simulated plant or a device. `seed` is that of the noise. Raises what the device raises.
+
+    `reading_age` [s]: how much older the tracker's readings are than the joints; the model makes up for it.
+    """
     s, tasks, limits, obstacle = scenario, scenario.tasks, scenario.limits, scenario.obstacle
     n = len(s.start.beta_mm)
 
@@ -152,7 +156,7 @@ def run_once(
         acceleration=1e-3 * s.trajectory.acceleration_mm_s2, period=1 / s.rate_Hz, settle=s.start.settle_s,
         beta=1e-3 * np.array(s.start.beta_mm), alpha=radians(s.start.alpha_deg), force=s.force(mass_g),
         tip_force=s.load.controller, noise_position=1e-3 * s.noise_mm, noise_rotation=np.radians(s.noise_deg),
-        seed=seed,
+        seed=seed, reading_age=reading_age,
     )  # fmt: skip
     return Run(
         mass_g, seed, result.status, result.settled, result.time, result.joints, result.tip, result.wanted,
