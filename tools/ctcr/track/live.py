@@ -22,13 +22,12 @@ from ctcr.record.row_file import RowFile
 from ctcr.robot import Robot
 from ctcr.track import scenario as scenario_file
 from ctcr.track.bench_robot import BenchRobot
-from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of
+from ctcr.track.recording import COLUMNS, CONTROL, READING_AGE_S, finished, runs_of
 from ctcr.track.runs import Run, check, run_once, system_values
 from ctcr.track.scenario import Scenario
 
 PATIENCE_S = 2.0
 MOST_ERROR_MM = 20.0
-READING_AGE_S = 0.036  # of the tracker against the encoders, as on the simulated bench
 MOST_FEEDBACK = (
     0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
 )
