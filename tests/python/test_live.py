@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import robot_file
+from ctcr import measurements, robot_file
 from ctcr.calibrate import tables
 from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table
 from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
@@ -19,10 +19,12 @@ from ctcr.devices import bench_file
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.person import PersonPresent
 from ctcr.errors import InputError
+from ctcr.frames import base_to_tracker
 from ctcr.one_tube import one_tube
 from ctcr.record.row_file import RowFile
 from ctcr.track import scenario as scenario_file
 from ctcr.track.live import within
+from ctcr.track.recording import COLUMNS, runs_of
 from ctcr.track.runs import run_once, system_values
 from ruamel.yaml import YAML
 
@@ -99,6 +101,35 @@ def test_what_a_device_raises_ends_the_run(robot, scenario, where):
     with pytest.raises(InputError):
         run_once(scenario, system_values(robot), device, 0.0)
     assert len(device.rows) == 0
+
+
+def test_late_readings_are_held_against_where_the_tip_was(robot, scenario, tmp_path):
+    """Two runs at constant speed, exactly on their paths, read late: nothing is left but for the last of each run."""
+    age, period, speed, count = 0.036, 0.025, 0.02, 20
+    t = period * np.arange(count)
+    along = np.array([0.6, 0.0, 0.8])
+    folder = SimpleNamespace(path=tmp_path, about={"runs": []})
+    rows, control = (
+        RowFile(tmp_path / "measurements.csv", measurements.column_names(3)),
+        RowFile(tmp_path / "control.csv", COLUMNS),
+    )
+    with closing(rows), closing(control):
+        for run in (1, 2):
+            entry = {"run": run, "mass_g": 0, "repetition": run, "ended": "finished", "status": "ok"}
+            folder.about["runs"].append(entry | {"settled_m": 0.0})
+            for now in t:
+                wanted, seen = ([*(run * 0.01 + speed * when * along)] for when in (now, now - age))
+                seen, quaternion = base_to_tracker(
+                    robot.tracker, np.array([seen]), np.array([[1.0, 0, 0, 0]])
+                )
+                clock = 100.0 * run + now
+                joints = [-0.4, -0.3, -0.2, 0, 0, 0]
+                rows.append([[clock, run, *joints, 0, 0, 0, *map(float, [*seen[0], *quaternion[0]])]])
+                control.append([[clock, run, now, *map(repr, map(float, wanted)), *[0.0] * (len(COLUMNS) - 6)]])
+    for run in runs_of(folder, scenario, robot, age):
+        assert run.error[:-2].max() < 1e-6
+    for run in runs_of(folder, scenario, robot):
+        np.testing.assert_allclose(run.error, speed * age, rtol=1e-3)
 
 
 def test_the_limits_are_those_of_bench_and_scenario(robot, bench, scenario):

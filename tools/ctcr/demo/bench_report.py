@@ -16,6 +16,7 @@ from ctcr.demo.bench_figures import Driven
 from ctcr.demo.bench_story import ROBOTS, cube
 from ctcr.demo.hidden_robot import EFFECT, VALUE
 from ctcr.demo.story import Story
+from ctcr.devices import bench_file
 from ctcr.frames import tracker_to_base
 from ctcr.html_page import cards, figure, table
 from ctcr.output import atomic_writer
@@ -94,7 +95,8 @@ def _controlled(recording: Path, robot: Robot) -> tuple[Array, Array]:
     """Time along the path (R,) [s], and errors (R,) [mm]."""
     about = json.loads((recording / ABOUT).read_text(encoding="utf-8"))
     wanted = scenario.load(recording / "scenario.yaml", robot.n_tubes)
-    (run,) = runs_of(SimpleNamespace(path=recording, about=about), wanted, robot)
+    age = 1e-3 * bench_file.load(recording / "bench.yaml").tracker.reading_age_ms
+    (run,) = runs_of(SimpleNamespace(path=recording, about=about), wanted, robot, age)
     return run.time, 1e3 * run.error
 
 

@@ -22,7 +22,7 @@ from ctcr.record.row_file import RowFile
 from ctcr.robot import Robot
 from ctcr.track import scenario as scenario_file
 from ctcr.track.bench_robot import BenchRobot
-from ctcr.track.recording import COLUMNS, CONTROL, READING_AGE_S, finished, runs_of
+from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of
 from ctcr.track.runs import Run, check, run_once, system_values
 from ctcr.track.scenario import Scenario
 
@@ -59,7 +59,10 @@ def track(
         tracker.connect()
         wish_real_time(CONTROL_PRIORITY)
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
-        tracking = _Tracking(loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm)
+        age = 1e-3 * devices.tracker.reading_age_ms
+        tracking = _Tracking(
+            loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm, age
+        )
         try:
             tracking.run(person_of(devices, place), said)
         except BaseException as error:
@@ -69,7 +72,7 @@ def track(
         finally:
             tracking.close()
         folder.note(motors, tracker, tracking.sight.lateness, "finished")
-    return runs_of(folder, wanted, loaded), wanted
+    return runs_of(folder, wanted, loaded, age), wanted
 
 
 def within(scenario: Scenario, bench: Bench, robot: Robot) -> Scenario:
@@ -114,9 +117,10 @@ class _Tracking:
         sight: Sight,
         folder: Folder,
         most_error: float,
+        reading_age: float,
     ):
         self._robot, self._scenario, self._motors, self.sight = robot, scenario, motors, sight
-        self._folder, self._most_error = folder, most_error
+        self._folder, self._most_error, self._reading_age = folder, most_error, reading_age
         self._control = RowFile(folder.path / CONTROL, COLUMNS, synced=False)
 
     def run(self, person: Person, said: Callable[[str], None]) -> None:
@@ -150,7 +154,7 @@ class _Tracking:
                 self._robot, motors, self.sight, self._folder.clock, self._folder.rows, self._control, entry["run"],
                 self._scenario.force(mass), self._most_error, progress.advance,
             )  # fmt: skip
-            run = run_once(self._scenario, values, device, mass, repetition, READING_AGE_S)
+            run = run_once(self._scenario, values, device, mass, repetition, self._reading_age)
         motors.halt()
         motors.wait(self.sight.next)
         for rows in (self._folder.rows, self._control):

@@ -11,7 +11,6 @@ from ctcr.track.runs import Run, beside_obstacle
 from ctcr.track.scenario import TASKS, Scenario
 
 CONTROL = "control.csv"
-READING_AGE_S = 0.036  # of the tracker against the encoders, as on the simulated bench
 COLUMNS = (
     "t_s", "run", "path_s", "wanted_x_m", "wanted_y_m", "wanted_z_m",
     *(f"shortfall_{task.replace(' ', '_')}" for task in TASKS),
@@ -39,21 +38,24 @@ def finished(folder: Folder) -> list[dict]:
     return [entry for entry in folder.about.get("runs", []) if entry["ended"] == "finished"]
 
 
-def runs_of(folder: Folder, scenario: Scenario, robot: Robot) -> list[Run]:
-    """The finished runs; tips are those measured, at the time when they were there: READING_AGE_S before the reading.
+def runs_of(folder: Folder, scenario: Scenario, robot: Robot, reading_age: float = 0.0) -> list[Run]:
+    """The finished runs; tips are those measured, at the time when they were there: `reading_age` [s] before the
+    reading.
 
     Raises InputError where a table is damaged.
     """
     table = measurements.load(folder.path / TABLE, robot.n_tubes)
     control = read_columns(folder.path / CONTROL, COLUMNS)
-    _, measured, controlled = np.intersect1d(table.t, control[:, 0], return_indices=True)
+    t, measured, controlled = np.intersect1d(table.t, control[:, 0], return_indices=True)
     joints = np.hstack(robot.joints_of_table(table.beta[measured], table.alpha[measured]))
     tip, _ = tracker_to_base(robot.tracker, table.position[measured], table.quaternion[measured])
-    then = table.t[measured] + READING_AGE_S
-    tip = np.column_stack([np.interp(then, table.t[measured], axis) for axis in tip.T])
     control, number = control[controlled], table.run[measured]
-    return [_run(entry, scenario, *(part[number == entry["run"]] for part in (joints, tip, control)))
-            for entry in finished(folder)]  # fmt: skip
+    runs = []
+    for entry in finished(folder):
+        mine = number == entry["run"]
+        there = np.column_stack([np.interp(t[mine] + reading_age, t[mine], axis) for axis in tip[mine].T])
+        runs.append(_run(entry, scenario, joints[mine], there, control[mine]))
+    return runs
 
 
 def _run(entry: dict, scenario: Scenario, joints, tip, control) -> Run:
