@@ -3,6 +3,7 @@
 
 #include <ctcr/control/closed_loop.hpp>
 #include <ctcr/control/path.hpp>
+#include <ctcr/effects/friction.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>
 #include <vector>
 
@@ -14,21 +15,30 @@ namespace {
 using namespace bench;
 using ctcr::Status, ctcr::TipForce, ctcr::Vec3;
 
-/// control_step/3: the paper's scenario on the simulated robot; only Controller::advance() is timed.
-template <TipForce Knowledge>
-void control_step(benchmark::State& state) {
+using Rubbing = ctcr::EffectList<ctcr::Friction>;
+
+Rubbing::On<3> rubbing() {
+  Rubbing::On<3> effects;
+  std::get<0>(effects.list).values = {0.02, 0.02, 0.02, 0, 0.1, 1, 0};
+  return effects;
+}
+
+/// control_step/3: the paper's scenario on the simulated robot; only Controller::advance() is timed. With friction the tubes
+/// wind each other up, which takes several equilibria a period, and the controller looks one period ahead.
+template <TipForce Knowledge, class Fx = ctcr::Standard>
+void control_step(benchmark::State& state, const typename Fx::template On<3>& effects = {}) {
   constexpr double period = 0.025;
-  const ctcr::System<3> system{{}, ctcr::Model<3>(table_ii()), {}};
+  const ctcr::System<3, Fx> system{{}, ctcr::Model<3, Fx>(table_ii(), effects), {}};
   const ctcr::Joints<3> start{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}};
   const ctcr::TipLoad load{{0, -0.15, 0}, Vec3::Zero()};
   std::vector<double> times;
   for (auto _ : state) {
-    ctcr::Controller<3> controller(system, {}, period);
+    ctcr::Controller<3, ctcr::PaperTasks, Fx> controller(system, {}, period);
     controller.tip_force = Knowledge;
     controller.at_limits = ctcr::AtLimits::redistribute;
-    ctcr::SimulatedRobot<3> robot(system, motor_angles(system.transmission, start), load, {35e-6, 0});
+    ctcr::SimulatedRobot<3, Fx> robot(system, motor_angles(system.transmission, start), load, {35e-6, 0});
     const Vec3 tip = robot.tip().position;
-    controller.tasks.get<ctcr::ObstacleAvoidance>().obstacle = {tip + Vec3(0, 0.02, 0), 5e-3};
+    controller.tasks.template get<ctcr::ObstacleAvoidance>().obstacle = {tip + Vec3(0, 0.02, 0), 5e-3};
     const ctcr::Polyline path(
         std::vector<Vec3>{tip, tip + Vec3(0.02, 0, 0), tip + Vec3(0.02, 0.02, 0), tip + Vec3(0.02, 0.02, -0.02), tip},
         5e-3, 2.5e-3);
@@ -53,9 +63,11 @@ void control_step(benchmark::State& state) {
 }
 
 const bool registered = [] {
-  benchmark::RegisterBenchmark("control_step/3/unknown_force", control_step<TipForce::unknown>);
-  benchmark::RegisterBenchmark("control_step/3/known_force", control_step<TipForce::known>);
-  benchmark::RegisterBenchmark("control_step/3/estimated_force", control_step<TipForce::estimated>);
+  const auto add = [](const char* name, auto step) { benchmark::RegisterBenchmark(name, step); };
+  add("control_step/3/unknown_force", [](auto& state) { control_step<TipForce::unknown>(state); });
+  add("control_step/3/known_force", [](auto& state) { control_step<TipForce::known>(state); });
+  add("control_step/3/estimated_force", [](auto& state) { control_step<TipForce::estimated>(state); });
+  add("control_step/3/friction", [](auto& state) { control_step<TipForce::known, Rubbing>(state, rubbing()); });
   return true;
 }();
 

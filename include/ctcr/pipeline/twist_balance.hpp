@@ -18,7 +18,7 @@ class TwistBalance {
   using Vec = VecN<N>;
 
   static constexpr int states = []<class... E>(std::type_identity<std::tuple<E...>>) {
-    const auto size = []<class One>(std::type_identity<One>) {
+    [[maybe_unused]] const auto size = []<class One>(std::type_identity<One>) {
       return requires { One::follows_twist; } ? int(typename One::Past{}.state.size()) : 0;
     };
     return (0 + ... + size(std::type_identity<E>{}));
