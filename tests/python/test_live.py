@@ -125,7 +125,9 @@ def test_late_readings_are_held_against_where_the_tip_was(robot, scenario, tmp_p
                 clock = 100.0 * run + now
                 joints = [-0.4, -0.3, -0.2, 0, 0, 0]
                 rows.append([[clock, run, *joints, 0, 0, 0, *map(float, [*seen[0], *quaternion[0]])]])
-                control.append([[clock, run, now, *map(repr, map(float, wanted)), *[0.0] * (len(COLUMNS) - 6)]])
+                control.append(
+                    [[clock, run, now, *map(repr, map(float, wanted)), *[0.0] * (len(COLUMNS) - 6)]]
+                )
     for run in runs_of(folder, scenario, robot, age):
         assert run.error[:-2].max() < 1e-6
     for run in runs_of(folder, scenario, robot):

@@ -56,7 +56,7 @@ struct LoopRequest {
   std::string tip_force;        ///< what the controller makes of it: unknown, known, estimated
   double noise_position, noise_rotation;
   std::uint64_t seed;
-  double reading_age;  ///< [s], as Controller::reading_age
+  double reading_age;                 ///< [s], as Controller::reading_age
   const AnyDevice* device = nullptr;  ///< instead of the plant, of which only the frames count; neither load nor noise
 };
 

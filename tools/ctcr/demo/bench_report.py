@@ -114,7 +114,9 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
             ("driven blindly", without.blind, with_it.blind),
             ("tracked at 40 Hz", without.controlled, with_it.controlled),
         ):
-            numbers.append(("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}"))
+            numbers.append(
+                ("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}")
+            )
     return (
         f"<h1>{TITLE}</h1>"
         f'<p class="lead">A robot stands on a simulated bench. It is off its file in {len(_calibrated(found))} '
