@@ -100,6 +100,8 @@ def test_without_memory_there_is_nothing_to_see(robot, plan):
 
 def test_a_table_without_poses_or_times_is_no_obstacle(robot, left_out):
     table = left_out[0]
+    silent = robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"jitter_mm": None})})
+    assert unrecorded.completed(silent, table) == (table, [])
     assert unrecorded.completed(robot, replace(table, position=None))[1] == []
     found, said = unrecorded.completed(robot, replace(table, t=np.full(len(table), np.nan)))
     assert len(said) == 1

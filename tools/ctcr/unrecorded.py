@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-from ctcr import identify
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
@@ -33,15 +32,15 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     two visits, wherever they differ. If it is always the one from the other side than that of the recorded motion, the
     robot came on the way of that visit: straight from where it last turned. Compares readings, not a model.
     """
-    returns = _returns(measurements)
-    if measurements.position is None or not returns:
+    jitter, returns = robot.tracker.jitter_mm, _returns(measurements)
+    if measurements.position is None or not jitter or not returns:
         return measurements, []
     here, same, other, turn = np.array(returns).T
     p = measurements.position
-    noise = np.sqrt(6) * identify.noise_of_readings(robot, measurements).position_jitter
+    noise = np.sqrt(6) * 1e-3 * jitter
     loop = p[other] - p[same]
     size = np.sum(loop**2, axis=1)
-    visible = np.sqrt(size) > VISIBLE * noise  # False where not measured
+    visible = (np.sqrt(size) > VISIBLE * noise) & np.isfinite(p[here]).all(axis=1)
     part = np.sum((p[here] - p[same]) * loop, axis=1)[visible] / size[visible]
     agree = int(np.sum(part > 0.5))
     if not visible.any() or binomtest(agree, len(part), alternative="greater").pvalue > DOUBT:
