@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from ctcr.record.row_file import RowFile
 from ctcr.robot import Robot
 from ctcr.track import scenario as scenario_file
 from ctcr.track.bench_robot import BenchRobot
-from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of
+from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of, tips_at
 from ctcr.track.runs import Run, check, run_once, system_values
 from ctcr.track.scenario import Scenario
 
@@ -155,6 +156,8 @@ class _Tracking:
                 self._scenario.force(mass), self._most_error, progress.advance,
             )  # fmt: skip
             run = run_once(self._scenario, values, device, mass, repetition, self._reading_age)
+        if len(run.time):
+            run = replace(run, tip=tips_at(run.time, run.time + self._reading_age, run.tip))
         motors.halt()
         motors.wait(self.sight.next)
         for rows in (self._folder.rows, self._control):

@@ -1,6 +1,7 @@
 """Runs on the bench as files: the measurements, and beside them what the controller wanted and found, row by row."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ctcr import measurements
 from ctcr.frames import tracker_to_base
@@ -9,6 +10,8 @@ from ctcr.record.folder import TABLE, Folder
 from ctcr.robot import Robot
 from ctcr.track.runs import Run, beside_obstacle
 from ctcr.track.scenario import TASKS, Scenario
+
+Array = NDArray[np.float64]
 
 CONTROL = "control.csv"
 COLUMNS = (
@@ -53,9 +56,14 @@ def runs_of(folder: Folder, scenario: Scenario, robot: Robot, reading_age: float
     runs = []
     for entry in finished(folder):
         mine = number == entry["run"]
-        there = np.column_stack([np.interp(t[mine] + reading_age, t[mine], axis) for axis in tip[mine].T])
+        there = tips_at(t[mine], t[mine] + reading_age, tip[mine])
         runs.append(_run(entry, scenario, joints[mine], there, control[mine]))
     return runs
+
+
+def tips_at(t: Array, when: Array, tip: Array) -> Array:
+    """The tip (K, 3) at the times `when` (K,), of tips (R, 3) at the times t (R,); beyond them the first or last."""
+    return np.column_stack([np.interp(when, t, axis) for axis in tip.T])
 
 
 def _run(entry: dict, scenario: Scenario, joints, tip, control) -> Run:
