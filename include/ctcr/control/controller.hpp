@@ -131,8 +131,6 @@ private:
     Solution<N> solution;
   };
 
-  static bool has_equilibrium(Status status) noexcept { return status == Status::ok || status == Status::singular; }
-
   /// Moves on to the joints of the motors; returns those of the tubes.
   template <Derivatives D>
   Joints<N> settle(Moving& to, const Joints<N>& motors, const TipLoad& load) const noexcept {

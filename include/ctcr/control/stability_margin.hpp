@@ -22,7 +22,7 @@ struct StabilityMargin {
       Solution<N> there;
       const Status status = solve<Derivatives::jacobian>(s.model, q, s.load, ws, there, s.settings);
       stability = there.stability;
-      return status == Status::ok || status == Status::singular;
+      return has_equilibrium(status);
     };
     if (!at(s.q, here)) return g;
     for (int j = 0; j < 2 * N; ++j) {

@@ -13,6 +13,9 @@ enum class [[nodiscard]] Status : std::uint8_t {
   not_finite,           ///< an input or a result is NaN or infinite
 };
 
+/// Whether the outputs solve the model; where it is about to snap they do, too. Real time: yes.
+constexpr bool has_equilibrium(Status status) noexcept { return status == Status::ok || status == Status::singular; }
+
 /// Plain-words name of a status. Real time: yes.
 constexpr const char* to_string(Status status) noexcept {
   switch (status) {

@@ -275,7 +275,7 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
   }
   settings.steps = std::max(settings.steps, shape_steps);
   const Status status = solve<Derivatives::none>(model, q, load, ws, out, settings);
-  if (!(status == Status::ok || status == Status::singular || status == Status::not_converged)) return status;
+  if (!(has_equilibrium(status) || status == Status::not_converged)) return status;
   if constexpr (!Fx::none)
     detail::fill_shape_with_effects(model, q, load, ws.guess, settings.steps, points);
   else if (!model.coefficients().gravity.isZero(0.0) || !load.force.isZero(0.0) || !load.moment.isZero(0.0))

@@ -137,7 +137,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
   };
   look();
   if (push.isZero(0.0)) return status;
-  for (int k = 0; k < iterations && (status == Status::ok || status == Status::singular); ++k) {
+  for (int k = 0; k < iterations && has_equilibrium(status); ++k) {
     status = solve<Derivatives::compliance>(out.model, out.q, out.load, ws, out.solution, settings);
     look();
     if (push.isZero(0.0)) {  // pushed out: the solution lies between
@@ -151,7 +151,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
     }
     out.load.force = known + added;
   }
-  if (status == Status::ok || status == Status::singular) status = Status::not_converged;
+  if (has_equilibrium(status)) status = Status::not_converged;
   return out.solution.status = status;
 }
 

@@ -84,7 +84,7 @@ public:
     const bool pushed = find_push();
     if (pushed || equations_)
       integrate(pushed);
-    else if (const Status status = take_standard(); !(status == Status::ok || status == Status::singular))
+    else if (const Status status = take_standard(); !has_equilibrium(status))
       return status;
     if (pushed) add_push();
     read(out);
@@ -272,7 +272,7 @@ CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRo
                                    Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
   out.setZero();
   const Status status = prediction.solution.status;
-  if (!(status == Status::ok || status == Status::singular)) return status;
+  if (!has_equilibrium(status)) return status;
   return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables).write(out);
 }
 

@@ -29,8 +29,7 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows) {
       VecN<N> found = given + wound;
       const RecordedRow<N> here = on_the_way<N>(rows, row, place);
       const auto equilibrium = [&](const Effects& with) {
-        const Status status = predict(system, here, with.memory(), ws, prediction);
-        return status == Status::ok || status == Status::singular;
+        return has_equilibrium(predict(system, here, with.memory(), ws, prediction));
       };
       const auto remembered = [&](const VecN<N>& t) {
         Effects now = effects;

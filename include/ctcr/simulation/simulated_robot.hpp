@@ -69,8 +69,7 @@ private:
     if constexpr (!Fx::none) {
       q = live_.advance(q, time_, ws_, [this](const auto& effects, const Joints<N>& tubes) {
         model_ = Model<N, Fx>(system_.model.robot(), effects);
-        const Status found = solve(model_, tubes, load_, ws_, solution_, system_.settings);
-        return found == Status::ok || found == Status::singular;
+        return has_equilibrium(solve(model_, tubes, load_, ws_, solution_, system_.settings));
       });
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }

@@ -99,7 +99,7 @@ private:
     const Settings settings{.steps = options.steps};
     const auto output = [&, tip_of = std::size_t(options.tip_of)](std::ptrdiff_t i, const Solution<N>& s,
                                                                   const Workspace<N>& ws) {
-      const bool solved = s.status == Status::ok || s.status == Status::singular;
+      const bool solved = has_equilibrium(s.status);
       const double scale = solved ? 1.0 : nan;
       put(answers.position, i, Vec3(s.tube_tips[tip_of].position * scale));
       put(answers.quaternion, i, Eigen::Vector4d(quaternion(s.tube_tips[tip_of].rotation) * scale));
