@@ -73,6 +73,11 @@ class Diagnosis:
         return left and (self.explained < EXPLAINED or bool(others_fit))
 
     @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Locked rows that hold a reading."""
+        return self.locked & identify.measured_rows(self.measurements)
+
+    @property
     def rms_mm(self) -> dict[str, float]:
         """Of the locked rows."""
         return {

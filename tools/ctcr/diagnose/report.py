@@ -56,7 +56,7 @@ def _opening(d: "Diagnosis", title: str) -> str:
         f"<h1>{html.escape(title)}</h1>"
         f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
         f"{cards(numbers)}"
-        f'<p class="soft">Errors of {int(d.locked.sum())} readings of runs that no fit saw. Even of a right '
+        f'<p class="soft">Errors of {int(d.judged.sum())} readings of runs that no fit saw. Even of a right '
         f"model the tracker's errors and uncertain parameters allow {short(d.expected_mm)} mm there.</p>"
     )
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ctcr import effects, identify, output
+from ctcr import effects, output
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -53,11 +53,10 @@ def _errors(result: "Diagnosis") -> Any:
         "with_effects": "with the effects found",
         "noise_floor": "noise floor",
     }
-    judged = result.locked & identify.measured_rows(result.measurements)
-    runs = len(set(result.measurements.run[judged].tolist()))
+    runs = len(set(result.measurements.run[result.judged].tolist()))
     rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
     rows.append(["allowed by the tracker and uncertain parameters", f"{result.expected_mm:.3f}"])
-    title = f"Position error (RMS) on {judged.sum()} readings of {runs} run(s) that no fit saw"
+    title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} run(s) that no fit saw"
     return output.table(title, ["model", "mm"], rows)
 
 
