@@ -90,6 +90,29 @@ def test_a_value_without_prior_has_no_share_of_one_left():
     assert told > 5
 
 
+def test_a_curve_that_the_file_has_behind_the_plate_is_found_where_the_readings_show_it():
+    """From the flat side no slope leads to the truth; a truth on that side stays there."""
+    random = np.random.default_rng(6)
+    for truth in random.uniform(0.046, 0.054, 40):
+        predict = Kinked(truth, 0.0, random)
+
+        def fitted_from(start, like=None, predict=predict):
+            frozen = {} if like is None else {"weights": like.weights, "inflation": like.inflation}
+            mean, sd = np.array([0.0515, 0.0]), np.array([2.5e-3, 1e-3])
+            return identify.identify_with(
+                predict, ["tubes.1.curved_length", "tracker.position.z"], mean, sd, mean - 0.05, mean + 0.05,
+                NOISE, np.zeros((21, 3)), start=start, starts=1, **frozen,
+            )  # fmt: skip
+
+        stuck = fitted_from(np.array([0.0515, 0.0]))
+        found = open_side.crossed(stuck, fitted_from)
+        assert stuck.values[0] == pytest.approx(0.0515) and stuck.ratio[0] > 0.99
+        if truth < 0.047:  # shows in enough readings not to look like outliers
+            assert abs(found.values[0] - truth) < 4 * found.sd[0] < 1e-3
+        if truth > 0.051:
+            assert found is stuck
+
+
 @pytest.mark.parametrize(("modulus", "more"), [(1.0, False), (0.1, True)])
 def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
     """Softer tubes under a weight bend more, and take more steps; readings of a coarser tracker fewer."""

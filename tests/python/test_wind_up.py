@@ -1,5 +1,6 @@
 """Tubes that rub wind each other up: in predictions, and in fits, which are repeated until they say so themselves."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,11 +55,20 @@ def test_what_is_predicted_is_wound_up(robot, plan):
     np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
 
 
-def test_every_law_is_tried():
+def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
     effect = effects.get("friction", 3)
-    held = Candidate("friction", tuple(effect.amplitudes), (("effects.friction.insertion", 0.0),))
-    shapes = [dict(form.shape) for form in forms(effect, held)]
-    assert shapes == [{"effects.friction.insertion": 0.0}, {"effects.friction.insertion": 0.0, LAW: 1.0}]
+    coefficient = effect.names("coefficient")
+    held = Candidate("friction", tuple(coefficient), (("effects.friction.insertion", 0.0),))
+    laws = [dict(form.shape) for form in forms(effect, held)]
+    assert laws == [{"effects.friction.insertion": 0.0}, {"effects.friction.insertion": 0.0, LAW: 1.0}]
+    for form in forms(
+        effect, held
+    ):  # a torque per length enters the race alone, never beside the coefficient
+        assert list(form.names) == coefficient + effect.shapes
     softening = effects.get("softening", 3)
     alone = Candidate("softening", tuple(softening.amplitudes))
-    assert forms(softening, alone) == [alone]
+    assert forms(softening, alone) == [replace(alone, names=(*alone.names, *softening.shapes))]
+    effect = effects.get("straight_curvature", 3)
+    plane, across = effect.names("bend_x"), effect.names("bend_y")
+    flat, free = forms(effect, Candidate("straight_curvature", tuple(plane)))
+    assert list(flat.names) == plane + effect.shapes and list(free.names) == plane + across + effect.shapes

@@ -147,13 +147,19 @@ def fit(
         "weights": weights,
         "inflation": inflation,
     }
+    within = free_parameters.admissible(robot, measurements.beta[chosen], names)
+
+    def fitted_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
+        frozen = {} if like is None else {"weights": like.weights, "inflation": like.inflation}
+        own = user_effects.recording_of(robot, measurements, names, steps=steps, threads=threads)
+        return identify_rows(
+            own, rows, names, mean, width, low, high, noise, places, **options | frozen, starts=starts,
+            start=np.clip(start, low, high), known=free_parameters.known_directions(robot, names), within=within,
+        )  # fmt: skip
+
     start = np.clip(table.nominal(), low, high)
-    fitted = identify_rows(
-        table, rows, names, mean, width, low, high, noise, places, **options, starts=starts,
-        start=_with_frame(start, table, rows, names, (mean, width, low, high), noise, places, options),
-        known=free_parameters.known_directions(robot, names),
-        within=free_parameters.admissible(robot, measurements.beta[chosen], names),
-    )  # fmt: skip
+    start = _with_frame(start, table, rows, names, (mean, width, low, high), noise, places, options)
+    fitted = open_side.crossed(fitted_from(start, starts=starts), fitted_from)
     units = free_parameters.units_with_effects(robot)
     fitted = open_side.widened(replace(fitted, units=[units[name] for name in names]))
     return replace(fitted, warnings=warnings + fitted.warnings, seconds=perf_counter() - began)

@@ -1,10 +1,11 @@
-"""Uncertainty of a fitted value that the readings bound on one side only.
+"""Values that the readings bound on one side only.
 
 Where the curve of a tube just reaches the plate in some readings, a longer curve changes nothing and a shorter one
-much: chi-square has a kink there, and its curvature on the steep side, which the covariance of a fit follows, says
-nothing of the flat one.
+much: chi-square has a kink there. Its curvature on the steep side, which the covariance of a fit follows, says nothing
+of the flat one; and on the flat side no slope leads back to where the curve shows.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 KINKED = ".curved_length"
 WIDTH = 2.0  # standard deviations at which the sides are judged
 WIDEN = 1.5  # steps of the search along a side, and how much wider than expected a flat one is
+UNSEEN = 0.99  # posterior over prior sd from which the readings say nothing of a length
+BETTER = 0.5  # log evidence by which a fit from beyond a flat side must be better
 
 
 def widened(fit: Any) -> Any:
@@ -45,6 +48,19 @@ def widened(fit: Any) -> Any:
     sd = np.sqrt(np.diag(covariance))
     ratio = np.where(np.isfinite(fit.prior_sd), sd / fit.prior_sd, fit.ratio)
     return replace(fit, covariance=covariance, sd=sd, ratio=ratio, warnings=[*fit.warnings, *warnings])
+
+
+def crossed(fit: Any, refit: Callable[[Array, Any], Any]) -> Any:
+    """The fit, or the better one to which a curve leads that is shorter by its prior deviation, so that it may show.
+
+    refit(start (n,), like): from there, at the weights and inflation of the fit `like`; None: as that fit was made.
+    """
+    for i, name in enumerate(fit.names):
+        if name.endswith(KINKED) and fit.ratio[i] > UNSEEN:
+            there = refit(fit.values - fit.prior_sd * np.eye(len(fit.values))[i], fit)
+            if there.log_evidence > fit.log_evidence + BETTER:
+                fit = refit(there.values, None)
+    return fit
 
 
 def _chi_square(fit: Any):

@@ -212,6 +212,8 @@ def _diagnose(
         fit, _ = _grow(engine, fit, pool, accepted, rounds, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
+        for a in accepted[:-1]:  # what the others hid of their forms shows now
+            fit = _with_shapes(engine, accepted, a, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
     alone = racing.predictive(engine, calibrated, [], progress)
@@ -252,33 +254,33 @@ def _grow(
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
         rejected = racing.is_rejected(engine, fit)
-        fit = _with_shapes(engine, accepted, fit, progress)
+        fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
         if rejected and accepted[0].share < EXPLAINED:
             break  # no effect is stacked on one that hardly explains anything
     return fit, True
 
 
 def _with_shapes(
-    engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress: Progress
+    engine: Engine, accepted: list[Accepted], one: Accepted, fit: identify.Fit, progress: Progress
 ) -> identify.Fit:
-    """Frees the shape parameters of the last accepted effect where that helps: its form may be another one."""
-    last = accepted[-1].entry
-    effect = effects.get(last.id, engine.robot.n_tubes)
-    shapes = [name for name in effect.shapes if name not in last.candidate.names]
-    if not shapes:
-        return fit
-    progress(f"freeing the shape of {last.id}")
+    """Frees what an accepted effect was not given in the race where that helps: its form may be another one."""
+    given = one.entry.candidate
     tried = []
-    for form in forms(effect, last.candidate):
-        entry = replace(last, candidate=replace(form, names=(*last.candidate.names, *shapes)))
-        names, fixed = racing.parameters([*(a.entry for a in accepted[:-1]), entry])
+    for form in forms(effects.get(given.id, engine.robot.n_tubes), given):
+        if form == given:
+            continue  # nothing is left to free
+        progress(f"freeing the shape of {given.id}")
+        entry = replace(one.entry, candidate=form)
+        names, fixed = racing.parameters([entry if a is one else a.entry for a in accepted])
         start = dict(form.shape) | values_of(fit)
         tried.append((entry, engine.fit_like(fit, names, start=start, fixed=fixed, near=True)))
+    if not tried:
+        return fit
     entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
-    accepted[-1].entry = replace(entry, fit=freed)
-    accepted[-1].share += (1 - accepted[-1].share) * racing.share_of(fit, freed, len(shapes))
+    one.entry = replace(entry, fit=freed)
+    one.share += (1 - one.share) * racing.share_of(fit, freed, len(freed.names) - len(fit.names))
     return racing.baseline(engine, [a.entry for a in accepted], values_of(freed), progress)
 
 
@@ -289,7 +291,7 @@ def _backward(
     for a in list(accepted[:-1]):
         rest = [b for b in accepted if b is not a]
         progress(f"without {a.entry.id}")
-        names, fixed = racing.parameters(b.entry for b in rest)
+        names, fixed = racing.parameters([b.entry for b in rest])
         without = engine.fit_like(fit, names, start=values_of(fit), fixed=fixed, tolerance=identify.COARSE)
         a.log_evidence = fit.log_evidence - without.log_evidence
         if a.log_evidence < racing.EVIDENCE:

@@ -3,7 +3,8 @@
 An effect may enter in several variants, from few parameters to all; the evidence pays for the parameters that it needs.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
             left_out[effect.id] = reason
             continue
         for variant in VARIANTS.get(effect.id, (None,)):
-            names = effect.amplitudes if variant is None else effect.names(*variant)
+            names = _names(effect, variant)
             if effect.id == "contact":
                 names = effect.names("stiffness")
             turns = variant is not None and any(".turn_" in name for name in names)
@@ -65,7 +66,8 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
 
 
 def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
-    """The candidate under each law that the effect offers; itself first."""
+    """What an accepted candidate may become: under each law that the effect offers, its shape free, with the strengths
+    by which it entered the race or with all that it may enter by."""
     laws = {name for p in effect.parameters if p.kind == "choice" for name in p.full_names}
     rest = {name: value for name, value in candidate.shape if name not in laws}
     shapes = [candidate.shape]
@@ -73,7 +75,16 @@ def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
         full = {f"effects.{effect.id}.{name}": value for name, value in form.items()}
         law = {name: value for name, value in full.items() if name in laws}
         shapes.append(tuple((rest | law).items()))
-    return [replace(candidate, shape=shape) for shape in dict.fromkeys(shapes)]
+    strengths = [_names(effect, variant) for variant in VARIANTS.get(effect.id, ())]
+    wider = [name for names in strengths if set(candidate.names) <= set(names) for name in names]
+    free = [tuple(dict.fromkeys((*candidate.names, *more, *effect.shapes))) for more in ((), wider)]
+    return [
+        Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in dict.fromkeys(shapes)
+    ]
+
+
+def _names(effect: effects.Effect, variant: tuple[str, ...] | None) -> Sequence[str]:
+    return effect.amplitudes if variant is None else effect.names(*variant)
 
 
 def _unseen(effect: effects.Effect, robot: Robot, measurements: Measurements) -> str | None:

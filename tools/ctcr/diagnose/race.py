@@ -1,13 +1,13 @@
 """The race: every candidate judged after a joint refit with the calibration, one accepted at a time."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify
+from ctcr import effects, identify, open_side
 from ctcr.diagnose import contact, jump, split
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine, Gain, values_of
@@ -123,7 +123,7 @@ def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
     return engine.as_stated(fit).p_value < SIGNIFICANCE
 
 
-def parameters(entries: Iterable[Entry]) -> tuple[list[str], dict[str, float]]:
+def parameters(entries: Collection[Entry]) -> tuple[list[str], dict[str, float]]:
     """Names of all parameters of effects that are fitted, and the values at which others are held."""
     names = [name for entry in entries for name in entry.candidate.names]
     return names, dict(pair for entry in entries for pair in entry.candidate.shape)
@@ -135,7 +135,17 @@ def baseline(
     """Calibration and the accepted effects, outliers weighted; the part of the field error that the data ask for."""
     progress("calibration")
     names, fixed = parameters(accepted)
+
+    def again(values: Array, like: identify.Fit | None) -> identify.Fit:
+        from_there = dict(zip(full.names, map(float, values), strict=True))
+        if like is None:
+            return engine.fit(names, start=from_there, fixed=fixed, near=True)
+        return engine.fit_like(
+            like, names, start=from_there, fixed=fixed, near=True, tolerance=identify.COARSE
+        )
+
     full = engine.fit(names, start=start, fixed=fixed, near=bool(start))
+    full = open_side.crossed(full, again)
     _, _, low, high = engine.priors(full.names)
     noise = identify.likeliest_field(full, low, high, engine.places)
     # From the full model's place: what effects do far from there, slopes do not tell.
