@@ -251,6 +251,19 @@ def test_add_what_a_diagnosis_found(run, tmp_path, robot):
     assert not any(written["friction"]["coefficient"])  # a strength is fitted, not taken over
 
 
+def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, plan):
+    """Two laws of friction beside each other would share what one of them explains."""
+    data, answer, target = tmp_path / "m.csv", tmp_path / "diagnosis.json", tmp_path / "new.yaml"
+    simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data, 3)
+    parameters = {"law": 1.0, **{f"coefficient.{i}": 0.01 for i in (1, 2, 3)}}
+    answer.write_text(json.dumps({"effects": [{"class": ["friction"], "parameters": parameters}]}))
+    fit = ("--fit", data, "--free", ",".join(CALIBRATION), "--json", tmp_path / "added.json")
+    assert run("add", ROBOT, "--diagnosis", answer, "-o", target, *fit)[0] == 0
+    fitted = json.loads((tmp_path / "added.json").read_text())["parameters"]
+    assert list(fitted) == effects.get("friction", 3).names("coefficient")
+    assert robot_file.load(target).effects["friction"]["law"] == 1
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [(None, "cannot be read"), ("[]", "is not what ctcr diagnose writes"), ("{", "is not what"),

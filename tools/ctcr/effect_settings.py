@@ -40,18 +40,20 @@ def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, floa
 
 
 def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
-    """The effects of a diagnosis (its as_json()), the first of each class, the values of their choices, and those of
-    their other parameters."""
-    ids, choices, values = [], {}, {}
+    """The effects of a diagnosis (its as_json()), the first of each class, the values of what it held (choices, and
+    what the data did not ask for, at its neutral value), and of what it fitted."""
+    ids, held, values = [], {}, {}
     for entry in answer["effects"]:
         effect, parameters = effects.get(entry["class"][0], robot.n_tubes), dict(entry["parameters"])
         ids.append(effect.id)
         for parameter in effect.parameters:
             for name in parameter.full_names:
                 value = parameters.get(name.removeprefix(f"effects.{effect.id}."))
-                if value is not None:
-                    (choices if parameter.kind == "choice" else values)[name] = float(value)
-    return ids, choices, values
+                if value is None:
+                    held[name] = parameter.neutral
+                else:
+                    (held if parameter.kind == "choice" else values)[name] = float(value)
+    return ids, held, values
 
 
 def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:

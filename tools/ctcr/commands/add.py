@@ -41,7 +41,7 @@ def command(robot, names, diagnosis, measurements, given, free, own, target, in_
     target = outcome.check_target(loaded, target, in_place)
     if not target:
         raise InputError(Problem("give -o: the robot file to write"))
-    found, choices, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})
+    found, held, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})
     ids = list(dict.fromkeys(effects.get(name, loaded.n_tubes).id for name in [*names, *found]))
     if not ids:
         raise InputError(
@@ -49,7 +49,7 @@ def command(robot, names, diagnosis, measurements, given, free, own, target, in_
             if diagnosis
             else Problem("name an effect: see ctcr effects")
         )
-    fixed = choices | settings(given, loaded, ids)
+    fixed = held | settings(given, loaded, ids)
     console = output.console(json_target)
     if not measurements:
         after = effect_fit.with_values(loaded, ids, fixed)
