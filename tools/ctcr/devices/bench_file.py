@@ -35,7 +35,7 @@ class TrackerPort(Section):
         pattern="^[0-9A-F]{2}$",
         description="the handle of the probe, two hexadecimal digits; else as tool",
     )
-    reading_age_ms: Annotated[float, Quantity("ms", usual=(1, 150), least=0)] = 36.0
+    reading_age_ms: Annotated[float, Quantity("ms", usual=(1, 150), least=0)] = 12.0
 
 
 class Motors(Section):

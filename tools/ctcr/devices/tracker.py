@@ -1,6 +1,7 @@
 """The tracked sensor as a program uses it: asks the process that reads the tracker."""
 
 import multiprocessing
+import pickle
 import time
 from pathlib import Path
 
@@ -58,16 +59,18 @@ class Tracker:
         try:
             if not self._pipe.poll(seconds):
                 return None
-            message = self._pipe.recv()
+            data = self._pipe.recv_bytes()
         except (EOFError, OSError):
             raise DeviceFault("tracker", "the process that reads it is not there", "connect again") from None
+        if data.startswith(TrackedFrame.MARK):
+            frame = TrackedFrame.unpacked(data)
+            self.frames += 1
+            self.missed += frame.missed
+            self.unseen += frame.reading.position is None
+            return frame
+        message = pickle.loads(data)
         if isinstance(message, DeviceFault):
             self.faults.append((time.monotonic(), message))
-            return None
-        if not isinstance(message, TrackedFrame):
+        else:
             self.version, self.connections = message[1], self.connections + 1
-            return None
-        self.frames += 1
-        self.missed += message.missed
-        self.unseen += message.reading.position is None
-        return message
+        return None

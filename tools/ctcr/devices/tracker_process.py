@@ -1,6 +1,8 @@
 """The process that reads the tracker: every frame once, to a pipe; connects again by itself after a fault."""
 
+import math
 import signal
+import struct
 import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -14,7 +16,9 @@ from ctcr.devices.ndi_replies import ToolReading
 
 PRIORITY = 50  # below that of the bus
 AGAIN_S = 0.5  # from a fault to the next connection
-PAUSE_S = 0.004  # between questions that brought no new frame
+PERIOD_S = 1 / 40  # of the tracker's frames
+BACK_S = 0.0015  # a question that came too early is put later by
+AHEAD_S, FASTER = 1e-5, 1.03  # and each that did not earlier, by more from one to the next
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,51 @@ class TrackedFrame:
     t: float
     reading: ToolReading
     missed: int
+
+    LAYOUT = struct.Struct("<d7d d 4q")
+    MARK = b"F"  # no pickle begins so
+
+    def packed(self) -> bytes:
+        """For the pipe: a pickle would take the control loop longer than the rest of the way."""
+        r, unseen = self.reading, (math.nan,)
+        pose = (*(r.position or 3 * unseen), *(r.quaternion or 4 * unseen))
+        error = math.nan if r.error is None else r.error
+        return self.MARK + self.LAYOUT.pack(self.t, *pose, error, r.handle, r.status, r.frame, self.missed)
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> "TrackedFrame":
+        t, *pose, error, handle, status, frame, missed = cls.LAYOUT.unpack_from(data, len(cls.MARK))
+        position, quaternion = (
+            None if math.isnan(part[0]) else part for part in (tuple(pose[:3]), tuple(pose[3:]))
+        )
+        error = None if math.isnan(error) else error
+        return cls(t, ToolReading(handle, position, quaternion, error, status, frame), missed)
+
+
+class FrameClock:
+    """When to ask the tracker: just after it has a new frame, so that no reading is older than it must be.
+
+    Each question comes a little earlier in the period than the one before, until one is too early.
+    """
+
+    def __init__(self) -> None:
+        self.due = time.monotonic()  # [s] next question
+        self._ahead = AHEAD_S
+
+    def wait(self) -> None:
+        time.sleep(max(0.0, self.due - time.monotonic()))
+
+    def was_new(self) -> None:
+        """The question that was due brought a new frame."""
+        self.due += PERIOD_S - self._ahead
+        self._ahead *= FASTER
+        while self.due < time.monotonic() - PERIOD_S:  # the computer was busy elsewhere
+            self.due += PERIOD_S
+
+    def was_early(self) -> None:
+        """It brought the frame before once more."""
+        self._ahead = AHEAD_S
+        self.due += BACK_S
 
 
 def run(port: str, section: TrackerPort, pipe: Connection) -> None:
@@ -47,8 +96,9 @@ def run(port: str, section: TrackerPort, pipe: Connection) -> None:
 
 
 def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
-    last, status = None, 0
+    last, status, clock = None, 0, FrameClock()
     while not pipe.poll(0):
+        clock.wait()
         frame = aurora.read()
         reading = next((r for r in frame.readings if r.handle == handle), None)
         if reading is None:
@@ -60,8 +110,9 @@ def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
             for what, remedy in system_troubles(status):
                 pipe.send(DeviceFault(f"tracker {aurora.port}", what, remedy, status))
         if reading.frame == last:
-            time.sleep(PAUSE_S)
+            clock.was_early()
             continue
+        clock.was_new()
         missed = 0 if last is None else reading.frame - last - 1
         last = reading.frame
-        pipe.send(TrackedFrame(frame.t, reading, missed))
+        pipe.send_bytes(TrackedFrame(frame.t, reading, missed).packed())

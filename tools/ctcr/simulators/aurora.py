@@ -54,7 +54,7 @@ class AuroraSimulator:
         self.line = SerialLine(folder / NAME)
         self._motors, self._input = shared_motors(folder), b""
         self._start = self._slow_since = time.monotonic()
-        self._next_look = 0.0
+        self._next_look, self._frame = 0.0, -1
 
     def close(self) -> None:
         self._control.close()
@@ -69,18 +69,18 @@ class AuroraSimulator:
 
     def step(self) -> None:
         """Waits for the next thing to do, at most one frame, and does it."""
-        wait = self.line.send_due()
-        wait = 1 / RATE_HZ if wait is None else min(wait, 1 / RATE_HZ)
+        waits = [self._device.frame_ends_in, self._next_look - time.monotonic(), self.line.send_due()]
+        wait = max(0.0, min(wait for wait in waits if wait is not None))
         sources = [self._control, *([self.line] if self.line.plugged else [])]
         ready, _, _ = select.select(sources, [], [], wait)
         for changes in self._scenario.due(time.monotonic() - self._start):
             self._set(changes)
+        self._follow_motors()
         if self._control in ready:
             self._control.answer()
         if self.line in ready and self.line.plugged:
             self._listen()
         self._guess_break()
-        self._follow_motors()
 
     # ---- the line
 
@@ -138,13 +138,17 @@ class AuroraSimulator:
         return Sight(pose, self.faults.out_of_volume)
 
     def _follow_motors(self) -> None:
-        now = time.monotonic()
-        if now < self._next_look:
+        """A pose is that of the moment at which its frame begins; the path to it is looked at twice as often."""
+        now, frame = time.monotonic(), self._device.frame
+        if frame == self._frame and now < self._next_look:
             return
         self._next_look = now + 0.5 / RATE_HZ
         motors = self._motors.read()
         axes = 2 * self.robot.robot.n_tubes
         self.robot.turn(now, np.zeros(axes) if motors is None else motors["turns"][:axes])
+        if frame != self._frame:
+            self._frame = frame
+            self._device.acquire()
 
     # ---- control
 

@@ -81,6 +81,17 @@ class AuroraDevice:
     def frame(self) -> int:
         return int((time.monotonic() - self._start) * RATE_HZ) & 0xFFFFFFFF
 
+    @property
+    def frame_ends_in(self) -> float:
+        """[s]"""
+        return (1 - (time.monotonic() - self._start) * RATE_HZ % 1) / RATE_HZ
+
+    def acquire(self) -> None:
+        """Looks at the tools as a frame begins, whether or not anybody asks for it."""
+        if self.tracking:
+            for _ in self._sights(""):
+                pass
+
     def answer(self, line: bytes) -> bytes:
         """The whole answer to a line without its carriage return. `next_baud` is the rate after it."""
         try:
