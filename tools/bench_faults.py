@@ -261,16 +261,18 @@ def notes(recording: Path) -> str:
 
 
 def kill(wires: Wires, times: int) -> Outcome:
-    """SIGKILL at random moments, from the first to the last thing that the recorder does."""
+    """SIGKILL at random moments: of the start in every other case, else from the first row on that it measures."""
     rng, target = random.Random(1), "killed"
     table, kept, lost = wires.folder / target / "measurements.csv", b"", 0
-    for _ in range(times):
+    for k in range(times):
         process = wires.start(wires.recorder(target))
-        end = time.monotonic() + rng.uniform(0.5, 4.5)
-        seen = kept
+        starting, left = k % 2 == 0, rng.uniform(0.5, 4.5) if k % 2 == 0 else rng.uniform(0.0, 1.5)
+        end, seen = time.monotonic() + (left if starting else LONGEST_S), kept
         while time.monotonic() < end and process.poll() is None:
             content = table.read_bytes() if table.exists() else b""
             seen = content[: content.rfind(b"\n") + 1]  # whole rows that another process has seen
+            if not starting and seen != kept:
+                starting, end = True, time.monotonic() + left
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -320,7 +322,7 @@ def beside_the_simulators(folder: Path, target: Path, only: str, kills: int) -> 
         outcomes.append(strike(wires, fault))
         print(outcomes[-1], flush=True)
     if kills:
-        outcomes.append(kill(Wires(folder, folder / "wires", 2 * kills), kills))
+        outcomes.append(kill(Wires(folder, folder / "wires", 4 * kills), kills))
         print(outcomes[-1], flush=True)
     target.write_text(written(outcomes, folder), encoding="utf-8")
     bad = [o for o in outcomes if o.wrong or o.lost]
