@@ -13,15 +13,13 @@ from ctcr import (
     free_parameters,
     identify,
     open_side,
-    recording,
     robot_update,
     sensor_roll,
     unrecorded,
-    user_effects,
 )
 from ctcr.calibrate import parameters
-from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.race import noise_for_prediction
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.race import likeliest, noise_for_prediction
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.measurements import Measurements
@@ -94,17 +92,17 @@ def add(
     """
     readings, said = sensor_roll.positions_alone(robot, readings)
     readings, ways = unrecorded.completed(robot, readings)
-    base, fixed = identify.expand(list(free), robot), dict(fixed or {})
+    fixed = dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     before = robot_before(robot, ids)
     held, fitted = locked_rows(before, readings), [*before.effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
-        stage = _Fitter(robot, readings, base, fixed)
-        now = stage.values()
+        stage = _Fitter(robot, readings, free, fixed)
+        now, nominal = stage.values(), stage.nominal(fitted)
         fit = stage(fitted, fitted, ~held, now)
         progress.advance(1)
         judged = held if held.any() else np.ones(len(readings), bool)
-        stages = [Stage("nominal", *_rms(stage.nominal()[judged])), _stage("calibrated", fit, judged)]
+        stages = [Stage("nominal", *_rms(nominal[judged])), _stage("calibrated", fit, judged)]
         for identity in ids:
             fitted.append(identity)
             for shaped in (fitted[:-1], fitted):
@@ -118,7 +116,7 @@ def add(
             fit = stage(fitted, fitted, np.ones(len(readings), bool), now)
         progress.advance(1)
     fit = open_side.widened(fit)
-    stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.places)))
+    stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(
         _applied(robot, fit),
         list(ids),
@@ -223,65 +221,48 @@ def _path(text: str) -> tuple[str | int, ...]:
 class _Fitter:
     """Fits of one recording with more and more parameters free."""
 
-    def __init__(self, robot: Robot, readings: Measurements, base: Sequence[str], fixed: Mapping[str, float]):
-        self.robot, self.readings, self.base, self.fixed = robot, readings, list(base), fixed
-        self.noise = identify.noise_of_readings(robot, readings)
-        self.places = identify.places_of(_plain(robot), readings)
-        self.measured = identify.measured_rows(readings)
-        self.steps = recording.steps_for(robot, readings, self.noise)
-        if not self.measured.any():
+    def __init__(self, robot: Robot, readings: Measurements, free: Sequence[str], fixed: Mapping[str, float]):
+        self.robot, self.fixed = robot, fixed
+        measured = identify.measured_rows(readings)
+        if not measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
-        self._engine = Engine(robot, readings, self.noise, self.measured)
+        self.engine = Engine(
+            robot, readings, identify.noise_of_readings(robot, readings), measured, free=free
+        )
 
     def shapes(self, identity: str) -> list[str]:
         return [name for name in effects.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]
 
     def values(self) -> dict[str, float]:
-        known = [*self.base, *(name for name in effects.value_of(self.robot))]
-        recorded = user_effects.recording_of(self.robot, self.readings, known)
-        return dict(zip(known, recorded.nominal().tolist(), strict=True))
+        """Of all parameters, as the robot has them."""
+        known = [*self.engine.base, *effects.value_of(self.robot)]
+        return dict(zip(known, self.engine.recording(known).nominal().tolist(), strict=True))
 
-    def nominal(self) -> Array:
-        """Residuals of the robot as its file describes it (M, 6)."""
-        return self._nominal
+    def nominal(self, ids: Sequence[str]) -> Array:
+        """Residuals (M, 6) of the robot as its file describes it, with these effects alone."""
+        self.engine.robot = self._with(ids)
+        recorded = self.engine.recording([])
+        return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
+
+    def _with(self, ids: Sequence[str]) -> Robot:
+        return _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
 
     def __call__(
         self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, start: Mapping[str, float]
     ) -> identify.Fit:
+        engine = self.engine
+        engine.robot, engine.rows = self._with(ids), rows
         known = [effects.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        names = [*self.base, *own]
-        robot = _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
-        recorded = user_effects.recording_of(robot, self.readings, names, steps=self.steps)
-        if not hasattr(self, "_nominal"):
-            self._nominal = recorded.residual(recorded.nominal())[0].reshape(-1, 6)
-        recorded.activate((self.measured & rows).tolist())
-        plain, with_effects = identify.priors(self.robot, self.base), effects.priors(self.robot, own)
-        mean, sd, low, high = (np.concatenate(pair) for pair in zip(plain, with_effects, strict=True))
-        first = np.clip(np.array([start[name] for name in names]), low, high)
-        options = {
-            "known": free_parameters.known_directions(self.robot, names),
-            "within": free_parameters.admissible(self.robot, self.readings.beta[rows], names),
-        }
-
-        def fitted(noise: identify.Noise, start: Array, weights: Array | None = None) -> identify.Fit:
-            return identify.identify_with(
-                recorded, names, mean, sd, low, high, noise, self.places, start=start, starts=1, weights=weights,
-                robust=weights is None, **options,
-            )  # fmt: skip
-
-        fit = fitted(self.noise, first)
-        noise = identify.likeliest_field(fit, low, high, self.places)
-        if noise is not fit.noise:
-            fit = fitted(noise, fit.values)
+        fit = likeliest(engine, own, dict(start), {})
         # The robot is to predict; how sure its values are is another question.
-        self._engine.robot, self._engine.rows = robot, rows
-        noise = noise_for_prediction(self._engine, fit)
+        noise = noise_for_prediction(engine, fit)
         if noise is not fit.noise:
-            likely, fit = fit, fitted(noise, fit.values, fit.weights)
+            likely = fit
+            fit = engine.fit(own, start=values_of(fit), noise=noise, weights=fit.weights, near=True)
             fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
-        return replace(fit, units=[parameters.field_of(name).unit for name in names])
+        return replace(fit, units=[parameters.field_of(name).unit for name in fit.names])
 
 
 def _in_words(readings: Measurements, held: Mask) -> str:
@@ -304,10 +285,6 @@ def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
     made = robot.model_copy(update={"effects": dict(section)})
     made._source = robot._source
     return made
-
-
-def _plain(robot: Robot) -> Robot:
-    return _copy(robot, {})
 
 
 def _only(fit: identify.Fit, kept) -> identify.Fit:

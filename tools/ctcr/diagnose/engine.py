@@ -62,13 +62,14 @@ class Engine:
     rows: Mask  # that are fitted
     robust: bool = True  # whether readings that are far off count for little
     threads: int = 0
+    free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in identify.expand
     steps: int = field(init=False)
     places: Array = field(init=False)
-    base: list[str] = field(init=False)  # calibration parameters
+    base: list[str] = field(init=False)  # their names
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
-        self.base = free_parameters.expand("standard", self.robot)
+        self.base = free_parameters.expand(list(self.free), self.robot)
         self.measured = identify.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
@@ -126,6 +127,7 @@ class Engine:
             table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
             start=at, max_iterations=max_iterations, tolerance=tolerance, few_first=not near,
+            known=free_parameters.known_directions(self.robot, names),
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
 

@@ -1,6 +1,6 @@
 """The race: every candidate judged after a joint refit with the calibration, one accepted at a time."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -135,6 +135,13 @@ def baseline(
     """Calibration and the accepted effects, outliers weighted; the part of the field error that the data ask for."""
     progress("calibration")
     names, fixed = parameters(accepted)
+    return likeliest(engine, names, start, fixed)
+
+
+def likeliest(
+    engine: Engine, names: Sequence[str], start: dict[str, float], fixed: dict[str, float]
+) -> identify.Fit:
+    """Calibration and these parameters of effects, fitted with the part of the field error that the data ask for."""
 
     def again(values: Array, like: identify.Fit | None) -> identify.Fit:
         from_there = dict(zip(full.names, map(float, values), strict=True))
