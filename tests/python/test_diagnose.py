@@ -12,6 +12,8 @@ from ctcr.diagnose import diagnose, jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.coverage import Coverage
 from ctcr.diagnose.engine import Linear
+from ctcr.diagnose.far_off import come_together, far_off
+from ctcr.diagnose.leftover import Leftover
 from ctcr.diagnose.split import OPEN, groups, locked_rows
 from ctcr.diagnose.verdict import judge
 from ctcr.measurements import Measurements
@@ -162,16 +164,63 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
 
 @pytest.mark.parametrize(
     ("calibrated", "with_effects", "structured", "word"),
-    [(0.3, 0.1, True, "identified"), (0.3, 0.29, True, "stand_in"), (0.3, 0.29, False, "identified"),
-     (0.061, 0.062, True, "identified")],
+    [(0.3, 0.1, True, "identified"), (0.3, 0.25, True, "stand_in"), (0.3, 0.29, False, "identified"),
+     (0.3, 0.45, False, "stand_in"), (0.061, 0.062, True, "identified")],
 )  # fmt: skip
 def test_what_other_runs_do_not_confirm_is_a_stand_in(calibrated, with_effects, structured, word):
     noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
     fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (calibrated, with_effects)]
     entry = SimpleNamespace(id="delay", implausible=())
     accepted = [SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)]
-    said = judge(*fits, accepted, [], SimpleNamespace(structured=structured), np.ones(3, bool))
+    said = judge(*fits, accepted, [], leftover(structured), np.ones(3, bool))
     assert said.word == word
+
+
+def leftover(rejected, places=()):
+    return Leftover(rejected, list(places), None, SimpleNamespace(chosen=[]), None)
+
+
+@pytest.mark.parametrize(("rejected", "struck", "word"), [
+    (False, "nothing", "nothing_missing"), (True, "nothing", "not_in_catalogue"),
+    (False, "readings", "nothing_missing"), (False, "places", "not_in_catalogue"),
+])  # fmt: skip
+def test_what_happens_at_a_place_is_missing_and_what_strikes_a_reading_is_not(robot, rejected, struck, word):
+    table = measured_session(robot)  # every run is driven out and back
+    fit = fit_with(table, struck, np.random.default_rng(3))
+    assert far_off(fit).sum() == (0 if struck == "nothing" else 8)
+    left = leftover(rejected, table.row[come_together(table, fit)])
+    rounds = [SimpleNamespace(reason="no candidate explains anything")]
+    said = judge(fit, fit, [], rounds, left, np.zeros(len(table), bool))
+    assert said.word == word and left.structured == (word == "not_in_catalogue")
+    assert (struck == "places") == ("8 readings (rows" in " ".join(said.sentences))
+
+
+def test_a_model_that_is_wrong_everywhere_is_not_wrong_at_a_place(robot):
+    table = measured_session(robot)
+    fit = fit_with(table, "places", np.random.default_rng(3))
+    assert come_together(table, fit).sum() == 8
+    fit.inflation[:] = 20.0
+    assert not come_together(table, fit).any()
+    fit.inflation[:], fit.weights[:] = 1.0, 1.0  # nor is what nobody took for outliers
+    assert not come_together(table, fit).any()
+
+
+def fit_with(table, struck, random):
+    """Residuals of noise, of which 8 are 0.5 mm: single readings, or both visits to four places."""
+    error = np.hstack([3e-5 * random.standard_normal((len(table), 3)), np.zeros((len(table), 3))])
+    joints = np.column_stack([table.beta, table.alpha, table.force])
+    visits = [np.flatnonzero((joints == row).all(axis=1)) for row in np.unique(joints, axis=0)]
+    pairs = random.permutation([visit for visit in visits if len(visit) == 2])
+    if struck == "places":
+        error[pairs[:4, 0], 0] = error[pairs[:4, 1], 0] = 5e-4
+    if struck == "readings":
+        error[pairs[:8, 0], 0] = 5e-4
+    weights = np.ones((len(table), 2))
+    weights[np.abs(error[:, 0]) > 3e-4, 0] = 1e-4
+    return SimpleNamespace(
+        residual=error, weights=weights, expected_square=np.full((len(table), 2), 3 * 3e-5**2), inflation=np.ones(2),
+        noise=SimpleNamespace(position_jitter=3e-5), rms_mm=lambda rows: 0.06,
+    )  # fmt: skip
 
 
 def test_linear_gain_is_the_evidence_of_a_linear_model():

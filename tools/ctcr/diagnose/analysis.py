@@ -12,6 +12,7 @@ from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.far_off import come_together, far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.race import Entry, Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
@@ -22,8 +23,8 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 
 TURNS = 2  # quarters that are locked away in turn, where that is needed
+WRONG = 3.0  # times the stated noise that a fit must admit: it is not even roughly right
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
-SURPRISE = 3.0  # times its expected size, from which an error says that a reading is far off
 
 
 @dataclass
@@ -70,7 +71,8 @@ class Diagnosis:
         most = racing.MOST_OUTLIERS
         left = self.outliers > most and racing.outliers(self.final) > max(most, 0.5 * self.outliers)
         others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
-        return left and (self.explained < EXPLAINED or bool(others_fit))
+        is_wrong = np.max(self.final.inflation) > WRONG
+        return left and bool(self.explained < EXPLAINED or others_fit or is_wrong)
 
     @property
     def judged(self) -> NDArray[np.bool_]:
@@ -136,7 +138,9 @@ def diagnose(
         beyond = _beyond_judging(result)
         if beyond:
             locked = locked_rows(robot, measurements, turn, beyond)
-            result = _of_these(robot, measurements, locked, progress, threads)
+            again = _of_these(robot, measurements, locked, progress, threads)
+            if again.accepted or not result.accepted:  # else the runs that showed it are those locked now
+                result = again
         if result.accepted or not _surprises(result):
             break
     result.notices = [*notices, *ways]
@@ -149,10 +153,13 @@ def _of_these(
 ) -> Diagnosis:
     """With these rows locked."""
     result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
-    if not result.hides_in_outliers:
+    together = come_together(measurements, result.with_effects).any()
+    if not result.hides_in_outliers and not together:
         return result
     # What an effect does to a few readings looks like outliers, until they count.
     other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
+    if together:
+        return min(result, other, key=lambda r: np.sum(far_off(r.with_effects)))
     return max(result, other, key=lambda r: r.final.log_evidence)
 
 
@@ -173,11 +180,8 @@ def _beyond_judging(result: Diagnosis) -> set[int]:
 
 def _surprises(result: Diagnosis) -> bool:
     """Whether the locked runs have errors that those which were fitted do not."""
-    square = np.sum(result.calibrated.residual[:, :3] ** 2, axis=1)
-    expected = result.calibrated.expected_square[:, 0]
-    seen = np.isfinite(square)
-    far = square > SURPRISE**2 * expected
-    return bool(np.mean(far[seen & result.locked]) > racing.MOST_OUTLIERS)
+    seen = np.isfinite(result.calibrated.residual[:, 0])
+    return bool(np.mean(far_off(result.calibrated)[seen & result.locked]) > racing.MOST_OUTLIERS)
 
 
 def _diagnose(

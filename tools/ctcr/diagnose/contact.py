@@ -8,12 +8,13 @@ from ctcr.diagnose.candidates import Candidate
 
 FORCE = ["effects.tip_load.force_x", "effects.tip_load.force_y", "effects.tip_load.force_z"]
 STEM = "effects.contact."
-DEPTHS = (0.6, 0.75, 0.9)  # parts of the tips that are outside
+DEPTHS = (0.6, 0.75, 0.9, 0.97)  # parts of the tips that are outside
 FEWEST = 5  # tips inside
 
 
-def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candidate, NDArray]]:
-    """The candidate with each plane, with its slope; `by_force` (M, 6, 3) are those of a force at the tip [1/N]."""
+def planes(engine, candidate: Candidate, by_force: NDArray, part: float) -> list[tuple[Candidate, NDArray]]:
+    """The candidate with each plane in front of which this part of the tips stays, with its slope; `by_force` (M, 6, 3)
+    are those of a force at the tip [1/N]."""
     tracker = engine.robot.tracker
     tips = (engine.places - tracker.position) @ tracker.rotation
     sigma = effects.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
@@ -26,14 +27,13 @@ def planes(engine, candidate: Candidate, by_force: NDArray) -> list[tuple[Candid
                 [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
             )
             height = tips @ normal
-            for part in DEPTHS:
-                distance = np.quantile(height, part)
-                inside = np.maximum(height - distance, 0.0)
-                if np.count_nonzero(inside) < FEWEST:
-                    continue
-                column = -sigma * inside[:, None] * (by_force @ normal)
-                plane = {"distance": distance, "azimuth": azimuth, "elevation": elevation}
-                shape = neutral | {STEM + name: float(value) for name, value in plane.items()}
-                names = (STEM + "stiffness", *shapes)
-                options.append((Candidate(candidate.id, names, tuple(shape.items())), column[:, :, None]))
+            distance = np.quantile(height, part)
+            inside = np.maximum(height - distance, 0.0)
+            if np.count_nonzero(inside) < FEWEST:
+                continue
+            column = -sigma * inside[:, None] * (by_force @ normal)
+            plane = {"distance": distance, "azimuth": azimuth, "elevation": elevation}
+            shape = neutral | {STEM + name: float(value) for name, value in plane.items()}
+            names = (STEM + "stiffness", *shapes)
+            options.append((Candidate(candidate.id, names, tuple(shape.items())), column[:, :, None]))
     return options

@@ -9,22 +9,49 @@ from ctcr import effect_model, identify
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.far_off import come_together
 from ctcr.diagnose.race import is_rejected
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
 OUTLIER = 0.3  # weight below which a reading's error is not looked at
+SHOWN = 6
 
 
 @dataclass(frozen=True)
 class Leftover:
-    structured: bool
+    rejected: bool  # whether noise as stated does not explain it
+    places: list[int]  # rows of the table that are far off the same way as their neighbours
     before: Ranking  # of what depends on what before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
 
     @property
+    def structured(self) -> bool:
+        return self.rejected or bool(self.places)
+
+    @property
     def depends_on(self) -> list[str]:
         return [item.name for item in self.after.chosen] if self.structured else []
+
+    @property
+    def at_places(self) -> str:
+        """Which readings are off together; empty where none are."""
+        if not self.places:
+            return ""
+        shown = ", ".join(map(str, self.places[:SHOWN])) + (", ..." if len(self.places) > SHOWN else "")
+        return (
+            f"{len(self.places)} readings (rows {shown}) are far off the same way as their neighbours in joints and "
+            "load: something acts just there."
+        )
+
+    @property
+    def in_words(self) -> list[str]:
+        if not self.structured:
+            return ["What is left is noise."]
+        on = ", ".join(item.label for item in self.after.chosen)
+        depends = f"it depends on {on}" if on else "it depends on nothing that was tried"
+        rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
+        return rejected + ([self.at_places] if self.places else [])
 
 
 def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Leftover:
@@ -33,7 +60,8 @@ def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Left
     )
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
-    return Leftover(is_rejected(engine, fit), ranked, after, sample)
+    places = engine.measurements.row[come_together(engine.measurements, fit)].tolist()
+    return Leftover(is_rejected(engine, fit), places, ranked, after, sample)
 
 
 def _rank(engine: Engine, sample: Sample, fit: identify.Fit) -> Ranking:

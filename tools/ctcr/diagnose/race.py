@@ -266,19 +266,19 @@ def screen(
         own = slopes[:, :, [place[name] for name in candidate.names]]
         if candidate.shape:
             own = engine.slopes(before, candidate.names, fixed | dict(candidate.shape))
+        kinds = [[(candidate, own)]]  # of each the best enters
         if candidate.id == "frame_jump":
-            options = jump.moment(
-                engine, candidate, own, lambda slopes: linear.gain(before.whiten(slopes)).log_evidence
-            )
+            kinds = [
+                jump.moment(engine, candidate, own, lambda s: linear.gain(before.whiten(s)).log_evidence)
+            ]
         elif candidate.id == "contact":
             tip = slopes[:, :, [place[name] for name in contact.FORCE]] / engine.priors(contact.FORCE)[1]
-            options = contact.planes(engine, candidate, tip)
-        else:
-            options = [(candidate, own)]
-        gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
-        if gains:
-            gain, variant = max(gains, key=lambda pair: pair[0].log_evidence)
-            entries.append(Entry(variant, gain))
+            kinds = [contact.planes(engine, candidate, tip, part) for part in contact.DEPTHS]
+        for options in kinds:
+            gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
+            if gains:
+                gain, variant = max(gains, key=lambda pair: pair[0].log_evidence)
+                entries.append(Entry(variant, gain))
     return sorted(entries, key=lambda entry: -entry.linear)
 
 

@@ -134,12 +134,8 @@ def _parameters(d: "Diagnosis") -> str:
 
 
 def _limits(d: "Diagnosis") -> str:
-    lines = [*d.notices, *(f"{identity}: {reason}" for identity, reason in d.unseen.items())]
-    if not d.leftover.structured:
-        lines.insert(0, "What is left is noise.")
-    else:
-        on = ", ".join(item.label for item in d.leftover.after.chosen)
-        lines.insert(0, "What is left is more than noise" + (f"; it depends on {on}" if on else ""))
+    unseen = (f"{identity}: {reason}" for identity, reason in d.unseen.items())
+    lines = [*d.leftover.in_words, *d.notices, *unseen]
     return (
         "<h2>What is left, and what these data cannot say</h2><ul>"
         + "".join(f"<li>{html.escape(line)}</li>" for line in lines)

@@ -39,7 +39,8 @@ def show(console: Any, result: "Diagnosis") -> None:
             console.print(f"Nothing accepted: {round_.reason}.", markup=False)
     if result.accepted:
         console.print(_parameters(result))
-    _leftover(console, result)
+    for line in result.leftover.in_words:
+        console.print(line, markup=False)
     for notice in result.notices:
         console.print(f"{notice}.", markup=False)
     for identity, reason in result.unseen.items():
@@ -93,16 +94,3 @@ def _parameters(result: "Diagnosis") -> Any:
         if name in known
     ]
     return output.table("Fitted effects", ["parameter", "value", "sd", "unit", "meaning"], rows)
-
-
-def _leftover(console: Any, result: "Diagnosis") -> None:
-    left = result.leftover
-    if not left.structured:
-        console.print("What is left is noise.")
-    elif left.depends_on:
-        console.print(
-            f"What is left is more than noise; it depends on {', '.join(i.label for i in left.after.chosen)}.",
-            markup=False,
-        )
-    else:
-        console.print("What is left is more than noise, and depends on nothing that was tried.")

@@ -13,10 +13,10 @@ from ctcr.diagnose.leftover import Leftover
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Accepted
 
-# Share of the excess, of the error on locked runs or of chi-square, that effects must remove to be no stand-ins.
-EXPLAINED = 0.4
-# ... and of the error on locked runs in any case, where that is not mere noise.
-LEARNED, MORE_THAN_NOISE = 0.2, 0.25
+# Share of the excess that effects must remove to be no stand-ins: of the squared error on locked runs, or where that is
+# mere noise, of chi-square.
+EXPLAINED, MORE_THAN_NOISE = 0.4, 0.25
+MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
 
 @dataclass
@@ -41,14 +41,15 @@ def judge(
             return Verdict(
                 "nothing_missing", ["Calibration and the tracker's noise explain these measurements."]
             )
-        return Verdict(
-            "not_in_catalogue",
-            ["Something is missing that no effect of the catalogue explains.", rounds[-1].reason],
-        )
+        missing = "Something is missing that no effect of the catalogue explains."
+        where = [leftover.at_places] if leftover.places else []
+        return Verdict("not_in_catalogue", [missing, *where, rounds[-1].reason])
     first = accepted[0]
-    learned_nothing = explained < LEARNED and before > MORE_THAN_NOISE * jitter**2
-    if leftover.structured and (max(explained, first.share) < EXPLAINED or learned_nothing):
+    noise = before < MORE_THAN_NOISE * jitter**2
+    if leftover.rejected and (max(explained, first.share) if noise else explained) < EXPLAINED:
         return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but most of it stays."])
+    if after > max(MISLED * before, jitter**2):
+        return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])
     if any(a.entry.implausible for a in accepted):
         return Verdict(
             "stand_in", ["The data want values that are hardly possible.", *first.entry.implausible]

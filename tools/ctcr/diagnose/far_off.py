@@ -1,0 +1,51 @@
+"""Readings that are far off: by chance, as a tracker's outliers are, or because something acts just there."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from scipy.stats import binom
+
+from ctcr.diagnose.race import OUTLIER
+from ctcr.measurements import Measurements
+from ctcr.unrecorded import LEVER
+
+Mask = NDArray[np.bool_]
+
+SURPRISE = 3.0  # times its expected size, from which an error says that a reading is far off
+ALIKE = 0.5  # cosine between the errors of neighbours from which they are off the same way,
+BY_CHANCE = 0.25  # ... and how often it is that by chance
+DOUBT = 1e-3  # significance of saying that it is no chance
+FEWEST = 4  # readings that say so
+
+
+def far_off(fit: Any, admitted: float = 1.0) -> Mask:
+    """Rows (M,) whose position is much farther from the prediction than open parameters and the noise, so many times
+    as large as stated, let expect."""
+    square = np.sum(fit.residual[:, :3] ** 2, axis=1)
+    return np.isfinite(square) & (square > (SURPRISE * admitted) ** 2 * fit.expected_square[:, 0])
+
+
+def come_together(measurements: Measurements, fit: Any) -> Mask:
+    """Fitted rows (M,) that are far off the same way as the reading nearest to them in joints and load; none where so
+    many may be so by chance. Outliers strike a reading, not a place.
+
+    Far off is what the fit takes for an outlier, and not for the error that its model has everywhere."""
+    fitted = fit.weights[:, 0] > 0
+    outlier = fitted & (fit.weights[:, 0] < OUTLIER)
+    far, error = outlier & far_off(fit, fit.inflation[0]), fit.residual[:, :3]
+    read = np.flatnonzero(fitted & np.isfinite(error).all(axis=1))
+    together = np.zeros(len(measurements), bool)
+    if np.sum(far) < FEWEST or len(read) < 2:
+        return together
+    load = 1e3 * measurements.force  # another load is another place
+    place = np.column_stack([measurements.beta / LEVER, measurements.alpha, load])[read]
+    neighbour = read[cKDTree(place).query(place, k=2)[1]]
+    neighbour = np.where(neighbour[:, 0] == read, neighbour[:, 1], neighbour[:, 0])
+    size = np.linalg.norm(error[read], axis=1) * np.linalg.norm(error[neighbour], axis=1)
+    alike = np.sum(error[read] * error[neighbour], axis=1) > ALIKE * size
+    together[read] = far[read] & far[neighbour] & alike
+    chance = BY_CHANCE * np.mean(far[read])
+    doubt = binom.sf(np.sum(together) - 1, np.sum(far), chance)
+    return together if np.sum(together) >= FEWEST and doubt < DOUBT else np.zeros_like(together)
