@@ -23,7 +23,10 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 
 TURNS = 2  # quarters that are locked away in turn, where that is needed
-WRONG = 3.0  # times the stated noise that a fit must admit: it is not even roughly right
+WRONG, MANY = (
+    3.0,
+    0.1,
+)  # times the stated noise, and share of outliers: a fit that takes so many is hardly right
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 
 
@@ -71,7 +74,7 @@ class Diagnosis:
         most = racing.MOST_OUTLIERS
         left = self.outliers > most and racing.outliers(self.final) > max(most, 0.5 * self.outliers)
         others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
-        is_wrong = np.max(self.final.inflation) > WRONG
+        is_wrong = self.outliers > MANY and np.max(self.final.inflation) > WRONG
         return left and bool(self.explained < EXPLAINED or others_fit or is_wrong)
 
     @property
@@ -203,7 +206,8 @@ def _diagnose(
     few = identify.few_of(engine.fitted)
     if few is not None:
         progress("a part of the readings first")
-        part, more = replace(engine, rows=few), np.sum(engine.fitted) / np.sum(few)
+        part = replace(engine, rows=few, tolerance=identify.COARSE)
+        more = np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
         before = values_of(first)
         first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
@@ -216,8 +220,6 @@ def _diagnose(
         fit, _ = _grow(engine, fit, pool, accepted, rounds, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
-        for a in accepted[:-1]:  # what the others hid of their forms shows now
-            fit = _with_shapes(engine, accepted, a, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
     alone = racing.predictive(engine, calibrated, [], progress)
@@ -261,6 +263,8 @@ def _grow(
         fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
         if rejected and accepted[0].share < EXPLAINED:
             break  # no effect is stacked on one that hardly explains anything
+    for a in accepted[:-1]:  # what the others hid of their forms shows now
+        fit = _with_shapes(engine, accepted, a, fit, progress)
     return fit, True
 
 

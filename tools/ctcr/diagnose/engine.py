@@ -63,6 +63,7 @@ class Engine:
     robust: bool = True  # whether readings that are far off count for little
     threads: int = 0
     free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in identify.expand
+    tolerance: float = 0.02  # of log evidence, in fits that are not told another one
     steps: int = field(init=False)
     places: Array = field(init=False)
     base: list[str] = field(init=False)  # their names
@@ -107,7 +108,7 @@ class Engine:
         inflation: Array | None = None,
         noise: Any = None,
         max_iterations: int = 50,
-        tolerance: float = 0.02,
+        tolerance: float | None = None,
         near: bool = False,
     ) -> identify.Fit:
         """Calibration and `added` parameters of effects together. `near`: the start is where a like fit ended, so that
@@ -126,7 +127,7 @@ class Engine:
         return identify.identify_rows(
             table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, max_iterations=max_iterations, tolerance=tolerance, few_first=not near,
+            start=at, max_iterations=max_iterations, tolerance=tolerance or self.tolerance, few_first=not near,
             known=free_parameters.known_directions(self.robot, names),
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
