@@ -267,13 +267,14 @@ def kill(wires: Wires, times: int) -> Outcome:
     table, kept, lost = wires.folder / target / "measurements.csv", b"", 0
     for k in range(times):
         process = wires.start(wires.recorder(target))
-        starting, left = k % 2 == 0, rng.uniform(0.5, 4.5) if k % 2 == 0 else rng.uniform(0.0, 1.5)
-        end, seen = time.monotonic() + (left if starting else LONGEST_S), kept
+        measures = k % 2 == 1
+        left, seen = rng.uniform(0.0, 1.5) if measures else rng.uniform(0.5, 4.5), kept
+        end = time.monotonic() + (LONGEST_S if measures else left)
         while time.monotonic() < end and process.poll() is None:
             content = table.read_bytes() if table.exists() else b""
             seen = content[: content.rfind(b"\n") + 1]  # whole rows that another process has seen
-            if not starting and seen != kept:
-                starting, end = True, time.monotonic() + left
+            if measures and seen != kept:  # the first row: its time begins
+                measures, end = False, time.monotonic() + left
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
         process.wait()

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from ctcr.devices.fault import DeviceFault
 from ctcr.devices.lateness import Lateness
 from ctcr.devices.tracker import Tracker
-from ctcr.devices.tracker_process import TrackedFrame
+from ctcr.devices.tracker_process import RATE_HZ, TrackedFrame
 
-RATE_HZ = 40.0  # of the tracker
 STALE_S = 0.25  # without a new frame: the pose is no longer that of now
 
 

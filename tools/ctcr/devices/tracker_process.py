@@ -16,7 +16,8 @@ from ctcr.devices.ndi_replies import ToolReading
 
 PRIORITY = 50  # below that of the bus
 AGAIN_S = 0.5  # from a fault to the next connection
-PERIOD_S = 1 / 40  # of the tracker's frames
+RATE_HZ = 40.0  # of the tracker
+PERIOD_S = 1 / RATE_HZ
 BACK_S = 0.0015  # a question that came too early is put later by
 AHEAD_S, FASTER = 1e-5, 1.03  # and each that did not earlier, by more from one to the next
 

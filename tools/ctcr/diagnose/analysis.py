@@ -23,10 +23,8 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 
 TURNS = 2  # quarters that are locked away in turn, where that is needed
-WRONG, MANY = (
-    3.0,
-    0.1,
-)  # times the stated noise, and share of outliers: a fit that takes so many is hardly right
+WRONG = 3.0  # times the stated noise that a fit admits, and
+MANY = 0.1  # ... share of outliers that calibration takes, beyond which it is hardly right
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 
 

@@ -10,10 +10,9 @@ from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.far_off import come_together
-from ctcr.diagnose.race import is_rejected
+from ctcr.diagnose.race import OUTLIER, is_rejected
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
-OUTLIER = 0.3  # weight below which a reading's error is not looked at
 SHOWN = 6
 
 
@@ -34,15 +33,15 @@ class Leftover:
         return [item.name for item in self.after.chosen] if self.structured else []
 
     @property
-    def at_places(self) -> str:
-        """Which readings are off together; empty where none are."""
+    def at_places(self) -> list[str]:
+        """Which readings are off together; nothing where none are."""
         if not self.places:
-            return ""
+            return []
         shown = ", ".join(map(str, self.places[:SHOWN])) + (", ..." if len(self.places) > SHOWN else "")
-        return (
+        return [
             f"{len(self.places)} readings (rows {shown}) are far off the same way as their neighbours in joints and "
             "load: something acts just there."
-        )
+        ]
 
     @property
     def in_words(self) -> list[str]:
@@ -51,7 +50,7 @@ class Leftover:
         on = ", ".join(item.label for item in self.after.chosen)
         depends = f"it depends on {on}" if on else "it depends on nothing that was tried"
         rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
-        return rejected + ([self.at_places] if self.places else [])
+        return rejected + self.at_places
 
 
 def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Leftover:

@@ -42,8 +42,7 @@ def judge(
                 "nothing_missing", ["Calibration and the tracker's noise explain these measurements."]
             )
         missing = "Something is missing that no effect of the catalogue explains."
-        where = [leftover.at_places] if leftover.places else []
-        return Verdict("not_in_catalogue", [missing, *where, rounds[-1].reason])
+        return Verdict("not_in_catalogue", [missing, *leftover.at_places, rounds[-1].reason])
     first = accepted[0]
     noise = before < MORE_THAN_NOISE * jitter**2
     if leftover.rejected and (max(explained, first.share) if noise else explained) < EXPLAINED:
