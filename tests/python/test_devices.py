@@ -15,6 +15,7 @@ from ctcr.devices.fault import DeviceFault
 from ctcr.devices.joint_limits import JointLimits
 from ctcr.devices.lateness import Lateness
 from ctcr.devices.motion import StraightMove, VelocityMove
+from ctcr.devices.real_time import BUS, TRACKER, real_time
 from ctcr.devices.shared_record import SharedRecord
 from ctcr.errors import InputError
 from ctcr.moving_model import RECENT_S, MovingModel
@@ -265,6 +266,31 @@ def test_lateness():
     assert late.quantile(0.5) == pytest.approx(0.5e-3, abs=3e-5)
     assert late.quantile(0.99) == pytest.approx(0.99e-3, abs=3e-5) and late.worst == 0.5
     assert late.as_dict()["count"] == 1002
+
+
+def scheduling():
+    return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, os.sched_getaffinity(0)
+
+
+def test_real_time_is_given_back():
+    before = scheduling()
+    for duty, core in ((BUS, min(before[2])), (TRACKER, max(before[2]))):
+        with real_time(duty) as granted:
+            assert scheduling() == ((os.SCHED_FIFO, duty.priority, {core}) if granted else before)
+        assert scheduling() == before
+    with pytest.raises(KeyboardInterrupt), real_time(BUS):
+        raise KeyboardInterrupt
+    assert scheduling() == before
+
+
+def test_without_the_permission_nothing_changes(monkeypatch):
+    def refused(*_):
+        raise PermissionError
+
+    before = scheduling()
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
+    with real_time(BUS) as granted:
+        assert not granted and scheduling() == before
 
 
 # ---- the model that moves

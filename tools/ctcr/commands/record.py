@@ -61,9 +61,9 @@ def command(
 
     from ctcr import measurements, output, robot_file, user_effects
     from ctcr.devices import bench_file, person
-    from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
     from ctcr.devices.motors import Motors
     from ctcr.devices.private_folder import private_folder
+    from ctcr.devices.real_time import CONTROLLER, real_time
     from ctcr.devices.sight import Sight
     from ctcr.devices.tracker import Tracker
     from ctcr.errors import InputError
@@ -90,7 +90,6 @@ def command(
     with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
-        wish_real_time(CONTROL_PRIORITY)
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)
@@ -108,7 +107,8 @@ def command(
             sight = Sight(tracker, patience)
             session = Session(loaded, motors, sight, who, recording.rows, options, recording.clock, shown)
             try:
-                done = session.run(steps)
+                with real_time(CONTROLLER):
+                    done = session.run(steps)
             except BaseException as error:
                 with suppress(InputError):  # a full disk must not hide what ended it
                     recording.note(motors, tracker, sight.lateness, str(error) or "interrupted")

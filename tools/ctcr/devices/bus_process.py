@@ -19,7 +19,8 @@ from ctcr.devices.axis_control import AxisControl, AxisSettings
 from ctcr.devices.bus import Bus
 from ctcr.devices.bus_lock import BusLock
 from ctcr.devices.fault import DeviceFault
-from ctcr.devices.lateness import Lateness, wish_real_time
+from ctcr.devices.lateness import Lateness
+from ctcr.devices.real_time import BUS, real_time
 from ctcr.devices.shared_record import SharedRecord
 from ctcr.devices.stepper_drive import DriveSettings
 
@@ -31,7 +32,6 @@ MOST_AXES = 8
 SILENCE_S = 0.06  # without a good frame, before it is a fault; the terminals themselves wait for 0.1 s
 STATE_CYCLES = 25  # between two looks at the terminals' states
 READY_S = 0.5  # from enabling to ready
-PRIORITY = 60
 STATE = np.dtype([
     ("t", "f8"), ("joints", "f8", MOST_AXES), ("wanted", "f8", MOST_AXES), ("counters", "i8", MOST_AXES),
     ("done", "i8"), ("moving", "?"), ("homed", "?"), ("limited", "?"), ("stopped", "?"), ("real_time", "?"),
@@ -62,10 +62,10 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
-        with BusLock(folder):
+        with BusLock(folder), real_time(BUS) as granted:
             try:
                 bus.connect()
-                owner = _Owner(settings, folder, pipe, bus)
+                owner = _Owner(settings, folder, pipe, bus, granted)
                 owner.tell(time.monotonic())
                 pipe.send(("ready", bus.names))
                 owner.serve()
@@ -79,11 +79,11 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
 
 
 class _Owner:
-    def __init__(self, settings: BusSettings, folder: Path, pipe: Connection, bus: Bus):
+    def __init__(self, settings: BusSettings, folder: Path, pipe: Connection, bus: Bus, real_time: bool):
         self._settings, self._folder, self._pipe, self._bus = settings, folder, pipe, bus
         self._record = state_record(folder, writer=True)
-        self._real_time = wish_real_time(PRIORITY)
-        self._lateness, self._cycles, self._bad = Lateness(), 0, 0
+        self._real_time, self._lateness = real_time, Lateness()
+        self._cycles = self._bad = 0
         inputs = self._first_inputs()
         self._counters = np.array([drive.counter for drive in inputs])
         homed = bool((np.abs(self._counters - HOME_COUNT) < HOME_RANGE).all())

@@ -4,7 +4,6 @@ import numpy as np
 
 BIN_S = 20e-6
 BINS = 5000  # up to 0.1 s; what is later counts as that
-CONTROL_PRIORITY = 30  # of the process that controls and records: below those that serve the devices
 
 
 class Lateness:
@@ -32,14 +31,3 @@ class Lateness:
             "p99_ms": 1e3 * self.quantile(0.99),
             "worst_ms": 1e3 * self.worst,
         }
-
-
-def wish_real_time(priority: int) -> bool:
-    """Asks for real-time priority of this process; whether it was granted. docs/hardware.md says how to permit it."""
-    import os
-
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (PermissionError, OSError, AttributeError):
-        return False
-    return True

@@ -10,11 +10,10 @@ from multiprocessing.connection import Connection
 from ctcr.devices.aurora import Aurora
 from ctcr.devices.bench_file import TrackerPort
 from ctcr.devices.fault import DeviceFault
-from ctcr.devices.lateness import wish_real_time
 from ctcr.devices.ndi_protocol import system_troubles
 from ctcr.devices.ndi_replies import ToolReading
+from ctcr.devices.real_time import TRACKER, real_time
 
-PRIORITY = 50  # below that of the bus
 AGAIN_S = 0.5  # from a fault to the next connection
 RATE_HZ = 40.0  # of the tracker
 PERIOD_S = 1 / RATE_HZ
@@ -79,17 +78,17 @@ class FrameClock:
 def run(port: str, section: TrackerPort, pipe: Connection) -> None:
     """The process: sends ("connected", version), TrackedFrame and DeviceFault until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
-    wish_real_time(PRIORITY)
     aurora = Aurora(port, section.baud, section.replies)
     try:
-        while not pipe.poll(0):
-            try:
-                aurora.connect()
-                pipe.send(("connected", aurora.version))
-                _read(aurora, int(section.tool, 16), pipe)
-            except DeviceFault as fault:
-                pipe.send(fault)
-                pipe.poll(AGAIN_S)
+        with real_time(TRACKER):
+            while not pipe.poll(0):
+                try:
+                    aurora.connect()
+                    pipe.send(("connected", aurora.version))
+                    _read(aurora, int(section.tool, 16), pipe)
+                except DeviceFault as fault:
+                    pipe.send(fault)
+                    pipe.poll(AGAIN_S)
     except (EOFError, OSError):
         pass  # who listened is gone
     finally:

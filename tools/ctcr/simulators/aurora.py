@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ctcr.devices import ndi_protocol as ndi
-from ctcr.devices.lateness import wish_real_time
+from ctcr.devices.real_time import SIMULATED_TRACKER, real_time
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.simulators.aurora_device import RATE_HZ, AuroraDevice, Sight
@@ -20,7 +20,6 @@ from ctcr.simulators.robot import SimulatedRobot
 from ctcr.simulators.serial_line import SerialLine
 
 NAME = "aurora"
-PRIORITY = 40
 SENSOR = 0x0A  # the handle of the coil at the robot's tip
 PROBE = 0x0C  # the handle of the coil in the probe
 STILL = (np.array([0.05, 0.0, -0.2]), np.array([1.0, 0.0, 0.0, 0.0]))  # where the other coils lie
@@ -63,9 +62,9 @@ class AuroraSimulator:
 
     def run(self, until=lambda: False) -> None:
         """Serves until `until()` is true."""
-        wish_real_time(PRIORITY)  # the device answers whatever else the computer does
-        while not until():
-            self.step()
+        with real_time(SIMULATED_TRACKER):
+            while not until():
+                self.step()
 
     def step(self) -> None:
         """Waits for the next thing to do, at most one frame, and does it."""

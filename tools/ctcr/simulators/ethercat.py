@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ctcr.devices.lateness import wish_real_time
+from ctcr.devices.real_time import SIMULATED_BUS, real_time
 from ctcr.errors import InputError, Problem
 from ctcr.simulators.control import ControlSocket
 from ctcr.simulators.faults import Faults, Scenario
@@ -24,7 +24,6 @@ NAME = "ethercat"
 TICK_S = 0.0005  # terminals work no more often
 IDLE_S = 0.01  # and no less
 SHARE_S = 0.004  # between two writings of the motors' turns
-PRIORITY = 70
 LARGEST_FRAME = 1600  # bytes
 FAULTS = {
     "lost_frames": 0.0,  # share
@@ -74,10 +73,10 @@ class EthercatSimulator:
 
     def run(self, until=lambda: False) -> None:
         """Serves until `until()` is true."""
-        wish_real_time(PRIORITY)  # terminals answer at once, whatever else the computer does
         gc.freeze()  # a collection would come at the worst moment
-        while not until():
-            self.step()
+        with real_time(SIMULATED_BUS):
+            while not until():
+                self.step()
 
     def step(self) -> None:
         """Waits for the next thing to do, at most IDLE_S, and does it."""

@@ -10,10 +10,10 @@ import numpy as np
 from ctcr import robot_file
 from ctcr.devices import bench_file
 from ctcr.devices.bench_file import Bench
-from ctcr.devices.lateness import CONTROL_PRIORITY, wish_real_time
 from ctcr.devices.motors import Motors
 from ctcr.devices.person import Person, person_of
 from ctcr.devices.private_folder import private_folder
+from ctcr.devices.real_time import CONTROLLER, real_time
 from ctcr.devices.sight import RATE_HZ, Sight
 from ctcr.devices.tracker import Tracker
 from ctcr.errors import InputError, Problem
@@ -58,14 +58,14 @@ def track(
     with Tracker(devices, place) as tracker, Motors(devices, loaded, place) as motors:
         motors.connect()
         tracker.connect()
-        wish_real_time(CONTROL_PRIORITY)
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
         age = 1e-3 * devices.tracker.reading_age_ms
         tracking = _Tracking(
             loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm, age
         )
         try:
-            tracking.run(person_of(devices, place), said)
+            with real_time(CONTROLLER):
+                tracking.run(person_of(devices, place), said)
         except BaseException as error:
             with suppress(InputError):  # a full disk must not hide what ended it
                 folder.note(motors, tracker, tracking.sight.lateness, str(error) or "interrupted")
