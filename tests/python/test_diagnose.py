@@ -172,7 +172,7 @@ def test_what_other_runs_do_not_confirm_is_a_stand_in(calibrated, with_effects, 
     fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (calibrated, with_effects)]
     entry = SimpleNamespace(id="delay", implausible=())
     accepted = [SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)]
-    said = judge(*fits, accepted, [], leftover(structured), np.ones(3, bool))
+    said = judge(*fits, accepted, leftover(structured), np.ones(3, bool))
     assert said.word == word
 
 
@@ -189,8 +189,7 @@ def test_what_happens_at_a_place_is_missing_and_what_strikes_a_reading_is_not(ro
     fit = fit_with(table, struck, np.random.default_rng(3))
     assert far_off(fit).sum() == (0 if struck == "nothing" else 8)
     left = leftover(rejected, table.row[come_together(table, fit)])
-    rounds = [SimpleNamespace(reason="no candidate explains anything")]
-    said = judge(fit, fit, [], rounds, left, np.zeros(len(table), bool))
+    said = judge(fit, fit, [], left, np.zeros(len(table), bool))
     assert said.word == word and left.structured == (word == "not_in_catalogue")
     assert (struck == "places") == ("8 readings (rows" in " ".join(said.sentences))
 

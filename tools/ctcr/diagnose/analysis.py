@@ -225,7 +225,7 @@ def _diagnose(
     return Diagnosis(
         robot, measurements, locked, unseen, alone, open_side.widened(after), open_side.widened(fit),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
-        judge(alone, after, accepted, rounds, leftover, locked),
+        judge(alone, after, accepted, leftover, locked),
     )  # fmt: skip
 
 

@@ -81,6 +81,11 @@ class Round:
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
     is_stand_in: bool = False  # whether the best candidate surely removes too little of the excess
 
+    @property
+    def why_not(self) -> str:
+        """A sentence, or nothing where an effect was accepted."""
+        return f"Nothing accepted: {self.reason}." if self.reason else ""
+
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
         best = max((entry.score for entry in self.entries), default=-np.inf)

@@ -83,7 +83,8 @@ def _errors(d: "Diagnosis") -> str:
         "The error after calibration against the quantities that predict it best, and what the effects found explain.",
         True,
     )
-    return f'<h2>The error falls</h2><div class="pair">{left}{right}</div>{more}'
+    heading = "The error falls" if d.accepted else "The errors"
+    return f'<h2>{heading}</h2><div class="pair">{left}{right}</div>{more}'
 
 
 def _view() -> str:
@@ -104,9 +105,9 @@ def _candidates(d: "Diagnosis") -> str:
         "How much of one candidate's signal another one can imitate together with calibration: near 1 both ways, these "
         "data cannot tell the two apart.",
     )  # fmt: skip
-    reason = next((r.reason for r in reversed(d.rounds) if r.reason), "")
-    why = f"<p>{html.escape(reason.capitalize())}.</p>" if reason else ""
-    return f'<h2>All candidates</h2>{drawn}<div class="pair">{apart}<div>{why}</div></div>' if drawn else ""
+    why = next((r.why_not for r in reversed(d.rounds) if r.why_not), "")
+    below = f'<div class="pair">{apart}<div><p>{html.escape(why)}</p></div></div>'
+    return f"<h2>All candidates</h2>{drawn}{below}" if drawn else ""
 
 
 def _next(d: "Diagnosis") -> str:

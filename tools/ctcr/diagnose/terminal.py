@@ -35,8 +35,8 @@ def show(console: Any, result: "Diagnosis") -> None:
     for number, round_ in enumerate(result.rounds, start=1):
         if round_.entries:
             console.print(_candidates(number, round_))
-        if round_.reason:
-            console.print(f"Nothing accepted: {round_.reason}.", markup=False)
+        if round_.why_not:
+            console.print(round_.why_not, markup=False)
     if result.accepted:
         console.print(_parameters(result))
     for line in result.leftover.in_words:

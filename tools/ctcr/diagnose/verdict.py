@@ -29,7 +29,6 @@ def judge(
     calibrated: identify.Fit,
     with_effects: identify.Fit,
     accepted: "list[Accepted]",
-    rounds: list[racing.Round],
     leftover: Leftover,
     locked: NDArray[np.bool_],
 ) -> Verdict:
@@ -42,7 +41,7 @@ def judge(
                 "nothing_missing", ["Calibration and the tracker's noise explain these measurements."]
             )
         missing = "Something is missing that no effect of the catalogue explains."
-        return Verdict("not_in_catalogue", [missing, *leftover.at_places, rounds[-1].reason])
+        return Verdict("not_in_catalogue", [missing, *leftover.at_places])
     first = accepted[0]
     noise = before < MORE_THAN_NOISE * jitter**2
     if leftover.rejected and (max(explained, first.share) if noise else explained) < EXPLAINED:
