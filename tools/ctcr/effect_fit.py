@@ -19,7 +19,8 @@ from ctcr import (
 )
 from ctcr.calibrate import parameters
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.race import likeliest, noise_for_prediction
+from ctcr.diagnose.prediction import noise_for_prediction
+from ctcr.diagnose.race import likeliest
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.measurements import Measurements

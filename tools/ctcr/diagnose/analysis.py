@@ -14,9 +14,10 @@ from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.far_off import come_together, far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
+from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import Entry, Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
-from ctcr.diagnose.verdict import EXPLAINED, Verdict, judge
+from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
@@ -25,6 +26,7 @@ Array = NDArray[np.float64]
 TURNS = 2  # quarters that are locked away in turn, where that is needed
 WRONG = 3.0  # times the stated noise that a fit admits, and
 MANY = 0.1  # ... share of outliers that calibration takes, beyond which it is hardly right
+HARDLY = 0.4  # share of the excess that the first effect removes, below which it hardly explains anything
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 
 
@@ -73,7 +75,7 @@ class Diagnosis:
         left = self.outliers > most and racing.outliers(self.final) > max(most, 0.5 * self.outliers)
         others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
         is_wrong = self.outliers > MANY and np.max(self.final.inflation) > WRONG
-        return left and bool(self.explained < EXPLAINED or others_fit or is_wrong)
+        return left and bool(self.explained < HARDLY or others_fit or is_wrong)
 
     @property
     def judged(self) -> NDArray[np.bool_]:
@@ -220,8 +222,10 @@ def _diagnose(
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
     leftover = leftover_of(engine, calibrated, fit)
-    alone = racing.predictive(engine, calibrated, [], progress)
-    after = racing.predictive(engine, fit, [a.entry for a in accepted], progress) if accepted else alone
+    progress("prediction of other runs")
+    alone = after = predictive(engine, calibrated, {})
+    if accepted:
+        after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
     return Diagnosis(
         robot, measurements, locked, unseen, alone, open_side.widened(after), open_side.widened(fit),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
@@ -259,7 +263,7 @@ def _grow(
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
         rejected = racing.is_rejected(engine, fit)
         fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
-        if rejected and accepted[0].share < EXPLAINED:
+        if rejected and accepted[0].share < HARDLY:
             break  # no effect is stacked on one that hardly explains anything
     for a in accepted[:-1]:  # what the others hid of their forms shows now
         fit = _with_shapes(engine, accepted, a, fit, progress)

@@ -16,6 +16,7 @@ Mask = NDArray[np.bool_]
 
 
 SLOPES = 1500  # rows by whose slopes candidates are screened where there are twice as many or more
+OUTLIER = 0.3  # weight below which a reading is taken for one
 CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import binom
 
-from ctcr.diagnose.race import OUTLIER
+from ctcr.diagnose.engine import OUTLIER
 from ctcr.measurements import Measurements
 from ctcr.unrecorded import LEVER
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from ctcr import effect_model, identify
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
-from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.far_off import come_together
-from ctcr.diagnose.race import OUTLIER, is_rejected
+from ctcr.diagnose.race import is_rejected
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
 SHOWN = 6

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import contact, jump, split
+from ctcr.diagnose import contact, jump
 from ctcr.diagnose.candidates import Candidate
-from ctcr.diagnose.engine import Engine, Gain, values_of
+from ctcr.diagnose.engine import OUTLIER, Engine, Gain, values_of
+from ctcr.diagnose.prediction import predicts_better
 from ctcr.errors import InputError
 
 Array = NDArray[np.float64]
@@ -21,7 +21,6 @@ UNASKED = 10.0  # evidence needed of a further effect besides where noise alone 
 FIRST_UNASKED = 5.0  # of the first one
 SHARE = 0.25  # of the excess that a further effect must remove, and
 FIRST_SHARE = 0.1  # the first one
-HELD_OUT_SHARE = 0.1  # of the error of other runs that a further effect must remove
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
 SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
@@ -31,12 +30,7 @@ IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below i
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
 SIGNIFICANCE = 0.01
-# Another noise must predict other runs so much better to be preferred to that of the most evidence.
-BETTER = 0.95
-MUCH_BETTER = 0.9  # where the model explains the readings as it is
-SOUND = 1.05  # inflation of the noise up to which it does
-FITS = 1.2  # ... and beyond which it certainly does not
-OUTLIER = 0.3  # weight below which a reading is taken for one
+FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 
 
@@ -175,47 +169,6 @@ def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> iden
     return engine.fit_like(before, names, start=values_of(fit), fixed=fixed, near=True)
 
 
-def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
-    """Mean square position errors [mm^2] of runs, each left out with a few others, of the model linearised at a fit."""
-    group = split.groups(engine.measurements)
-    plain, squares = fit.weights[:, 0] > OUTLIER, []
-    for fold in range(split.FOLDS):
-        out = engine.rows & (group % split.FOLDS == fold)
-        if not out.any():
-            continue
-        inflation = fit.inflation if noise is None else None  # another noise has its own
-        trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=inflation)
-        errors = (trial.rms_mm(out & plain & (group == k)) for k in np.unique(group[out]))
-        squares += [error**2 for error in errors if error > 0]
-    return np.array(squares)
-
-
-def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
-    """The noise of a fit, or that with the part of the field error that predicts other runs better.
-
-    A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
-    """
-    tried = {part: engine.noise_with(part) for part in identify.FIELDS}
-    # Of the typical run: one that goes where no other went would outweigh all.
-    errors = {part: np.exp(np.log(held_out(engine, fit, noise)).mean()) for part, noise in tried.items()}
-    part = min(errors, key=lambda part: errors[part])
-    usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
-    needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
-    return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
-
-
-def predictive(engine: Engine, fit: identify.Fit, accepted: list[Entry], progress: Progress) -> identify.Fit:
-    """The same parameters fitted for prediction."""
-    progress("prediction of other runs")
-    noise = noise_for_prediction(engine, fit)
-    if noise is fit.noise:
-        return fit
-    names, fixed = parameters(accepted)
-    return engine.fit(
-        names, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, tolerance=identify.COARSE
-    )
-
-
 def race(
     engine: Engine,
     before: identify.Fit,
@@ -244,17 +197,10 @@ def race(
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
     decide(round_, len({c.id for c in candidates}), bool(accepted), is_rejected(engine, before))
-    if round_.accepted and accepted and not _predicts(engine, before, round_.accepted.fit):
+    if round_.accepted and accepted and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"{round_.accepted.id} would not predict other runs better"
         round_.accepted, round_.ids = None, []
     return round_
-
-
-def _predicts(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:
-    """Whether a further effect makes errors of runs left out smaller by its share of what noise does not explain."""
-    jitter = 3e6 * engine.noise.position_jitter**2
-    old, new = held_out(engine, before).mean(), held_out(engine, after).mean()
-    return old - new >= HELD_OUT_SHARE * max(old - jitter, 0.0)
 
 
 def screen(

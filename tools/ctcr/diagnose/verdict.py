@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Share of the excess that effects must remove to be no stand-ins: of the squared error on locked runs, or where that is
 # mere noise, of chi-square.
-EXPLAINED, MORE_THAN_NOISE = 0.4, 0.25
+EXPLAINED, MORE_THAN_NOISE = 0.6, 0.25
 MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
 
@@ -45,7 +45,7 @@ def judge(
     first = accepted[0]
     noise = before < MORE_THAN_NOISE * jitter**2
     if leftover.rejected and (max(explained, first.share) if noise else explained) < EXPLAINED:
-        return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but most of it stays."])
+        return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but much of it stays."])
     if after > max(MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])
     if any(a.entry.implausible for a in accepted):
