@@ -10,6 +10,7 @@ import pytest
 from ctcr import effect_fit, effects, free_parameters, identify, recording, robot_file
 from ctcr.diagnose import diagnose, jump
 from ctcr.diagnose import race as racing
+from ctcr.diagnose.analysis import _beyond_judging
 from ctcr.diagnose.coverage import Coverage
 from ctcr.diagnose.engine import Linear
 from ctcr.diagnose.far_off import come_together, far_off
@@ -282,6 +283,19 @@ def test_a_run_that_goes_where_no_other_went_judges_nothing(robot):
     # What was read has no say.
     moved = np.random.default_rng(1).normal(size=(len(table), 3))
     np.testing.assert_array_equal(locked, locked_rows(robot, dataclasses.replace(table, position=moved)))
+
+
+@pytest.mark.parametrize(
+    ("identity", "judges"), [("friction", False), ("backlash_rotation", False), ("softening", True)]
+)
+def test_the_first_run_judges_no_effect_that_remembers(robot, identity, judges):
+    table = measured_session(robot)
+    accepted = [SimpleNamespace(entry=SimpleNamespace(id=identity))]
+    fit = SimpleNamespace(expected_square=np.ones((len(table), 2)))
+    for locked in ({0, 5}, {2, 5}):
+        result = SimpleNamespace(robot=robot, measurements=table, with_effects=fit, accepted=accepted)
+        result.locked = np.isin(groups(table), list(locked))
+        assert _beyond_judging(result) == (set() if judges else {0} & locked)
 
 
 def test_what_is_left_open_is_the_variance_of_a_prediction(robot):

@@ -109,8 +109,7 @@ class _Owner:
         return self._settings.ratios * turns + self._settings.home
 
     def serve(self) -> None:
-        gc.collect()
-        gc.disable()  # a collection would come at the worst moment; a cycle leaves nothing to collect
+        gc.disable()  # a cycle leaves nothing to collect
         period, control = self._settings.period, self._control
         self._good_at = now = time.monotonic()
         last, due = now, now + period

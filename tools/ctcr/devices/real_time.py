@@ -1,5 +1,6 @@
 """Who runs before whom while devices are served, and on which core: the one list of it."""
 
+import gc
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,8 +31,20 @@ CONTROLLER = Duty(30, -1)  # and recording: below those that serve the devices
 def real_time(duty: Duty) -> Iterator[bool]:
     """Asks for real-time priority of this thread on the core of its duty; both are given back at the end.
 
-    Yields whether the priority was granted; docs/hardware.md says how to permit it. Without it no core is kept.
+    Yields whether the priority was granted; docs/hardware.md says how to permit it. Without it no core is kept. What
+    lives already is left out of garbage collections, which come at the worst moment.
     """
+    gc.collect()
+    gc.freeze()
+    try:
+        with _scheduled(duty) as granted:
+            yield granted
+    finally:
+        gc.unfreeze()
+
+
+@contextmanager
+def _scheduled(duty: Duty) -> Iterator[bool]:
     try:
         before = os.sched_getscheduler(0), os.sched_getparam(0), os.sched_getaffinity(0)
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(duty.priority))

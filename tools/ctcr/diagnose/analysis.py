@@ -175,6 +175,8 @@ def _beyond_judging(result: Diagnosis) -> set[int]:
         k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual
     }
     for a in result.accepted:
+        if "order" in effects.get(a.entry.id, result.robot.n_tubes).needs and result.locked[group == 0].any():
+            beyond.add(0)  # how the robot came to its first row is not recorded
         if a.entry.id == "frame_jump":  # before or after it?
             when = dict(a.entry.candidate.shape)[jump.WHEN]
             beyond |= set(group[jump.uncertain_rows(result.measurements, ~result.locked, when)])

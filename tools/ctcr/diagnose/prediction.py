@@ -55,8 +55,9 @@ def predictive(engine: Engine, fit: identify.Fit, fixed: dict[str, float]) -> id
     added = [name for name in fit.names if name.startswith("effects.")]
     start = values_of(engine.linear_fit(fit, noise=noise, weights=fit.weights))
     return engine.fit(
-        added, start=start, fixed=fixed, noise=noise, weights=fit.weights, near=True, tolerance=identify.COARSE
-    )
+        added, start=start, fixed=fixed, noise=noise, weights=fit.weights, near=True,
+        tolerance=identify.COARSE,
+    )  # fmt: skip
 
 
 def predicts_better(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:

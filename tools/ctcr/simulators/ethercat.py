@@ -1,7 +1,6 @@
 """The simulated bus: a coupler and stepper terminals that answer the EtherCAT frames on a network interface."""
 
 import errno
-import gc
 import random
 import select
 import socket
@@ -73,7 +72,6 @@ class EthercatSimulator:
 
     def run(self, until=lambda: False) -> None:
         """Serves until `until()` is true."""
-        gc.freeze()  # a collection would come at the worst moment
         with real_time(SIMULATED_BUS):
             while not until():
                 self.step()
