@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.compare.figures import ERROR, FAINT, INK, NOISE
 from ctcr.diagnose.race import Entry, imitated
 from ctcr.html_page import short
 
@@ -125,12 +125,10 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
 
 
 def directions(figure, d: "Diagnosis") -> None:
-    """The course of the error over the session, before and after."""
+    """The course of the error over the session, before and after effects were found."""
     axes = figure.subplots()
-    for fit, colour, label in (
-        (d.calibrated, OUT, "calibrated"),
-        (d.with_effects, BACK, "with the effects found"),
-    ):
+    shown = [(d.calibrated, ERROR, "calibrated"), (d.with_effects, GOOD, "with the effects found")]
+    for fit, colour, label in shown if d.accepted else shown[:1]:
         size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
         axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
     first = np.flatnonzero(np.diff(d.locked.astype(int)) != 0) + 1

@@ -32,7 +32,7 @@ def page(d: "Diagnosis", source: str) -> str:
         _opening(d, title),
         _found(d),
         _errors(d),
-        _view(),
+        _view(d),
         _candidates(d),
         _next(d),
         _parameters(d),
@@ -48,7 +48,7 @@ def _opening(d: "Diagnosis", title: str) -> str:
         ("error", f"{short(rms['calibrated'])} mm", "after calibration"),
     ]
     if d.accepted:
-        numbers.append(("back", f"{short(rms['with_effects'])} mm", "with the effects found"))
+        numbers.append(("good", f"{short(rms['with_effects'])} mm", "with the effects found"))
     numbers.append(("noise", f"{short(rms['noise_floor'])} mm", "noise floor"))
     verdict = d.verdict.word.replace("_", " ")
     lead = " ".join(d.verdict.sentences)
@@ -87,9 +87,10 @@ def _errors(d: "Diagnosis") -> str:
     return f'<h2>{heading}</h2><div class="pair">{left}{right}</div>{more}'
 
 
-def _view() -> str:
+def _view(d: "Diagnosis") -> str:
+    heading = "Before and after" if d.accepted else "Where the errors are"
     return (
-        '<h2>Before and after</h2><div id="view"></div><p class="soft">Errors as lines from the predicted towards the '
+        f'<h2>{heading}</h2><div id="view"></div><p class="soft">Errors as lines from the predicted towards the '
         "measured tip, all drawn with the same factor; tracker frame. Click a name to hide it.</p>"
     )
 
