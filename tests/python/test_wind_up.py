@@ -55,6 +55,23 @@ def test_what_is_predicted_is_wound_up(robot, plan):
     np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
 
 
+def test_a_recording_begins_at_the_twist_of_another(robot, plan):
+    x, still = np.array(list(TRUE.values())), np.zeros(len(TRUE))
+    first, like, unlike, fresh = (user_effects.recording_of(robot, plan, list(TRUE)) for _ in range(4))
+    assert first.wind_up(x) > 10 * identify.WOUND
+    for table in (like, unlike):
+        table.begin_at(first)
+    assert like.wind_up(x) < 1e-3
+    np.testing.assert_allclose(predicted(like, x), predicted(first, x), atol=1e-6)
+    assert unlike.wind_up(still) == 0  # where nothing rubs, tubes are not wound up
+    np.testing.assert_array_equal(predicted(unlike, still), predicted(fresh, still))
+
+
+def predicted(table, x):
+    table.residual(x)
+    return table.predicted()[0]
+
+
 def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
     effect = effects.get("friction", 3)
     coefficient = effect.names("coefficient")

@@ -41,6 +41,7 @@ public:
   /// Residual and derivatives are predicted at once, and kept: of what a descent tries it keeps nearly all, and asks for
   /// it again. Null where the prediction fails; valid until the next call.
   const Point* at(const Eigen::VectorXd& z) {
+    if (held_.z.size() == z.size() && held_.z == z) return held_.predicted ? &held_ : nullptr;
     if (point_.z.size() != z.size() || point_.z != z) {
       ++evaluations_;
       point_.z = z;
@@ -48,18 +49,24 @@ public:
     }
     return point_.predicted ? &point_ : nullptr;
   }
+  /// Keeps what is predicted at z while others are tried.
+  void hold(const Eigen::VectorXd& z) {
+    if (at(z) == &point_) std::swap(point_, held_);
+  }
   /// Infinite where the prediction fails.
   double cost(const Eigen::VectorXd& z) {
-    if (!at(z)) return std::numeric_limits<double>::infinity();
-    Eigen::VectorXd residual = point_.residual;
+    const Point* point = at(z);
+    if (!point) return std::numeric_limits<double>::infinity();
+    Eigen::VectorXd residual = point->residual;
     whitening_->apply(residual);
     const double cost = 0.5 * (residual.squaredNorm() + prior_.dot(z.cwiseAbs2()));
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
   }
   bool linearise(const Eigen::VectorXd& z, Linearised& out) {
-    if (!at(z)) return false;
-    Eigen::VectorXd residual = point_.residual;
-    Eigen::MatrixXd jacobian = point_.jacobian * scale_.asDiagonal();
+    const Point* point = at(z);
+    if (!point) return false;
+    Eigen::VectorXd residual = point->residual;
+    Eigen::MatrixXd jacobian = point->jacobian * scale_.asDiagonal();
     whitening_->apply(residual);
     whitening_->apply(jacobian);
     out.chi_square = residual.squaredNorm();
@@ -73,7 +80,7 @@ private:
   const Predictor& predict_;
   Eigen::VectorXd scale_, origin_, prior_;
   const Whitening* whitening_ = nullptr;
-  Point point_;
+  Point point_, held_;
   int evaluations_ = 0;
 };
 
@@ -144,6 +151,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
   z = bounds.clamped(z);
   Linearised here, there;
   if (!objective.linearise(z, here)) return out;
+  objective.hold(z);
   const auto hessian = [&](const Linearised& at) {
     return Eigen::MatrixXd(at.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
   };
@@ -184,6 +192,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
       z += step;
       damping *= std::max(1.0 / 3, 1 - std::pow(2 * gain - 1, 3));
       if (!objective.linearise(z, here)) return out;
+      objective.hold(z);
       out.cost = here.cost;
       moved = true;
     }

@@ -94,9 +94,19 @@ public:
   double wind_up(const Eigen::VectorXd& x) {
     if constexpr (Fx::template On<N>::follows_twist) {
       const System<N, Fx> rubbing = system(x);
-      if (rubbing.model.effects().act_by_twist()) return ctcr::wind_up<N, Fx>(rubbing, rows_);
+      if (!rubbing.model.effects().act_by_twist()) return 0;
+      for (std::size_t i = 0; i < std::min(rows_.size(), begin_.size()); ++i)
+        if (begin_[i].size() == rows_[i].twist.size()) rows_[i].twist = begin_[i];
+      begin_.clear();
+      return ctcr::wind_up<N, Fx>(rubbing, rows_);
     }
     return 0;
+  }
+
+  /// The next wind_up() begins at the twist of another recording of the same table: with like values little is left to do.
+  void begin_at(const Recording& other) {
+    begin_.clear();
+    for (const RecordedRow<N>& row : other.rows_) begin_.push_back(row.twist);
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
@@ -174,6 +184,7 @@ private:
 
   System<N, Fx> nominal_;
   std::vector<RecordedRow<N>> rows_;
+  std::vector<decltype(RecordedRow<N>::twist)> begin_;  ///< of the next wind_up(); or none
   std::vector<Pose> measured_;
   std::vector<int> parameters_, columns_;
   ThreadPool* pool_;

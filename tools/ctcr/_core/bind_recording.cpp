@@ -54,6 +54,9 @@ void bind_recording(nb::module_& m) {
       .def(
           "wind_up", [](const BoundRecording& self, const Eigen::VectorXd& x) { return (*self).wind_up(x); }, "x"_a,
           "Lets tubes that rub wind each other up as they do at x; returns the largest change of a twist [rad].")
+      .def(
+          "begin_at", [](const BoundRecording& self, const BoundRecording& other) { (*self).begin_at(*other); },
+          "other"_a, "The next wind_up begins at the twist of another recording of the same table.")
       .def("active", [](const BoundRecording& self) { return (*self).active(); })
       .def(
           "unsolved", [](const BoundRecording& self) { return (*self).unsolved(); },

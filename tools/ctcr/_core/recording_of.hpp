@@ -77,6 +77,9 @@ public:
     return recording_(x, residual, jacobian);
   }
   double wind_up(const Eigen::VectorXd& x) override { return recording_.wind_up(x); }
+  void begin_at(const AnyRecording& other) override {
+    if (const auto* like = dynamic_cast<const RecordingOf*>(&other)) recording_.begin_at(like->recording_);
+  }
   Eigen::VectorXd nominal() const override { return recording_.nominal(); }
   const std::vector<int>& unsolved() const override { return recording_.unsolved(); }
   const std::vector<bool>& active() const override { return recording_.active(); }

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, free_parameters, identify, recording, user_effects
+from ctcr import _core, effects, free_parameters, identify, recording, user_effects
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
@@ -68,6 +68,7 @@ class Engine:
     steps: int = field(init=False)
     places: Array = field(init=False)
     base: list[str] = field(init=False)  # their names
+    _last: _core.Recording | None = field(init=False, default=None)  # that of the last fit
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
@@ -123,6 +124,10 @@ class Engine:
         mean_of = dict(zip(names, mean, strict=True))
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
+        if isinstance(table, _core.Recording):
+            if self._last:
+                table.begin_at(self._last)  # rubbing tubes are wound up much as in the fit before
+            self._last = table
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         return identify.identify_rows(
