@@ -53,9 +53,8 @@ def predictive(engine: Engine, fit: identify.Fit, fixed: dict[str, float]) -> id
     if noise is fit.noise:
         return fit
     added = [name for name in fit.names if name.startswith("effects.")]
-    start = values_of(engine.linear_fit(fit, noise=noise, weights=fit.weights))
     return engine.fit(
-        added, start=start, fixed=fixed, noise=noise, weights=fit.weights, near=True,
+        added, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, near=True,
         tolerance=identify.COARSE,
     )  # fmt: skip
 
