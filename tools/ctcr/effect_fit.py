@@ -18,8 +18,8 @@ from ctcr import (
     unrecorded,
 )
 from ctcr.calibrate import parameters
-from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.prediction import noise_for_prediction
+from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import likeliest
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
@@ -256,13 +256,10 @@ class _Fitter:
         known = [effects.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        fit = likeliest(engine, own, dict(start), {})
+        likely = likeliest(engine, own, dict(start), {})
         # The robot is to predict; how sure its values are is another question.
-        noise = noise_for_prediction(engine, fit)
-        if noise is not fit.noise:
-            likely = fit
-            fit = engine.fit(own, start=values_of(fit), noise=noise, weights=fit.weights, near=True)
-            fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
+        fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
+        fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
         return replace(fit, units=[parameters.field_of(name).unit for name in fit.names])
 
 

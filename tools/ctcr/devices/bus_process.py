@@ -79,10 +79,10 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
 
 
 class _Owner:
-    def __init__(self, settings: BusSettings, folder: Path, pipe: Connection, bus: Bus, real_time: bool):
+    def __init__(self, settings: BusSettings, folder: Path, pipe: Connection, bus: Bus, granted: bool):
         self._settings, self._folder, self._pipe, self._bus = settings, folder, pipe, bus
         self._record = state_record(folder, writer=True)
-        self._real_time, self._lateness = real_time, Lateness()
+        self._real_time, self._lateness = granted, Lateness()
         self._cycles = self._bad = 0
         inputs = self._first_inputs()
         self._counters = np.array([drive.counter for drive in inputs])

@@ -68,7 +68,7 @@ class Engine:
     steps: int = field(init=False)
     places: Array = field(init=False)
     base: list[str] = field(init=False)  # their names
-    _last: _core.Recording | None = field(init=False, default=None)  # that of the last fit
+    _last: _core.Recording | None = field(init=False, default=None)  # what was fitted last
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
@@ -125,7 +125,7 @@ class Engine:
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
         if isinstance(table, _core.Recording):
-            if self._last:
+            if self._last is not None:
                 table.begin_at(self._last)  # rubbing tubes are wound up much as in the fit before
             self._last = table
         if weights is None and not self.robust:

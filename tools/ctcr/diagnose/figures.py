@@ -10,6 +10,7 @@ from ctcr.html_page import short
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
+    from ctcr.fit import Fit
 
 GOOD = "#4b8b3b"
 CANDIDATES = 10
@@ -124,11 +125,16 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
     return None
 
 
+def fits_shown(d: "Diagnosis") -> list[tuple["Fit", str, str]]:
+    """Fits whose errors are drawn one beside the other, each with its colour and name."""
+    shown = [(d.calibrated, ERROR, "calibrated"), (d.with_effects, GOOD, "with the effects found")]
+    return shown if d.accepted else shown[:1]
+
+
 def directions(figure, d: "Diagnosis") -> None:
     """The course of the error over the session, before and after effects were found."""
     axes = figure.subplots()
-    shown = [(d.calibrated, ERROR, "calibrated"), (d.with_effects, GOOD, "with the effects found")]
-    for fit, colour, label in shown if d.accepted else shown[:1]:
+    for fit, colour, label in fits_shown(d):
         size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
         axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
     first = np.flatnonzero(np.diff(d.locked.astype(int)) != 0) + 1

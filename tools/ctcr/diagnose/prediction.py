@@ -47,7 +47,9 @@ def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
     return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
 
 
-def predictive(engine: Engine, fit: identify.Fit, fixed: dict[str, float]) -> identify.Fit:
+def predictive(
+    engine: Engine, fit: identify.Fit, fixed: dict[str, float], tolerance: float = identify.COARSE
+) -> identify.Fit:
     """The same parameters fitted under that noise; `fixed` are values of effects that are held."""
     noise = noise_for_prediction(engine, fit)
     if noise is fit.noise:
@@ -55,7 +57,7 @@ def predictive(engine: Engine, fit: identify.Fit, fixed: dict[str, float]) -> id
     added = [name for name in fit.names if name.startswith("effects.")]
     return engine.fit(
         added, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, near=True,
-        tolerance=identify.COARSE,
+        tolerance=tolerance,
     )  # fmt: skip
 
 

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
 
 MOST_ARROWS = 800
-COLOURS = {"calibrated": "#b3361e", "with the effects found": "#4b8b3b"}
 
 
 def write(d: "Diagnosis", target: str | Path, source: str) -> None:
@@ -154,11 +153,10 @@ def scene(d: "Diagnosis") -> str:
     size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
     factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
     data = [_trace(tips, "measured", {"mode": "markers", "marker": {"size": 2, "color": "#6b7785"}})]
-    fits = {"calibrated": d.calibrated} | ({"with the effects found": d.with_effects} if d.accepted else {})
-    for name, fit in fits.items():
+    for fit, colour, name in figures.fits_shown(d):
         lines = np.full((3 * len(rows), 3), np.nan)
         lines[0::3], lines[1::3] = tips, tips - factor * 1e3 * fit.residual[rows, :3]
-        style = {"mode": "lines", "line": {"width": 4, "color": COLOURS[name]}, "connectgaps": False}
+        style = {"mode": "lines", "line": {"width": 4, "color": colour}, "connectgaps": False}
         data.append(_trace(lines, f"error, {name}, × {factor:g}", style))
     axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
     layout = {
