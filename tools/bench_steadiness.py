@@ -31,11 +31,14 @@ about 1 of it. {beside} Written by `tools/bench_steadiness.py`.
 
 def rows(sitting: dict) -> list[tuple[str, str]]:
     tracker, bus, late = sitting["tracker"], sitting["bus"], sitting["frames_late"]
+    asked = tracker["questions_late"]
     return [
         ("tracker frames", str(tracker["frames"])),
         ("of these missed", str(tracker["missed"])),
         ("without the sensor", str(tracker["unseen"])),
         ("faults of the tracker", str(len(tracker["faults"]))),
+        ("late by, 99 %: the reader wakes up to ask", f"{asked['p99_ms']:.2f} ms"),
+        ("worst", f"{asked['worst_ms']:.2f} ms"),
         ("from the tracker's answer to the controller, 50 %", f"{late['p50_ms']:.2f} ms"),
         ("99 %", f"{late['p99_ms']:.2f} ms"),
         ("worst", f"{late['worst_ms']:.2f} ms"),

@@ -9,7 +9,7 @@ from ctcr.devices.ndi_replies import ToolReading
 from ctcr.devices.tracker_process import PERIOD_S, FrameClock, TrackedFrame
 
 SEEN = TrackedFrame(
-    12.25, ToolReading(10, (0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5), 0.25, 0x1F, 4_000_000_000), 3
+    12.25, ToolReading(10, (0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5), 0.25, 0x1F, 4_000_000_000), 3, 1.5e-4
 )
 UNSEEN = replace(SEEN, reading=ToolReading(10, None, None, None, 0x100, 7))
 
@@ -42,7 +42,8 @@ def test_questions_settle_just_behind_the_frames(monkeypatch, answer_s, drift):
         monkeypatch.setattr(tracker_process, "time", clock_of_computer)
         clock, last, ages, seen = FrameClock(), None, [], []
         while len(seen) < 1000:
-            clock.wait()
+            due = max(clock.due, clock_of_computer.now)
+            assert clock.wait() == clock_of_computer.now - due
             asked = (clock_of_computer.now - 1000.0 + phase) * (1 + drift)
             clock_of_computer.now += answer_s
             if (frame := int(asked / PERIOD_S)) == last:

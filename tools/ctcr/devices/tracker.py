@@ -8,6 +8,7 @@ from pathlib import Path
 from ctcr.devices import tracker_process
 from ctcr.devices.bench_file import Bench
 from ctcr.devices.fault import DeviceFault
+from ctcr.devices.lateness import Lateness
 from ctcr.devices.places import port_of
 from ctcr.devices.tracker_process import TrackedFrame
 
@@ -22,6 +23,7 @@ class Tracker:
         self.port, self._section = port_of(bench, folder), bench.tracker
         self.version = ""
         self.frames = self.missed = self.unseen = self.connections = 0
+        self.lateness = Lateness()  # of the reader, from when it should ask to when it does
         self.faults: list[tuple[float, DeviceFault]] = []  # when, what
         self._pipe = self._process = None
 
@@ -67,6 +69,7 @@ class Tracker:
             self.frames += 1
             self.missed += frame.missed
             self.unseen += frame.reading.position is None
+            self.lateness.add(frame.late)
             return frame
         message = pickle.loads(data)
         if isinstance(message, DeviceFault):

@@ -23,13 +23,17 @@ AHEAD_S, FASTER = 1e-5, 1.03  # and each that did not earlier, by more from one 
 
 @dataclass(frozen=True)
 class TrackedFrame:
-    """One frame of the sensor as it came in at `t` [s] (`time.monotonic`); `missed` frames lie before it."""
+    """One frame of the sensor as it came in at `t` [s] (`time.monotonic`); `missed` frames lie before it.
+
+    The reader woke up `late` [s] to ask for it.
+    """
 
     t: float
     reading: ToolReading
     missed: int
+    late: float
 
-    LAYOUT = struct.Struct("<d7d d 4q")
+    LAYOUT = struct.Struct("<d7d 2d 4q")
     MARK = b"F"  # no pickle begins so
 
     def packed(self) -> bytes:
@@ -37,16 +41,18 @@ class TrackedFrame:
         r, unseen = self.reading, (math.nan,)
         pose = (*(r.position or 3 * unseen), *(r.quaternion or 4 * unseen))
         error = math.nan if r.error is None else r.error
-        return self.MARK + self.LAYOUT.pack(self.t, *pose, error, r.handle, r.status, r.frame, self.missed)
+        return self.MARK + self.LAYOUT.pack(
+            self.t, *pose, error, self.late, r.handle, r.status, r.frame, self.missed
+        )
 
     @classmethod
     def unpacked(cls, data: bytes) -> "TrackedFrame":
-        t, *pose, error, handle, status, frame, missed = cls.LAYOUT.unpack_from(data, len(cls.MARK))
+        t, *pose, error, late, handle, status, frame, missed = cls.LAYOUT.unpack_from(data, len(cls.MARK))
         position, quaternion = (
             None if math.isnan(part[0]) else part for part in (tuple(pose[:3]), tuple(pose[3:]))
         )
         error = None if math.isnan(error) else error
-        return cls(t, ToolReading(handle, position, quaternion, error, status, frame), missed)
+        return cls(t, ToolReading(handle, position, quaternion, error, status, frame), missed, late)
 
 
 class FrameClock:
@@ -59,8 +65,11 @@ class FrameClock:
         self.due = time.monotonic()  # [s] next question
         self._ahead = AHEAD_S
 
-    def wait(self) -> None:
-        time.sleep(max(0.0, self.due - time.monotonic()))
+    def wait(self) -> float:
+        """How late [s] it is then; what is overdue already is due now."""
+        due = max(self.due, time.monotonic())
+        time.sleep(max(0.0, due - time.monotonic()))
+        return time.monotonic() - due
 
     def was_new(self) -> None:
         """The question that was due brought a new frame."""
@@ -98,7 +107,7 @@ def run(port: str, section: TrackerPort, pipe: Connection) -> None:
 def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
     last, status, clock = None, 0, FrameClock()
     while not pipe.poll(0):
-        clock.wait()
+        late = clock.wait()
         frame = aurora.read()
         reading = next((r for r in frame.readings if r.handle == handle), None)
         if reading is None:
@@ -115,4 +124,4 @@ def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
         clock.was_new()
         missed = 0 if last is None else reading.frame - last - 1
         last = reading.frame
-        pipe.send_bytes(TrackedFrame(frame.t, reading, missed).packed())
+        pipe.send_bytes(TrackedFrame(frame.t, reading, missed, late).packed())

@@ -56,6 +56,7 @@ class Folder:
             "tracker": {
                 "port": tracker.port, "version": tracker.version, "frames": tracker.frames, "missed": tracker.missed,
                 "unseen": tracker.unseen, "connections": tracker.connections,
+                "questions_late": tracker.lateness.as_dict(),
                 "faults": [{"t_s": self.clock(t), "text": str(fault)} for t, fault in tracker.faults],
             },
             "frames_late": lateness.as_dict(),
