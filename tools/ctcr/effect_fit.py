@@ -15,6 +15,7 @@ from ctcr import (
     open_side,
     robot_update,
     sensor_roll,
+    spikes,
     unrecorded,
 )
 from ctcr.calibrate import parameters
@@ -92,6 +93,7 @@ def add(
     where no fit is possible.
     """
     readings, said = sensor_roll.positions_alone(robot, readings)
+    readings, spiked = spikes.left_out(robot, readings)
     readings, ways = unrecorded.completed(robot, readings)
     fixed = dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
@@ -124,7 +126,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*said, *ways, *_notices(robot, fit, ids)],
+        [*said, *spiked, *ways, *_notices(robot, fit, ids)],
     )
 
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from ctcr.measurements import Measurements
+from ctcr.places import joint_places
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
 
-LEVER = 0.02  # [m] of insertion that moves the tip about as far as a radian
 LONG = 1.5  # a step that is as many times longer, in joints or in time, than the run's others may hide a way round
 SAME_JOINTS = 0.01  # of the usual step
 SAME_SIDE = 0.5  # cosine between two steps
@@ -61,7 +61,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
 def _returns(m: Measurements) -> list[tuple[int, int, int, int]]:
     """Rows that return after a long step: themselves, the last visit from the same side, that from the other side, and
     where the robot turned before it."""
-    q, found = np.column_stack([m.beta / LEVER, m.alpha]), []
+    q, found = joint_places(m), []
     for run in np.unique(m.run):
         rows = np.flatnonzero(m.run == run)
         step, pause = np.diff(q[rows], axis=0), np.diff(m.t[rows])

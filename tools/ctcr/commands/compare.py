@@ -31,7 +31,7 @@ def command(
     directions, and what the error depends on.
     """
     from ctcr import measurements as table
-    from ctcr import output, robot_file, unrecorded
+    from ctcr import output, robot_file, spikes, unrecorded
     from ctcr.compare import compare, terminal
 
     if own:
@@ -40,6 +40,7 @@ def command(
         user_effects.load_all(own)
     loaded = robot_file.load(robot)
     readings = table.load(measurements, loaded.n_tubes)
+    readings, spiked = spikes.left_out(loaded, readings)
     ways: list[str] = []
     if loaded.effects:  # they may remember what the table leaves out
         readings, ways = unrecorded.completed(loaded, readings)
@@ -52,8 +53,8 @@ def command(
         output.write_json(result.as_dict(), json_target)
     console = output.console(json_target)
     terminal.show(console, result)
-    for way in ways:
-        console.print(f"{way}.", markup=False)
+    for notice in [*spiked, *ways]:
+        console.print(f"{notice}.", markup=False)
     for warning in readings.warnings:
         console.print(f"{warning}", markup=False)
     doubts = len(robot_file.warnings(loaded))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, open_side, sensor_roll, unrecorded
+from ctcr import effects, identify, open_side, sensor_roll, spikes, unrecorded
 from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
@@ -134,6 +134,7 @@ def diagnose(
     """
     began = perf_counter()
     measurements, notices = sensor_roll.positions_alone(robot, measurements)
+    measurements, spiked = spikes.left_out(robot, measurements)
     measurements, ways = unrecorded.completed(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(robot, measurements, turn)
@@ -146,7 +147,7 @@ def diagnose(
                 result = again
         if result.accepted or not _surprises(result):
             break
-    result.notices = [*notices, *ways]
+    result.notices = [*notices, *spiked, *ways]
     result.seconds = perf_counter() - began
     return result
 

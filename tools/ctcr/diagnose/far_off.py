@@ -9,7 +9,7 @@ from scipy.stats import binom
 
 from ctcr.diagnose.engine import OUTLIER
 from ctcr.measurements import Measurements
-from ctcr.unrecorded import LEVER
+from ctcr.places import loaded_places
 
 Mask = NDArray[np.bool_]
 
@@ -39,8 +39,7 @@ def come_together(measurements: Measurements, fit: Any) -> Mask:
     together = np.zeros(len(measurements), bool)
     if np.sum(far) < FEWEST or len(read) < 2:
         return together
-    load = 1e3 * measurements.force  # another load is another place
-    place = np.column_stack([measurements.beta / LEVER, measurements.alpha, load])[read]
+    place = loaded_places(measurements)[read]
     neighbour = read[cKDTree(place).query(place, k=2)[1]]
     neighbour = np.where(neighbour[:, 0] == read, neighbour[:, 1], neighbour[:, 0])
     size = np.linalg.norm(error[read], axis=1) * np.linalg.norm(error[neighbour], axis=1)

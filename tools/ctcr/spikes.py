@@ -1,0 +1,76 @@
+"""Readings that leap away and back: spikes of the tracker, told by the readings around them and not by a fit."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.identify import measured_rows
+from ctcr.measurements import Measurements
+from ctcr.model import Model
+from ctcr.places import loaded_places
+from ctcr.robot import Robot
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FARTHER = 2.0  # than the tip moves by the model, both to the reading before and to that after,
+BACK = 0.5  # ... with these so near each other, of the leap
+VISIBLE = 10.0  # times the noise of a difference
+SHOWN = 6
+
+
+def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """The table without the poses of spikes, and what to say about them.
+
+    What a robot does to its tip shows in more than one reading of a path that goes on, or moves the tip no farther than
+    its joints and load do. The model is that of the robot file: no fit decides which readings it is judged by.
+    """
+    leap = leaps(robot, measurements)
+    spikes = np.isfinite(leap)
+    if not spikes.any():
+        return measurements, []
+    rows = ", ".join(map(str, measurements.row[spikes][:SHOWN])) + (", ..." if spikes.sum() > SHOWN else "")
+    what = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
+    said = (
+        f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {FARTHER:g} times as "
+        "far as the joints and the load move the tip: spikes of the tracker, left out of all fits and errors"
+    )
+    poses = {name: getattr(measurements, name) for name in ("position", "quaternion")}
+    return replace(
+        measurements,
+        **{name: np.where(spikes[:, None], np.nan, old) for name, old in poses.items() if old is not None},
+    ), [said]
+
+
+def leaps(robot: Robot, measurements: Measurements) -> Array:
+    """How far each spike (M,) leaps [m]; NaN where a reading is none."""
+    leap, jitter = np.full(len(measurements), np.nan), robot.tracker.jitter_mm
+    if measurements.position is None or not jitter:
+        return leap
+    read = np.flatnonzero(measured_rows(measurements) & np.isfinite(measurements.position).all(axis=1))
+    beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
+    tips = Model(robot.standard).predict(beta, alpha, measurements.force[read])
+    before, here, after = read[:-2], read[1:-1], read[2:]
+    measured, predicted = measurements.position, np.full((len(measurements), 3), np.nan)
+    predicted[read] = tips.position
+
+    def apart(p: Array, one: NDArray[np.int64], other: NDArray[np.int64]) -> Array:
+        return np.linalg.norm(p[one] - p[other], axis=1)
+
+    step = np.diff(loaded_places(measurements)[read], axis=0)
+    goes_on = (
+        np.sum(step[:-1] * step[1:], axis=1) >= 0
+    )  # where a path turns, a leap is one step that the model misses
+    leaped = np.minimum(apart(measured, here, before), apart(measured, here, after))
+    moved = np.maximum(apart(predicted, here, before), apart(predicted, here, after))
+    run, noise = measurements.run, np.sqrt(6) * 1e-3 * jitter
+    found = (
+        goes_on
+        & (run[before] == run[after])
+        & (leaped > FARTHER * moved)  # NaN, where the model has no solution, says nothing
+        & (leaped > VISIBLE * noise)
+        & (apart(measured, before, after) < BACK * leaped)
+    )
+    leap[here[found]] = leaped[found]
+    return leap
