@@ -166,7 +166,7 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
 @pytest.mark.parametrize(
     ("calibrated", "with_effects", "structured", "word"),
     [(0.3, 0.1, True, "identified"), (0.3, 0.25, True, "stand_in"), (0.3, 0.29, False, "identified"),
-     (0.3, 0.45, False, "stand_in"), (0.061, 0.062, True, "identified")],
+     (0.3, 0.45, False, "stand_in"), (0.061, 0.062, True, "identified"), (0.3, 0.16, True, "probable")],
 )  # fmt: skip
 def test_what_other_runs_do_not_confirm_is_a_stand_in(calibrated, with_effects, structured, word):
     noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))

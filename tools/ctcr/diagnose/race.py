@@ -178,7 +178,11 @@ def race(
 ) -> Round:
     """One round: screens all candidates by their slopes, refits the best, and decides."""
     progress("screening all candidates")
-    _, fixed = parameters(accepted)
+    names, fixed = parameters(accepted)
+    if accepted:  # what a refit without a further effect finds too is no gain of one
+        before = engine.fit_like(
+            before, names, start=values_of(before), fixed=fixed, near=True, tolerance=identify.COARSE
+        )
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
         return Round(before, [], {}, reason="no effect is left to try")

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 # Share of the excess that effects must remove to be no stand-ins: of the squared error on locked runs, or where that is
 # mere noise, of chi-square.
 EXPLAINED, MORE_THAN_NOISE = 0.6, 0.25
+MOSTLY = 0.8  # ... and to be identified where more than noise is left
 MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
 
@@ -44,7 +45,8 @@ def judge(
         return Verdict("not_in_catalogue", [missing, *leftover.at_places])
     first = accepted[0]
     noise = before < MORE_THAN_NOISE * jitter**2
-    if leftover.rejected and (max(explained, first.share) if noise else explained) < EXPLAINED:
+    share = max(explained, first.share) if noise else explained
+    if leftover.rejected and share < EXPLAINED:
         return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but much of it stays."])
     if after > max(MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])
@@ -58,4 +60,7 @@ def judge(
         return Verdict("probable", ["Another effect is nearly as likely."])
     names = " and ".join(a.entry.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
+    if leftover.rejected and share < MOSTLY:
+        most = f"{names} {verb} {share:.0%} of the squared error beyond noise, and more than noise is left"
+        return Verdict("probable", [f"{most}: the law may be another one, or something else acts too."])
     return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])

@@ -1,0 +1,34 @@
+"""A round of the race asks what a further effect adds, and not what a better fit of the others would."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import effect_fit, identify, robot_file, simulation
+from ctcr.diagnose import race as racing
+from ctcr.diagnose.candidates import Candidate, candidates
+from ctcr.diagnose.engine import Engine, Gain
+
+MASS = "effects.tip_load.mass"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml")
+
+
+def test_a_fit_that_did_not_end_gives_no_further_effect_its_gain(robot, plan):
+    made = simulation.simulate(
+        effect_fit.with_values(robot, ["tip_load"], {MASS: 0.01}), plan, "jitter", seed=4
+    )
+    engine = Engine(robot, made, identify.noise_of_readings(robot, made), np.ones(len(made), bool))
+    candidate = Candidate("tip_load", (MASS,))
+    ended = engine.fit([MASS])
+    early = engine.fit_like(ended, [MASS], max_iterations=1)
+    assert ended.log_evidence - early.log_evidence > 2 * racing.UNASKED
+    accepted = racing.Entry(candidate, Gain(0.0, *4 * [np.zeros(1)]), fit=early)
+    pool = [c for c in candidates(robot, made)[0] if c.id not in ("tip_load", "contact")]
+    round_ = racing.race(engine, early, pool, [accepted], lambda _: None)
+    assert round_.accepted is None
+    assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
+    assert max(entry.score for entry in round_.entries) < racing.EVIDENCE
