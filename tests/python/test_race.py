@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
 from ctcr.diagnose import race as racing
+from ctcr.diagnose import verdict
 from ctcr.diagnose.candidates import Candidate, candidates
 from ctcr.diagnose.engine import Engine, Gain
 
+ROOT = Path(__file__).parents[2]
 MASS = "effects.tip_load.mass"
 
 
 @pytest.fixture(scope="module")
 def robot():
-    return robot_file.load(Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml")
+    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
 
 
 def test_a_fit_that_did_not_end_gives_no_further_effect_its_gain(robot, plan):
@@ -32,3 +34,12 @@ def test_a_fit_that_did_not_end_gives_no_further_effect_its_gain(robot, plan):
     assert round_.accepted is None
     assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
     assert max(entry.score for entry in round_.entries) < racing.EVIDENCE
+
+
+def test_the_tutorial_explains_every_verdict_with_its_limits():
+    text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    words = ["nothing_missing", "identified", "probable", "ambiguous", "stand_in", "not_in_catalogue"]
+    assert [word for word in rows if word in words] == words
+    assert f"less than {100 * verdict.MOSTLY:.0f} %" in rows["probable"]
+    assert f"less than {100 * verdict.EXPLAINED:.0f} %" in rows["stand_in"]
