@@ -131,11 +131,13 @@ def test_a_comparison_counts_no_spikes_and_says_so(robot, paths, tmp_path, capsy
         [table.t, table.run, table.beta, table.alpha, table.force, table.position, table.quaternion]
     )
     np.savetxt(tmp_path / "table.csv", rows, delimiter=",", header=",".join(header), comments="")
-    numbers = tmp_path / "numbers.json"
-    assert cli.run(["compare", str(TABLE2), str(tmp_path / "table.csv"), "--json", str(numbers)]) == 0
+    numbers, page = tmp_path / "numbers.json", tmp_path / "page.html"
+    files = ["--json", str(numbers), "--report", str(page)]
+    assert cli.run(["compare", str(TABLE2), str(tmp_path / "table.csv"), *files]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "2 readings leap" in said
     assert "rows 9, 62" in said
     found = json.loads(numbers.read_text())
     assert found["position_mm"]["maximum"] < 0.5
     assert found["rows"]["not_measured"] == [9, 62]
+    assert found["notices"][0] in page.read_text(encoding="utf-8")

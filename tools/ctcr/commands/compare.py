@@ -44,7 +44,7 @@ def command(
     ways: list[str] = []
     if loaded.effects:  # they may remember what the table leaves out
         readings, ways = unrecorded.completed(loaded, readings)
-    result = compare(loaded, readings, _predict(loaded, readings, steps))
+    result = compare(loaded, readings, _predict(loaded, readings, steps), [*spiked, *ways])
     if report:
         from ctcr.compare import report as page
 
@@ -53,8 +53,6 @@ def command(
         output.write_json(result.as_dict(), json_target)
     console = output.console(json_target)
     terminal.show(console, result)
-    for notice in [*spiked, *ways]:
-        console.print(f"{notice}.", markup=False)
     for warning in readings.warnings:
         console.print(f"{warning}", markup=False)
     doubts = len(robot_file.warnings(loaded))

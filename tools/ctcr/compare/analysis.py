@@ -1,5 +1,6 @@
 """How wrong the model is, and where: all numbers of a comparison, without a picture or a word."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -76,6 +77,7 @@ class Comparison:
     sample: Sample  # the same, with the frame fitted where it is grossly wrong
     stops: Stops
     revisits: Revisits
+    notices: Sequence[str]  # what became of the table before it was compared
 
     @property
     def noise_share(self) -> float:
@@ -102,11 +104,12 @@ class Comparison:
             "ranked": [_dependence(item) for item in self.ranking.alone],
         }
         data["never_varied"] = self.fixed
+        data["notices"] = list(self.notices)
         return data
 
 
-def compare(robot, measurements, prediction) -> Comparison:
-    """Compare measured with predicted tip poses.
+def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Comparison:
+    """Compare measured with predicted tip poses; `notices` say what became of the table before.
 
     robot, measurements and prediction as `ctcr.robot_file.load`, `ctcr.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -155,6 +158,7 @@ def compare(robot, measurements, prediction) -> Comparison:
         sample=sample,
         stops=stops,
         revisits=revisits,
+        notices=notices,
     )
 
 

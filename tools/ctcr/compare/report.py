@@ -66,7 +66,11 @@ def _findings(c: Comparison) -> str:
         f"concerns; shares overlap.</p>" if items else "<p>No finding beyond noise.</p>"
     )  # fmt: skip
     text = f"<h2>What was found</h2>{found}"
-    for title, lines in (("", quiet(c)), ("What these data cannot say", limits(c))):
+    for title, lines in (
+        ("", quiet(c)),
+        ("What these data cannot say", limits(c)),
+        ("What became of the table first", c.notices),
+    ):
         if lines:
             heading = f"<h2>{title}</h2>" if title else ""
             text += heading + bullets(lines)

@@ -30,6 +30,7 @@ def show(console, c: Comparison) -> None:
         ("Findings", [item.text for item in findings(c)]),
         ("No finding", quiet(c)),
         ("What these data cannot say", limits(c)),
+        ("What became of the table first", c.notices),
     ):
         if lines:
             console.print(f"[bold]{title}[/bold]")
