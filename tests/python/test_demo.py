@@ -104,9 +104,8 @@ def check_story(said, folder):
     assert diagnosis["effects"][0]["class"][0] == "friction"
     assert "The error of the model fell from" in said
     page = (folder / "report.html").read_text()
-    tags = re.sub(
-        r"(?s)(<script[^>]*>).*?</script>", r"\1", page
-    )  # the drawing library names pages in its texts
+    # The drawing library names pages in its texts.
+    tags = re.sub(r"(?s)(<script[^>]*>).*?</script>", r"\1", page)
     assert not re.search(r'(src|href)="http', tags) and page.count("<svg") >= 3
 
 

@@ -14,9 +14,6 @@ from ctcr import (
     identify,
     open_side,
     robot_update,
-    sensor_roll,
-    spikes,
-    unrecorded,
 )
 from ctcr.calibrate import parameters
 from ctcr.diagnose.engine import Engine
@@ -26,6 +23,7 @@ from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.measurements import Measurements
 from ctcr.output import Progress
+from ctcr.preparation import prepared
 from ctcr.robot import Robot
 from ctcr.robot_update import Change, Entry
 
@@ -92,9 +90,7 @@ def add(
     time) is kept out of the fits that give the errors; the values are those of a fit to all rows. Raises InputError
     where no fit is possible.
     """
-    readings, said = sensor_roll.positions_alone(robot, readings)
-    readings, spiked = spikes.left_out(robot, readings)
-    readings, ways = unrecorded.completed(robot, readings)
+    readings, said = prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     before = robot_before(robot, ids)
@@ -126,7 +122,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*said, *spiked, *ways, *_notices(robot, fit, ids)],
+        [*said, *_notices(robot, fit, ids)],
     )
 
 

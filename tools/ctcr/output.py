@@ -5,7 +5,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -73,6 +73,11 @@ def console(json_target: str | None = None):
     from rich.console import Console
 
     return Console(stderr=json_target == "-", highlight=False, soft_wrap=True)
+
+
+def listed(items: Sequence[Any], most: int) -> str:
+    """The first of them, and dots where there are more."""
+    return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
 
 
 def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1):

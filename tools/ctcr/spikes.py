@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.identify import measured_rows
+from ctcr.joint_space import loaded_places
 from ctcr.measurements import Measurements
 from ctcr.model import Model
-from ctcr.places import loaded_places
+from ctcr.output import listed
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FARTHER = 2.0  # than the tip moves by the model, both to the reading before and to that after,
 BACK = 0.5  # ... with these so near each other, of the leap
@@ -30,7 +29,7 @@ def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, li
     spikes = np.isfinite(leap)
     if not spikes.any():
         return measurements, []
-    rows = ", ".join(map(str, measurements.row[spikes][:SHOWN])) + (", ..." if spikes.sum() > SHOWN else "")
+    rows = listed(measurements.row[spikes], SHOWN)
     what = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
     said = (
         f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {FARTHER:g} times as "
@@ -48,29 +47,23 @@ def leaps(robot: Robot, measurements: Measurements) -> Array:
     leap, jitter = np.full(len(measurements), np.nan), robot.tracker.jitter_mm
     if measurements.position is None or not jitter:
         return leap
-    read = np.flatnonzero(measured_rows(measurements) & np.isfinite(measurements.position).all(axis=1))
+    read = np.flatnonzero(np.isfinite(measurements.position).all(axis=1))
     beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
-    tips = Model(robot.standard).predict(beta, alpha, measurements.force[read])
-    before, here, after = read[:-2], read[1:-1], read[2:]
-    measured, predicted = measurements.position, np.full((len(measurements), 3), np.nan)
-    predicted[read] = tips.position
-
-    def apart(p: Array, one: NDArray[np.int64], other: NDArray[np.int64]) -> Array:
-        return np.linalg.norm(p[one] - p[other], axis=1)
-
+    predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
+    measured, run = measurements.position[read], measurements.run[read]
     step = np.diff(loaded_places(measurements)[read], axis=0)
-    goes_on = (
-        np.sum(step[:-1] * step[1:], axis=1) >= 0
-    )  # where a path turns, a leap is one step that the model misses
-    leaped = np.minimum(apart(measured, here, before), apart(measured, here, after))
-    moved = np.maximum(apart(predicted, here, before), apart(predicted, here, after))
-    run, noise = measurements.run, np.sqrt(6) * 1e-3 * jitter
+    measured_step, predicted_step = (
+        np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (measured, predicted)
+    )
+    leaped = np.minimum(measured_step[:-1], measured_step[1:])
+    moved = np.maximum(predicted_step[:-1], predicted_step[1:])
+    goes_on = np.sum(step[:-1] * step[1:], axis=1) >= 0  # else a leap is one step that the model misses
     found = (
         goes_on
-        & (run[before] == run[after])
+        & (run[:-2] == run[2:])
         & (leaped > FARTHER * moved)  # NaN, where the model has no solution, says nothing
-        & (leaped > VISIBLE * noise)
-        & (apart(measured, before, after) < BACK * leaped)
+        & (leaped > VISIBLE * np.sqrt(6) * 1e-3 * jitter)
+        & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < BACK * leaped)
     )
-    leap[here[found]] = leaped[found]
+    leap[read[1:-1][found]] = leaped[found]
     return leap

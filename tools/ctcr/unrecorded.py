@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from ctcr.joint_space import joint_places
 from ctcr.measurements import Measurements
-from ctcr.places import joint_places
+from ctcr.output import listed
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -48,9 +49,9 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     apart = [
         1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)
     ]
-    rows = [str(measurements.row[k]) for k in here[:SHOWN]] + ["..."] * (len(here) > SHOWN)
+    rows = listed(measurements.row[here], SHOWN)
     said = (
-        f"{len(here)} readings return to joints after a long step (rows {', '.join(rows)}). They agree with the "
+        f"{len(here)} readings return to joints after a long step (rows {rows}). They agree with the "
         f"earlier visit from the other side than that of the recorded motion ({apart[0]:.2f} mm apart, the other one "
         f"{apart[1]:.2f} mm): the robot moved in between without a reading. They are taken as reached on the way of "
         "that visit"

@@ -9,6 +9,7 @@ from ctcr.compare import wording
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.measurements import Measurements
+from ctcr.output import listed
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -133,5 +134,5 @@ def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
 
 
 def _rows(rows: NDArray[np.int64]) -> str:
-    listed = ", ".join(map(str, rows[:LISTED])) + (", ..." if len(rows) > LISTED else "")
-    return f"{len(rows)} rows ({listed})" if len(rows) > 1 else f"Row {listed}"
+    text = listed(rows, LISTED)
+    return f"{len(rows)} rows ({text})" if len(rows) > 1 else f"Row {text}"

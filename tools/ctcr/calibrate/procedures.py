@@ -12,6 +12,7 @@ from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
+from ctcr.output import listed
 from ctcr.robot import Robot
 from ctcr.robot_update import Change
 
@@ -297,5 +298,4 @@ def left_out(name: str, rows: list[int]) -> list[str]:
     """A notice of outliers, by their rows of the file."""
     if not rows:
         return []
-    listed = ", ".join(map(str, rows[:10])) + (", ..." if len(rows) > 10 else "")
-    return [f"{name}: outliers, not used: rows {listed}".removeprefix(": ")]
+    return [f"{name}: outliers, not used: rows {listed(rows, 10)}".removeprefix(": ")]

@@ -44,7 +44,9 @@ def command(
     ways: list[str] = []
     if loaded.effects:  # they may remember what the table leaves out
         readings, ways = unrecorded.completed(loaded, readings)
-    result = compare(loaded, readings, _predict(loaded, readings, steps), [*spiked, *ways])
+    result = compare(
+        loaded, readings, _predict(loaded, readings, steps), [f"{said}." for said in (*spiked, *ways)]
+    )
     if report:
         from ctcr.compare import report as page
 

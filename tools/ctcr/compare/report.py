@@ -12,7 +12,7 @@ from ctcr.compare.limits import limits
 from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
 from ctcr.compare.summary import findings, headline, quiet
 from ctcr.html_page import bullets, cards, figure, table
-from ctcr.output import atomic_writer
+from ctcr.output import atomic_writer, listed
 
 
 def write(c: Comparison, target: str | Path, source: str) -> None:
@@ -133,6 +133,5 @@ def _tables(c: Comparison) -> str:
     ]  # fmt: skip
     for what, rows in (("not measured", c.sample.not_measured), ("not solved", c.sample.not_solved)):
         if len(rows):
-            listed = ", ".join(map(str, rows[:200])) + (", ..." if len(rows) > 200 else "")
-            parts.append(f"<p>{len(rows)} rows {what}: {listed}</p>")
+            parts.append(f"<p>{len(rows)} rows {what}: {listed(rows, 200)}</p>")
     return "<h2>Numbers</h2>" + "".join(parts)

@@ -3,7 +3,7 @@
 from ctcr.compare.analysis import Comparison, Spread
 from ctcr.compare.limits import limits
 from ctcr.compare.summary import findings, headline, quiet
-from ctcr.output import table
+from ctcr.output import listed, table
 
 SHOWN_RUNS = 15
 SHOWN_FORMS = 10
@@ -38,8 +38,7 @@ def show(console, c: Comparison) -> None:
                 console.print(f"  • {line}", markup=False)
     for what, rows in (("not measured", c.sample.not_measured), ("not solved", c.sample.not_solved)):
         if len(rows):
-            listed = ", ".join(map(str, rows[:SHOWN_ROWS])) + (", ..." if len(rows) > SHOWN_ROWS else "")
-            console.print(f"{len(rows)} rows {what}: {listed}", markup=False)
+            console.print(f"{len(rows)} rows {what}: {listed(rows, SHOWN_ROWS)}", markup=False)
 
 
 COLUMNS = ["mean", "RMS", "95 %", "max", "readings"]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, open_side, sensor_roll, spikes, unrecorded
+from ctcr import effects, identify, open_side
 from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
@@ -19,6 +19,7 @@ from ctcr.diagnose.race import Entry, Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.measurements import Measurements
+from ctcr.preparation import prepared
 from ctcr.robot import Robot
 
 Array = NDArray[np.float64]
@@ -133,9 +134,7 @@ def diagnose(
     others turn out to leave open.
     """
     began = perf_counter()
-    measurements, notices = sensor_roll.positions_alone(robot, measurements)
-    measurements, spiked = spikes.left_out(robot, measurements)
-    measurements, ways = unrecorded.completed(robot, measurements)
+    measurements, notices = prepared(robot, measurements)
     for turn in range(TURNS):
         locked = locked_rows(robot, measurements, turn)
         result = _of_these(robot, measurements, locked, progress, threads)
@@ -147,7 +146,7 @@ def diagnose(
                 result = again
         if result.accepted or not _surprises(result):
             break
-    result.notices = [*notices, *spiked, *ways]
+    result.notices = notices
     result.seconds = perf_counter() - began
     return result
 

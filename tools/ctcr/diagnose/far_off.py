@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 from scipy.stats import binom
 
 from ctcr.diagnose.engine import OUTLIER
+from ctcr.joint_space import loaded_places
 from ctcr.measurements import Measurements
-from ctcr.places import loaded_places
 
 Mask = NDArray[np.bool_]
 

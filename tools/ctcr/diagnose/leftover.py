@@ -11,6 +11,7 @@ from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.far_off import come_together
 from ctcr.diagnose.race import is_rejected
+from ctcr.output import listed
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
 SHOWN = 6
@@ -37,9 +38,9 @@ class Leftover:
         """Which readings are off together; nothing where none are."""
         if not self.places:
             return []
-        shown = ", ".join(map(str, self.places[:SHOWN])) + (", ..." if len(self.places) > SHOWN else "")
+        rows = listed(self.places, SHOWN)
         return [
-            f"{len(self.places)} readings (rows {shown}) are far off the same way as their neighbours in joints and "
+            f"{len(self.places)} readings (rows {rows}) are far off the same way as their neighbours in joints and "
             "load: something acts just there."
         ]
 

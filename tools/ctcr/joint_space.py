@@ -1,4 +1,4 @@
-"""Where a reading was taken, as one vector: joints, or joints and load."""
+"""Where in the space of joints a reading was taken, as one vector; or of joints and load."""
 
 import numpy as np
 from numpy.typing import NDArray
