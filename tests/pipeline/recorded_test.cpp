@@ -212,6 +212,25 @@ TEST(Recorded, AnswersParametersThatAreNoNumbers) {
     }
 }
 
+TEST(Recorded, RemembersTheSameWithoutSlopes) {
+  test::Random random(6);
+  const auto recorded = test::random_recording<2>(test::random_effects<2>(random), 1, random);
+  const auto with = memories<2, Catalogue>(recorded.system, recorded.rows);
+  const auto without = memories<2, Catalogue>(recorded.system, recorded.rows, false);
+  const auto each = [&]<std::size_t... I>(const auto& f, std::index_sequence<I...>) {
+    (f(std::integral_constant<std::size_t, I>{}), ...);
+  };
+  double largest = 0;
+  const auto compare = [&]<std::size_t I>(std::integral_constant<std::size_t, I>) {
+    for (std::size_t row = 0; row < with.size(); ++row) {
+      EXPECT_EQ(std::get<I>(without[row]).state, std::get<I>(with[row]).state) << I << ", row " << row;
+      for (const double x : std::get<I>(with[row]).state) largest = std::max(largest, std::abs(x));
+    }
+  };
+  each(compare, std::make_index_sequence<std::tuple_size_v<Catalogue::On<2>::Memory>>{});
+  EXPECT_GT(largest, 0.1);
+}
+
 TEST(Recorded, DoesNotTouchTheHeap) {
   test::Random random(5);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);

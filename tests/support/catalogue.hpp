@@ -19,7 +19,7 @@
                                           const RecordedPrediction<N, Catalogue>&, std::span<const int>,           \
                                           Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>) noexcept;          \
   kind std::vector<Catalogue::On<N>::Memory> memories<N, Catalogue>(const System<N, Catalogue>&,                   \
-                                                                    std::span<const RecordedRow<N>>);
+                                                                    std::span<const RecordedRow<N>>, bool);
 
 namespace ctcr {
 CTCR_TEST_CATALOGUE(extern template, 1)

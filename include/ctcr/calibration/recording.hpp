@@ -58,7 +58,7 @@ public:
   /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const System<N, Fx> system = this->system(x);
-    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_);
+    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, jacobian != nullptr);
     const Mat3 turning = left_jacobian(turn_of(x));
     residual.resize(6 * size());
     if (jacobian) jacobian->resize(6 * size(), x.size());

@@ -136,10 +136,12 @@ private:
   Joints<N> settle(Moving& to, const Joints<N>& motors, const TipLoad& load) const noexcept {
     Joints<N> q = motors;
     if constexpr (!Fx::none) {
-      q = to.live.advance(motors, time_, to.ws, [&](const auto& effects, const Joints<N>& tubes) {
+      const auto equilibrium = [&](const auto& effects, const Joints<N>& tubes) {
         to.model = Model<N, Fx>(system_.model.robot(), effects);
-        return has_equilibrium(step<Derivatives::none>(to.model, tubes, load, to.ws, to.solution, system_.settings));
-      });
+        const Status status = step<Derivatives::none>(to.model, tubes, load, to.ws, to.solution, system_.settings);
+        return has_equilibrium(status) ? &to.model : nullptr;
+      };
+      q = to.live.advance(motors, time_, to.ws, system_.settings.steps, equilibrium);
       to.model = Model<N, Fx>(system_.model.robot(), to.live.effects());
     }
     (void)step<D>(to.model, q, load, to.ws, to.solution, system_.settings);

@@ -16,21 +16,24 @@ public:
   explicit LiveEffects(const Effects& effects) noexcept : effects_(effects) {}
 
   /// Takes the next joints of the motors, and their time [s]; returns the joints that the tubes have.
-  /// @param equilibrium  equilibrium(effects, joints of the tubes) -> bool: whether there is one, left in ws
-  /// Real time: as `equilibrium`, which is called `most` times, and once more a state that follows the twist.
-  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, const auto& equilibrium) noexcept {
+  /// @param steps        of integration, per segment
+  /// @param equilibrium  equilibrium(effects, joints of the tubes): the model with these effects, its equilibrium left in
+  ///                     ws; or null if none
+  /// Real time: as `equilibrium`, which is called at most 9 times.
+  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, int steps,
+                    const auto& equilibrium) noexcept {
     const std::size_t row = add(motors, time);
-    const auto remembered = [&](const VecN<N>& twist) {
+    const auto remembered = [&](const Twist<N>& twist) {
       Effects now = effects_;
-      VecN<N>::Map(rows_[row].twist.data()) = twist;
+      rows_[row].twist = twist;
       now.remember({{rows_.data(), count_}, {times_.data(), count_}}, row);
       return now;
     };
     if constexpr (Effects::follows_twist) {
       if (effects_.act_by_twist()) {
         effects_ = balance_.solve([&](const Effects& with) { return equilibrium(with, tubes(with, motors)); },
-                                  remembered, ws, twist_, most);
-        VecN<N>::Map(rows_[row].twist.data()) = twist_;
+                                  remembered, ws, steps, twist_, most);
+        rows_[row].twist = twist_;
         return tubes(effects_, motors);
       }
     }
@@ -40,7 +43,8 @@ public:
 
   /// The same of tubes that are stiff in torsion. Real time: yes.
   Joints<N> advance(const Joints<N>& motors, double time) noexcept {
-    return advance(motors, time, {}, [](const Effects&, const Joints<N>&) { return false; });
+    return advance(motors, time, {}, 1,
+                   [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
   }
 
   /// With the past of now.
@@ -76,7 +80,7 @@ private:
   std::array<typename Path<N, double>::Row, window> rows_{};
   std::array<double, window> times_{};
   std::size_t count_ = 0;
-  VecN<N> twist_ = VecN<N>::Zero();
+  Twist<N> twist_{};
   TwistBalance<N, Fx> balance_;
   Occasion at_;
 };

@@ -51,7 +51,7 @@ inline constexpr std::array parameters{
                     .hard_low = 0.005,
                     .hard_high = 3,
                     .role = Role::shape,
-                    .meaning = "rotation of the tips after which friction has turned round to 63 %"},
+                    .meaning = "rotation of the tubes where they touch after which friction has turned round to 63 %"},
     EffectParameter{.name = "insertion",
                     .unit = "",
                     .neutral = 1,
@@ -79,12 +79,13 @@ inline constexpr std::array parameters{
 }  // namespace friction
 
 /// Torque exchanged where the bending moment of the tubes inside a contact jumps, C |jump| h, and all along the overlap
-/// of two tubes, so much per length times h. h in [-1, 1] follows the tube's rotation in the next outer one (in the guide,
-/// for the outermost), as far as their twist leaves of that of their bases, so that the tube lags its base. That twist is
-/// one of what they rub, too: see wind_up.hpp.
-/// State: h of each tube, then with the second law the share of the limit that insertion takes.
+/// of two tubes, so much per length times h, which changes linearly from contact to contact. h in [-1, 1] of each contact
+/// follows how the tube turns there in the next outer one (the outermost, in the guide), as far as their twist leaves of
+/// the rotation of their bases, so that the tube lags its base. That twist is one of what they rub, too: see wind_up.hpp.
+/// State: h of each of Contacts<N>, and of the outermost tube in the plate; then with the second law the share of each limit
+/// that insertion takes.
 template <int N, class P = double>
-struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
+struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::count + 1)> {
   static constexpr const EffectInfo& info = friction::info;
   static constexpr bool follows_twist = true;
 
@@ -97,14 +98,18 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
       // Both tubes must be there; the outermost rubs on the front plate alone.
       if (j + 1 < N ? j + 1 >= s.near : s.kind != Station<P, N>::Kind::plate) continue;
       constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
-      const P torque = this->template get<0>(j) * this->past.state[i] * square_root(dx * dx + dy * dy + smooth);
+      const P& h = this->past.state[j + 1 < N ? Contacts<N>::place(j, s.number()) : in_plate];
+      const P torque = this->template get<0>(j) * h * square_root(dx * dx + dy * dy + smooth);
       s.torque[i] = s.torque[i] - torque;
       if (j + 1 < s.near) s.torque[i + 1] = s.torque[i + 1] + torque;
     }
   }
 
-  void rub(std::array<P, N>& torque) const noexcept {
-    for (std::size_t i = 0; i + 1 < N; ++i) torque[i] = torque[i] - this->template get<1>() * this->past.state[i];
+  void rub(int station, std::array<P, N>& torque) const noexcept {
+    for (int j = 0; j + 1 < N; ++j) {
+      const auto i = std::size_t(j);
+      torque[i] = torque[i] - this->template get<1>() * this->past.state[Contacts<N>::place(j, station)];
+    }
   }
 
   /// Exactly along each straight move.
@@ -112,19 +117,27 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * N> {
     if (row == 0) return;
     const auto &from = path.q[row - 1], &to = path.q[row];
     constexpr double per_radius = 1 / 0.8e-3;
-    for (std::size_t i = 0; i < N; ++i) {
-      const auto against_next = [&](const std::array<P, N>& v) -> P { return i + 1 < N ? v[i] - v[i + 1] : v[i]; };
-      const P turn = against_next(to.alpha) - against_next(from.alpha) + (to.twist[i] - from.twist[i]);
+    const bool bends = value(this->template get<4>()) < 0.5;
+    const auto follow = [&](std::size_t contact, const P& turn, const P& slide) {
+      P &h = this->past.state[contact], &k = this->past.state[limits + contact];
+      bends ? bend(turn, slide, h) : slip(turn, slide, h, k);
+    };
+    follow(in_plate, to.alpha[N - 1] - from.alpha[N - 1], per_radius * (to.beta[N - 1] - from.beta[N - 1]));
+    for (int j = 0; j + 1 < N; ++j) {
+      const auto i = std::size_t(j);
+      const auto against_next = [&](const std::array<P, N>& v) -> P { return v[i] - v[i + 1]; };
+      const P turn = against_next(to.alpha) - against_next(from.alpha);
       const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
-      P &h = this->past.state[i], &k = this->past.state[N + i];
-      if (value(this->template get<4>()) < 0.5)
-        bend(turn, slide, h);
-      else
-        slip(turn, slide, h, k);
+      for (int station = 0; station < Contacts<N>::stations; ++station) {
+        const std::size_t contact = Contacts<N>::place(j, station);
+        follow(contact, turn + (to.twist[contact] - from.twist[contact]), slide);
+      }
     }
   }
 
 private:
+  static constexpr std::size_t in_plate = Contacts<N>::count;  // the state of the outermost tube
+  static constexpr std::size_t limits = Contacts<N>::count + 1;
   static constexpr double rest = 1e-12;  // [rad]: no division by 0 where nothing moves
 
   /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip.

@@ -4,7 +4,7 @@
 //
 //   material(TubePlace<P>, Material<P>&)         what a tube is made of at a place
 //   station(Station<P, N>&)                      torques between tubes, and kinks, where tubes end or start to curve
-//   rub(torque&)                                 torque per length between each tube and the next outer one
+//   rub(station, torque&)                        torque per length between each tube and the next outer one, at a station
 //   grip(torque, angle&)                         angles of the tubes at their grasped ends
 //   tip_force(gravity, force&)                   a force at the robot tip, base frame
 //   environment(position, force&)                the same, depending on where the tip is
@@ -20,6 +20,7 @@
 
 #include "ctcr/effects/effect.hpp"
 #include "ctcr/math/se3.hpp"
+#include "ctcr/robot/contacts.hpp"
 #include "ctcr/robot/joints.hpp"
 
 namespace ctcr {
@@ -60,6 +61,11 @@ struct Station {
   std::array<P, N> torque{};  ///< out: added to the torque of each tube towards the base [N m]
   std::array<P, 2> kink{};    ///< out: turn of the far side against the near one, along `moment` [rad]
   std::array<P, 2> shift{};   ///< out: displacement of the far side against the near one [m]; at the plate alone
+
+  /// Among those of Contacts<N>.
+  [[nodiscard]] int number() const noexcept {
+    return kind == Kind::plate ? Contacts<N>::plate : kind == Kind::tube_tip ? tube : N + tube;
+  }
 };
 
 /// When a row was measured, and how.
@@ -74,8 +80,8 @@ struct Occasion {
 template <int N, class P>
 struct Path {
   struct Row {
-    std::array<P, N> beta, alpha;   ///< [m], [rad]
-    std::array<double, N> twist{};  ///< as in RecordedRow
+    std::array<P, N> beta, alpha;  ///< [m], [rad]
+    Twist<N> twist{};              ///< as in RecordedRow
   };
   std::span<const Row> q;
   std::span<const double> time;  ///< [s]; empty: unknown
@@ -93,7 +99,7 @@ concept HasStation = requires(const Effect& effect, Station<P, N>& station) { ef
 
 /// An effect between tubes wherever both of them are.
 template <class Effect, class P, int N>
-concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effect.rub(torque); };
+concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effect.rub(0, torque); };
 
 /// An effect on what tubes are made of.
 template <class Effect, class P>
@@ -211,6 +217,10 @@ struct EffectList {
     [[nodiscard]] bool acts_at_stations() const noexcept {
       return any([](const auto& e) { return HasStation<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
+    /// Whether an effect that is active lets tubes rub along their length.
+    [[nodiscard]] bool acts_by_rubbing() const noexcept {
+      return any([](const auto& e) { return HasRub<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
+    }
     /// Whether an effect that is active changes what tubes are made of.
     [[nodiscard]] bool acts_on_material() const noexcept {
       return any([](const auto& e) { return HasMaterial<std::remove_cvref_t<decltype(e)>, P> && e.active; });
@@ -248,10 +258,10 @@ struct EffectList {
           if (e.active) e.station(s);
       });
     }
-    void rub(std::array<P, N>& torque) const noexcept {
+    void rub(int station, std::array<P, N>& torque) const noexcept {
       for_each([&](const auto& e, int) {
         if constexpr (HasRub<std::remove_cvref_t<decltype(e)>, P, N>)
-          if (e.active) e.rub(torque);
+          if (e.active) e.rub(station, torque);
       });
     }
     void grip(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
@@ -312,10 +322,12 @@ struct EffectList {
       for (std::size_t k = 0; k < count_; ++k) to.values[k] = value(from.values[k], first + int(k));
       if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
       to.active = acts(to);
+      if (!to.active) return;
       for (std::size_t i = 0; i < from.past.state.size(); ++i) {
         auto& state = to.past.state[i] = from.past.state[i];
         const auto& slope = from.past.slope[i];
-        for (std::size_t k = 0; k < count_; ++k) state = state + slope[k] * (to.values[k] - from.values[k]);
+        for (std::size_t k = 0; k < count_; ++k)
+          if (slope[k] != 0) state = state + slope[k] * (to.values[k] - from.values[k]);
         if constexpr (!std::is_same_v<Transmission, Constant>)
           for (std::size_t k = 0; k < std::size_t(From::transmission_count); ++k)
             state = state + slope[count_ + k] * transmission(int(k));

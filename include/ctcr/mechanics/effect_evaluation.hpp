@@ -42,6 +42,10 @@ struct Window {
   }
 };
 
+struct Ignored {
+  void operator()(int, const auto&) const noexcept {}
+};
+
 /// One integration of the general path, differentiated along a window of variables. The unknowns come first among them:
 /// turns of the tip about the base axes, psi_2..N at the tubes' tips.
 template <int N, class Fx, int Groups>
@@ -52,9 +56,11 @@ public:
   using S = typename Window::S;
   using Inputs = RodInputs<N, S, Fx>;
 
-  /// @param in  with derivatives along the window's variables other than the unknowns
+  /// @param in   with derivatives along the window's variables other than the unknowns
+  /// @param met  called as met(station, state) at each station of Contacts<N> but the robot tip
+  template <class Met = Ignored>
   EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, int steps,
-             const Window& window) noexcept
+             const Window& window, const Met& met = {}) noexcept
     : alpha_(in.alpha), tip_psi_(0.0) {
     using Rod = EffectRod<N, S, Fx>;
     for (int k = 0; k < 3; ++k) turn_[std::size_t(k)] = window(0, turn + k);
@@ -64,12 +70,12 @@ public:
       for (int g = 0; g < Window::groups; ++g)
         tip_.rotation_twist[k][g] = tip_.translation_twist[k][g] = frame_.rotation_twist[k][g] =
             frame_.translation_twist[k][g] = Lanes{};
-    const auto keep_tip = [&](int id, const Frame<S>& frame, const S& angle) noexcept {
-      if (id > 0) {
-        tips.frame[std::size_t(id - 1)] = frame;
-        tips.psi[std::size_t(id - 1)] = angle.v;
-      }
-      if (id == tube && id > 0) tip_ = frame, tip_psi_ = angle;
+    const auto keep_tip = [&](int id, const Frame<S>& frame, const auto& state) noexcept {
+      met(id, state);
+      if (id >= N) return;
+      tips.frame[std::size_t(id - 1)] = frame;
+      tips.psi[std::size_t(id - 1)] = state.psi(id).v;
+      if (id == tube) tip_ = frame, tip_psi_ = state.psi(id);
     };
     Rod(in).run(events, steps, y, frame_, keep_tip, typename Rod::NoNode{});
     std::array<S, N> torque;

@@ -3,36 +3,11 @@
 // anywhere and by any law of hooks.hpp; tubes may exchange torque along their length and where tubes end or start to
 // curve, and there the frame may kink. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
 #include "ctcr/mechanics/bending.hpp"
+#include "ctcr/mechanics/effect_state.hpp"
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
 
 namespace ctcr {
-
-/// All that the mechanics depends on.
-template <int N, class S, class Fx>
-struct RodInputs {
-  std::array<TubeParameters<S>, N> tubes;
-  std::array<S, N> beta, alpha;             ///< [m], [rad]
-  std::array<S, 3> force, moment, gravity;  ///< base frame [N], [N m], [m/s^2]
-  typename Fx::OnRod::template On<N, S> effects;
-};
-
-/// Carried along the rod; body vectors in the Bishop frame.
-template <int N, class S>
-struct EffectState {
-  static constexpr int size = 2 * N + 8;
-  std::array<S, std::size_t(size)> y;
-  S& psi(int i) noexcept { return y[std::size_t(i)]; }            ///< angle of a tube [rad]
-  S& torque(int i) noexcept { return y[std::size_t(N + i)]; }     ///< its torsional moment [N m]
-  S& m(int i) noexcept { return y[std::size_t(2 * N + i)]; }      ///< bending moment of all tubes [N m]
-  S& n(int i) noexcept { return y[std::size_t(2 * N + 2 + i)]; }  ///< force [N]
-  S& g(int i) noexcept { return y[std::size_t(2 * N + 5 + i)]; }  ///< gravity [m/s^2]
-  const S& psi(int i) const noexcept { return y[std::size_t(i)]; }
-  const S& torque(int i) const noexcept { return y[std::size_t(N + i)]; }
-  const S& m(int i) const noexcept { return y[std::size_t(2 * N + i)]; }
-  const S& n(int i) const noexcept { return y[std::size_t(2 * N + 2 + i)]; }
-  const S& g(int i) const noexcept { return y[std::size_t(2 * N + 5 + i)]; }
-};
 
 template <int N, class S, class Fx>
 class EffectRod {
@@ -53,24 +28,21 @@ public:
   struct Place {
     int present = 0;  ///< tubes 1..present
     std::array<bool, N> curved{};
-    std::array<S, N> along;               ///< arc length of each present tube here [m]
+    std::array<S, N> along;          ///< arc length of each present tube here [m]
+    std::array<S, N> rub, rub_rate;  ///< torque per length on each tube from the next outer one [N], its rate [N/m]
     std::array<Material<S>, N> material;  ///< of each present tube here
   };
 
-  explicit EffectRod(const Inputs& inputs) noexcept : in_(inputs), varied_(inputs.effects.acts_on_material()) {
-    if constexpr (Fx::template On<N, S>::has_rub) {
-      rub_.fill(0.0);
-      in_.effects.rub(rub_);
-    }
-  }
+  explicit EffectRod(const Inputs& inputs) noexcept
+    : in_(inputs), varied_(inputs.effects.acts_on_material()), rubs_(inputs.effects.acts_by_rubbing()) {}
 
   /// Integrates from the state at the tip to the grasped side of the front plate.
   /// @param frame  out: Bishop frame there as seen from the tip frame
-  /// @param tip    called as tip(tube, frame, psi) at the tip of each tube but the innermost
+  /// @param met    called as met(station, frame, state) at each station of Contacts<N> but the robot tip
   /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
-  template <class Tip, class Node>
-  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Tip& tip,
+  template <class Met, class Node>
+  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Met& met,
            const Node& node) const noexcept {
     Place place;
     frame = Frame<S>{};
@@ -91,10 +63,11 @@ public:
         using Kind = typename Station<S, N>::Kind;
         stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
       }
-      if (id < N) tip(id, frame, y.psi(id));
+      if (id > 0) met(id, frame, y);
       place = near;
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
       const S next = last ? S(0.0) : event_place(events.id[e + 1]);
+      rub_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, place);
       const S h = (1.0 / steps) * (next - here);
       for (int i = 0; i < steps; ++i) {
         if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, place, y, frame, *this);
@@ -103,6 +76,7 @@ public:
       if constexpr (!std::is_same_v<Node, NoNode>) node(next, place, y, frame, *this);
       here = next;
     }
+    met(Contacts<N>::plate, frame, y);
     stop(Station<S, N>::Kind::plate, -1, place, place, y, frame);
   }
 
@@ -131,6 +105,8 @@ public:
       return r;
     };
     const auto advance = [&] {
+      if (rubs())
+        for (std::size_t i = 0; i < N; ++i) place.rub[i] = place.rub[i] + half * place.rub_rate[i];
       if (!varied_) return;
       for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
       locate(place);
@@ -220,6 +196,20 @@ private:
     return id < N ? tip : tip - in_.tubes[i].curved_length;
   }
 
+  [[nodiscard]] bool rubs() const noexcept { return Fx::template On<N, S>::has_rub && rubs_; }
+
+  /// Sets what tubes rub from a station to the next one, a distance of h < 0 towards the base.
+  void rub_between(int far, int near, const S& h, Place& place) const noexcept {
+    if (!rubs()) return;
+    constexpr double shortest = 1e-9;  // [m]: no division by 0
+    std::array<S, N> end;
+    for (std::size_t i = 0; i < N; ++i) place.rub[i] = end[i] = 0.0;
+    in_.effects.rub(far, place.rub);
+    in_.effects.rub(near, end);
+    const S per_length = value(h) < -shortest ? inverse(h) : S(0.0);
+    for (std::size_t i = 0; i < N; ++i) place.rub_rate[i] = (end[i] - place.rub[i]) * per_length;
+  }
+
   static void clear_twist(Frame<S>& frame) noexcept {
     if constexpr (is_dual<S>)
       for (int i = 0; i < 3; ++i)
@@ -286,10 +276,10 @@ private:
         d.psi(j) = d.torque(j) = 0.0;
       }
     }
-    if constexpr (Fx::template On<N, S>::has_rub) {
+    if (rubs()) {
       for (int j = 0; j + 1 < place.present; ++j) {
-        d.torque(j) = d.torque(j) - rub_[std::size_t(j)];
-        d.torque(j + 1) = d.torque(j + 1) + rub_[std::size_t(j)];
+        d.torque(j) = d.torque(j) - place.rub[std::size_t(j)];
+        d.torque(j + 1) = d.torque(j + 1) + place.rub[std::size_t(j)];
       }
     }
     const S &ux = u[0], &uy = u[1];
@@ -389,8 +379,8 @@ private:
   }
 
   const Inputs& in_;
-  bool varied_;           ///< whether effects change what tubes are made of
-  std::array<S, N> rub_;  ///< what each tube takes from the next outer one, per length [N]
+  bool varied_;  ///< whether effects change what tubes are made of
+  bool rubs_;    ///< whether tubes rub along their length
 };
 
 }  // namespace ctcr

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "ctcr/math/frame_algebra.hpp"
+#include "ctcr/mechanics/rod_in_equilibrium.hpp"
 #include "ctcr/mechanics/solve.hpp"
 
 namespace ctcr {
@@ -170,7 +171,8 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
 template <int N, class Fx>
 inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
                                     const TipGuess<N>& guess, int steps, std::span<ShapePoint<N>> points) noexcept {
-  using Rod = EffectRod<N, double, Fx>;
+  using Equilibrium = RodInEquilibrium<N, Fx>;
+  using Rod = typename Equilibrium::Rod;
   using State = typename Rod::State;
   using Place = typename Rod::Place;
   struct Node {
@@ -179,40 +181,24 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
     State y;
     Frame<double> frame;
   };
-  const auto& c = model.coefficients();
-  const auto as_array = [](const Vec3& v) noexcept { return std::array{v[0], v[1], v[2]}; };
-  RodInputs<N, double, Fx> in{.tubes = c.tubes,
-                              .beta = {},
-                              .alpha = {},
-                              .force = as_array(load.force),
-                              .moment = as_array(load.moment),
-                              .gravity = as_array(c.gravity),
-                              .effects = c.effects};
-  for (int i = 0; i < N; ++i) in.beta[std::size_t(i)] = q.beta[i], in.alpha[std::size_t(i)] = q.alpha[i];
-  in.effects.tip_force(in.gravity, in.force);
-  const Rod rod(in);
-  const Events<N> events = sort_events(c.plain, q.beta);
-  const auto no_tip = [](int, const Frame<double>&, double) noexcept {};
+  const Equilibrium equilibrium(model, q, load);
+  const Rod& rod = equilibrium.rod;
+  const Events<N>& events = equilibrium.events;
+  const auto no_station = [](int, const Frame<double>&, const State&) noexcept {};
 
-  State tip;
-  const Mat3 R_tip_base = guess.rotation.transpose();
-  const Vec3 n = R_tip_base * Vec3::Map(in.force.data()), l = R_tip_base * load.moment, g = R_tip_base * c.gravity;
-  for (int i = 0; i < N; ++i) tip.psi(i) = guess.psi[i], tip.torque(i) = i == 0 ? l[2] : 0;
-  for (int i = 0; i < 2; ++i) tip.m(i) = l[i];
-  for (int i = 0; i < 3; ++i) tip.n(i) = n[i], tip.g(i) = g[i];
-
+  const State tip = equilibrium.at_tip(guess);
   State plate = tip;
   Frame<double> frame;
-  rod.run(events, steps, plate, frame, no_tip, typename Rod::NoNode{});
+  rod.run(events, steps, plate, frame, no_station, typename Rod::NoNode{});
   std::array<double, N> psi, w, torque, angle;
   for (int i = 0; i < N; ++i) {
     const auto t = std::size_t(i);
     psi[t] = plate.psi(i);
     torque[t] = plate.torque(i);
-    w[t] = torque[t] / c.tubes[t].kz;
+    w[t] = torque[t] / equilibrium.in.tubes[t].kz;
     angle[t] = psi[t] + q.beta[i] * w[t];
   }
-  in.effects.grip(torque, angle);
+  equilibrium.in.effects.grip(torque, angle);
   BaseView base;
   base.turn = q.alpha[0] - angle[0];
   base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * pose_of(frame).inverse();
@@ -248,7 +234,7 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
     node = {s, place, y, f};
   };
   State y = tip;
-  rod.run(events, steps, y, frame, no_tip, record);
+  rod.run(events, steps, y, frame, no_station, record);
   fill_down_to(-2 * same_place);
   for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, psi, w, points[left - 1]);
 }

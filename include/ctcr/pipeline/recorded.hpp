@@ -54,7 +54,19 @@ struct RecordedPath {
   operator Path<N, P>() const noexcept { return {q, time}; }
 };
 
-/// What one effect remembers of each row, by the motion before it.
+/// What an effect remembers of each row, by the motion before it, without slopes.
+template <int N, class Effect>
+void remember_values(Effect effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
+                     const auto& keep) {
+  const RecordedPath<N, double> path(transmission, rows, [](double x, int) { return x; });
+  effect.past = {};
+  for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
+    for (; place <= path.end[row]; ++place) effect.remember(path, place);
+    keep(row).state = effect.past.state;
+  }
+}
+
+/// The same with its slopes.
 template <int N, template <int, class> class E>
 void remember(const E<N, double>& effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
               const auto& keep) {
@@ -85,17 +97,20 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
 }  // namespace detail
 
 /// What the motion before each row left behind in the effects. Rows in the order of recording; between them joints move
-/// in a straight line. Real time: no (allocates).
+/// in a straight line.
+/// @param slopes  whether derivatives are wanted, too   Real time: no (allocates).
 template <int N, class Fx>
 std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
-                                                          std::span<const RecordedRow<N>> rows) {
+                                                          std::span<const RecordedRow<N>> rows, bool slopes = true) {
   std::vector<typename Fx::template On<N>::Memory> memory(rows.size());
   const auto& list = system.model.effects().list;
   [&]<std::size_t... I>(std::index_sequence<I...>) {
     [[maybe_unused]] const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
-      if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty())
-        detail::remember<N>(std::get<J>(list), system.transmission, rows,
-                            [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); });
+      if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty()) {
+        const auto keep = [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); };
+        slopes ? detail::remember<N>(std::get<J>(list), system.transmission, rows, keep)
+               : detail::remember_values<N>(std::get<J>(list), system.transmission, rows, keep);
+      }
     };
     (fill(std::integral_constant<std::size_t, I>{}), ...);
   }(std::make_index_sequence<std::tuple_size_v<std::remove_cvref_t<decltype(list)>>>{});

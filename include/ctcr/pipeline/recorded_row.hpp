@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "ctcr/effects/hooks.hpp"
-#include "ctcr/mechanics/tip_twist.hpp"
+#include "ctcr/mechanics/contact_twist.hpp"
 #include "ctcr/pipeline/system.hpp"
 
 namespace ctcr {
@@ -16,9 +16,9 @@ struct RecordedRow {
   MotorAngles<N> theta;
   TipLoad load;
   Occasion at;
-  /// The twist_between() of the tubes at evenly spaced places of the way from the row before, the last of them in this
+  /// The twist_of() the tubes at evenly spaced places of the way from the row before, the last of them in this
   /// row, as add_twist() and wind_up() give it; none: tubes count as stiff in torsion [rad].
-  std::vector<std::array<double, std::size_t(N)>> twist{};
+  std::vector<Twist<N>> twist{};
 
   [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), 1); }
 };
@@ -45,7 +45,7 @@ void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
   constexpr double most_rotation = 0.175, most_translation = 5e-3;  // of a part [rad], [m]
   Workspace<N> ws;
   Solution<N> solution;
-  std::array<double, N> twist{};
+  Twist<N> twist{};
   bool known = false;
   for (std::size_t row = 0; row < rows.size(); ++row) {
     double parts = 1;
@@ -60,7 +60,7 @@ void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
       const RecordedRow<N> here = on_the_way<N>(rows, row, place);
       if (solve(system.model, joints(system.transmission, here.theta), here.load, ws, solution, system.settings) ==
           Status::ok) {
-        twist = twist_between(ws, twist);
+        twist = twist_of(system.model, ws, system.settings.steps, twist);
         if (!known)
           for (RecordedRow<N>& earlier : rows.first(row + 1)) std::ranges::fill(earlier.twist, twist);
         known = true;

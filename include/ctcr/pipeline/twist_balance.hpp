@@ -1,44 +1,45 @@
 #pragma once
-// Tubes that rub wind each other up: what they rub depends on how they turn at their tips, and that on what they rub.
+// Tubes that rub wind each other up: what they rub depends on how they turn where they touch, and that on what they rub.
 #include <Eigen/LU>
 #include <utility>
 
-#include "ctcr/effects/hooks.hpp"
-#include "ctcr/mechanics/tip_twist.hpp"
+#include "ctcr/mechanics/contact_twist.hpp"
 
 namespace ctcr {
 
-/// Finds the twist_between() with what is rubbed on the way to it, by Newton's method. The law of rubbing may be stiff: its
-/// slope is taken where it is. What the equilibrium makes of the rubbing is smooth: its slope is learnt, from place to
-/// place (Broyden). Rubbing by the twist of the place before instead would overshoot by more than it corrects, and change
-/// sides at every place.
+/// Finds the twist_of() the robot with what is rubbed on the way to it, by Newton's method. The law of rubbing may be
+/// stiff: its slope is taken where it is. What the equilibrium makes of the rubbing is smooth: its slope is that of a place
+/// before, corrected by what is seen of it (Broyden), and taken anew where that does not lead on. Rubbing by the twist of
+/// the place before instead would overshoot by more than it corrects, and change sides at every place.
 template <int N, class Fx>
 class TwistBalance {
   using Effects = typename Fx::template On<N>;
-  using Vec = VecN<N>;
-
-  static constexpr int states = []<class... E>(std::type_identity<std::tuple<E...>>) {
-    [[maybe_unused]] const auto size = []<class One>(std::type_identity<One>) {
-      return requires { One::follows_twist; } ? int(typename One::Past{}.state.size()) : 0;
-    };
-    return (0 + ... + size(std::type_identity<E>{}));
-  }(std::type_identity<decltype(Effects::list)>{});
+  static constexpr int contacts = Contacts<N>::count;
+  using Vec = VecN<contacts>;
 
 public:
-  /// @param equilibrium  equilibrium(effects) -> bool: whether the robot with these effects has one, left in ws
+  /// @param equilibrium  equilibrium(effects): the model with these effects, its equilibrium left in ws; or null if none
   /// @param remembered   remembered(twist): the effects after the motion to this place, if the twist there is that
+  /// @param steps        of integration, per segment
   /// @param twist        in: a guess; out: the solution [rad], unchanged without an equilibrium
-  /// @param most         equilibria that are tried, besides one a state where that does not lead on
+  /// @param most         equilibria that are tried
   /// @return the effects at the solution. Real time: as equilibrium and remembered.
-  Effects solve(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, Vec& twist,
+  Effects solve(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, int steps, Twist<N>& twist,
                 int most) noexcept {
+    if constexpr (contacts == 0)
+      return remembered(twist);
+    else
+      return balanced(equilibrium, remembered, ws, steps, twist, most);
+  }
+
+private:
+  Effects balanced(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, int steps, Twist<N>& twist,
+                   int most) noexcept {
     constexpr double tolerance = 1e-4;  // [rad]
     const auto find = [&](Point& at) {
-      if (!equilibrium(at.effects)) return false;
-      std::array<double, N> found;
-      Vec::Map(found.data()) = at.twist;
-      found = twist_between(ws, found);
-      at.left = Vec::Map(found.data()) - at.twist;
+      const Model<N, Fx>* model = equilibrium(at.effects);
+      if (model == nullptr) return false;
+      at.left = as_vector(twist_of(*model, ws, steps, at.twist)) - as_vector(at.twist);
       return true;
     };
     Point best;
@@ -56,71 +57,56 @@ public:
       if (worse && measured) {
         part *= 0.5;
       } else {
-        if (worse) measure(find, best);
-        measured = measured || worse;
+        if (worse) {
+          if (const Model<N, Fx>* model = equilibrium(best.effects)) by_rubbing_ = twist_slopes(*model, ws, steps);
+          measured = true;
+        }
         step = newton_step(best, remembered);
         part = 1;
       }
-      twist = best.twist + part * step;
+      as_vector(twist) = as_vector(best.twist) + part * step;
     }
     twist = best.twist;
     return best.effects;
   }
 
-private:
-  using Rubbing = Eigen::Matrix<double, states, 1>;
-
   struct Point {
-    Vec twist = Vec::Zero();  ///< with which rubbing is reckoned
-    Effects effects;          ///< so
-    Vec left = Vec::Zero();   ///< what the equilibrium's twist differs from it
+    Twist<N> twist{};        ///< with which rubbing is reckoned
+    Effects effects;         ///< so
+    Vec left = Vec::Zero();  ///< what the equilibrium's twist differs from it
   };
 
-  /// Calls f(state, number) for each that follows the twist.
-  static void for_each_state(auto& effects, const auto& f) noexcept {
-    Eigen::Index k = 0;
-    effects.for_each([&](auto& e, int) {
-      if constexpr (requires { e.follows_twist; })
-        for (auto& state : e.past.state) f(state, k++);
-    });
-  }
+  static Eigen::Map<Vec> as_vector(Twist<N>& twist) noexcept { return Eigen::Map<Vec>(twist.data()); }
+  static Eigen::Map<const Vec> as_vector(const Twist<N>& twist) noexcept { return Eigen::Map<const Vec>(twist.data()); }
 
   /// What is rubbed.
-  static Rubbing rubbing(const Effects& effects) noexcept {
-    Rubbing all;
-    for_each_state(effects, [&](double state, Eigen::Index k) { all[k] = state; });
+  static Vec rubbing(const Effects& effects) noexcept {
+    Vec all;
+    effects.for_each([&](const auto& e, int) {
+      if constexpr (requires { e.follows_twist; }) all = Vec::Map(e.past.state.data());
+    });
     return all;
   }
 
   /// What a change of the rubbing did to the equilibrium's twist.
   void learn(const Point& from, const Point& to) noexcept {
-    const Rubbing change = rubbing(to.effects) - rubbing(from.effects);
+    const Vec change = rubbing(to.effects) - rubbing(from.effects);
     if (!(change.squaredNorm() > 1e-16)) return;
-    const Vec turned = to.twist + to.left - from.twist - from.left;
+    const Vec turned = as_vector(to.twist) + to.left - as_vector(from.twist) - from.left;
     by_rubbing_ += (turned - by_rubbing_ * change) * change.transpose() / change.squaredNorm();
-  }
-
-  /// The same for each state on its own.
-  void measure(const auto& find, const Point& at) noexcept {
-    constexpr double change = 0.02;
-    Point moved = at;
-    for_each_state(moved.effects, [&](double& state, Eigen::Index column) {
-      const double kept = std::exchange(state, state + (state > 0 ? -change : change));
-      if (find(moved)) by_rubbing_.col(column) = (moved.left - at.left) / (state - kept);
-      state = kept;
-    });
   }
 
   Vec newton_step(const Point& at, const auto& remembered) const noexcept {
     constexpr double small = 1e-6;  // [rad]
-    Eigen::Matrix<double, states, N> law;
-    for (int i = 0; i < N; ++i)
-      law.col(i) = (rubbing(remembered(at.twist + small * Vec::Unit(i))) - rubbing(at.effects)) / small;
-    const Eigen::Matrix<double, N, N> slope = Eigen::Matrix<double, N, N>::Identity() - by_rubbing_ * law;
+    Twist<N> moved = at.twist;
+    as_vector(moved).array() += small;  // what is rubbed at a contact follows the twist there alone
+    const Vec law = (rubbing(remembered(moved)) - rubbing(at.effects)) / small;
+    const Eigen::Matrix<double, contacts, contacts> slope =
+        Eigen::Matrix<double, contacts, contacts>::Identity() - by_rubbing_ * law.asDiagonal();
     return slope.partialPivLu().solve(at.left);
   }
 
-  Eigen::Matrix<double, N, states> by_rubbing_ = Eigen::Matrix<double, N, states>::Zero();
+  Eigen::Matrix<double, contacts, contacts> by_rubbing_ = Eigen::Matrix<double, contacts, contacts>::Zero();
 };
 
 }  // namespace ctcr

@@ -5,7 +5,7 @@
 
 namespace ctcr {
 
-/// Gives each row the twist_between() of the system with its effects in equilibrium on the way there: place after place,
+/// Gives each row the twist_of() the system with its effects in equilibrium on the way there: place after place,
 /// since what tubes rub depends on how they came there. Rows bring the twist of a robot without effects, by add_twist(), or
 /// that of other values; a place without an equilibrium keeps it, with what the place before was wound up.
 /// @return the largest change of a twist [rad]   Real time: no.
@@ -19,27 +19,30 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows) {
   Workspace<N> ws;
   RecordedPrediction<N, Fx> prediction;
   Effects effects = system.model.effects();
-  VecN<N> wound = VecN<N>::Zero();
+  using Vec = VecN<Contacts<N>::count>;
+  Vec wound = Vec::Zero();
   double largest = 0;
   for (std::size_t row = 0, k = 0; row < rows.size(); ++row) {
     rows[row].twist.resize(rows[row].places());
     for (std::size_t place = 0; place < rows[row].places(); ++place, ++k) {
-      auto& twist = path.q[k].twist;
-      const VecN<N> given = VecN<N>::Map(twist.data());
-      VecN<N> found = given + wound;
+      Twist<N>& twist = path.q[k].twist;
+      const Vec given = Vec::Map(twist.data());
+      Twist<N> found = twist;
+      Vec::Map(found.data()) += wound;
       const RecordedRow<N> here = on_the_way<N>(rows, row, place);
       const auto equilibrium = [&](const Effects& with) {
-        return has_equilibrium(predict(system, here, with.memory(), ws, prediction));
+        const bool has = has_equilibrium(predict(system, here, with.memory(), ws, prediction));
+        return has ? &prediction.model : nullptr;
       };
-      const auto remembered = [&](const VecN<N>& t) {
+      const auto remembered = [&](const Twist<N>& t) {
         Effects now = effects;
-        VecN<N>::Map(twist.data()) = t;
+        twist = t;
         now.remember(path, k);
         return now;
       };
-      effects = balance.solve(equilibrium, remembered, ws, found, most);
-      VecN<N>::Map(twist.data()) = found;
-      wound = found - given;
+      effects = balance.solve(equilibrium, remembered, ws, system.settings.steps, found, most);
+      twist = found;
+      wound = Vec::Map(found.data()) - given;
       largest = std::max(largest, wound.cwiseAbs().maxCoeff());
       rows[row].twist[place] = twist;
     }

@@ -67,10 +67,11 @@ private:
   void settle() noexcept {
     Joints<N> q = joints(system_.transmission, theta_);
     if constexpr (!Fx::none) {
-      q = live_.advance(q, time_, ws_, [this](const auto& effects, const Joints<N>& tubes) {
+      const auto equilibrium = [this](const auto& effects, const Joints<N>& tubes) {
         model_ = Model<N, Fx>(system_.model.robot(), effects);
-        return has_equilibrium(solve(model_, tubes, load_, ws_, solution_, system_.settings));
-      });
+        return has_equilibrium(solve(model_, tubes, load_, ws_, solution_, system_.settings)) ? &model_ : nullptr;
+      };
+      q = live_.advance(q, time_, ws_, system_.settings.steps, equilibrium);
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }
     (void)solve<Derivatives::jacobian>(model_, q, load_, ws_, solution_, system_.settings);

@@ -1,0 +1,23 @@
+#pragma once
+#include <array>
+#include <cstddef>
+
+namespace ctcr {
+
+/// Where tubes may touch: each tube and the next outer one at the tips and at the curved starts of all tubes, and in the
+/// front plate. These stations have the numbers of Events, and the plate the last one.
+template <int N>
+struct Contacts {
+  static constexpr int plate = 2 * N, stations = 2 * N + 1, count = (N - 1) * stations;
+  /// Place of a contact of a tube, from 0, with the next outer one.
+  [[nodiscard]] static constexpr std::size_t place(int tube, int station) noexcept {
+    return std::size_t(tube * stations + station);
+  }
+};
+
+/// By how much more each tube is turned against the next outer one at each contact than at their bases [rad]. Where one of
+/// them has ended, or the station is behind the plate, it is that of the nearest place at which both are in front of it.
+template <int N>
+using Twist = std::array<double, std::size_t(Contacts<N>::count)>;
+
+}  // namespace ctcr
