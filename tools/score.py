@@ -14,6 +14,7 @@ import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from statistics import quantiles
 
 from ruamel.yaml import YAML
 
@@ -87,10 +88,32 @@ def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
         if len(hidden) > 1:
             scores["pairs: both found"] = all(found)
     if said and hidden:
-        floor = math.hypot(*(truth["rms_mm"][part] for part in ("jitter", "field", "chance")))
         limit = 1.1 if truth["noise"] == "jitter" else 1.25
-        scores["locked error within its limit of the floor"] = said["rms_mm"]["with_effects"] <= limit * floor
+        within = said["rms_mm"]["with_effects"] <= limit * floor_mm(truth)
+        scores["locked error within its limit of the floor"] = within
     return scores
+
+
+def floor_mm(truth: dict) -> float:
+    """RMS of the true noise of a set."""
+    return math.hypot(*(truth["rms_mm"][part] for part in ("jitter", "field", "chance")))
+
+
+def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict]) -> list[str]:
+    """Table of how far above the floor the locked errors of sets with effects of the catalogue are."""
+    rows = []
+    for noise in sorted({truths[name]["noise"] for name in chosen}):
+        sets = [n for n in chosen if said[n] and truths[n]["classes"] and truths[n]["noise"] == noise]
+        ratios = {
+            key: [said[n]["rms_mm"][key] / floor_mm(truths[n]) for n in sets]
+            for key in ("calibrated", "with_effects")
+        }
+        for key, values in ratios.items():
+            if len(values) > 1:
+                parts = [f"{p:.2f}" for p in quantiles(values, n=20, method="inclusive")]
+                rows.append(f"| {key} | {noise} | {parts[9]} | {parts[14]} | {parts[17]} |")
+    head = ["| locked error over the floor | noise | half of the sets | three quarters | nine tenths |"]
+    return [*head, "|---|---|---|---|---|", *rows]
 
 
 def main() -> None:
@@ -147,6 +170,7 @@ def report(
         f"| {score} | {noise} | {wilson(hits[score, noise], count)} |"
         for (score, noise), count in sorted(counts.items())
     ]
+    lines += ["", *locked_errors(chosen, said, truths)]
     lines += ["", "| sets | hidden | named |", "|---|---|---|"]
     lines += [f"| {count} | {hidden} | {named} |" for (hidden, named), count in sorted(confusion.items())]
     return "\n".join(lines)

@@ -1,6 +1,6 @@
 """What a joint fit found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
 from typing import Any
@@ -58,6 +58,10 @@ class Fit:
     def used(self) -> Mask:
         """Rows that were fitted (M,)."""
         return (self.weights > 0).any(axis=1)
+
+    def without_readings(self) -> "Fit":
+        """Its values and what is known of them alone: small, however many rows there are. It has no residual."""
+        return replace(self, core=None, predict=None)
 
     @cached_property
     def _every_row(self) -> Any:

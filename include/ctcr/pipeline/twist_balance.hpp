@@ -44,8 +44,8 @@ private:
     };
     Point best;
     Vec step = Vec::Zero();
-    double part = 1;  // of the step
-    bool measured = false;
+    double part = 1;       // of the step
+    bool renewed = false;  // the slopes
     for (int k = 0; k < most; ++k) {
       Point here{twist, remembered(twist), Vec::Zero()};
       const bool found = find(here);
@@ -54,12 +54,12 @@ private:
       const bool worse = k > 0 && !(found && here.left.norm() <= best.left.norm());
       if (!worse) best = here;
       if (best.left.norm() < tolerance) break;
-      if (worse && measured) {
+      if (worse && renewed) {
         part *= 0.5;
       } else {
         if (worse) {
           if (const Model<N, Fx>* model = equilibrium(best.effects)) by_rubbing_ = twist_slopes(*model, ws, steps);
-          measured = true;
+          renewed = true;
         }
         step = newton_step(best, remembered);
         part = 1;

@@ -291,7 +291,7 @@ def _with_shapes(
     entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)
     if freed.log_evidence - fit.log_evidence < racing.TIE:
         return fit
-    one.entry = replace(entry, fit=freed)
+    one.entry = replace(entry, fit=freed.without_readings())
     one.share += (1 - one.share) * racing.share_of(fit, freed, len(freed.names) - len(fit.names))
     return racing.baseline(engine, [a.entry for a in accepted], values_of(freed), progress)
 

@@ -185,10 +185,11 @@ class Engine:
         at = np.concatenate([fit.values, neutral[len(fit.names) :]])
         table = self.recording(everything, fixed)
         table.activate(self.fitted.tolist())
-        _, jacobian, _ = table.residual(at, True)
         chosen = [everything.index(name) for name in names]
-        slopes = jacobian[:, chosen] * sd[chosen]
-        return np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(self.measurements), 6, len(names))
+        slopes = table.residual(at, True)[1][:, chosen]
+        slopes *= sd[chosen]  # in place: of many rows this is the largest table of all
+        slopes[~np.isfinite(slopes)] = 0.0
+        return slopes.reshape(len(self.measurements), 6, len(names))
 
 
 def values_of(fit: identify.Fit) -> dict[str, float]:

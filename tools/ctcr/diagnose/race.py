@@ -80,6 +80,15 @@ class Round:
         """A sentence, or nothing where an effect was accepted."""
         return f"Nothing accepted: {self.reason}." if self.reason else ""
 
+    def shed(self) -> None:
+        """Gives back the memory of what was fitted: of many rows, a round would keep as much as all else."""
+        self.before = self.before.without_readings()
+        for place, entry in enumerate(self.entries):
+            if entry.fit is not None:
+                self.entries[place] = replace(entry, fit=entry.fit.without_readings())
+            if entry is self.accepted:
+                self.accepted = self.entries[place]
+
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
         best = max((entry.score for entry in self.entries), default=-np.inf)
@@ -204,6 +213,7 @@ def race(
     if round_.accepted and accepted and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"{round_.accepted.id} would not predict other runs better"
         round_.accepted, round_.ids = None, []
+    round_.shed()
     return round_
 
 
