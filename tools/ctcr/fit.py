@@ -63,6 +63,10 @@ class Fit:
         """Its values and what is known of them alone: small, however many rows there are. It has no residual."""
         return replace(self, core=None, predict=None)
 
+    def at_rest(self) -> "Fit":
+        """Itself without what it can compute again of its readings."""
+        return replace(self)
+
     @cached_property
     def _every_row(self) -> Any:
         """The predictor, of rows that were not fitted too."""

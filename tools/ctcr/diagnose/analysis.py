@@ -12,7 +12,7 @@ from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.far_off import come_together, far_off
+from ctcr.diagnose.far_off import far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import Entry, Progress, Round
@@ -101,6 +101,12 @@ class Diagnosis:
         """
         return max(self.with_effects.floor_mm(self.locked), self.noise_floor_mm)
 
+    def rest(self) -> None:
+        """Gives back the memory of what its fits can compute again."""
+        self.calibrated, self.with_effects, self.final = (
+            fit.at_rest() for fit in (self.calibrated, self.with_effects, self.final)
+        )
+
     def parameters(self, accepted: Accepted) -> dict[str, float]:
         """Fitted values, and those of its choices, by name without the id."""
         stem = f"effects.{accepted.entry.id}."
@@ -140,6 +146,7 @@ def diagnose(
         result = _of_these(robot, measurements, locked, progress, threads)
         beyond = _beyond_judging(result)
         if beyond:
+            result.rest()
             locked = locked_rows(robot, measurements, turn, beyond)
             again = _of_these(robot, measurements, locked, progress, threads)
             if again.accepted or not result.accepted:  # else the runs that showed it are those locked now
@@ -156,13 +163,17 @@ def _of_these(
 ) -> Diagnosis:
     """With these rows locked."""
     result = _diagnose(robot, measurements, locked, progress, threads, robust=True)
-    together = come_together(measurements, result.with_effects).any()
+    together = result.leftover.places
     if not result.hides_in_outliers and not together:
         return result
+    result.rest()
     # What an effect does to a few readings looks like outliers, until they count.
     other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
     if together:
-        return min(result, other, key=lambda r: np.sum(far_off(r.with_effects)))
+        there = np.isin(measurements.row, together)
+        return min(
+            result, other, key=lambda r: (np.sum(far_off(r.with_effects)), r.with_effects.rms_mm(there))
+        )
     return max(result, other, key=lambda r: r.final.log_evidence)
 
 

@@ -86,14 +86,15 @@ class Engine:
         return identify.with_field(self.noise, part)
 
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
+        """Mean, standard deviation, lower and upper bound of parameters of the robot and of effects."""
+        found: dict[str, tuple[float, ...]] = {}
         own = [name for name in names if not name.startswith("effects.")]
         added = [name for name in names if name.startswith("effects.")]
-        parts = [
-            source.priors(self.robot, some)
-            for source, some in ((free_parameters, own), (effects, added))
-            if some
-        ]
-        return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+        for source, some in ((free_parameters, own), (effects, added)):
+            if some:
+                found |= zip(some, zip(*source.priors(self.robot, some), strict=True), strict=True)
+        mean, sd, low, high = np.array([found[name] for name in names]).reshape(-1, 4).T
+        return mean, sd, low, high
 
     def recording(self, names: Sequence[str], fixed: dict[str, float] | None = None) -> Any:
         return user_effects.recording_of(
@@ -180,14 +181,15 @@ class Engine:
 
         0 in rows that are not fitted.
         """
-        everything = [*fit.names, *(name for name in names if name not in fit.names)]
+        everything = [*(name for name in fit.names if name not in names), *names]
         neutral, sd, _, _ = self.priors(everything)
-        at = np.concatenate([fit.values, neutral[len(fit.names) :]])
+        at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
         table = self.recording(everything, fixed)
         table.activate(self.fitted.tolist())
-        chosen = [everything.index(name) for name in names]
-        slopes = table.residual(at, True)[1][:, chosen]
-        slopes *= sd[chosen]  # in place: of many rows this is the largest table of all
+        values = np.array([at[name] for name in everything])
+        # A part of the table, scaled in place: of many rows this is the largest one of all.
+        slopes = table.residual(values, True)[1][:, len(everything) - len(names) :]
+        slopes *= sd[len(everything) - len(names) :]
         slopes[~np.isfinite(slopes)] = 0.0
         return slopes.reshape(len(self.measurements), 6, len(names))
 

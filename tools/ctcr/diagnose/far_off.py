@@ -28,8 +28,8 @@ def far_off(fit: Any, admitted: float = 1.0) -> Mask:
 
 
 def come_together(measurements: Measurements, fit: Any) -> Mask:
-    """Fitted rows (M,) that are far off the same way as the reading nearest to them in joints and load; none where so
-    many may be so by chance. Outliers strike a reading, not a place.
+    """Fitted rows (M,) that are far off the same way as the reading nearest to them in joints and load, or even by the
+    same error but for noise; none where so many may be so by chance. Outliers strike a reading, not a place.
 
     Far off is what the fit takes for an outlier, and not for the error that its model has everywhere."""
     fitted = fit.weights[:, 0] > 0
@@ -37,14 +37,27 @@ def come_together(measurements: Measurements, fit: Any) -> Mask:
     far, error = outlier & far_off(fit, fit.inflation[0]), fit.residual[:, :3]
     read = np.flatnonzero(fitted & np.isfinite(error).all(axis=1))
     together = np.zeros(len(measurements), bool)
-    if np.sum(far) < FEWEST or len(read) < 2:
+    if not far[read].any() or len(read) < 2:
         return together
     place = loaded_places(measurements)[read]
     neighbour = read[cKDTree(place).query(place, k=2)[1]]
     neighbour = np.where(neighbour[:, 0] == read, neighbour[:, 1], neighbour[:, 0])
-    size = np.linalg.norm(error[read], axis=1) * np.linalg.norm(error[neighbour], axis=1)
-    alike = np.sum(error[read] * error[neighbour], axis=1) > ALIKE * size
-    together[read] = far[read] & far[neighbour] & alike
-    chance = BY_CHANCE * np.mean(far[read])
-    doubt = binom.sf(np.sum(together) - 1, np.sum(far), chance)
-    return together if np.sum(together) >= FEWEST and doubt < DOUBT else np.zeros_like(together)
+    both, share = far[read] & far[neighbour], np.mean(far[read])
+    size, size_there = (np.linalg.norm(error[rows], axis=1) for rows in (read, neighbour))
+    alike = both & (np.sum(error[read] * error[neighbour], axis=1) > ALIKE * size * size_there)
+    if np.sum(alike) >= FEWEST and _doubt(np.sum(alike), far, BY_CHANCE * share) < DOUBT:
+        together[read] |= alike
+    expected = fit.expected_square[:, 0]
+    noise = SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])
+    equal = both & (np.linalg.norm(error[read] - error[neighbour], axis=1) < noise)
+    by_chance = np.mean((noise[far[read]] / size[far[read]]) ** 3)  # share of a ball's volume
+    if (
+        equal.any() and _doubt((np.sum(equal) + 1) // 2, far, by_chance * share) < DOUBT
+    ):  # two may be one pair
+        together[read] |= equal
+    return together
+
+
+def _doubt(seen: int, far: Mask, chance: float) -> float:
+    """Probability that so many of those far off would be seen by chance."""
+    return float(binom.sf(seen - 1, np.sum(far), min(chance, 1.0)))

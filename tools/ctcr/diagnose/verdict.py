@@ -47,7 +47,9 @@ def judge(
     noise = before < MORE_THAN_NOISE * jitter**2
     share = max(explained, first.share) if noise else explained
     if leftover.rejected and share < EXPLAINED:
-        return Verdict("stand_in", [f"{first.entry.id} takes up part of the error, but much of it stays."])
+        return Verdict(
+            "stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."]
+        )
     if after > max(MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])
     if any(a.entry.implausible for a in accepted):
@@ -61,6 +63,6 @@ def judge(
     names = " and ".join(a.entry.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
     if leftover.rejected and share < MOSTLY:
-        most = f"{names} {verb} {share:.0%} of the squared error beyond noise, and more than noise is left"
+        most = f"Of the squared error beyond noise, {names} {verb} {share:.0%}; more than noise is left"
         return Verdict("probable", [f"{most}: the law may be another one, or something else acts too."])
     return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])

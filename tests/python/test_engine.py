@@ -1,0 +1,51 @@
+"""What a diagnosis asks of its fits: slopes by parameters that were fitted or are neutral, and memory given back."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import identify, measurements, robot_file
+from ctcr.diagnose.engine import Engine, values_of
+
+DEMO = Path(__file__).parents[2] / "examples" / "data" / "demo"
+ADDED = ["effects.tip_load.force_z", "effects.sensor_offset.x"]
+
+
+@pytest.fixture(scope="module")
+def engine():
+    robot = robot_file.load(DEMO / "robot.yaml")
+    readings = measurements.load(DEMO / "measurements.csv", robot.n_tubes)
+    rows = np.arange(len(readings)) % 3 > 0
+    return Engine(robot, readings, identify.noise_of_readings(robot, readings), rows, threads=1)
+
+
+@pytest.fixture(scope="module")
+def fit(engine):
+    return engine.fit(ADDED[:1], max_iterations=3)
+
+
+@pytest.mark.parametrize("names", [ADDED, ADDED[::-1], ["tracker.position.x", ADDED[1]]])
+def test_slopes_are_those_of_the_residual_in_prior_deviations(engine, fit, names):
+    slopes = engine.slopes(fit, names)
+    everything = list(dict.fromkeys([*fit.names, *names]))
+    neutral, sd, _, _ = engine.priors(everything)
+    at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
+    table = engine.recording(everything)
+    values = np.array([at[name] for name in everything])
+    for k, name in enumerate(names):
+        step = np.zeros(len(everything))
+        step[everything.index(name)] = 1e-3 * sd[everything.index(name)]
+        there = [table.residual(values + side * step)[0].reshape(-1, 6) for side in (-1, 1)]
+        difference = (there[1] - there[0]) / 2e-3
+        np.testing.assert_allclose(slopes[engine.rows, :, k], difference[engine.rows], rtol=1e-4, atol=1e-8)
+        assert np.abs(difference).max() > 1e-5
+    assert (slopes[~engine.rows] == 0).all()
+
+
+def test_a_fit_at_rest_holds_no_table_and_says_the_same(fit):
+    before = fit.jacobian_all.copy()
+    assert any(np.size(part) >= before.size for part in fit.__dict__["_report"])
+    rested = fit.at_rest()
+    assert "_report" not in rested.__dict__
+    np.testing.assert_array_equal(rested.jacobian_all, before)
+    np.testing.assert_array_equal(rested.residual, fit.residual)
