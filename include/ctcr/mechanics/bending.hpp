@@ -36,11 +36,15 @@ struct Left {
 };
 
 /// f = r + (1 - r) (1 + t)^(-1/p), t = (2 c z / (1 - r))^(p/2), with the softening c, the plateau r, the sharpness p.
-inline Left stiffness_left(double z, double c, double r, double p) noexcept {
+/// @param by_shape  whether the slope by the sharpness is wanted, too
+inline Left stiffness_left(double z, double c, double r, double p, bool by_shape) noexcept {
   if (!(c * z > 1e-12)) return {1 - c * z, -c, -z, 0, 0};  // there the same, with the derivatives of p = 2
-  const double rest = 1 - r, power = std::log(2 * c * z / rest), t = std::exp(0.5 * p * power);
-  const double fall = std::log(1 + t) / p, left = rest * std::exp(-fall), part = t / (1 + t);
-  const double by_power = -0.5 * left * part;
+  const double rest = 1 - r, ratio = 2 * c * z / rest;
+  const bool gradual = p == 2 && !by_shape;  // the usual one needs a root alone
+  const double power = gradual ? 0 : std::log(ratio), t = gradual ? ratio : std::exp(0.5 * p * power);
+  const double fall = gradual ? 0 : std::log(1 + t) / p,
+               left = rest * (gradual ? 1 / std::sqrt(1 + t) : std::exp(-fall));
+  const double part = t / (1 + t), by_power = -0.5 * left * part;
   return {r + left, by_power / z, by_power / c, (rest - left + by_power) / rest,
           left * (fall - 0.5 * part * power) / p};
 }
@@ -89,7 +93,7 @@ Response<T> response(const Material<S>& m, const T& dx, const T& dy) noexcept {
   T k = as<T>(m.bending_stiffness);
   if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
   const T z = dx * e[0] + dy * e[1];
-  const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness));
+  const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness), is_dual<T>);
   const double loss = 2 * value(m.bending_stiffness) * left.by_z, x = value(e[0]), y = value(e[1]);
   Slope slope = stiffness(m, left.f);
   slope += {loss * x * x, loss * x * y, loss * y * y};

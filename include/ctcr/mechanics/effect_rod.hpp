@@ -31,6 +31,8 @@ public:
     std::array<S, N> along;          ///< arc length of each present tube here [m]
     std::array<S, N> rub, rub_rate;  ///< torque per length on each tube from the next outer one [N], its rate [N/m]
     std::array<Material<S>, N> material;  ///< of each present tube here
+    std::array<double, 2> u{};            ///< curvature a little further out, where iterations may begin [1/m]
+    bool bent = false;                    ///< whether it is known
   };
 
   explicit EffectRod(const Inputs& inputs) noexcept
@@ -65,6 +67,7 @@ public:
       }
       if (id > 0) met(id, frame, y);
       place = near;
+      place.bent = false;
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
       const S next = last ? S(0.0) : event_place(events.id[e + 1]);
       rub_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, place);
@@ -149,21 +152,12 @@ private:
 
   /// The value by Newton's method; one more step of it with derivatives then makes both exact to rounding.
   static void bend_by_iteration(const Place& place, const State& y, Bend& b) noexcept {
-    bending::Slope slope;
-    std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
-    bool linear = true;
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = place.material[i];
-      const bending::Slope unsoftened = bending::stiffness(m, 1.0);
-      const auto q = unsoftened * std::array{value(m.curvature[0]), value(m.curvature[1])};
-      const double s = value(b.sine[i]), c = value(b.cosine[i]);
-      moment[0] += c * q[0] - s * q[1];
-      moment[1] += s * q[0] + c * q[1];
-      slope += unsoftened.turned(s, c);
-      linear = linear && value(m.softening) == 0;
-    }
-    std::array<double, 2> u = slope.inverted() * moment;
-    double left = linear ? 0 : 1;  // (relative change)^2
+    std::array<double, 2> u = place.u;
+    bool is_linear = true;
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i)
+      is_linear = is_linear && value(place.material[i].softening) == 0;
+    if (is_linear || !place.bent) u = bent_without_softening(place, y, b);
+    double left = is_linear ? 0 : 1;  // (relative change)^2
     for (int k = 0; k < softening_iterations && left > 1e-8; ++k) {
       Tubes<double> ignored;
       const auto change = newton_step(place, y, b, u, ignored);
@@ -183,6 +177,21 @@ private:
         b.moment[i][k] = tubes[i].moment[k] + moment_more[k];
       }
     }
+  }
+
+  static std::array<double, 2> bent_without_softening(const Place& place, const State& y, const Bend& b) noexcept {
+    bending::Slope slope;
+    std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
+    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
+      const Material<S>& m = place.material[i];
+      const bending::Slope unsoftened = bending::stiffness(m, 1.0);
+      const auto q = unsoftened * std::array{value(m.curvature[0]), value(m.curvature[1])};
+      const double s = value(b.sine[i]), c = value(b.cosine[i]);
+      moment[0] += c * q[0] - s * q[1];
+      moment[1] += s * q[0] + c * q[1];
+      slope += unsoftened.turned(s, c);
+    }
+    return slope.inverted() * moment;
   }
 
   template <class T>
@@ -260,9 +269,11 @@ private:
     return slope.inverted() * rest;
   }
 
-  State rates(const Place& place, const State& y, std::array<S, 2>& u) const noexcept {
+  State rates(Place& place, const State& y, std::array<S, 2>& u) const noexcept {
     const Bend b = bend(place, y);
     u = b.u;
+    place.u = {value(u[0]), value(u[1])};
+    place.bent = true;
     State d;
     S mz = 0.0, mass = 0.0;
     for (int j = 0; j < N; ++j) {
