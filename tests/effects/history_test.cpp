@@ -107,6 +107,36 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
   EXPECT_GT(largest, 0.2);
 }
 
+TEST(Friction, KnowsHowHardTubesPress) {
+  const System<2> system{{1, 1, VecN<2>::Zero(), VecN<2>::Zero()}, Model<2>(two_tubes()), {}, {.tolerance = 1e-12}};
+  std::vector<RecordedRow<2>> rows;
+  for (int k = 0; k < 10; ++k) rows.push_back({{at(0, 0).beta, at(0.6 * k, -0.1 * k).alpha}, {}, {}});
+  add_twist<2>(system, rows);
+  const Robot<2>& robot = two_tubes();
+  Workspace<2> ws;
+  Solution<2> solution;
+  for (const RecordedRow<2>& row : rows) {
+    const VecN<2>& beta = row.theta.translation;
+    const auto inner_moment = [&](double place) {  // of the inner tube, base frame
+      std::array<ShapePoint<2>, 1> here;
+      EXPECT_EQ(shape<2>(system.model, {beta, row.theta.rotation}, {}, std::array{place}, here, ws, solution),
+                Status::ok);
+      const TubeShape& tube = here[0].tube[0];
+      return Vec3(here[0].bishop.rotation * rotation_z(tube.angle) * Vec3(tube.moment.x(), tube.moment.y(), 0));
+    };
+    const MomentJumps<2>& jumps = row.jumps.back();
+    for (const int station : {1, 2, 3}) {
+      const Tube& tube = robot.tubes[std::size_t(station % 2)];
+      const double place = tube.length + beta[station % 2] - (station < 2 ? 0 : tube.curved_length);
+      const bool is_met = place > 0 && place <= robot.tubes[1].length + beta[1];
+      const double jump = is_met ? (inner_moment(place + 1e-7) - inner_moment(place - 1e-7)).norm() : 0;
+      EXPECT_NEAR(jumps[Contacts<2>::place(0, station)], jump, 1e-5 * MomentJumps<2>::usual) << station;
+    }
+    EXPECT_NEAR(jumps[Contacts<2>::place(0, Contacts<2>::plate)], inner_moment(1e-7).norm(), 1e-6);  // straight behind
+  }
+  EXPECT_GT(rows[3].jumps.back()[Contacts<2>::place(0, 1)], 0.01);
+}
+
 TEST(Friction, LagsAndNeverLeads) {
   Random random(1);
   for (int n = 0; n < test::cases(10); ++n) {
@@ -165,6 +195,31 @@ TEST(Friction, OfAContactIsElasticUntilItSlips) {
   EXPECT_NEAR(walk.remembered<Friction>()[0], 0, 1e-12);
   walk.to(at(0.5, 0)).to(at(0.44, 0));
   EXPECT_NEAR(walk.remembered<Friction>()[0], 0.8, 1e-12);
+}
+
+TEST(Friction, OfAContactHasAStiffnessThatDoesNotGrowWithItsLimit) {
+  constexpr double usual = MomentJumps<2>::usual;
+  const auto torque = [](double before, double after, double turn, double along = 0) {
+    Catalogue::On<2> effects = with_friction(0.03, 1, 1);
+    effect<Friction, 2>(effects).values[2] = along;
+    Walk<2> walk(two_tubes(), effects);
+    walk.to(at(0, 0)).to(at(0.03, 0)).to(at(0.03 + turn, 0));
+    const double jumps[] = {before, before, after};
+    for (std::size_t i = 0; i < 3; ++i) {
+      walk.rows[i].twist.resize(1);
+      walk.rows[i].jumps.resize(1);
+      walk.rows[i].jumps[0].fill(jumps[i]);
+    }
+    return 0.03 * after * walk.remembered<Friction>()[0];
+  };
+  for (const double jump : {0.5 * usual, usual, 2 * usual})
+    EXPECT_NEAR(torque(jump, jump, 0.02), 0.03 * usual * 0.05 / 0.3, 1e-15) << jump;
+  // Where the tubes press less hard, they give way to what is left; where harder, nothing is lost.
+  EXPECT_NEAR(torque(usual, 3 * usual, 0), torque(usual, usual, 0), 1e-15);
+  EXPECT_NEAR(torque(usual, 0.1 * usual, 0.01), 0.03 * 0.1 * usual, 1e-9);
+  // What is rubbed all along does not depend on how hard they press: no more does its stiffness.
+  const double share = 0.03 * usual / (0.03 * usual + 0.05 * 0.02), h = torque(2 * usual, 2 * usual, 0, 0.02) / 0.06;
+  EXPECT_NEAR(h, usual * 0.03 / (0.3 * (1 + share)), 1e-12);
 }
 
 TEST(Backlash, IsAPlayOperator) {

@@ -16,7 +16,8 @@ from ctcr import (
     robot_update,
 )
 from ctcr.calibrate import parameters
-from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.candidates import starts
+from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import likeliest
 from ctcr.diagnose.split import locked_rows
@@ -254,11 +255,22 @@ class _Fitter:
         known = [effects.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        likely = likeliest(engine, own, dict(start), {})
+        likely = likeliest(engine, own, self._best(own, start), {})
         # The robot is to predict; how sure its values are is another question.
         fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
         fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
         return replace(fit, units=[parameters.field_of(name).unit for name in fit.names])
+
+    def _best(self, own: Sequence[str], start: Mapping[str, float]) -> dict[str, float]:
+        """The best of all starts for these parameters of effects."""
+        first, *others = starts(own, start)
+        if not others:
+            return first
+        fit = self.engine.fit(own, start=first, near=True, tolerance=identify.COARSE)
+        fits = [fit]
+        for other in others:
+            fits.append(self.engine.fit_like(fit, own, start=other, near=True, tolerance=identify.COARSE))
+        return values_of(max(fits, key=lambda tried: tried.log_evidence))
 
 
 def _in_words(readings: Measurements, held: Mask) -> str:

@@ -31,8 +31,11 @@ public:
     };
     if constexpr (Effects::follows_twist) {
       if (effects_.act_by_twist()) {
-        effects_ = balance_.solve([&](const Effects& with) { return equilibrium(with, tubes(with, motors)); },
-                                  remembered, ws, steps, twist_, most);
+        const Model<N, Fx>* last = nullptr;
+        const auto found = [&](const Effects& with) { return last = equilibrium(with, tubes(with, motors)); };
+        rows_[row].jumps = jumps_;  // of the period before: they change slowly
+        effects_ = balance_.solve(found, remembered, ws, steps, twist_, most);
+        if (last) jumps_ = moment_jumps(*last, ws, steps, jumps_);
         rows_[row].twist = twist_;
         return tubes(effects_, motors);
       }
@@ -81,6 +84,7 @@ private:
   std::array<double, window> times_{};
   std::size_t count_ = 0;
   Twist<N> twist_{};
+  MomentJumps<N> jumps_;
   TwistBalance<N, Fx> balance_;
   Occasion at_;
 };

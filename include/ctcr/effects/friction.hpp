@@ -1,4 +1,6 @@
 #pragma once
+#include <algorithm>
+
 #include "ctcr/effects/hooks.hpp"
 #include "ctcr/math/functions.hpp"
 
@@ -51,7 +53,9 @@ inline constexpr std::array parameters{
                     .hard_low = 0.005,
                     .hard_high = 3,
                     .role = Role::shape,
-                    .meaning = "rotation of the tubes where they touch after which friction has turned round to 63 %"},
+                    .meaning =
+                        "rotation of the tubes where they touch after which friction has turned round to 63 %; with "
+                        "the second law of a contact whose moment jumps by 0.05 N m, in others in proportion"},
     EffectParameter{.name = "insertion",
                     .unit = "",
                     .neutral = 1,
@@ -73,8 +77,8 @@ inline constexpr std::array parameters{
                     .hard_high = 1,
                     .role = Role::choice,
                     .meaning =
-                        "0: a bristle that bends ever less; 1: an elastic contact that slips at once, rotation and "
-                        "insertion sharing one limit"},
+                        "0: a bristle that bends ever less; 1: an elastic contact of constant stiffness that slips at "
+                        "once, rotation and insertion sharing one limit"},
 };
 }  // namespace friction
 
@@ -118,11 +122,14 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
     const auto &from = path.q[row - 1], &to = path.q[row];
     constexpr double per_radius = 1 / 0.8e-3;
     const bool bends = value(this->template get<4>()) < 0.5;
-    const auto follow = [&](std::size_t contact, const P& turn, const P& slide) {
+    const auto follow = [&](int tube, std::size_t contact, const P& turn, const P& slide) {
       P &h = this->past.state[contact], &k = this->past.state[limits + contact];
-      bends ? bend(turn, slide, h) : slip(turn, slide, h, k);
+      if (bends) return bend(turn, slide, h);
+      const P angle = slip_angle(tube, to.jumps[contact]);
+      stretch(slip_angle(tube, from.jumps[contact]) * inverse(angle), h, k);
+      slip(turn, slide, angle, h, k);
     };
-    follow(in_plate, to.alpha[N - 1] - from.alpha[N - 1], per_radius * (to.beta[N - 1] - from.beta[N - 1]));
+    follow(N - 1, in_plate, to.alpha[N - 1] - from.alpha[N - 1], per_radius * (to.beta[N - 1] - from.beta[N - 1]));
     for (int j = 0; j + 1 < N; ++j) {
       const auto i = std::size_t(j);
       const auto against_next = [&](const std::array<P, N>& v) -> P { return v[i] - v[i + 1]; };
@@ -130,7 +137,7 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
       const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
       for (int station = 0; station < Contacts<N>::stations; ++station) {
         const std::size_t contact = Contacts<N>::place(j, station);
-        follow(contact, turn + (to.twist[contact] - from.twist[contact]), slide);
+        follow(j, contact, turn + (to.twist[contact] - from.twist[contact]), slide);
       }
     }
   }
@@ -147,13 +154,34 @@ private:
     h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<2>())));
   }
 
+  /// Of a contact of a tube: limit / stiffness. The stiffness is that of a contact whose moment jumps as is usual.
+  [[nodiscard]] P slip_angle(int tube, double jump) const noexcept {
+    constexpr double usual = MomentJumps<N>::usual, least = 0.05;  // share of it: no division by 0
+    constexpr double overlap = 0.05;                               // [m] of a contact, of what is rubbed all along
+    const double grown = std::max(jump / usual, least);
+    const P pressed = usual * this->template get<0>(tube), along = overlap * this->template get<1>();
+    if (value(along) == 0) return grown * this->template get<2>();
+    return this->template get<2>() * (grown * pressed + along) * inverse(pressed + along);
+  }
+
+  /// The limit of a contact changes; its stretch does not, as far as the new limit holds it.
+  static void stretch(const P& factor, P& h, P& k) noexcept {
+    h = factor * h;
+    k = factor * k;
+    const P square = h * h + k * k;
+    if (!(value(square) > 1)) return;
+    const P within = inverse(square_root(square));
+    h = within * h;
+    k = within * k;
+  }
+
   /// (h, k)' = (turn', share slide') / slip within the unit circle; on it the part that points out is slip. There the angle
   /// to the motion falls as tan(angle / 2)' = -tan(angle / 2) / slip.
-  void slip(const P& turn, const P& slide, P& h, P& k) const noexcept {
+  void slip(const P& turn, const P& slide, const P& angle, P& h, P& k) const noexcept {
     const P shared = this->template get<3>() * slide, square = turn * turn + shared * shared;
     if (!(value(square) > rest * rest)) return;
     const P travel = square_root(square), c = turn * inverse(travel), s = shared * inverse(travel);
-    P far = travel * inverse(this->template get<2>()), along = h * c + k * s, across = k * c - h * s;
+    P far = travel * inverse(angle), along = h * c + k * s, across = k * c - h * s;
     const P room = 1.0 - across * across;  // the circle is met where along^2 is that
     const P edge = value(room) > 1e-12 ? square_root(room) : P(0.0);
     if (value(along + far) < value(edge)) {

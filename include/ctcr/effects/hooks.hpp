@@ -82,6 +82,7 @@ struct Path {
   struct Row {
     std::array<P, N> beta, alpha;  ///< [m], [rad]
     Twist<N> twist{};              ///< as in RecordedRow
+    MomentJumps<N> jumps;          ///< the same
   };
   std::span<const Row> q;
   std::span<const double> time;  ///< [s]; empty: unknown

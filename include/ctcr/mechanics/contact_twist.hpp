@@ -54,7 +54,8 @@ template <int N, class Fx>
   Frame<double> frame;
   detail::ContactAngles<N, double> angles;
   rod.rod.run(
-      rod.events, steps, y, frame, [&](int station, const auto&, const auto& state) { angles(station, state); },
+      rod.events, steps, y, frame,
+      [&](int station, const auto&, const auto& state, const auto&) { angles(station, state); },
       typename decltype(rod)::NoNode{});
   for (int i = 0; i + 1 < N; ++i) {
     const double at_base = ws.q.alpha[i] - ws.q.alpha[i + 1];
@@ -66,7 +67,33 @@ template <int N, class Fx>
   return last;
 }
 
-/// Slopes of that twist by what is rubbed at each contact: by the first states of the effect that follows the twist. Rows
+/// The jumps of the moments in equilibrium; arguments as above, but `last` is what is returned without one.
+/// Real time: yes; one integration.
+template <int N, class Fx>
+[[nodiscard]] MomentJumps<N> moment_jumps(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+                                          const MomentJumps<N>& last) noexcept {
+  if (!ws.warm) return last;
+  const detail::RodInEquilibrium<N, Fx> rod(model, ws.q, ws.load);
+  auto y = rod.at_tip(ws.guess);
+  Frame<double> frame;
+  MomentJumps<N> jumps;
+  jumps.fill(0);
+  const auto gather = [&](int station, const auto&, const auto&, const auto& moments) {
+    const auto [far, near] = moments();
+    double dx = 0, dy = 0;
+    for (std::size_t i = 0; i < N; ++i) {
+      dx += far[i][0] - near[i][0];
+      dy += far[i][1] - near[i][1];
+      const bool is_outermost = i + 1 == N;
+      if (is_outermost && station != Contacts<N>::plate) continue;
+      jumps[is_outermost ? Contacts<N>::count : Contacts<N>::place(int(i), station)] = std::hypot(dx, dy);
+    }
+  };
+  rod.rod.run(rod.events, steps, y, frame, gather, typename decltype(rod)::NoNode{});
+  return jumps;
+}
+
+/// Slopes of the twist by what is rubbed at each contact: by the first states of the effect that follows the twist. Rows
 /// are contacts whose twist changes. Arguments as above. Real time: yes; an integration for each 16 of the contacts and unknowns.
 template <int N, class Fx>
 [[nodiscard]] auto twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps) noexcept {

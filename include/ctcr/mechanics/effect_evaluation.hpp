@@ -70,7 +70,7 @@ public:
       for (int g = 0; g < Window::groups; ++g)
         tip_.rotation_twist[k][g] = tip_.translation_twist[k][g] = frame_.rotation_twist[k][g] =
             frame_.translation_twist[k][g] = Lanes{};
-    const auto keep_tip = [&](int id, const Frame<S>& frame, const auto& state) noexcept {
+    const auto keep_tip = [&](int id, const Frame<S>& frame, const auto& state, const auto&) noexcept {
       met(id, state);
       if (id >= N) return;
       tips.frame[std::size_t(id - 1)] = frame;

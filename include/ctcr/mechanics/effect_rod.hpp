@@ -40,7 +40,8 @@ public:
 
   /// Integrates from the state at the tip to the grasped side of the front plate.
   /// @param frame  out: Bishop frame there as seen from the tip frame
-  /// @param met    called as met(station, frame, state) at each station of Contacts<N> but the robot tip
+  /// @param met    called as met(station, frame, state, moments) at each station of Contacts<N> but the robot tip;
+  ///               moments() are those of the tubes on its far and on its near side, Bishop axes
   /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
   template <class Met, class Node>
@@ -65,7 +66,7 @@ public:
         using Kind = typename Station<S, N>::Kind;
         stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
       }
-      if (id > 0) met(id, frame, y);
+      if (id > 0) met(id, frame, y, [&] { return std::pair(moments(place, y), moments(near, y)); });
       place = near;
       place.bent = false;
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
@@ -79,7 +80,7 @@ public:
       if constexpr (!std::is_same_v<Node, NoNode>) node(next, place, y, frame, *this);
       here = next;
     }
-    met(Contacts<N>::plate, frame, y);
+    met(Contacts<N>::plate, frame, y, [&] { return std::pair(moments(place, y), moments_behind_plate(place, y)); });
     stop(Station<S, N>::Kind::plate, -1, place, place, y, frame);
   }
 

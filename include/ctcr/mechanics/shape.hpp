@@ -184,7 +184,7 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
   const Equilibrium equilibrium(model, q, load);
   const Rod& rod = equilibrium.rod;
   const Events<N>& events = equilibrium.events;
-  const auto no_station = [](int, const Frame<double>&, const State&) noexcept {};
+  const auto no_station = [](int, const Frame<double>&, const State&, const auto&) noexcept {};
 
   const State tip = equilibrium.at_tip(guess);
   State plate = tip;

@@ -44,6 +44,7 @@ struct RecordedPath {
         auto& now = q.emplace_back();
         joints_of<N, P>(transmission, here.theta, seed, now.beta, now.alpha);
         if (!rows[row].twist.empty()) now.twist = rows[row].twist[place];
+        if (!rows[row].jumps.empty()) now.jumps = rows[row].jumps[place];
         if (std::isfinite(here.at.time)) time.push_back(here.at.time);
       }
       end.push_back(q.size() - 1);

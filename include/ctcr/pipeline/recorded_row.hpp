@@ -19,6 +19,8 @@ struct RecordedRow {
   /// The twist_of() the tubes at evenly spaced places of the way from the row before, the last of them in this
   /// row, as add_twist() and wind_up() give it; none: tubes count as stiff in torsion [rad].
   std::vector<Twist<N>> twist{};
+  /// The moment_jumps() of a robot without effects at these places, as add_twist() gives them [N m].
+  std::vector<MomentJumps<N>> jumps{};
 
   [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), 1); }
 };
@@ -38,14 +40,15 @@ RecordedRow<N> on_the_way(std::span<const RecordedRow<N>> rows, std::size_t row,
   return here;
 }
 
-/// Gives each row the twist of a robot without effects in its equilibrium on the way there; a place without one keeps that
-/// of the place before. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
+/// Gives each row the twist and the jumps of a robot without effects in its equilibrium on the way there; a place without
+/// one keeps those of the place before. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
 template <int N>
 void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
   constexpr double most_rotation = 0.175, most_translation = 5e-3;  // of a part [rad], [m]
   Workspace<N> ws;
   Solution<N> solution;
   Twist<N> twist{};
+  MomentJumps<N> jumps;
   bool known = false;
   for (std::size_t row = 0; row < rows.size(); ++row) {
     double parts = 1;
@@ -56,16 +59,20 @@ void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
                         (to.beta - from.beta).cwiseAbs().maxCoeff() / most_translation});
     }
     rows[row].twist.resize(std::size_t(std::ceil(parts)));
+    rows[row].jumps.resize(rows[row].twist.size());
     for (std::size_t place = 0; place < rows[row].twist.size(); ++place) {
       const RecordedRow<N> here = on_the_way<N>(rows, row, place);
       if (solve(system.model, joints(system.transmission, here.theta), here.load, ws, solution, system.settings) ==
           Status::ok) {
         twist = twist_of(system.model, ws, system.settings.steps, twist);
+        jumps = moment_jumps(system.model, ws, system.settings.steps, jumps);
         if (!known)
-          for (RecordedRow<N>& earlier : rows.first(row + 1)) std::ranges::fill(earlier.twist, twist);
+          for (RecordedRow<N>& earlier : rows.first(row + 1))
+            std::ranges::fill(earlier.twist, twist), std::ranges::fill(earlier.jumps, jumps);
         known = true;
       }
       rows[row].twist[place] = twist;
+      rows[row].jumps[place] = jumps;
     }
   }
 }

@@ -58,7 +58,10 @@ private:
         part *= 0.5;
       } else {
         if (worse) {
-          if (const Model<N, Fx>* model = equilibrium(best.effects)) by_rubbing_ = twist_slopes(*model, ws, steps);
+          if (const Model<N, Fx>* model = equilibrium(best.effects)) {
+            by_rubbing_ = twist_slopes(*model, ws, steps);
+            weight_ = by_rubbing_.colwise().squaredNorm().transpose();
+          }
           renewed = true;
         }
         step = newton_step(best, remembered);
@@ -88,12 +91,14 @@ private:
     return all;
   }
 
-  /// What a change of the rubbing did to the equilibrium's twist.
+  /// What a change of the rubbing did to the equilibrium's twist, by the contacts that may have done it: where tubes hardly
+  /// press on each other, what is rubbed changes most, and does nothing.
   void learn(const Point& from, const Point& to) noexcept {
     const Vec change = rubbing(to.effects) - rubbing(from.effects);
-    if (!(change.squaredNorm() > 1e-16)) return;
+    const Vec blamed = weight_.cwiseProduct(change);
+    if (!(blamed.dot(change) > 1e-16)) return;
     const Vec turned = as_vector(to.twist) + to.left - as_vector(from.twist) - from.left;
-    by_rubbing_ += (turned - by_rubbing_ * change) * change.transpose() / change.squaredNorm();
+    by_rubbing_ += (turned - by_rubbing_ * change) * blamed.transpose() / blamed.dot(change);
   }
 
   Vec newton_step(const Point& at, const auto& remembered) const noexcept {
@@ -106,6 +111,7 @@ private:
     return slope.partialPivLu().solve(at.left);
   }
 
+  Vec weight_ = Vec::Ones();
   Eigen::Matrix<double, contacts, contacts> by_rubbing_ = Eigen::Matrix<double, contacts, contacts>::Zero();
 };
 

@@ -20,4 +20,12 @@ struct Contacts {
 template <int N>
 using Twist = std::array<double, std::size_t(Contacts<N>::count)>;
 
+/// By how much the bending moment of all tubes inside each contact jumps there, and at last that of all tubes in the plate
+/// [N m]: how hard they press on what is around them. 0 where there is no contact; as usual where it is not known.
+template <int N>
+struct MomentJumps : std::array<double, std::size_t(Contacts<N>::count) + 1> {
+  static constexpr double usual = 0.05;
+  constexpr MomentJumps() noexcept { this->fill(usual); }
+};
+
 }  // namespace ctcr

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ctcr import effects, identify, open_side
 from ctcr.diagnose import jump
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates, forms
+from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.far_off import far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
@@ -295,8 +295,12 @@ def _with_shapes(
         progress(f"freeing the shape of {given.id}")
         entry = replace(one.entry, candidate=form)
         names, fixed = racing.parameters([entry if a is one else a.entry for a in accepted])
-        start = dict(form.shape) | values_of(fit)
-        tried.append((entry, engine.fit_like(fit, names, start=start, fixed=fixed, near=True)))
+        neutral = dict(zip(form.names, engine.priors(form.names)[0], strict=True))
+        for start in starts(form.names, neutral | dict(form.shape) | values_of(fit)):
+            freed = engine.fit_like(
+                fit, names, start=start, fixed=fixed, near=True, tolerance=identify.COARSE
+            )
+            tried.append((entry, freed))
     if not tried:
         return fit
     entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)

@@ -3,8 +3,9 @@
 An effect may enter in several variants, from few parameters to all; the evidence pays for the parameters that it needs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -26,7 +27,10 @@ VARIANTS = {
     "field_distortion": (("scale",), None, ()),
 }  # None: all amplitudes; (): all parameters
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
-FORMS = {"friction": ({"law": 1.0}, {"insertion": 0.0})}
+FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0})}
+# Shape parameters whose slope does not lead far, since it leaves out what tubes wind each other up: parts of the value
+# reached so far from which a fit begins, too.
+STARTS = {"effects.friction.slip_angle": (1.0, 0.5, 0.25)}
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,16 @@ def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
     free = [tuple(dict.fromkeys((*candidate.names, *more, *effect.shapes))) for more in ((), wider)]
     return [
         Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in dict.fromkeys(shapes)
+    ]
+
+
+def starts(names: Collection[str], values: Mapping[str, float]) -> list[dict[str, float]]:
+    """From where a fit of these parameters begins: from `values` by full name, and from others of shapes."""
+    free = [name for name in STARTS if name in names and name in values]
+    parts = product(*(STARTS[name] for name in free))
+    return [
+        dict(values) | {name: part * values[name] for name, part in zip(free, some, strict=True)}
+        for some in parts
     ]
 
 
