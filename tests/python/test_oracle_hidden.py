@@ -17,7 +17,7 @@ import make_suite  # noqa: E402
 from benches import ROBOTS, describe, joint_range  # noqa: E402
 from detectable import detectability  # noqa: E402
 from drives import Play  # noqa: E402
-from field import dipole_field, induced_dipole  # noqa: E402
+from field import coil_fields, induced_fields, misread  # noqa: E402
 from hidden import CAUSES, hide  # noqa: E402
 from make_set import Order, measure, write_set  # noqa: E402
 from mechanics import Mechanics  # noqa: E402
@@ -100,18 +100,14 @@ def test_play_follows_late_and_by_its_own_gap():
     assert_allclose(outputs, [0.0, 0.0, 0.7, 0.7, 0.6])
 
 
-def test_induced_dipole_is_what_a_tracker_without_metal_would_believe():
-    place, metal, volume = np.array([0.05, -0.1, -0.08]), np.array([0.1, -0.15, -0.02]), 1e-9
-    shift, turn = induced_dipole(place, metal, volume)
-    origin = np.array([0.0, 0.0, 0.05])
-    seen = dipole_field(place - origin) + dipole_field(place - metal) @ (
-        -volume * dipole_field(metal - origin)
-    )
+def test_beside_metal_a_tracker_reads_what_explains_the_field_best():
+    place, volume = np.array([0.05, -0.1, -0.08]), 1e-9
+    metal = np.array([0.1, -0.15, -0.02]) + np.outer([-0.02, 0.02], [0.0, 0.6, 0.8])
+    shift, turn = misread(place, metal, volume)
+    seen = coil_fields(place) + induced_fields(place, metal, volume)
 
     def misfit(p: np.ndarray, rotation: np.ndarray) -> float:
-        return float(
-            np.linalg.norm(Rotation.from_rotvec(-rotation).as_matrix() @ dipole_field(p - origin) - seen)
-        )
+        return float(np.linalg.norm(Rotation.from_rotvec(-rotation).as_matrix() @ coil_fields(p) - seen))
 
     best = misfit(place + shift, turn)
     rng = np.random.default_rng(0)

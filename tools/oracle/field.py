@@ -1,8 +1,13 @@
-"""How a piece of metal misleads an electromagnetic tracker: an induced dipole, inverted as if it were not there."""
+"""How metal misleads an electromagnetic tracker: dipoles induced in it, read as if they were not there."""
 
 import numpy as np
 
-_GENERATOR = np.array([0.0, 0.0, 0.05])  # [m] three crossed coils, behind the origin of the tracker's frame
+# Six coils on a plate behind the origin of the tracker's frame: places (6, 3) [m], and axes that lean different ways.
+_TURN = np.deg2rad(np.arange(0, 360, 60))
+_COILS = 0.06 * np.column_stack([np.cos(_TURN), np.sin(_TURN), np.full(6, 0.5)])
+_LEAN = _TURN + np.tile([0.0, 2.1], 3)
+_AXES = np.column_stack([np.cos(_LEAN), np.sin(_LEAN), np.full(6, 0.7)])
+_AXES /= np.linalg.norm(_AXES, axis=1, keepdims=True)
 
 
 def dipole_field(place: np.ndarray) -> np.ndarray:
@@ -12,19 +17,30 @@ def dipole_field(place: np.ndarray) -> np.ndarray:
     return (3 * np.outer(n, n) - np.eye(3)) / r**3
 
 
-def induced_dipole(place: np.ndarray, metal: np.ndarray, volume: float) -> tuple[np.ndarray, np.ndarray]:
+def coil_fields(place: np.ndarray) -> np.ndarray:
+    """(3, 6) field at a place (3,) [m] of each coil of the tracker. Scale left out."""
+    return np.column_stack(
+        [dipole_field(place - coil) @ axis for coil, axis in zip(_COILS, _AXES, strict=True)]
+    )
+
+
+def induced_fields(place: np.ndarray, metal: np.ndarray, volume: float) -> np.ndarray:
+    """(3, 6) what metal of a volume [m^3], in pieces at (K, 3) [m], adds: a dipole in each against the field there."""
+    parts = [dipole_field(place - piece) @ coil_fields(piece) for piece in metal]
+    return -volume * np.mean(parts, axis=0)
+
+
+def misread(place: np.ndarray, metal: np.ndarray, volume: float) -> tuple[np.ndarray, np.ndarray]:
     """Error of position (3,) [m] and rotation vector (3,) [rad] read at a place, to first order in the volume [m^3].
 
-    The metal answers the field of each coil with a dipole against it. The tracker takes the sum for the field of its
-    coils alone and looks for the pose that explains it best.
+    The tracker takes the sum of the fields for that of its coils alone and looks for the pose that explains it best.
     """
-    here, at_metal = place - _GENERATOR, metal - _GENERATOR
-    extra = dipole_field(place - metal) @ (-volume * dipole_field(at_metal))
-    field, step = dipole_field(here), 1e-6 * np.linalg.norm(here)
+    own, step = coil_fields(place), 1e-7
     columns = [
-        (dipole_field(here + d) - dipole_field(here - d)).ravel() / (2 * step) for d in step * np.eye(3)
+        (coil_fields(place + d) - coil_fields(place - d)).ravel() / (2 * step) for d in step * np.eye(3)
     ]
     # A sensor turned by w reads the field turned by -w.
-    columns += [-np.cross(axis, field, axisb=0, axisc=0).ravel() for axis in np.eye(3)]
-    solution = np.linalg.lstsq(np.column_stack(columns), extra.ravel(), rcond=None)[0]
+    columns += [-np.cross(axis, own, axisb=0, axisc=0).ravel() for axis in np.eye(3)]
+    added = induced_fields(place, metal, volume)
+    solution = np.linalg.lstsq(np.column_stack(columns), added.ravel(), rcond=None)[0]
     return solution[:3], solution[3:]

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from field import induced_dipole
+from field import misread
 from hidden_cause import Truth, cause, signed, unit
 from scipy.spatial.transform import Rotation
 from session import ELEMENT_LENGTH, Setup
@@ -19,24 +19,27 @@ def sensor_offset(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
 
 @cause("field_distortion")
 def field_distortion(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
-    """A piece of metal beside the workspace; scaled so that 0.15 mm remain when position and scale are fitted."""
+    """A bar of metal beside the workspace; scaled so that 0.15 mm remain when position and scale are fitted."""
     specimen, bench = Specimen(setup.mechanics, 2 * ELEMENT_LENGTH), setup.bench
     few = setup.plan.joints[:: max(1, len(setup.plan.time) // 80)]
     tips = np.array([specimen.settle(*np.split(setup.true_joints(q), 2), np.zeros(3)).position for q in few])
     places = bench.tracker_rotation.apply(tips) + bench.tracker_position
-    centre = places.mean(axis=0) + rng.uniform(0.08, 0.11) * unit(rng)
+    middle, side = places.mean(axis=0), unit(rng)
+    side[2] = -abs(side[2])  # not before the coils
+    centre = middle + (np.max((places - middle) @ side) + rng.uniform(0.05, 0.08)) * side
+    bar = centre + np.outer(np.linspace(-0.015, 0.015, 5), unit(rng))
     volume = 1e-9
-    error = np.array([induced_dipole(p, centre, volume)[0] for p in places])
+    error = np.array([misread(p, bar, volume)[0] for p in places])
     columns = np.column_stack([places - places.mean(axis=0), np.ones(len(places))])
     left = error - columns @ np.linalg.lstsq(columns, error, rcond=None)[0]
     volume *= 0.15e-3 * size / np.sqrt(np.mean(np.sum(left**2, axis=1)))
 
     def sensing(position: np.ndarray, rotation: Rotation, time: float) -> tuple[np.ndarray, Rotation]:
-        shift, turn = induced_dipole(position, centre, volume)
+        shift, turn = misread(position, bar, volume)
         return position + shift, Rotation.from_rotvec(turn) * rotation
 
     setup.tracker_sensings.append(sensing)
-    return {"centre_m": centre, "volume_m3": volume}
+    return {"ends_m": bar[[0, -1]], "volume_m3": volume}
 
 
 @cause("frame_drift")
