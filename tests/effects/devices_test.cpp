@@ -71,27 +71,34 @@ Pose random_pose(Random& random) {
   return {rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.3)};
 }
 
-TEST(FieldDistortion, IsAPolynomialOfThePlace) {
+TEST(FieldDistortion, IsAPolynomialOfThePlaceAndAPieceOfMetal) {
   Random random(5);
   for (int n = 0; n < test::cases(20); ++n) {
     FieldDistortion<2> effect;
     std::map<std::string, double> c;
     for (std::size_t k = 0; k < effect.values.size(); ++k)
       c[std::string(effect.parameters[k].name)] = effect.values[k] = test::uniform(random, -1e-3, 1e-3);
+    c["metal_volume"] = effect.values[effect.values.size() - 7] *= 0.01;  // [m^3]
+    c["metal_z"] = effect.values[effect.values.size() - 4] = -0.2;
     const Pose pose = random_pose(random);
     const Vec3 centre = test::random_vector(random, 0.1), v = pose.position - centre;
     Vec3 by = c["scale"] * v, turn = Vec3::Zero();
     c["z_z"] = -c["x_x"] - c["y_y"];
     c["y_x"] = c["x_y"], c["z_x"] = c["x_z"], c["z_y"] = c["y_z"];
+    const Vec3 coils(c["coils_x"], c["coils_y"], c["coils_z"]),
+        p = pose.position - coils, metal = Vec3(c["metal_x"], c["metal_y"], c["metal_z"]) - coils;
+    const auto off = beside_metal<double>({p[0], p[1], p[2]}, {metal[0], metal[1], metal[2]}, c["metal_volume"]);
+    by += Vec3(off.shift[0], off.shift[1], off.shift[2]);
+    turn += Vec3(off.turn[0], off.turn[1], off.turn[2]);
     for (const auto& [name, value] : c) {
       const std::size_t bar = name.rfind('_');
-      if (bar == std::string::npos) continue;
+      if (bar == std::string::npos || name.starts_with("metal") || name.starts_with("coils")) continue;
       double product = value;
       for (const char axis : name.substr(bar + 1)) product *= v[axis - 'x'] / 0.05;
       (name.starts_with("turn") ? turn : by)[name[bar - 1] - 'x'] += product;
     }
     const Pose read = sensed(effect, {.centre = centre}, pose);
-    EXPECT_LE((read.position - pose.position - by).norm(), 1e-15);
+    EXPECT_LE((read.position - pose.position - by).norm(), 1e-14);
     EXPECT_LE((read.rotation - rotation_matrix(turn) * pose.rotation).norm(), 1e-14);
   }
 }

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "ctcr/effects/hooks.hpp"
+#include "ctcr/effects/metal.hpp"
 #include "ctcr/math/frame_algebra.hpp"
 
 namespace ctcr {
@@ -13,7 +14,9 @@ inline constexpr EffectInfo info{
         "Metal near an electromagnetic tracker bends its field: readings are off by an amount that depends on where "
         "the sensor is.",
     .signature = "The same place read with other joints has the same error.",
-    .measure = "Read known points of a plate; move the robot base within the field.",
+    .measure =
+        "Read known points of a plate; move the robot base within the field; look for metal where metal_x, metal_y and "
+        "metal_z say.",
     .look_alikes = "sensor_offset precurvature_profile",
     .reference = "Hummel et al. 2005; Harish et al.",
 };
@@ -46,8 +49,40 @@ inline constexpr std::string_view turn[] = {
     "turn_x_yz", "turn_y_xx", "turn_y_yy", "turn_y_zz", "turn_y_xy", "turn_y_xz", "turn_y_yz",
     "turn_z_xx", "turn_z_yy", "turn_z_zz", "turn_z_xy", "turn_z_xz", "turn_z_yz"};
 
+consteval EffectParameter coordinate(std::string_view name, double usual, double sigma, std::string_view meaning) {
+  return {.name = name,
+          .unit = "m",
+          .neutral = usual,
+          .sigma = sigma,
+          .soft_low = -1,
+          .soft_high = 1,
+          .hard_low = -3,
+          .hard_high = 3,
+          .role = Role::shape,
+          .meaning = meaning};
+}
+
+inline constexpr EffectParameter metal[] = {
+    {.name = "metal_volume",
+     .unit = "m^3",
+     .neutral = 0,
+     .sigma = 1e-5,
+     .soft_low = -1e-3,
+     .soft_high = 1e-3,
+     .hard_low = -0.1,
+     .hard_high = 0.1,
+     .role = Role::detail,
+     .meaning = "of a small piece of metal beside the tracker; negative: of iron that strengthens the field"},
+    coordinate("metal_x", 0.1, 0.3, "of the piece of metal, tracker frame"),
+    coordinate("metal_y", 0.1, 0.3, "the same"),
+    coordinate("metal_z", -0.1, 0.3, "the same"),
+    coordinate("coils_x", 0, 0.05, "of the middle of the tracker's coils, tracker frame"),
+    coordinate("coils_y", 0, 0.05, "the same"),
+    coordinate("coils_z", 0, 0.05, "the same")};
+
 consteval auto all() {
-  std::array<EffectParameter, 1 + std::size(quadratic) + std::size(shear) + std::size(cubic) + std::size(turn)> list;
+  constexpr std::size_t terms = 1 + std::size(quadratic) + std::size(shear) + std::size(cubic) + std::size(turn);
+  std::array<EffectParameter, terms + std::size(metal)> list;
   list[0] = {.name = "scale",
              .unit = "",
              .neutral = 0,
@@ -62,13 +97,15 @@ consteval auto all() {
   for (const auto& name : shear) list[k++] = coefficient(name, 2e-4, Role::detail);
   for (const auto& name : cubic) list[k++] = coefficient(name, 1e-4, Role::detail);
   for (const auto& name : turn) list[k++] = coefficient(name, 3e-3, Role::detail);
+  for (const auto& parameter : metal) list[k++] = parameter;
   return list;
 }
 inline constexpr auto parameters = all();
 }  // namespace field_distortion
 
 /// Readings distorted by metal near the tracker: a scale and a quadratic field of the position read, about the centre of
-/// all readings. Its details are a shear, terms of third order, and a field by which readings are turned.
+/// all readings. Its details are a shear, terms of third order, a field by which readings are turned, and one small piece
+/// of metal.
 template <int N, class P = double>
 struct FieldDistortion : EffectValues<field_distortion::parameters, N, P> {
   static constexpr const EffectInfo& info = field_distortion::info;
@@ -99,6 +136,15 @@ struct FieldDistortion : EffectValues<field_distortion::parameters, N, P> {
       for (std::size_t k = 0; k < 10; ++k) by[i] = by[i] + third[10 * i + k] * cube[k];
       rotation[i] = turn[3 * i] * x + turn[3 * i + 1] * y + turn[3 * i + 2] * z;
       for (std::size_t k = 0; k < 6; ++k) rotation[i] = rotation[i] + turn[9 + 6 * i + k] * square[k];
+    }
+    const P* const piece = turn + std::size(field_distortion::turn);
+    if (!vanishes(piece[0])) {
+      const Triple<P> metal{piece[1], piece[2], piece[3]}, coils{piece[4], piece[5], piece[6]};
+      const Misreading<P> off = beside_metal<P>(difference(p, coils), difference(metal, coils), piece[0]);
+      for (std::size_t i = 0; i < 3; ++i) {
+        by[i] = by[i] + off.shift[i];
+        rotation[i] = rotation[i] + off.turn[i];
+      }
     }
     shift(reading, by);
     turn_in_place(reading, rotation);

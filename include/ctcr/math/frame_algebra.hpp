@@ -9,6 +9,12 @@ namespace ctcr {
 template <class S>
 using Triple = std::array<S, 3>;
 
+/// a - b.
+template <class S>
+Triple<S> difference(const Triple<S>& a, const Triple<S>& b) noexcept {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
 /// A pose without derivatives.
 template <class S>
 Frame<S> frame_of(const Pose& T) noexcept {

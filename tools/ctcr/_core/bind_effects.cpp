@@ -1,9 +1,11 @@
 // The catalogue of effects. Use ctcr.effects, which converts.
+#include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <ctcr/effects/catalogue.hpp>
+#include <ctcr/effects/metal.hpp>
 
 #include "any_recording.hpp"
 #include "with_tubes.hpp"
@@ -23,6 +25,16 @@ std::vector<CatalogueEntry> catalogue() {
                    i.needs.time, i.needs.orientation, i.needs.loads, i.needs.gravity});
   });
   return out;
+}
+
+RowMajor beside_metal(const RowMajor& places, const Eigen::Vector3d& metal) {
+  RowMajor off(places.rows(), 6);
+  for (Eigen::Index i = 0; i < places.rows(); ++i) {
+    const auto at =
+        ctcr::beside_metal<double>({places(i, 0), places(i, 1), places(i, 2)}, {metal[0], metal[1], metal[2]}, 1.0);
+    off.row(i) << at.shift[0], at.shift[1], at.shift[2], at.turn[0], at.turn[1], at.turn[2];
+  }
+  return off;
 }
 
 }  // namespace
@@ -60,6 +72,10 @@ void bind_effects(nb::module_& m) {
       "effect_parameters",
       [](int tubes) { return with_tubes(tubes, [](auto n) { return catalogue_parameters<n>(); }); }, "tubes"_a,
       "Parameters of all effects; `first` is the place of a parameter's value among those of the catalogue.");
+  m.def("beside_metal", &beside_metal, "places"_a, "metal"_a,
+        "(M, 6) position [m] and rotation vector [rad] by which readings at places (M, 3) [m] are off for each m^3 of "
+        "metal "
+        "at a place (3,) [m]; tracker frame.");
 }
 
 }  // namespace ctcr::python

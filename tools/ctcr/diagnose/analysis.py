@@ -40,6 +40,7 @@ class Accepted:
     log_evidence: float
     margin: float
     share: float
+    aside: dict[str, float] = field(default_factory=dict)  # of its other variants, as the race left them
 
 
 @dataclass
@@ -271,7 +272,8 @@ def _grow(
         if round_.accepted is None:
             break
         entry, engine.robust = round_.accepted, True
-        accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, entry.share))
+        rest = entry.refit, round_.margin, entry.share, racing.aside(round_)
+        accepted.append(Accepted(entry, round_.ids, *rest))
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
         rejected = racing.is_rejected(engine, fit)
@@ -289,14 +291,14 @@ def _with_shapes(
     """Frees what an accepted effect was not given in the race where that helps: its form may be another one."""
     given = one.entry.candidate
     tried = []
-    for form in forms(effects.get(given.id, engine.robot.n_tubes), given):
+    for form in forms(effects.get(given.id, engine.robot.n_tubes), given, one.aside):
         if form == given:
             continue  # nothing is left to free
         progress(f"freeing the shape of {given.id}")
         entry = replace(one.entry, candidate=form)
         names, fixed = racing.parameters([entry if a is one else a.entry for a in accepted])
         neutral = dict(zip(form.names, engine.priors(form.names)[0], strict=True))
-        for start in starts(form.names, neutral | dict(form.shape) | values_of(fit)):
+        for start in starts(form.names, neutral | one.aside | dict(form.shape) | values_of(fit)):
             freed = engine.fit_like(
                 fit, names, start=start, fixed=fixed, near=True, tolerance=identify.COARSE
             )

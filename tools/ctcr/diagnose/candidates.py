@@ -13,6 +13,7 @@ from ctcr import effects
 from ctcr.measurements import Measurements
 from ctcr.robot import Robot
 
+METAL = ("metal_volume", "metal_x", "metal_y", "metal_z", "coils_x", "coils_y", "coils_z")
 VARIANTS = {
     "friction": (("coefficient",), ("torque_per_length",)),
     "tip_load": (("mass",), ("force_x", "force_y", "force_z")),
@@ -24,8 +25,8 @@ VARIANTS = {
     ),
     "straight_curvature": (("bend_x",), ("bend_x", "bend_y")),
     "sensor_offset": (("x", "y", "z"), ("x", "y", "z", "turn_x", "turn_y", "turn_z")),
-    "field_distortion": (("scale",), None, ()),
-}  # None: all amplitudes; (): all parameters
+    "field_distortion": (("scale",), None, METAL, ()),
+}  # None: all amplitudes; (): all parameters but those of a piece of metal
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
 FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0})}
 # Shape parameters whose slope does not lead far, since it leaves out what tubes wind each other up: parts of the value
@@ -69,9 +70,10 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
     return found, left_out
 
 
-def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
+def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] = ()) -> list[Candidate]:
     """What an accepted candidate may become: under each law that the effect offers, its shape free, with the strengths
-    by which it entered the race or with all that it may enter by."""
+    by which it entered the race or with all that it may enter by. A piece of metal is among these where the race left
+    its place, full names, `aside`."""
     laws = {name for p in effect.parameters if p.kind == "choice" for name in p.full_names}
     rest = {name: value for name, value in candidate.shape if name not in laws}
     shapes = [candidate.shape]
@@ -81,7 +83,12 @@ def forms(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
         shapes.append(tuple((rest | law).items()))
     strengths = [_names(effect, variant) for variant in VARIANTS.get(effect.id, ())]
     wider = [name for names in strengths if set(candidate.names) <= set(names) for name in names]
-    free = [tuple(dict.fromkeys((*candidate.names, *more, *effect.shapes))) for more in ((), wider)]
+    has_metal = any(is_of_metal(name) for name in (*candidate.names, *aside))
+    details = [name for name in effect.shapes if has_metal or not is_of_metal(name)]
+    more = [details, [*wider, *details]]
+    if is_of_metal(candidate.names[0]):  # besides it, the field of what is farther away
+        more = [effect.amplitudes, [*effect.amplitudes, *details]]
+    free = [tuple(dict.fromkeys((*candidate.names, *names))) for names in more]
     return [
         Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in dict.fromkeys(shapes)
     ]
@@ -97,8 +104,15 @@ def starts(names: Collection[str], values: Mapping[str, float]) -> list[dict[str
     ]
 
 
+def is_of_metal(name: str) -> bool:
+    """Whether a parameter, by full name, is one of a piece of metal."""
+    return name.startswith("effects.field_distortion.") and name.split(".")[2] in METAL
+
+
 def _names(effect: effects.Effect, variant: tuple[str, ...] | None) -> Sequence[str]:
-    return effect.amplitudes if variant is None else effect.names(*variant)
+    if variant is None:
+        return effect.amplitudes
+    return effect.names(*variant) if variant else [name for name in effect.names() if not is_of_metal(name)]
 
 
 def _unseen(effect: effects.Effect, robot: Robot, measurements: Measurements) -> str | None:

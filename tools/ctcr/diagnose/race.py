@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import contact, jump
-from ctcr.diagnose.candidates import Candidate
+from ctcr.diagnose import contact, jump, metal
+from ctcr.diagnose.candidates import Candidate, is_of_metal
 from ctcr.diagnose.engine import OUTLIER, Engine, Gain, values_of
 from ctcr.diagnose.prediction import predicts_better
 from ctcr.errors import InputError
@@ -137,6 +137,17 @@ def parameters(entries: Collection[Entry]) -> tuple[list[str], dict[str, float]]
     return names, dict(pair for entry in entries for pair in entry.candidate.shape)
 
 
+def aside(round_: Round) -> dict[str, float]:
+    """Values of variants of the accepted effect whose shape was fitted in the race, but which were not accepted."""
+    found = {}
+    for entry in reversed(round_.entries):
+        if entry.id == round_.accepted.id and entry.fit is not None and entry is not round_.accepted:
+            own = entry.candidate.names
+            if any(name in own for name, _ in entry.candidate.shape):  # a place of strength 0 has no slopes
+                found |= {name: value for name, value in values_of(entry.fit).items() if name in own}
+    return found
+
+
 def baseline(
     engine: Engine, accepted: list[Entry], start: dict[str, float], progress: Progress
 ) -> identify.Fit:
@@ -227,18 +238,22 @@ def screen(
     slopes = engine.slopes(before, names, fixed | {jump.WHEN: -1.0})
     place = {name: i for i, name in enumerate(names)}
     entries = []
+
+    def worth(columns: Array) -> float:
+        return linear.gain(before.whiten(columns)).log_evidence
+
     for candidate in candidates:
         own = slopes[:, :, [place[name] for name in candidate.names]]
         if candidate.shape:
             own = engine.slopes(before, candidate.names, fixed | dict(candidate.shape))
         kinds = [[(candidate, own)]]  # of each the best enters
         if candidate.id == "frame_jump":
-            kinds = [
-                jump.moment(engine, candidate, own, lambda s: linear.gain(before.whiten(s)).log_evidence)
-            ]
+            kinds = [jump.moment(engine, candidate, own, worth)]
         elif candidate.id == "contact":
             tip = slopes[:, :, [place[name] for name in contact.FORCE]] / engine.priors(contact.FORCE)[1]
             kinds = [contact.planes(engine, candidate, tip, part) for part in contact.DEPTHS]
+        elif is_of_metal(candidate.names[0]):
+            kinds = [metal.piece(engine, candidate, worth)]
         for options in kinds:
             gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
             if gains:
