@@ -274,8 +274,8 @@ TEST(Backlash, MovesTheTubes) {
 
 TEST(Delay, IsThePoseOfAWhileAgo) {
   Catalogue::On<2> effects;
-  const auto pose = [&](double delay) {
-    effect<Delay, 2>(effects).values = {delay};
+  const auto pose = [&](double delay, double spread) {
+    effect<Delay, 2>(effects).values = {delay, spread};
     return Walk<2>(two_tubes(), effects)
         .to(at(0, 0), 10)
         .to(at(0.4, -0.2, -0.34), 12)
@@ -287,13 +287,16 @@ TEST(Delay, IsThePoseOfAWhileAgo) {
                                  {1.0, at(0.4, -0.2, -0.34)},
                                  {2.0, at(0.2, -0.1, -0.345)}}) {
     const Solution<2> expected = Walk<2>(two_tubes()).to(q).solution();
-    EXPECT_LE((pose(delay).position - expected.position).norm(), 1e-11) << delay;
+    EXPECT_LE((pose(delay, 0).position - expected.position).norm(), 1e-11) << delay;
   }
+  // The mean of 0.5 and 1.5 s ago.
+  const Solution<2> expected = Walk<2>(two_tubes()).to(at(0.4, -0.075, -0.34125)).solution();
+  EXPECT_LE((pose(1.0, 0.5).position - expected.position).norm(), 1e-11);
 }
 
 TEST(Delay, VanishesAtRestAndWhereAClockStartsAnew) {
   Catalogue::On<2> effects;
-  effect<Delay, 2>(effects).values = {0.3};
+  effect<Delay, 2>(effects).values = {0.3, 0.4};
   const auto lag = [](const Walk<2>& walk) { return walk.remembered<Delay>(); };
   const std::array<double, 4> none{};
   Walk<2> walk(two_tubes(), effects);

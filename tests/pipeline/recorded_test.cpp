@@ -103,10 +103,14 @@ void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
       EXPECT_EQ(test::predict_last(P<N>::with_values(system, moved), rows, from, other), Status::ok);
       return test::difference(prediction.reading, other.reading);
     };
-    const Vec6 expected = slope(change, v);
-    EXPECT_LE((exact.col(place) - expected).norm(), 2e-5 * (expected.norm() + 1e-2 / v.size))
-        << P<N>::name(place) << ", " << what << "\nexact      " << exact.col(place).transpose() << "\ndifference "
-        << expected.transpose();
+    Vec6 expected = slope(change, v);
+    const auto agrees = [&] {
+      return (exact.col(place) - expected).norm() <= 2e-5 * (expected.norm() + 1e-2 / v.size);
+    };
+    // Near an instability a reading changes so fast that the usual step is too long.
+    if (!agrees()) expected = slope(change, {v.size, v.h / 16, v.forward});
+    EXPECT_TRUE(agrees()) << P<N>::name(place) << ", " << what << "\nexact      " << exact.col(place).transpose()
+                          << "\ndifference " << expected.transpose();
   }
 }
 

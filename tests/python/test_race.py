@@ -1,5 +1,6 @@
 """A round of the race asks what a further effect adds, and not what a better fit of the others would."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
 from ctcr.diagnose import race as racing
 from ctcr.diagnose import verdict
-from ctcr.diagnose.candidates import Candidate, candidates
+from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, Gain
+from ctcr.effects import get
 
 ROOT = Path(__file__).parents[2]
 MASS = "effects.tip_load.mass"
+SPREAD = "effects.delay.spread"
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +46,13 @@ def test_the_tutorial_explains_every_verdict_with_its_limits():
     assert [word for word in rows if word in words] == words
     assert f"less than {100 * verdict.MOSTLY:.0f} %" in rows["probable"]
     assert f"less than {100 * verdict.EXPLAINED:.0f} %" in rows["stand_in"]
+
+
+def test_a_delay_whose_moments_are_spread_is_freed_from_where_it_entered(robot, plan):
+    timed = replace(plan, t=np.arange(len(plan), dtype=float))
+    found = [c for c in candidates(robot, timed)[0] if c.id == "delay"]
+    assert [dict(c.shape) for c in found] == [{}, {SPREAD: 0.5}]
+    for candidate in found:
+        [form] = forms(get("delay", robot.n_tubes), candidate)
+        assert form.names == ("effects.delay.delay", SPREAD)
+        assert form.shape == candidate.shape

@@ -25,10 +25,21 @@ inline constexpr std::array parameters{
                     .hard_low = -0.05,
                     .hard_high = 1,
                     .meaning = "by which poses are late"},
+    EffectParameter{.name = "spread",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 0.3,
+                    .soft_low = 0,
+                    .soft_high = 1,
+                    .hard_low = 0,
+                    .hard_high = 1,
+                    .role = Role::detail,
+                    .meaning = "share of the delay: standard deviation of the moments over which the tracker averages"},
 };
 }  // namespace delay
 
-/// Poses are logged later than joints: the joints that count are those of a time ago.
+/// Poses are logged later than joints: the joints that count are those of a time ago, or where the tracker averages, the
+/// mean of those of two moments, delay (1 - spread) and delay (1 + spread) ago: to second order that of any filter.
 template <int N, class P = double>
 struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = delay::info;
@@ -38,16 +49,21 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
     auto& state = this->past.state;
     for (auto& x : state) x = 0.0;
     if (path.time.empty() || row == 0 || !(path.time[row - 1] < path.time[row])) return;
-    const P& delay = this->template get<0>();
-    const double now = path.time[row], then = now - value(delay);
-    std::size_t k = row;  // then lies between rows k - 1 and k, or before the first of a clock that started anew
-    while (k > 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
-    const P part = (path.time[k] - now + delay) * (1 / (path.time[k] - path.time[k - 1]));
-    const auto &a = path.q[k], &b = path.q[k - 1], &here = path.q[row];
-    for (std::size_t i = 0; i < N; ++i) {
-      state[i] = (a.beta[i] - here.beta[i]) + part * (b.beta[i] - a.beta[i]);
-      state[N + i] = (a.alpha[i] - here.alpha[i]) + part * (b.alpha[i] - a.alpha[i]);
-    }
+    const P &delay = this->template get<0>(), apart = delay * this->template get<1>();
+    const double now = path.time[row];
+    const auto add_half = [&](const P& late) {
+      const double then = now - value(late);
+      std::size_t k = row;  // then lies between rows k - 1 and k, or before the first of a clock that started anew
+      while (k > 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
+      const P part = (path.time[k] - now + late) * (1 / (path.time[k] - path.time[k - 1]));
+      const auto &a = path.q[k], &b = path.q[k - 1], &here = path.q[row];
+      for (std::size_t i = 0; i < N; ++i) {
+        state[i] = state[i] + 0.5 * ((a.beta[i] - here.beta[i]) + part * (b.beta[i] - a.beta[i]));
+        state[N + i] = state[N + i] + 0.5 * ((a.alpha[i] - here.alpha[i]) + part * (b.alpha[i] - a.alpha[i]));
+      }
+    };
+    add_half(delay - apart);
+    add_half(delay + apart);
   }
 
   void actuate(const Occasion&, std::array<P, N>& beta, std::array<P, N>& alpha) const noexcept {

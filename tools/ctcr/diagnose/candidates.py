@@ -28,7 +28,7 @@ VARIANTS = {
     "field_distortion": (("scale",), None, METAL, ()),
 }  # None: all amplitudes; (): all parameters but those of a piece of metal
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
-FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0})}
+FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0}), "delay": ({"spread": 0.5},)}
 # Shape parameters whose slope does not lead far, since it leaves out what tubes wind each other up: parts of the value
 # reached so far from which a fit begins, too.
 STARTS = {"effects.friction.slip_angle": (1.0, 0.5, 0.25)}
