@@ -22,7 +22,7 @@ TEST(Descent, StaysWithinBoundsAndSaysSo) {
   const Identification fit = identify(toy.predictor(), parameters, noise, toy.places);
   EXPECT_NEAR(fit.values[0], 0.2, 1e-9);
   ASSERT_FALSE(fit.warnings.empty());
-  EXPECT_NE(fit.warnings[0].find("stopped at its bound"), std::string::npos);
+  EXPECT_TRUE(fit.warnings[0].starts_with("stopped at a bound: p1 (0.2)")) << fit.warnings[0];
 }
 
 /// The minimum of |y - slope x|^2_W + |x|^2 where change . x >= low of every bound, by trying all sets of bounds that hold

@@ -181,6 +181,32 @@ def test_a_hidden_effect_is_found(robot, plan, given):
     assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
 
 
+def places_to_find(robot, plan) -> dict[str, dict[str, float]]:
+    """Effects that are somewhere: at a moment, at a plane, beside the tracker."""
+    tips = ctcr.Model(robot).predict(plan.beta, plan.alpha, plan.force).position
+    read = effect_model.readings(robot, plan).position
+    normal = np.array([np.cos(0.5) * np.cos(1.2), np.cos(0.5) * np.sin(1.2), np.sin(0.5)])
+    metal = read.mean(axis=0) + 1.1 * np.ptp(read, axis=0).max() * np.array([0.6, -0.64, 0.48])
+    return {
+        "frame_jump": {"x": 4e-4, "y": -3e-4, "when": 0.371},
+        "contact": {"stiffness": 20.0, "azimuth": 1.2, "elevation": 0.5, "distance": np.quantile(tips @ normal, 0.6)},
+        "field_distortion": {"metal_volume": 1e-4} | dict(zip(("metal_x", "metal_y", "metal_z"), metal, strict=True)),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("identity", ["frame_jump", "contact", "field_distortion"])
+def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
+    given = {f"effects.{identity}.{name}": x for name, x in places_to_find(robot, plan)[identity].items()}
+    made = simulation.simulate(effect_fit.with_values(robot, [identity], given), plan, "jitter", seed=1)
+    added = effect_fit.add(robot, made, [identity], free=CALIBRATION)
+    rms = added.rms("rms_mm")
+    assert rms["calibrated"] > 1.5 * rms["noise_floor"]
+    assert rms[identity] < 1.25 * rms["noise_floor"]
+    if identity == "frame_jump":
+        part = recording.session_part(made)
+        np.testing.assert_array_equal(part > added.robot.effects["frame_jump"]["when"], part > 0.371)
+
+
 def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan):
     """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
     true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")

@@ -16,10 +16,11 @@ from ctcr import (
     robot_update,
 )
 from ctcr.calibrate import parameters
-from ctcr.diagnose.candidates import starts
+from ctcr.calibrate.checks import sentence
+from ctcr.diagnose.candidates import candidates, starts
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
-from ctcr.diagnose.race import likeliest
+from ctcr.diagnose.race import begin, likeliest, screen
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.measurements import Measurements
@@ -31,6 +32,7 @@ from ctcr.robot_update import Change, Entry
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+PLACES = 2  # of an effect that are tried, the best by their slopes, with outliers and without
 SAYS_NOTHING = 0.9  # posterior over prior standard deviation
 
 
@@ -86,10 +88,10 @@ def add(
 ) -> Added:
     """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
 
-    Of each effect the amplitudes are fitted first, then its shape parameters are freed too. `fixed` parameters, by
-    full name in SI, keep their value, those of `start` begin at one. Every fourth run (where there are few: block of
-    time) is kept out of the fits that give the errors; the values are those of a fit to all rows. Raises InputError
-    where no fit is possible.
+    Of each effect the amplitudes are fitted first, then its shape parameters are freed too, also from where slopes say
+    that they may be. `fixed` parameters, by full name in SI, keep their value, those of `start` begin at one. Every
+    fourth run (where there are few: block of time) is kept out of the fits that give the errors; the values are those
+    of a fit to all rows. Raises InputError where no fit is possible.
     """
     readings, said = prepared(robot, readings)
     fixed = dict(fixed or {})
@@ -99,26 +101,29 @@ def add(
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, free, fixed)
         now, nominal = stage.values(), stage.nominal(fitted)
-        fit = stage(fitted, fitted, ~held, now)
+        fit = stage(fitted, fitted, ~held, [now])
         progress.advance(1)
         judged = held if held.any() else np.ones(len(readings), bool)
         stages = [Stage("nominal", *_rms(nominal[judged])), _stage("calibrated", fit, judged)]
         for identity in ids:
             fitted.append(identity)
-            for shaped in (fitted[:-1], fitted):
-                now |= dict(zip(fit.names, fit.values, strict=True))
-                if shaped is not fitted or stage.shapes(identity):
-                    fit = stage(fitted, shaped, ~held, now)
-                progress.advance(1)
+            begun = set(effects.get(identity, robot.n_tubes).names()) & {*fixed, *(start or {})}
+            elsewhere = [] if begun else [now | values for values in stage.places(identity, fit, fitted)]
+            now |= values_of(fit)
+            fit = stage(fitted, fitted[:-1], ~held, [now])
+            progress.advance(1)
+            now |= values_of(fit)
+            if stage.shapes(identity):
+                fit = stage(fitted, fitted, ~held, [*elsewhere, now])
+            progress.advance(1)
             stages.append(_stage(identity, fit, judged))
         if held.any():
-            now |= dict(zip(fit.names, fit.values, strict=True))
-            fit = stage(fitted, fitted, np.ones(len(readings), bool), now)
+            fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
     fit = open_side.widened(fit)
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(
-        _applied(robot, fit),
+        _applied(stage.robot, fit),
         list(ids),
         fit,
         stages,
@@ -248,22 +253,43 @@ class _Fitter:
         return _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
 
     def __call__(
-        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, start: Mapping[str, float]
+        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, begins: Sequence[Mapping[str, float]]
     ) -> identify.Fit:
         engine = self.engine
         engine.robot, engine.rows = self._with(ids), rows
         known = [effects.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        likely = likeliest(engine, own, self._best(own, start), {})
+        likely = likeliest(engine, own, self._best(own, begins), {})
         # The robot is to predict; how sure its values are is another question.
         fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
         fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
         return replace(fit, units=[parameters.field_of(name).unit for name in fit.names])
 
-    def _best(self, own: Sequence[str], start: Mapping[str, float]) -> dict[str, float]:
+    def places(self, identity: str, before: identify.Fit, ids: Sequence[str]) -> list[dict[str, float]]:
+        """Where slopes at the fit before, of all rows, say that an effect may be: a plane, a piece of metal.
+
+        A jump is put where they say: between which rows it was, no fit can find.
+        """
+        engine = self.engine
+        engine.robot, engine.rows = self._with(ids), np.ones(len(engine.measurements), bool)
+        usual, _ = candidates(engine.robot, engine.measurements)
+        plain = [one for one in usual if one.id == identity and not one.shape]
+        found = []
+        # What a contact does to a few readings looks like outliers: with and without these.
+        for weights in (None, np.ones((len(engine.measurements), 2))):
+            there = engine.linear_fit(before, weights=weights)
+            entries = [e for e in screen(*engine.thinned(there), plain, {}) if e.candidate.shape]
+            found += [(entry, begin(engine, there, entry)) for entry in entries[:PLACES]]
+        if found:
+            fitted = effects.get(identity, self.robot.n_tubes).shapes
+            chosen = {name: x for name, x in found[0][0].candidate.shape if name not in fitted}
+            self.robot = with_values(self.robot, [identity], chosen)
+        return [start for _, start in found]
+
+    def _best(self, own: Sequence[str], begins: Sequence[Mapping[str, float]]) -> dict[str, float]:
         """The best of all starts for these parameters of effects."""
-        first, *others = starts(own, start)
+        first, *others = [start for values in begins for start in starts(own, values)]
         if not others:
             return first
         fit = self.engine.fit(own, start=first, near=True, tolerance=identify.COARSE)
@@ -316,7 +342,7 @@ def _rms(residual: Array) -> tuple[float, float]:
 def _notices(robot: Robot, fit: identify.Fit, ids: Sequence[str]) -> list[str]:
     """What to doubt of the fitted effects."""
     known = effects.parameter_of(robot.n_tubes)
-    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *fit.warnings]
+    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
     place = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = effects.get(identity, robot.n_tubes)

@@ -15,6 +15,12 @@ inline std::string number(double value) {
   return text;
 }
 
+inline std::string listed(const std::vector<std::string>& names) {
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  return all;
+}
+
 /// All that makes a fit impossible. @throws std::invalid_argument with one sentence a line
 inline void check(const std::vector<FreeParameter>& parameters, const Noise& noise, const Eigen::MatrixX3d& places,
                   const IdentifyOptions& options) {
@@ -61,19 +67,28 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
     warn("only " + std::to_string(out.observations) + " numbers were measured for " + std::to_string(n) +
          " parameters: " +
          (out.observations < n ? "the prior decides" : "few are left to tell a wrong model from a right one"));
+  std::vector<std::string> idle, open, moved, stopped;
   for (Eigen::Index k = 0; k < n; ++k) {
     const FreeParameter& p = parameters[std::size_t(k)];
     if (!(information[k] > 0))
-      warn(p.name + " has no effect on these readings: it stays where it was");
+      idle.push_back(p.name);
     else if (!std::isfinite(out.sd[k]))
-      warn(p.name + " is not determined by these readings, and no prior says what it is: give it one or leave it out");
-    if (std::abs(out.shift[k]) > 2)
-      warn(p.name + " moved by " + number(out.shift[k]) +
-           " prior standard deviations: its prior is too narrow, or it stands in for something else");
+      open.push_back(p.name);
+    if (std::abs(out.shift[k]) > 2) moved.push_back(p.name + " (" + number(out.shift[k]) + ")");
     const double margin = 1e-6 * out.sd[k];
     if (out.values[k] <= p.low + margin || out.values[k] >= p.high - margin)
-      warn(p.name + " stopped at its bound " + number(out.values[k]));
+      stopped.push_back(p.name + " (" + number(out.values[k]) + ")");
   }
+  const auto warn_of = [&](const std::vector<std::string>& names, const std::string& text) {
+    if (!names.empty()) warn(text + ": " + listed(names));
+  };
+  warn_of(idle, "without effect on these readings and left as it was");
+  warn_of(open, "determined neither by these readings nor by a prior: give it one or leave it out");
+  warn_of(
+      moved,
+      "moved by more than 2 prior standard deviations (the prior is too narrow, or the value stands in for something "
+      "else)");
+  warn_of(stopped, "stopped at a bound");
   for (const std::string& text : reached) warn("the fit stopped where " + text);
   if (posterior.singular() && out.sd.allFinite()) warn("some combination of the parameters is not determined");
   for (int kind = 0; kind < 2; ++kind)

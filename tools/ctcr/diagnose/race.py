@@ -289,7 +289,7 @@ def refit(
     candidate = entry.candidate
     progress(f"fitting {candidate.label}")
     added = [name for name in before.names if name.startswith("effects.")]
-    first = values_of(entry.fit) if entry.fit else _start(engine, before, entry)
+    first = values_of(entry.fit) if entry.fit else begin(engine, before, entry)
     for start in (first, values_of(before)):
         try:
             fit = engine.fit_like(
@@ -313,7 +313,7 @@ def refit(
     )
 
 
-def _start(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float]:
+def begin(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float]:
     """Where the slopes say that the refit will end."""
     fitted = entry.candidate.names[: len(entry.gain.values)]  # the shapes of a contact come after
     neutral, sd, _, _ = engine.priors(fitted)
