@@ -18,9 +18,9 @@ from ctcr import (
     robot_file,
     simulation,
 )
-from ctcr.diagnose.split import locked_rows
 from ctcr.effect_settings import settings
 from ctcr.errors import InputError
+from hidden_effect import hidden
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
@@ -48,11 +48,6 @@ def run(capsys):
         return code, printed.out, printed.err
 
     return run
-
-
-def hidden(robot, **given) -> ctcr.robot_file.Robot:
-    values = settings([f"{name.replace('__', '.')}={value}" for name, value in given.items()], robot)
-    return effect_fit.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
 
 
 # ---- ctcr effects
@@ -155,78 +150,6 @@ def test_a_model_refuses_what_it_cannot_use(robot):
         model.predict(np.zeros((1, 3)), np.zeros((1, 3)), derivatives=True)
     with pytest.raises(InputError, match="standard model alone"):
         model.shape([-0.3, -0.2, -0.1], [0, 0, 0])
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"sensor_offset__x": "0.001"},
-        {"backlash_rotation": "0.01,0.02,0.01"},
-        {"anisotropy__along": "0.05,-0.05,0.05"},
-    ],
-    ids=lambda given: next(iter(given)),
-)
-def test_a_hidden_effect_is_found(robot, plan, given):
-    true = hidden(robot, **given)
-    (identity,) = true.effects
-    made = simulation.simulate(true, plan, "jitter", seed=1)
-    added = effect_fit.add(robot, made, [identity], free=CALIBRATION)
-    value_of = effects.value_of(true)
-    for name, found in added.parameters().items():
-        assert abs(found["value"] - value_of[name]) < 3 * found["sd"] + 1e-12, name
-    rms = added.rms("rms_mm")
-    assert list(rms) == ["nominal", "calibrated", identity, "noise_floor"]
-    assert rms[identity] < 0.7 * rms["calibrated"]
-    locked = np.unique(made.run[locked_rows(robot, made)])
-    assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
-
-
-def places_to_find(robot, plan) -> dict[str, dict[str, float]]:
-    """Effects that are somewhere: at a moment, at a plane, beside the tracker."""
-    tips = ctcr.Model(robot).predict(plan.beta, plan.alpha, plan.force).position
-    read = effect_model.readings(robot, plan).position
-    normal = np.array([np.cos(0.5) * np.cos(1.2), np.cos(0.5) * np.sin(1.2), np.sin(0.5)])
-    metal = read.mean(axis=0) + 1.1 * np.ptp(read, axis=0).max() * np.array([0.6, -0.64, 0.48])
-    return {
-        "frame_jump": {"x": 4e-4, "y": -3e-4, "when": 0.371},
-        "contact": {"stiffness": 20.0, "azimuth": 1.2, "elevation": 0.5, "distance": np.quantile(tips @ normal, 0.6)},
-        "field_distortion": {"metal_volume": 1e-4} | dict(zip(("metal_x", "metal_y", "metal_z"), metal, strict=True)),
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize("identity", ["frame_jump", "contact", "field_distortion"])
-def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
-    given = {f"effects.{identity}.{name}": x for name, x in places_to_find(robot, plan)[identity].items()}
-    made = simulation.simulate(effect_fit.with_values(robot, [identity], given), plan, "jitter", seed=1)
-    added = effect_fit.add(robot, made, [identity], free=CALIBRATION)
-    rms = added.rms("rms_mm")
-    assert rms["calibrated"] > 1.5 * rms["noise_floor"]
-    assert rms[identity] < 1.25 * rms["noise_floor"]
-    if identity == "frame_jump":
-        part = recording.session_part(made)
-        np.testing.assert_array_equal(part > added.robot.effects["frame_jump"]["when"], part > 0.371)
-
-
-def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan):
-    """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
-    true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")
-    made = simulation.simulate(true, plan, "jitter", seed=1)
-    there = {name: value for name, value in effects.value_of(true).items() if ".softening." in name}
-    alone, begun = (
-        effect_fit.add(robot, made, ["softening"], start=start, free=CALIBRATION) for start in (None, there)
-    )
-    for name in ("nominal", "calibrated"):
-        assert begun.rms("rms_mm")[name] == pytest.approx(alone.rms("rms_mm")[name], rel=1e-9)
-    for name, found in begun.parameters().items():
-        assert abs(found["value"] - alone.parameters()[name]["value"]) < 0.5 * found["sd"], name
-
-
-def test_what_the_data_cannot_say_is_said(robot, plan):
-    timeless = replace(simulation.simulate(robot, plan, "jitter"), t=np.full(len(plan), np.nan))
-    one_run = replace(timeless, run=0 * plan.run)
-    added = effect_fit.add(robot, one_run, ["delay"], free=["tracker.position.*"])
-    assert any("say nothing of delay" in notice for notice in added.notices)
-    assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
 
 
 def test_remove_undoes_add(run, robot, plan, table, tmp_path):
