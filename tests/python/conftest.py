@@ -25,3 +25,18 @@ def plan():
     kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
     names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
     return replace(table, **{name: getattr(table, name)[kept] for name in names})
+
+
+@pytest.fixture(scope="session")
+def hidden():
+    """hidden(robot, friction__coefficient="0.01"): the robot with effects that a test hides in its readings."""
+    from ctcr import effect_fit
+    from ctcr.effect_settings import settings
+
+    def with_them(robot, **given):
+        values = settings([f"{name.replace('__', '.')}={value}" for name, value in given.items()], robot)
+        return effect_fit.with_values(
+            robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values
+        )
+
+    return with_them

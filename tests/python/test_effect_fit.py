@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from ctcr import effect_fit, effect_model, effects, recording, robot_file, simulation
 from ctcr.diagnose.split import locked_rows
-from ctcr.effect_settings import settings
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml"
 CALIBRATION = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
@@ -28,8 +27,7 @@ def robot():
     ],
     ids=lambda given: next(iter(given)),
 )
-from hidden_effect import hidden
-def test_a_hidden_effect_is_found(robot, plan, given):
+def test_a_hidden_effect_is_found(robot, plan, given, hidden):
     true = hidden(robot, **given)
     (identity,) = true.effects
     made = simulation.simulate(true, plan, "jitter", seed=1)
@@ -70,7 +68,7 @@ def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
         np.testing.assert_array_equal(part > added.robot.effects["frame_jump"]["when"], part > 0.371)
 
 
-def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan):
+def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan, hidden):
     """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
     true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")
     made = simulation.simulate(true, plan, "jitter", seed=1)

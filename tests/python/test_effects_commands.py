@@ -20,7 +20,6 @@ from ctcr import (
 )
 from ctcr.effect_settings import settings
 from ctcr.errors import InputError
-from hidden_effect import hidden
 
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
@@ -125,7 +124,7 @@ def test_neutral_effects_change_nothing(robot, plan):
     )
 
 
-def test_the_model_without_path_is_the_recording(robot, plan):
+def test_the_model_without_path_is_the_recording(robot, plan, hidden):
     model = ctcr.Model(robot, steps=4).predict(plan.beta, plan.alpha, plan.force)
     read = effect_model.readings(robot, plan, steps=4)
     np.testing.assert_allclose(read.position, model.position, atol=1e-9)
@@ -136,13 +135,13 @@ def test_the_model_without_path_is_the_recording(robot, plan):
     assert np.linalg.norm(with_effects.position - read.position, axis=1).max() > 1e-4
 
 
-def test_a_model_uses_the_tube_not_the_sensor(robot, plan):
+def test_a_model_uses_the_tube_not_the_sensor(robot, plan, hidden):
     off = hidden(robot, sensor_offset__x="0.003")
     a, b = (ctcr.Model(r).predict(plan.beta, plan.alpha).position for r in (off, robot))
     np.testing.assert_array_equal(a, b)
 
 
-def test_a_model_refuses_what_it_cannot_use(robot):
+def test_a_model_refuses_what_it_cannot_use(robot, hidden):
     with pytest.raises(InputError, match="friction, delay need the rows in their order"):
         ctcr.Model(hidden(robot, friction__coefficient="0.01", delay="0.05"))
     model = ctcr.Model(hidden(robot, softening="0.01"))
@@ -152,7 +151,7 @@ def test_a_model_refuses_what_it_cannot_use(robot):
         model.shape([-0.3, -0.2, -0.1], [0, 0, 0])
 
 
-def test_remove_undoes_add(run, robot, plan, table, tmp_path):
+def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):
     data, first, second, third, last = (
         tmp_path / name for name in ("m.csv", "1.yaml", "2.yaml", "3.yaml", "4.yaml")
     )
@@ -200,7 +199,7 @@ def test_add_what_a_diagnosis_found(run, tmp_path, robot):
     assert not any(written["friction"]["coefficient"])  # a strength is fitted, not taken over
 
 
-def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, plan):
+def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, plan, hidden):
     """Two laws of friction beside each other would share what one of them explains."""
     data, answer, target = tmp_path / "m.csv", tmp_path / "diagnosis.json", tmp_path / "new.yaml"
     simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data, 3)
@@ -324,7 +323,7 @@ def test_history_of_a_new_robot(run):
     assert code == 0 and "nothing was changed yet" in out
 
 
-def test_history_report(run, tmp_path, robot, plan):
+def test_history_report(run, tmp_path, robot, plan, hidden):
     data, new, page = tmp_path / "m.csv", tmp_path / "new.yaml", tmp_path / "page.html"
     simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data, 3)
     assert (
