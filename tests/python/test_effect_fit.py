@@ -6,7 +6,16 @@ from pathlib import Path
 import ctcr
 import numpy as np
 import pytest
-from ctcr import effect_fit, effect_model, effects, recording, robot_file, simulation
+from ctcr import (
+    effect_fit,
+    effect_model,
+    effects,
+    fitted_effects,
+    output,
+    recording,
+    robot_file,
+    simulation,
+)
 from ctcr.diagnose.split import locked_rows
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml"
@@ -88,3 +97,20 @@ def test_what_the_data_cannot_say_is_said(robot, plan):
     added = effect_fit.add(robot, one_run, ["delay"], free=["tracker.position.*"])
     assert any("say nothing of delay" in notice for notice in added.notices)
     assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
+
+
+def test_of_many_coefficients_the_clearest_are_shown(capsys):
+    """All parameters of a few; of a field of many terms those that stand out, and how many do not."""
+    field = effects.get("field_distortion", 3)
+    many = [(name, 1e-4 * (k % 7), 1e-4) for k, name in enumerate(field.names())]
+    console = output.console(None)
+    fitted_effects.show(
+        console, 3, [("tracker.position.x", 0.1, 0.1), ("effects.delay.delay", 0.0606, 0.0015), *many]
+    )
+    out = capsys.readouterr().out
+    assert "Fitted: delay (SI)" in out and "0.0606" in out and "tracker" not in out.split("Fitted: field")[0]
+    told = [line.split()[0] for line in out.split("Fitted: field_distortion")[1].splitlines() if line.strip()]
+    names = [p.name for p in field.parameters]
+    shown = [name for name in names if name in told]
+    assert {"metal_volume", "metal_x", "coils_z", "scale"} < set(shown) and len(shown) < 25
+    assert f"and {len(names) - len(shown)} coefficients" in out

@@ -5,7 +5,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -80,14 +80,17 @@ def listed(items: Sequence[Any], most: int) -> str:
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
 
 
-def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1):
-    """A rich table: the first columns are text, the others numbers."""
+def table(
+    title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()
+):
+    """A rich table: the first columns, or those of `text`, are text, the others numbers; the first is never cut."""
     from rich import box
     from rich.table import Table
 
     made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
-        made.add_column(column, justify="left" if i < text_columns else "right")
+        is_text = i in text if text else i < text_columns
+        made.add_column(column, justify="left" if is_text else "right", no_wrap=i == 0)
     for row in rows:
         made.add_row(*row)
     return made

@@ -86,16 +86,11 @@ def _as_data(added) -> dict:
 def _report(console, robot, added) -> None:
     from math import isfinite
 
-    from ctcr import effects
-    from ctcr.calibrate.outcome import deviation, number
+    from ctcr import fitted_effects
     from ctcr.output import table
 
-    known = effects.parameter_of(robot.n_tubes)
-    rows = [
-        [name.removeprefix("effects."), known[name].unit, number(found["value"], found["sd"]), deviation(found["sd"])]
-        for name, found in added.parameters().items()
-    ]  # fmt: skip
-    console.print(table("Fitted effects (SI)", ["parameter", "unit", "value", "sd"], rows, 2))
+    fitted = ((name, found["value"], found["sd"]) for name, found in added.parameters().items())
+    fitted_effects.show(console, robot.n_tubes, fitted)
     on = f"what the fit has not seen ({added.held_out})" if added.held_out else "the rows that were fitted"
     with_angle = isfinite(added.stages[0].rms_deg)
     rows = [

@@ -32,6 +32,7 @@ FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0}), "de
 # Shape parameters whose slope does not lead far, since it leaves out what tubes wind each other up: parts of the value
 # reached so far from which a fit begins, too.
 STARTS = {"effects.friction.slip_angle": (1.0, 0.5, 0.25)}
+TOLD = 6  # parameters of a candidate that its label names
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,16 @@ class Candidate:
     shape: tuple[tuple[str, float], ...] = ()
 
     @property
-    def label(self) -> str:
+    def told(self) -> str:
+        """Its parameters, and the values of those that are held."""
         own = dict.fromkeys(name.split(".")[2] for name in self.names)
+        told = [*own] if len(own) <= TOLD else [*list(own)[:3], f"{len(own) - 3} more"]
         held = (f"{name.split('.')[2]} {value:g}" for name, value in self.shape if name not in self.names)
-        return f"{self.id} ({', '.join([*own, *held])})"
+        return ", ".join([*told, *held])
+
+    @property
+    def label(self) -> str:
+        return f"{self.id} ({self.told})"
 
 
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:

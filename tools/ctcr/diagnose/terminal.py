@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ctcr import effects, output
+from ctcr import fitted_effects, output
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -37,8 +37,12 @@ def show(console: Any, result: "Diagnosis") -> None:
             console.print(_candidates(number, round_))
         if round_.why_not:
             console.print(round_.why_not, markup=False)
+    console.print(
+        "  slopes, fit: gain in log evidence, by slopes alone and in the fit; removed: of the excess error"
+    )
     if result.accepted:
-        console.print(_parameters(result))
+        fit = result.final
+        fitted_effects.show(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
     for line in result.leftover.in_words:
         console.print(line, markup=False)
     for notice in result.notices:
@@ -62,35 +66,25 @@ def _errors(result: "Diagnosis") -> Any:
 
 
 def _candidates(number: int, round_: Any) -> Any:
+    best = {entry.id: entry for entry in reversed(round_.entries)}  # of each effect: the best come first
+    if round_.accepted:
+        best[round_.accepted.id] = round_.accepted
     rows = []
-    for entry in round_.entries[:SHOWN]:
+    for entry in sorted(best.values(), key=lambda entry: (-entry.score, -entry.linear))[:SHOWN]:
         refitted = entry.refit is not None
         rows.append([
-            entry.candidate.label,
+            entry.id,
+            entry.candidate.told,
             f"{entry.linear:.1f}",
             f"{entry.refit:.1f}" if refitted else "",
             f"{entry.share:.0%}" if refitted else "",
             _remark(entry, round_),
         ])  # fmt: skip
-    columns = ["effect", "log evidence by slopes", "after refit", "excess removed", ""]
-    return output.table(
-        f"Round {number}: candidates, each fitted together with the calibration", columns, rows
-    )
+    title = f"Round {number}: effects, each fitted together with the calibration"
+    return output.table(title, ["effect", "parameters", "slopes", "fit", "removed", ""], rows, text=(0, 1, 5))
 
 
 def _remark(entry: Any, round_: Any) -> str:
     if entry is round_.accepted:
         return "accepted"
-    if round_.accepted and entry.id == round_.accepted.id:
-        return "another form of it"
-    return "cannot be told from it" if entry.id in round_.ids else ""
-
-
-def _parameters(result: "Diagnosis") -> Any:
-    known, fit = effects.parameter_of(result.robot.n_tubes), result.final
-    rows = [
-        [name.removeprefix("effects."), f"{value:.4g}", f"{sd:.2g}", known[name].unit, known[name].meaning]
-        for name, value, sd in zip(fit.names, fit.values, fit.sd, strict=True)
-        if name in known
-    ]
-    return output.table("Fitted effects", ["parameter", "value", "sd", "unit", "meaning"], rows)
+    return "as likely" if entry.id in round_.ids else ""
