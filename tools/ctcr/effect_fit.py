@@ -17,6 +17,7 @@ from ctcr import (
 )
 from ctcr.calibrate import parameters
 from ctcr.calibrate.checks import sentence
+from ctcr.diagnose import unsteady
 from ctcr.diagnose.candidates import candidates, starts
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
@@ -120,7 +121,7 @@ def add(
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
-    fit = open_side.widened(fit)
+    fit = unsteady.widened(stage.engine, open_side.widened(fit))
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(
         _applied(stage.robot, fit),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import jump
+from ctcr.diagnose import jump, unsteady
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
 from ctcr.diagnose.engine import Engine, values_of
@@ -241,7 +241,8 @@ def _diagnose(
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
     return Diagnosis(
-        robot, measurements, locked, unseen, alone, open_side.widened(after), open_side.widened(fit),
+        robot, measurements, locked, unseen, alone, open_side.widened(after),
+        unsteady.widened(engine, open_side.widened(fit)),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
         judge(alone, after, accepted, leftover, locked),
     )  # fmt: skip
@@ -322,7 +323,7 @@ def _backward(
         progress(f"without {a.entry.id}")
         names, fixed = racing.parameters([b.entry for b in rest])
         without = engine.fit_like(fit, names, start=values_of(fit), fixed=fixed, tolerance=identify.COARSE)
-        a.log_evidence = fit.log_evidence - without.log_evidence
+        a.log_evidence = unsteady.evidence(engine, fit) - unsteady.evidence(engine, without)
         if a.log_evidence < racing.EVIDENCE:
             accepted.remove(a)
             return racing.baseline(engine, [b.entry for b in accepted], values_of(without), progress)

@@ -43,6 +43,10 @@ class Linear:
         """The change of the fitted parameters that imitates whitened columns best, given their priors."""
         return np.linalg.solve(self.cholesky.T, np.linalg.solve(self.cholesky, self.jacobian.T @ columns))
 
+    def covariance(self) -> Array:
+        """Of the parameters, given the readings and the priors."""
+        return np.linalg.inv(self.cholesky @ self.cholesky.T)
+
     def gain(self, columns: Array) -> Gain:
         """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
         imitation = self.imitation(columns)

@@ -1,6 +1,6 @@
 """What no accepted effect explains: whether it has structure, and what it depends on."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ctcr import effect_model, identify
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
+from ctcr.diagnose import unsteady
 from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.far_off import come_together
 from ctcr.diagnose.race import is_rejected
@@ -24,6 +25,7 @@ class Leftover:
     before: Ranking  # of what depends on what before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
+    lags: list[str] = field(default_factory=list)  # what is to be said of a delay that varies
 
     @property
     def structured(self) -> bool:
@@ -51,7 +53,7 @@ class Leftover:
         on = ", ".join(item.label for item in self.after.chosen)
         depends = f"it depends on {on}" if on else "it depends on nothing that was tried"
         rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
-        return rejected + self.at_places
+        return rejected + self.lags + self.at_places
 
 
 def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Leftover:
@@ -61,7 +63,8 @@ def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Left
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     places = engine.measurements.row[come_together(engine.measurements, fit)].tolist()
-    return Leftover(is_rejected(engine, fit), places, ranked, after, sample)
+    lags = unsteady.in_words(engine, fit)
+    return Leftover(is_rejected(engine, fit), places, ranked, after, sample, lags)
 
 
 def _rank(engine: Engine, sample: Sample, fit: identify.Fit) -> Ranking:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import contact, jump, metal
+from ctcr.diagnose import contact, jump, metal, unsteady
 from ctcr.diagnose.candidates import Candidate, is_of_metal
 from ctcr.diagnose.engine import OUTLIER, Engine, Gain, values_of
 from ctcr.diagnose.prediction import predicts_better
@@ -232,7 +232,7 @@ def screen(
     engine: Engine, before: identify.Fit, candidates: list[Candidate], fixed: dict[str, float]
 ) -> list[Entry]:
     """All candidates with their gain by slopes, best first."""
-    linear = engine.linear(before)
+    linear = unsteady.linear(engine, before)
     candidates = [c for c in candidates if not set(c.names) & set(before.names)]
     names = list(dict.fromkeys([name for c in candidates for name in c.names] + contact.FORCE))
     slopes = engine.slopes(before, names, fixed | {jump.WHEN: -1.0})
@@ -304,7 +304,7 @@ def refit(
     share = share_of(before, fit, len(candidate.names))
     return replace(
         entry,
-        refit=fit.log_evidence - before.log_evidence,
+        refit=unsteady.evidence(engine, fit) - unsteady.evidence(engine, before),
         share=share,
         # A chi-square removed has a standard deviation of twice its root.
         spread=2 * np.sqrt(max(share, 0.0) / max(excess(before), 1.0)),
@@ -317,7 +317,7 @@ def begin(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float
     """Where the slopes say that the refit will end."""
     fitted = entry.candidate.names[: len(entry.gain.values)]  # the shapes of a contact come after
     neutral, sd, _, _ = engine.priors(fitted)
-    moved = before.values + before.prior_sd * entry.gain.calibration
+    moved = before.values + before.prior_sd * entry.gain.calibration[: len(before.names)]
     own = dict(zip(fitted, neutral + sd * entry.gain.values, strict=True))
     return dict(zip(before.names, map(float, moved), strict=True)) | dict(entry.candidate.shape) | own
 
