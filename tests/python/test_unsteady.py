@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import effect_fit, measurements, robot_file, simulation
-from ctcr.diagnose import diagnose
+from ctcr.diagnose import diagnose, figures
+from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
 DELAYS = (0.5, 0.75)  # s: rows of the demonstration follow each other slowly
@@ -80,3 +81,14 @@ def test_the_delay_is_no_surer_than_its_lags(steps, steady):
 def test_nothing_is_told_of_a_steady_delay(steady):
     assert [accepted.ids for accepted in steady.accepted] == [["delay"]]
     assert steady.leftover.in_words == ["What is left is noise."]
+
+
+def test_a_delay_is_drawn_over_the_speed_of_the_tip(steady):
+    """What the report shows of it: the error along the motion, and the same explained."""
+    picture = Figure()
+    assert figures.before_after(picture, steady) is None
+    (axes,) = [axes for axes in picture.axes if "speed of the tip" in axes.get_xlabel()]
+    error, explained = (line.get_ydata() for line in axes.lines[:2])
+    known = np.isfinite(error) & np.isfinite(explained)
+    assert np.corrcoef(error[known], explained[known])[0, 1] > 0.98
+    assert "along the motion" in axes.get_ylabel()

@@ -1,6 +1,7 @@
 """The pictures of the report, as SVG text. One colour means one thing in all of them."""
 
 import io
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,9 +12,11 @@ from scipy import stats
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.forms import FRAME_NAMES
+from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
 
 Array = NDArray[np.float64]
+Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 
 ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
 AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
@@ -190,36 +193,45 @@ def ranking(figure: Figure, c: Comparison) -> bool | None:
 def strongest(figure: Figure, c: Comparison) -> bool | None:
     """The error components against the strongest quantities."""
     chosen = {item.name for item in c.ranking.chosen}
-    items = [item for item in c.ranking.distinct() if _abscissa(item, c) is not None]
-    items = sorted(items, key=lambda item: item.name not in chosen)[:PANELS]
+    items = sorted(c.ranking.distinct(), key=lambda item: item.name not in chosen)
+    items = drawable(items, c.sample, c.ranking.rows)[:PANELS]
     if not items:
         return False
     columns = 3 if len(items) > 1 else 1
     grid = figure.subplots(int(np.ceil(len(items) / columns)), columns, squeeze=False).ravel()
     for axes in grid[len(items) :]:
         axes.set_visible(False)
-    for axes, item in zip(grid[: len(items)], items, strict=True):
-        _against(axes, item, c, item.name in chosen)
+    for axes, (item, against) in zip(grid[: len(items)], items, strict=True):
+        _against(axes, item, against, c, item.name in chosen)
     return None
 
 
-def _abscissa(item: Dependence, c: Comparison) -> tuple[Array, str, str] | None:
-    """Values, axis label and frame to draw a dependence with; None when it is no function of one number."""
-    if item.name == "lag":
-        speed = np.linalg.norm(c.sample.tip_velocity[c.ranking.rows], axis=1) * 1e3
-        return speed, "speed of the tip, mm/s", "motion"
+def drawable(items: Iterable[Dependence], sample: Sample, rows: Array) -> list[tuple[Dependence, Abscissa]]:
+    """Dependences on one number each, with what to draw them against; of several on the same the first."""
+    found: dict[str, tuple[Dependence, Abscissa]] = {}
+    for item in items:
+        against = _abscissa(item, sample, rows)
+        if against is not None:
+            found.setdefault(against[1], (item, against))
+    return list(found.values())
+
+
+def _abscissa(item: Dependence, sample: Sample, rows: Array) -> Abscissa | None:
+    if item.name in ("lag", "motion_offset"):
+        speed = np.linalg.norm(sample.tip_velocity[rows], axis=1) * 1e3
+        return (speed, "speed of the tip, mm/s", "motion") if np.isfinite(speed).any() else None
     quantity = item.form.covariate
     if quantity is None:
         return None
-    value = quantity.value[c.ranking.rows]
+    value = quantity.value[rows]
     if quantity.kind == "angle":
         value = np.angle(np.exp(1j * value))
     unit = f", {quantity.unit}" if quantity.unit else ""
     return value * quantity.scale, quantity.symbol + unit, item.form.frame
 
 
-def _against(axes, item: Dependence, c: Comparison, found: bool) -> None:
-    x, label, frame = _abscissa(item, c)
+def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bool) -> None:
+    x, label, frame = against
     local = np.einsum("kji,kj->ki", c.ranking.frames[frame], c.ranking.error) * 1e3
     known = np.isfinite(x)
     x, local = x[known], local[known]

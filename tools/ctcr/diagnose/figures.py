@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr.compare.figures import ERROR, FAINT, INK, NOISE
-from ctcr.diagnose.race import Entry, imitated
+from ctcr.compare.figures import ERROR, FAINT, INK, NOISE, drawable
+from ctcr.diagnose.race import imitated
 from ctcr.html_page import short
 
 if TYPE_CHECKING:
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 GOOD = "#4b8b3b"
 CANDIDATES = 10
+PANELS = 3
+PALE = 0.45  # of bars by slopes alone
 
 
 def waterfall(figure, d: "Diagnosis") -> None:
@@ -49,22 +51,19 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
         return False
     panels = figure.subplots(1, len(rounds), squeeze=False)[0]
     for number, (axes, round_) in enumerate(zip(panels, rounds, strict=True), start=1):
-        best: dict[str, float] = {}
-        for entry in round_.entries:
-            value = entry.refit if entry.refit is not None else entry.linear
-            best[entry.id] = max(value, best.get(entry.id, -np.inf))
-        shown = sorted(best.items(), key=lambda item: -item[1])[:CANDIDATES]
-        for i, (identity, value) in enumerate(shown):
-            accepted = identity in round_.ids
+        shown = round_.best[:CANDIDATES]
+        for i, entry in enumerate(shown):
+            value = entry.linear if entry.refit is None else entry.refit
+            accepted = entry.id in round_.ids
             axes.barh(
                 i, max(value, 0.3), color=GOOD if accepted else FAINT, edgecolor=INK if accepted else "none",
-                linewidth=1.5,
+                linewidth=1.5, alpha=PALE if entry.refit is None else 1,
             )  # fmt: skip
             axes.text(max(value, 0.3), i, f" {value:.1f}", va="center", fontsize=9)
-        axes.set_yticks(range(len(shown)), [identity.replace("_", " ") for identity, _ in shown])
+        axes.set_yticks(range(len(shown)), [entry.id.replace("_", " ") for entry in shown])
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
-        axes.set_xlim(0, 8 * max(10.0, *(value for _, value in shown)))
+        axes.set_xlim(0, 8 * max(10.0, *(max(entry.linear, entry.score) for entry in shown)))
         axes.set_xlabel("log evidence over none")
         axes.set_title(f"round {number}")
     return None
@@ -73,43 +72,40 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
 def before_after(figure, d: "Diagnosis") -> bool | None:
     """The error after calibration against what predicts it best, and the part of it that the effects found explain.
 
-    Both along the direction in which the effects act most.
+    Both along the tip's motion where it is that, else along the direction in which the effects act most.
     """
     ranking, sample = d.leftover.before, d.leftover.sample
-    quantities = [item.form.covariate for item in ranking.chosen if item.form.covariate][:3]
-    if not quantities or not d.accepted:
+    drawn = drawable([*ranking.chosen, *ranking.distinct()], sample, ranking.rows)
+    drawn = drawn[: max(1, min(len(ranking.chosen), PANELS))]
+    if not drawn or not d.accepted:
         return False
-    rows = np.searchsorted(d.measurements.row, sample.row)
-    error = 1e3 * d.calibrated.residual[rows, :3]
-    explained = error - 1e3 * d.with_effects.residual[rows, :3]
-    known = np.isfinite(explained).all(axis=1)
-    _, _, axes_of_effect = np.linalg.svd(
-        explained[known] - explained[known].mean(axis=0), full_matrices=False
-    )
-    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
-    for axes, quantity in zip(panels, quantities, strict=True):
-        x = quantity.scale * quantity.value
-        for vectors, colour, label in (
-            (error, ERROR, "error after calibration"),
+    rows = np.searchsorted(d.measurements.row, sample.row[ranking.rows])
+    before, after = (1e3 * fit.residual[rows, :3] @ sample.rotation for fit in (d.calibrated, d.with_effects))
+    explained = before - after
+    finite = np.isfinite(explained).all(axis=1)
+    _, _, main = np.linalg.svd(explained[finite] - explained[finite].mean(axis=0), full_matrices=False)
+    panels = figure.subplots(1, len(drawn), squeeze=False)[0]
+    for axes, (_, (x, label, frame)) in zip(panels, drawn, strict=True):
+        along = ranking.frames["motion"][:, :, 0] if frame == "motion" else np.tile(main[0], (len(rows), 1))
+        for vectors, colour, name in (
+            (before, ERROR, "error after calibration"),
             (explained, GOOD, "explained by the effects found"),
         ):
-            axes.plot(x, vectors @ axes_of_effect[0], ".", color=colour, markersize=4, alpha=0.6, label=label)
+            y = np.sum(vectors * along, axis=1)
+            axes.plot(x, y, ".", color=colour, markersize=4, alpha=0.6, label=name)
         axes.axhline(0, color=INK, linewidth=0.6)
-        axes.set_xlabel(f"{quantity.label}, {quantity.unit}" if quantity.unit else quantity.label)
-    panels[0].set_ylabel("along the main direction, mm")
+        axes.set_xlabel(label)
+        axes.set_ylabel(f"along the {'motion' if frame == 'motion' else 'main direction'}, mm")
     panels[0].legend(markerscale=3)
     return None
 
 
 def overlap(figure, d: "Diagnosis") -> bool | None:
     """How much of the signal of each candidate of the first round another one can imitate together with calibration."""
-    best: dict[str, Entry] = {}
-    for entry in d.rounds[0].entries:
-        if entry.fit is not None:
-            best.setdefault(entry.id, entry)
+    best = [entry for entry in d.rounds[0].best if entry.fit is not None]
     if len(best) < 2:
         return False
-    share = np.array([[imitated(of, by) for by in best.values()] for of in best.values()])
+    share = np.array([[imitated(of, by) for by in best] for of in best])
     axes = figure.subplots()
     axes.grid(False)
     picture = axes.imshow(share, vmin=0, vmax=1, cmap="Blues")
@@ -117,7 +113,7 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
         axes.text(
             j, i, f"{share[i, j]:.2f}", ha="center", va="center", color="w" if share[i, j] > 0.6 else INK
         )
-    names = [identity.replace("_", " ") for identity in best]
+    names = [entry.id.replace("_", " ") for entry in best]
     axes.set_xticks(range(len(best)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(best)), names)
     axes.set_xlabel("imitated by")

@@ -80,6 +80,14 @@ class Round:
         """A sentence, or nothing where an effect was accepted."""
         return f"Nothing accepted: {self.reason}." if self.reason else ""
 
+    @property
+    def best(self) -> list[Entry]:
+        """Of each effect the accepted form, or the best one; those that were refitted come first."""
+        found = {entry.id: entry for entry in reversed(self.entries)}
+        if self.accepted:
+            found[self.accepted.id] = self.accepted
+        return sorted(found.values(), key=lambda entry: (-entry.score, -entry.linear))
+
     def shed(self) -> None:
         """Gives back the memory of what was fitted: of many rows, a round would keep as much as all else."""
         self.before = self.before.without_readings()

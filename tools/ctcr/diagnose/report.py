@@ -97,8 +97,8 @@ def _view(d: "Diagnosis") -> str:
 def _candidates(d: "Diagnosis") -> str:
     drawn = figure(
         figures.candidates, d, 10.4, 4.4,
-        "Every candidate was fitted together with the calibration. Boxed: accepted, with all that these data cannot "
-        "tell from it.", True,
+        "Every candidate was judged together with the calibration; pale: by slopes alone, too far behind to be fitted. "
+        "Boxed: accepted, with all that these data cannot tell from it.", True,
     )  # fmt: skip
     apart = figure(
         figures.overlap, d, 5.2, 4.2,

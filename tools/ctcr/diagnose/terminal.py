@@ -66,11 +66,8 @@ def _errors(result: "Diagnosis") -> Any:
 
 
 def _candidates(number: int, round_: Any) -> Any:
-    best = {entry.id: entry for entry in reversed(round_.entries)}  # of each effect: the best come first
-    if round_.accepted:
-        best[round_.accepted.id] = round_.accepted
     rows = []
-    for entry in sorted(best.values(), key=lambda entry: (-entry.score, -entry.linear))[:SHOWN]:
+    for entry in round_.best[:SHOWN]:
         refitted = entry.refit is not None
         rows.append([
             entry.id,
