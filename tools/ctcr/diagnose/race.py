@@ -22,6 +22,7 @@ FIRST_UNASKED = 5.0  # of the first one
 SHARE = 0.25  # of the excess that a further effect must remove, and
 FIRST_SHARE = 0.1  # the first one
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
+ALIKE = 0.5  # ... and of forms of one effect the plainest is taken
 SURE = 5.0  # ... and beyond this they are
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 REFITS = 6  # effects that are refitted, the best by their slopes
@@ -352,11 +353,15 @@ def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> No
     unasked = UNASKED if is_further else FIRST_UNASKED
     round_.needed = EVIDENCE + np.log(tried)
     threshold = round_.needed + (0.0 if is_rejected else unasked)
-    fitted = [entry for entry in round_.entries if entry.fit is not None]
-    best = next((entry for entry in fitted if not (is_further and entry.implausible)), None)
-    if best is None:
+    fitted = [
+        entry for entry in round_.entries if entry.fit is not None and not (is_further and entry.implausible)
+    ]
+    if not fitted:
         round_.reason = "no candidate explains anything"
         return
+    best = fitted[0]
+    alike = [entry for entry in fitted if entry.id == best.id and best.score - entry.score < ALIKE]
+    best = min(alike, key=lambda entry: len(entry.candidate.shape))
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
