@@ -56,3 +56,21 @@ def test_a_delay_whose_moments_are_spread_is_freed_from_where_it_entered(robot, 
         [form] = forms(get("delay", robot.n_tubes), candidate)
         assert form.names == ("effects.delay.delay", SPREAD)
         assert form.shape == candidate.shape
+
+
+@pytest.mark.parametrize(("better", "chosen"), [(0.4, {}), (0.6, {SPREAD: 0.5})])
+def test_of_forms_that_are_as_likely_the_plainest_is_taken(better, chosen):
+    gain = Gain(0.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
+    plain, spread, other = (
+        racing.Entry(Candidate(identity, (name,), shape), gain, refit=score, share=0.9, fit=object())
+        for identity, name, shape, score in (
+            ("delay", "effects.delay.delay", (), 100.0),
+            ("delay", "effects.delay.delay", ((SPREAD, 0.5),), 100.0 + better),
+            ("tip_load", MASS, (), 20.0),
+        )
+    )
+    round_ = racing.Round(None, [spread, plain, other], {})
+    racing.decide(round_, tried=20, is_further=False, is_rejected=True)
+    assert dict(round_.accepted.candidate.shape) == chosen
+    assert round_.ids == ["delay"] and [entry.id for entry in round_.best] == ["delay", "tip_load"]
+    assert round_.best[0] is round_.accepted

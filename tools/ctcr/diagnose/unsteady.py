@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 DELAY = "effects.delay.delay"
 STRETCHES = 2  # of each run: out and back
+MOST = 48  # stretches: of more runs several share one, as each is a column of all readings
 SPREAD = 0.2  # standard deviation of a stretch's lag, over the delay
 TOLD = 5.0  # log evidence from which it is said
 
@@ -84,4 +85,5 @@ def _stretches(measurements: Measurements) -> NDArray[np.int64]:
     for k in np.unique(group):
         rows = np.flatnonzero(group == k)
         stretch[rows] = STRETCHES * k + np.arange(len(rows)) * STRETCHES // len(rows)
-    return stretch
+    count = int(stretch.max()) + 1
+    return stretch if count <= MOST else stretch * MOST // count
