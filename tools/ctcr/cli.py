@@ -40,6 +40,8 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line and exits: 0 when it did what was asked, 1 with what was wrong on standard error."""
+    # Before numpy loads: its matrices are too small for threads, which only wait for each other. The core has its own.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     sys.exit(run(arguments))
 
 
