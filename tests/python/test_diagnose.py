@@ -378,9 +378,8 @@ blank = racing.Entry(candidate=None, gain=None)
 
 def decided(score, share, is_further, is_rejected, spread=np.inf):
     """The round of one candidate among 21."""
-    only = dataclasses.replace(
-        blank, candidate=SimpleNamespace(id="delay"), refit=score, share=share, spread=spread, fit="a fit"
-    )
+    delay = SimpleNamespace(id="delay", shape=())
+    only = dataclasses.replace(blank, candidate=delay, refit=score, share=share, spread=spread, fit="a fit")
     round_ = racing.Round("a fit", [only], {})
     racing.decide(round_, 21, is_further, is_rejected)
     return round_
