@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from ctcr import output
 from ctcr.errors import InputError
+from rich.console import Console
 
 
 def test_a_file_appears_whole_and_replaces_the_old_one(tmp_path):
@@ -103,6 +104,20 @@ def test_json_holds_numpy_and_no_nan(tmp_path, capsys):
     output.write_json(data, str(tmp_path / "a.json"))
     output.write_json(data, "-")
     assert json.loads((tmp_path / "a.json").read_text()) == expected == json.loads(capsys.readouterr().out)
+
+
+def test_a_narrow_table_breaks_sentences_and_cuts_no_word_or_number():
+    sentence, number = "floor of a model without any history", "0.034 ± 0.006"
+    made = output.table(
+        "", ["", "id", "what", "p"], [[sentence, "precurvature_profile", sentence, number]], 3
+    )
+    narrow = Console(width=80, file=io.StringIO())
+    narrow.print(made)
+    text = narrow.file.getvalue()
+    assert max(map(len, text.splitlines())) <= 80
+    assert number in text and sentence not in text  # it had to give way
+    for word in ("precurvature_profile", *sentence.split()):
+        assert word in text
 
 
 def test_the_bar_waits_a_second_and_needs_a_terminal(monkeypatch):

@@ -83,14 +83,25 @@ def listed(items: Sequence[Any], most: int) -> str:
 def table(
     title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()
 ):
-    """A rich table: the first columns, or those of `text`, are text, the others numbers; the first is never cut."""
+    """A rich table: the first columns, or those of `text`, are text, the others numbers.
+
+    On a narrow terminal text goes on in the next line between words, so that numbers and names are not cut.
+    """
     from rich import box
     from rich.table import Table
 
     made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
         is_text = i in text if text else i < text_columns
-        made.add_column(column, justify="left" if is_text else "right", no_wrap=i == 0)
+        cells = [row[i].strip() for row in rows]
+        folds = is_text and any(" " in cell for cell in cells)
+        longest = max((len(word) for cell in cells for word in cell.split()), default=0)
+        made.add_column(
+            column,
+            justify="left" if is_text else "right",
+            no_wrap=not folds,
+            min_width=longest if folds else None,
+        )
     for row in rows:
         made.add_row(*row)
     return made

@@ -53,10 +53,8 @@ def _list(console, shown) -> None:
         for effect in shown
     ]
     columns = ["id", "what it is", "the data need", "looks like"]
-    made = table(f"{len(shown)} physical effects", columns, rows, 4)
-    made.columns[0].no_wrap = made.columns[3].no_wrap = True
     console.soft_wrap = False
-    console.print(made)
+    console.print(table(f"{len(shown)} physical effects", columns, rows, 4))
     console.print("ctcr effects ID tells how one looks in the data and what to measure to see it.")
 
 
@@ -85,7 +83,7 @@ def _tell(console, effect) -> None:
     ]  # fmt: skip
     columns = ["parameter (SI)", "unit", "kind", "neutral", "sd", "usual", "possible"]
     console.print()
-    console.print(table("", columns, rows, 3))
+    console.print(table("", columns, rows, text=(0, 1, 2, 5, 6)))
 
 
 def _families(effect):
