@@ -74,3 +74,21 @@ def test_of_forms_that_are_as_likely_the_plainest_is_taken(better, chosen):
     assert dict(round_.accepted.candidate.shape) == chosen
     assert round_.ids == ["delay"] and [entry.id for entry in round_.best] == ["delay", "tip_load"]
     assert round_.best[0] is round_.accepted
+
+
+def test_a_further_effect_with_a_value_that_is_hardly_possible_is_said_to_be_that():
+    gain = Gain(0.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
+    entry = racing.Entry(
+        Candidate("tip_load", (MASS,)),
+        gain,
+        refit=600.0,
+        share=0.9,
+        fit=object(),
+        implausible=(f"{MASS} = 3 kg",),
+    )
+    round_ = racing.Round(None, [entry], {})
+    racing.decide(round_, tried=20, is_further=True, is_rejected=True)
+    assert round_.accepted is None
+    assert round_.why_not == (
+        f"Nothing accepted: the best candidate, tip_load, wants what is hardly possible, {MASS} = 3 kg."
+    )

@@ -353,11 +353,13 @@ def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> No
     unasked = UNASKED if is_further else FIRST_UNASKED
     round_.needed = EVIDENCE + np.log(tried)
     threshold = round_.needed + (0.0 if is_rejected else unasked)
-    fitted = [
-        entry for entry in round_.entries if entry.fit is not None and not (is_further and entry.implausible)
-    ]
+    refitted = [entry for entry in round_.entries if entry.fit is not None]
+    fitted = [entry for entry in refitted if not (is_further and entry.implausible)]
     if not fitted:
         round_.reason = "no candidate explains anything"
+        if refitted:
+            wanted = ", ".join(refitted[0].implausible)
+            round_.reason = f"the best candidate, {refitted[0].id}, wants what is hardly possible, {wanted}"
         return
     best = fitted[0]
     alike = [entry for entry in fitted if entry.id == best.id and best.score - entry.score < ALIKE]
