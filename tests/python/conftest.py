@@ -19,10 +19,21 @@ DEMO = Path(__file__).parents[2] / "examples" / "data" / "demo" / "measurements.
 @pytest.fixture(scope="module")
 def plan():
     """80 rows in 8 runs of the demonstration, out and back, with loads."""
+    return demonstration(runs=8, every=4)
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """280 rows in 14 runs of the demonstration."""
+    return demonstration(runs=14, every=2)
+
+
+def demonstration(runs: int, every: int):
+    """Its first runs, and of these every n-th row."""
     from ctcr import measurements
 
     table = measurements.load(DEMO, 3)
-    kept = np.flatnonzero((table.run < 8) & (np.arange(len(table)) % 4 == 0))
+    kept = np.flatnonzero((table.run < runs) & (np.arange(len(table)) % every == 0))
     names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
     return replace(table, **{name: getattr(table, name)[kept] for name in names})
 

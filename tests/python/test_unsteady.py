@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr import effect_fit, measurements, robot_file, simulation
+from ctcr import effect_fit, robot_file, simulation
 from ctcr.diagnose import diagnose, figures
 from matplotlib.figure import Figure
 
@@ -16,14 +16,6 @@ DELAYS = (0.5, 0.75)  # s: rows of the demonstration follow each other slowly
 @pytest.fixture(scope="module")
 def robot():
     return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
-
-
-@pytest.fixture(scope="module")
-def recorded():
-    table = measurements.load(ROOT / "examples" / "data" / "demo" / "measurements.csv", 3)
-    kept = np.flatnonzero(np.arange(len(table)) % 2 == 0)
-    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
-    return replace(table, **{name: getattr(table, name)[kept] for name in names})
 
 
 def late(robot, table, delays):

@@ -49,7 +49,7 @@ def command(
     terminal.show(console, result)
     for warning in readings.warnings:
         console.print(f"{warning}", markup=False)
-    if result.accepted:
+    if result.accepted and not result.verdict.names_no_cause:
         found = "FILE" if json_target in (None, "-") else json_target
         way = f"ctcr add {robot} --diagnosis {found} --fit {measurements} -o NEW.yaml"
         hint = " (FILE: that of --json)" if found == "FILE" else ""

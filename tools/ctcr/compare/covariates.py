@@ -1,7 +1,7 @@
 """What the error may depend on: joints, joint differences, lengths, directions, speeds, load, place and time."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ class Covariate:
     scale: float
     kind: str
     value: Array  # (K,)
+    tube: int = 0  # that it belongs to alone; 0: to none
 
     def bases(self) -> list[Array]:
         """Columns (K, P) whose sums are smooth curves of the value, without the constant: plain ones, richer ones.
@@ -79,17 +80,18 @@ def _all(sample: Sample, pitch: float | None) -> Iterator[Covariate]:
         for i, beta in enumerate(sample.beta.T, 1):
             phase = 2 * np.pi * beta / pitch
             yield Covariate(f"screw_phase{i}", f"phase of drive screw {i}", f"screw {i}", "deg", 180 / np.pi,
-                            "angle", phase)  # fmt: skip
+                            "angle", phase, i)  # fmt: skip
     yield Covariate("time", "time since the start", "t", "s", 1.0, "number", sample.t)
     yield Covariate("order", "order of measuring", "row", "", 1.0, "number", sample.row.astype(float))
 
 
 def _joints(sample: Sample) -> Iterator[Covariate]:
     for i, alpha in enumerate(sample.alpha.T, 1):
-        yield _angle(f"alpha{i}", f"base angle α{i}", f"α{i}", alpha)
+        yield replace(_angle(f"alpha{i}", f"base angle α{i}", f"α{i}", alpha), tube=i)
     for i, beta in enumerate(sample.beta.T, 1):
         length = sample.tube_lengths[i - 1] + beta
-        yield _length(f"length{i}", f"deployed length of tube {i} (moves with β{i})", f"ℓ{i}", length)
+        label = f"deployed length of tube {i} (moves with β{i})"
+        yield replace(_length(f"length{i}", label, f"ℓ{i}", length), tube=i)
 
 
 def _differences(sample: Sample) -> Iterator[Covariate]:
@@ -105,19 +107,19 @@ def _differences(sample: Sample) -> Iterator[Covariate]:
 
 
 def _directions(sample: Sample) -> Iterator[Covariate]:
-    for name, symbol, column in _joint_columns(sample):
+    for name, symbol, column, tube in _joint_columns(sample):
         sign = sample.motion.direction[:, column].astype(float)
         yield Covariate(f"direction_{name}", f"direction of the last motion of {symbol}", f"sign of d{symbol}",
-                        "", 1.0, "direction", sign)  # fmt: skip
+                        "", 1.0, "direction", sign, tube)  # fmt: skip
 
 
 def _speeds(sample: Sample) -> Iterator[Covariate]:
     if not has_speed(sample):
         return
-    for name, symbol, column in _joint_columns(sample):
+    for name, symbol, column, tube in _joint_columns(sample):
         turns = name.startswith("alpha")
         yield Covariate(f"speed_{name}", f"speed of {symbol}", f"d{symbol}/dt", "deg/s" if turns else "mm/s",
-                        180 / np.pi if turns else 1e3, "number", sample.motion.rate[:, column])  # fmt: skip
+                        180 / np.pi if turns else 1e3, "number", sample.motion.rate[:, column], tube)  # fmt: skip
     speed = np.linalg.norm(sample.tip_velocity, axis=1)
     yield Covariate("tip_speed", "speed of the tip", "tip speed", "mm/s", 1e3, "number", speed)
 
@@ -146,12 +148,13 @@ def _place(sample: Sample) -> Iterator[Covariate]:
     )
 
 
-def _joint_columns(sample: Sample) -> Iterator[tuple[str, str, int]]:
+def _joint_columns(sample: Sample) -> Iterator[tuple[str, str, int, int]]:
+    """Name and symbol of each joint, its column, and its tube."""
     count = sample.beta.shape[1]
     for i in range(count):
-        yield f"alpha{i + 1}", f"α{i + 1}", count + i
+        yield f"alpha{i + 1}", f"α{i + 1}", count + i, i + 1
     for i in range(count):
-        yield f"beta{i + 1}", f"β{i + 1}", i
+        yield f"beta{i + 1}", f"β{i + 1}", i, i + 1
 
 
 def _angle(name: str, label: str, symbol: str, value: Array) -> Covariate:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import jump, unsteady
+from ctcr.diagnose import jump, unsteady, varying
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
 from ctcr.diagnose.engine import Engine, values_of
@@ -56,6 +56,7 @@ class Diagnosis:
     rounds: list[Round]
     accepted: list[Accepted]
     leftover: Leftover
+    varying: varying.Varying | None  # what would have to vary to explain what is left
     verdict: Verdict
     notices: list[str] = field(default_factory=list)
     seconds: float = 0.0
@@ -114,6 +115,12 @@ class Diagnosis:
         values = dict(accepted.entry.candidate.shape) | values_of(self.final)
         return {name.removeprefix(stem): value for name, value in values.items() if name.startswith(stem)}
 
+    @property
+    def depends_on(self) -> list[str]:
+        """Ids of the quantities on which what is left depends."""
+        more = self.varying.depends_on if self.varying else []
+        return list(dict.fromkeys([*self.leftover.depends_on, *more]))
+
     def as_json(self) -> dict[str, Any]:
         return {
             "verdict": self.verdict.word,
@@ -125,7 +132,7 @@ class Diagnosis:
                 }
                 for a in self.accepted
             ],
-            "leftover": {"structured": self.leftover.structured, "depends_on": self.leftover.depends_on},
+            "leftover": {"structured": self.leftover.structured, "depends_on": self.depends_on},
             "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
             "seconds": round(self.seconds, 2),
         }
@@ -240,11 +247,18 @@ def _diagnose(
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
+    varies, outdone = None, False
+    if leftover.rejected:
+        progress("parameters that are not constant")
+        varies = varying.found(engine, calibrated, leftover.sample)
+        outdone = bool(accepted) and varies is not None and varies.outdoes(engine, calibrated, after)
+    verdict = judge(alone, after, accepted, leftover, locked, outdone)
+    if leftover.rejected and not verdict.names_no_cause:
+        varies = varying.found(engine, fit, leftover.sample)
     return Diagnosis(
         robot, measurements, locked, unseen, alone, open_side.widened(after),
         unsteady.widened(engine, open_side.widened(fit)),
-        identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover,
-        judge(alone, after, accepted, leftover, locked),
+        identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
     )  # fmt: skip
 
 

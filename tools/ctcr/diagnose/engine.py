@@ -163,9 +163,9 @@ class Engine:
             max_iterations=max_iterations,
         )  # fmt: skip
 
-    def thinned(self, fit: identify.Fit) -> tuple["Engine", identify.Fit]:
-        """Itself and a fit, or where rows are many both with fewer of them, each of which counts for its neighbours."""
-        few = identify.few_of(self.fitted, SLOPES)
+    def thinned(self, fit: identify.Fit, least: int = SLOPES) -> tuple["Engine", identify.Fit]:
+        """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
+        few = identify.few_of(self.fitted, least)
         if few is None:
             return self, fit
         weights = fit.weights * few[:, None] * (np.sum(self.fitted) / np.sum(few))

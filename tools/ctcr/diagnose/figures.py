@@ -100,6 +100,18 @@ def before_after(figure, d: "Diagnosis") -> bool | None:
     return None
 
 
+def varying(figure, d: "Diagnosis") -> None:
+    """How each parameter that is not constant would have to change with its quantity."""
+    panels = figure.subplots(1, len(d.varying.variations), squeeze=False)[0]
+    for axes, v in zip(panels, d.varying.variations, strict=True):
+        axes.plot(v.covariate.scale * v.covariate.value, v.change, ".", color=GOOD, markersize=4)
+        axes.axhline(0, color=INK, linewidth=0.6)
+        unit = f", {v.covariate.unit}" if v.covariate.unit else ""
+        axes.set_xlabel(f"{v.covariate.symbol}{unit}")
+        axes.set_ylabel(f"change, {v.unit}")
+        axes.set_title(v.label)
+
+
 def overlap(figure, d: "Diagnosis") -> bool | None:
     """How much of the signal of each candidate of the first round another one can imitate together with calibration."""
     best = [entry for entry in d.rounds[0].best if entry.fit is not None]

@@ -51,7 +51,7 @@ class Leftover:
         if not self.structured:
             return ["What is left is noise."]
         on = ", ".join(item.label for item in self.after.chosen)
-        depends = f"it depends on {on}" if on else "it depends on nothing that was tried"
+        depends = f"it depends on {on}" if on else "no quantity alone tells how large it is on other runs"
         rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
         return rejected + self.lags + self.at_places
 

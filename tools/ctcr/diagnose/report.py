@@ -31,6 +31,7 @@ def page(d: "Diagnosis", source: str) -> str:
         _opening(d, title),
         _found(d),
         _errors(d),
+        _varying(d),
         _view(d),
         _candidates(d),
         _next(d),
@@ -68,7 +69,8 @@ def _found(d: "Diagnosis") -> str:
         for identity in a.ids:
             e = effects.get(identity, d.robot.n_tubes)
             items.append(f"<li><b>{html.escape(e.title)}</b> ({identity}). {html.escape(e.physics)}</li>")
-    return f"<h2>What is missing</h2><ul>{''.join(items)}</ul>"
+    heading = "What takes the place of the cause" if d.verdict.names_no_cause else "What is missing"
+    return f"<h2>{heading}</h2><ul>{''.join(items)}</ul>"
 
 
 def _errors(d: "Diagnosis") -> str:
@@ -82,8 +84,23 @@ def _errors(d: "Diagnosis") -> str:
         "The error after calibration against the quantities that predict it best, and what the effects found explain.",
         True,
     )
-    heading = "The error falls" if d.accepted else "The errors"
+    heading = "The error falls" if d.accepted and not d.verdict.names_no_cause else "The errors"
     return f'<h2>{heading}</h2><div class="pair">{left}{right}</div>{more}'
+
+
+def _varying(d: "Diagnosis") -> str:
+    """What an effect of one's own would have to do."""
+    if not d.varying:
+        return ""
+    items = "".join(f"<li>{html.escape(v.in_words)}</li>" for v in d.varying.variations)
+    drawn = figure(
+        figures.varying, d, 10.4, 3.4,
+        "How each parameter would have to change over the readings, beside its calibrated value.", True,
+    )  # fmt: skip
+    return (
+        f"<h2>What does not stay constant</h2><p>{html.escape(d.varying.lead)}:</p><ul>{items}</ul>{drawn}"
+        f"<p>{html.escape(d.varying.advice)}</p>"
+    )
 
 
 def _view(d: "Diagnosis") -> str:

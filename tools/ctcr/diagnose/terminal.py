@@ -48,6 +48,11 @@ def show(console: Any, result: "Diagnosis") -> None:
         fitted_effects.show(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
     for line in result.leftover.in_words:
         console.print(line, markup=False)
+    if result.varying:
+        console.print(f"{result.varying.lead}:", markup=False)
+        for variation in result.varying.variations:
+            console.print(f"  • {variation.in_words}", markup=False)
+        console.print(result.varying.advice, markup=False)
     for notice in result.notices:
         console.print(f"{notice}.", markup=False)
     for identity, reason in result.unseen.items():

@@ -25,6 +25,11 @@ class Verdict:
     word: str  # nothing_missing, identified, probable, ambiguous, stand_in, not_in_catalogue
     sentences: list[str] = field(default_factory=list)
 
+    @property
+    def names_no_cause(self) -> bool:
+        """Whether something is missing, and no effect of the catalogue is said to be it."""
+        return self.word in ("stand_in", "not_in_catalogue")
+
 
 def judge(
     calibrated: identify.Fit,
@@ -32,7 +37,9 @@ def judge(
     accepted: "list[Accepted]",
     leftover: Leftover,
     locked: NDArray[np.bool_],
+    outdone: bool = False,
 ) -> Verdict:
+    """outdone: whether parameters that are not constant explain far more than the effects that were accepted."""
     jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
     before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     explained = 1 - after / before
@@ -49,6 +56,10 @@ def judge(
     if leftover.rejected and share < EXPLAINED:
         return Verdict(
             "stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."]
+        )
+    if outdone:
+        return Verdict(
+            "stand_in", [f"Calibration that is not constant explains far more than {first.entry.id} does."]
         )
     if after > max(MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])

@@ -1,0 +1,205 @@
+"""Calibration parameters that are not constant: what a cause outside the catalogue looks like.
+
+A tube that is twisted while it is pushed has a home rotation that changes with its deployed length; an alloy that gets
+warm has a stiffness that changes with time. Which parameter would have to change with which quantity says where an
+effect of one's own must act, and on what it depends. Everything is linear in the parameters at a fit, so that no
+further prediction is needed.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import free_parameters
+from ctcr.compare.covariates import HARMONICS, Covariate, covariates
+from ctcr.compare.sample import Sample
+from ctcr.diagnose.engine import Engine, Linear
+from ctcr.identify import Fit
+
+Array = NDArray[np.float64]
+
+ROWS = 400  # that are looked at where there are twice as many or more
+MOST = 4  # variations, one found after the other
+EVIDENCE = 5.0  # of a variation, beyond the price of having looked at many
+SHARE = 0.3  # of what noise does not explain of the runs that no fit saw, that they must explain together
+LITTLE = 0.05  # ... and for which no further one is named
+FAR_LESS = 0.5  # of what effects leave there, which says that they are stand-ins
+MOST_TEETH = 24  # of a wheel whose errors are looked for
+SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A parameter that changes with a quantity, over the readings (K,)."""
+
+    parameter: str
+    covariate: Covariate
+    change: Array  # (K,) of the parameter, in `unit`; without a constant, which calibration takes up
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """Of the parameter, for people."""
+        first, middle, last = self.parameter.replace("_", " ").split(".")
+        if first == "tracker":
+            return f"{middle} {last} of the tracker frame"
+        return f"{last} of tube {middle}" if first == "tubes" else f"{middle} of tube {last}"
+
+    @property
+    def in_words(self) -> str:
+        return (
+            f"{self.label}: by {np.ptp(self.change):.2g} {self.unit} in all, with the {self.covariate.label}"
+        )
+
+
+@dataclass(frozen=True)
+class Varying:
+    """What would have to vary, and what that would do."""
+
+    variations: list[Variation]
+    log_evidence: float
+    share: float  # of what noise does not explain of the runs that no fit saw, that they explain, by slopes
+
+    def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
+        """Whether effects leave far more of the runs that were not fitted than what was found to vary without them."""
+        excess = excess_of_unseen(engine, calibrated)
+        left = excess(with_effects.residual) / max(excess(calibrated.residual), 1.0)
+        return 1 - self.share < FAR_LESS * left
+
+    @property
+    def depends_on(self) -> list[str]:
+        """Ids of the quantities."""
+        return list(dict.fromkeys(v.covariate.name for v in self.variations))
+
+    @property
+    def lead(self) -> str:
+        share = "all" if self.share > 0.995 else f"{self.share:.0%}"
+        return (
+            f"It looks as if these were not constant, which by slopes explains {share} of what noise does not explain "
+            "of the runs that no fit saw"
+        )
+
+    @property
+    def advice(self) -> str:
+        return "An effect of your own that acts there may be what is missing: see docs/effects.md."
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Parameters, by their places in the fit, each with a quantity and the columns (M, k) by which it may vary."""
+
+    pairs: tuple[tuple[int, Covariate, Array], ...]
+    whitened: Array  # (readings, columns)
+
+    @property
+    def ids(self) -> set[tuple[int, str]]:
+        return {(p, covariate.name) for p, covariate, _ in self.pairs}
+
+
+def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
+    """What explains most of the rest of a fit, if that holds on the runs that it did not see."""
+    excess = excess_of_unseen(engine, fit)
+    thin, at = engine.thinned(fit, ROWS)
+    if at is not fit:  # that is in balance with all readings, not with these
+        at = thin.linear_fit(at, weights=at.weights, inflation=at.inflation)
+    residual, jacobian = at.whitened()
+    jacobian = jacobian * at.prior_sd
+    slopes = np.nan_to_num(at.jacobian_all).reshape(*at.residual.shape, -1) * at.prior_sd
+    trials = list(_trials(engine, at, sample, slopes))
+    whitened, columns, moved = jacobian, slopes, np.zeros(len(at.names))
+    chosen, evidence = [], 0.0
+    reached = [(excess(at.residual + columns @ moved), evidence, moved)]
+    while len(chosen) < MOST and trials:
+        linear = Linear(residual + whitened @ moved, whitened)
+        gains = [linear.gain(trial.whitened).log_evidence for trial in trials]
+        best = int(np.argmax(gains))
+        if gains[best] < EVIDENCE + np.log(len(trials)):
+            break
+        chosen.append(trials[best])
+        trials = [trial for trial in trials if not trial.ids & chosen[-1].ids]
+        evidence += gains[best]
+        added = [slopes[:, :, p, None] * basis[:, None, :] for p, _, basis in chosen[-1].pairs]
+        whitened = np.hstack([whitened, chosen[-1].whitened])
+        columns = np.concatenate([columns, *added], axis=2)
+        gradient = whitened.T @ residual
+        gradient[: len(at.names)] = 0.0  # the fit is where prior and readings are in balance
+        moved = -np.linalg.solve(whitened.T @ whitened + np.eye(len(gradient)), gradient)
+        reached.append((excess(at.residual + columns @ moved), evidence, moved))
+    before, least = reached[0][0], min(left for left, *_ in reached)
+    count = next(k for k, (left, *_) in enumerate(reached) if left - least <= LITTLE * before)
+    after, evidence, moved = reached[count]
+    if after >= (1 - SHARE) * before:
+        return None
+    pairs = [pair for trial in chosen[:count] for pair in trial.pairs]
+    variations = _variations(engine, at, sample, pairs, moved[len(at.names) :])
+    return Varying(variations, evidence, 1 - after / before)
+
+
+def excess_of_unseen(engine: Engine, fit: Fit) -> Callable[[Array], float]:
+    """What a residual (M, 6) of the runs that were not fitted holds beyond noise as stated: chi-square, less that of
+    noise. Readings that are outliers of the fit count for little."""
+    rest = replace(engine, rows=~engine.rows)
+    usual = rest.linear_fit(fit, max_iterations=0)
+    noise = rest.linear_fit(fit, weights=usual.weights, inflation=np.ones(2), max_iterations=0)
+
+    def excess(residual: Array) -> float:
+        whitened = noise.whiten(np.nan_to_num(residual))
+        return max(float(np.sum(whitened**2)) - len(whitened), 0.0)
+
+    return excess
+
+
+def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator[_Trial]:
+    """Each parameter with each quantity; all tubes' parameters of a kind with one, or each with its own tube's."""
+    rows = np.searchsorted(engine.measurements.row, sample.row)
+    pitch = engine.robot.actuation.translation_mm_per_rev
+    quantities = covariates(sample, 1e-3 * pitch if pitch else None)
+    if any(quantity.name == "time" for quantity in quantities):  # the order of measuring is nearly the same
+        quantities = [quantity for quantity in quantities if quantity.name != "order"]
+    kinds: dict[tuple, list[_Trial]] = defaultdict(list)
+    for quantity in quantities:
+        for richness, (covariate, basis) in enumerate(_shapes(quantity)):
+            columns = np.zeros((len(engine.measurements), basis.shape[1]))
+            columns[rows] = np.nan_to_num(basis)
+            for p, name in enumerate(fit.names):
+                if name not in engine.base:
+                    continue
+                whitened = fit.whiten(slopes[:, :, p, None] * columns[:, None, :])
+                trial = _Trial(((p, covariate, columns),), whitened)
+                yield trial
+                tube = next((part for part in name.split(".") if part.isdigit()), "")
+                if tube and covariate.tube in (0, int(tube)):
+                    kinds[name.replace(tube, "*"), covariate.name.replace(tube, "*"), richness].append(trial)
+    for alike in kinds.values():
+        if len(alike) > 1:
+            pairs = tuple(pair for trial in alike for pair in trial.pairs)
+            yield _Trial(pairs, np.hstack([trial.whitened for trial in alike]))
+
+
+def _shapes(quantity: Covariate) -> Iterator[tuple[Covariate, Array]]:
+    """Ways in which a parameter may change with a quantity: its smooth curves, and those of a wheel with teeth."""
+    for basis in quantity.bases():
+        yield quantity, basis
+    if quantity.kind == "angle" and quantity.tube:
+        for teeth in range(HARMONICS + 1, MOST_TEETH + 1):
+            label = f"{quantity.label}, {teeth} times a turn"
+            angle = teeth * quantity.value[:, None]
+            yield replace(quantity, label=label), np.hstack([np.cos(angle), np.sin(angle)])
+
+
+def _variations(
+    engine: Engine, fit: Fit, sample: Sample, pairs: list[tuple[int, Covariate, Array]], moved: Array
+) -> list[Variation]:
+    """What `moved`, of all columns of the pairs in units of prior sd, says of each parameter."""
+    rows = np.searchsorted(engine.measurements.row, sample.row)
+    units, found, begin = free_parameters.units_with_effects(engine.robot), [], 0
+    for p, covariate, columns in pairs:
+        end = begin + columns.shape[1]
+        unit, scale = SHOWN_UNITS.get(units[fit.names[p]], (units[fit.names[p]], 1.0))
+        change = scale * fit.prior_sd[p] * columns[rows] @ moved[begin:end]
+        found.append(Variation(fit.names[p], covariate, change, unit))
+        begin = end
+    return found
