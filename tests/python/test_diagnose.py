@@ -163,17 +163,18 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
     assert racing.Round("a fit", [], {}).is_hopeless(1e6)
 
 
-@pytest.mark.parametrize(
-    ("calibrated", "with_effects", "structured", "word"),
-    [(0.3, 0.1, True, "identified"), (0.3, 0.25, True, "stand_in"), (0.3, 0.29, False, "identified"),
-     (0.3, 0.45, False, "stand_in"), (0.061, 0.062, True, "identified"), (0.3, 0.16, True, "probable")],
-)  # fmt: skip
-def test_what_other_runs_do_not_confirm_is_a_stand_in(calibrated, with_effects, structured, word):
+@pytest.mark.parametrize(("before", "after", "explained", "structured", "outdone", "word"), [
+    (0.3, 0.1, 0.95, True, False, "identified"), (0.3, 0.25, 0.3, True, False, "stand_in"),
+    (0.3, 0.29, 0.3, False, False, "identified"), (0.3, 0.45, 0.9, False, False, "stand_in"),
+    (0.061, 0.062, np.nan, True, False, "identified"), (0.3, 0.16, 0.78, True, False, "probable"),
+    (0.3, 0.1, 0.95, True, True, "stand_in"),
+])  # fmt: skip
+def test_what_other_runs_do_not_confirm_is_a_stand_in(before, after, explained, structured, outdone, word):
     noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
-    fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (calibrated, with_effects)]
+    fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (before, after)]
     entry = SimpleNamespace(id="delay", implausible=())
     accepted = [SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)]
-    said = judge(*fits, accepted, leftover(structured), np.ones(3, bool))
+    said = judge(*fits, accepted, leftover(structured), np.ones(3, bool), explained, outdone)
     assert said.word == word
 
 
@@ -190,7 +191,7 @@ def test_what_happens_at_a_place_is_missing_and_what_strikes_a_reading_is_not(ro
     fit = fit_with(table, struck, np.random.default_rng(3))
     assert far_off(fit).sum() == (0 if struck == "nothing" else 8)
     left = leftover(rejected, table.row[come_together(table, fit)])
-    said = judge(fit, fit, [], left, np.zeros(len(table), bool))
+    said = judge(fit, fit, [], left, np.zeros(len(table), bool), np.nan, False)
     assert said.word == word and left.structured == (word == "not_in_catalogue")
     assert (struck == "places") == ("8 readings (rows" in " ".join(said.sentences))
 

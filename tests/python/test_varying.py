@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ctcr import effect_model, identify, output, robot_file, simulation
 from ctcr.compare.sample import take_sample
-from ctcr.diagnose import diagnose, race, report, terminal, varying
+from ctcr.diagnose import diagnose, other_runs, race, report, terminal, varying
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.split import locked_rows
 
@@ -87,7 +87,7 @@ def test_noise_varies_with_nothing(robot, plan, seed):
 
 def test_excess_is_none_for_noise_and_grows_with_the_square_of_an_error(robot, plan):
     engine, fit, _ = looked_at(robot, readings_of(robot, plan, plan.alpha))
-    excess = varying.excess_of_unseen(engine, fit)
+    excess = other_runs.excess_of(engine, fit, ~engine.rows)
     unseen = int(6 * np.sum(~engine.rows))
     assert excess(fit.residual) < 3 * np.sqrt(2 * unseen)
     off = np.zeros_like(fit.residual)
@@ -117,6 +117,7 @@ class NoResidual:
     """What a fit reports where the model explains everything."""
 
     def __init__(self, fit):
+        self.whiten = fit.core.whiten
         self.report = lambda _: (0 * fit.residual.ravel(), fit.jacobian_all, 0 * fit.field.ravel(), None)
 
 
@@ -135,3 +136,24 @@ def test_where_noise_explains_the_rest_nothing_is_said_to_vary(robot, plan):
     found = diagnose(robot, readings_of(robot, plan, plan.alpha))
     assert found.varying is None
     assert "What does not stay constant" not in report.page(found, "a test")
+
+
+def test_the_median_run_says_how_much_is_explained(robot, recorded):
+    engine, before, _ = looked_at(robot, readings_of(robot, recorded, twisted(recorded)))
+    runs = np.unique(recorded.run[~engine.rows])
+    assert len(runs) >= 3 and other_runs.explained(engine, before, before) == pytest.approx(0, abs=0.1)
+
+    def with_residual(residual):
+        found = replace(before, core=NoResidual(before))
+        found.core.report = lambda _: (residual.ravel(), before.jacobian_all, 0 * residual.ravel(), None)
+        return found
+
+    one_is_off = before.residual * (recorded.run == runs[0])[:, None]
+    assert other_runs.explained(engine, before, with_residual(one_is_off)) > 0.99
+    far, half = with_residual(20 * before.residual), with_residual(10 * before.residual)
+    assert other_runs.explained(engine, far, half) == pytest.approx(0.75, abs=0.02)
+
+
+def test_where_noise_explains_other_runs_nothing_is_left_to_explain(robot, recorded):
+    engine, fit, _ = looked_at(robot, readings_of(robot, recorded, recorded.alpha))
+    assert np.isnan(other_runs.explained(engine, fit, fit))

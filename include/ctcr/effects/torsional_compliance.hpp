@@ -20,7 +20,7 @@ inline constexpr std::array parameters{
                     .neutral = 0,
                     .sigma = 2.0,
                     .soft_low = -2,
-                    .soft_high = 10,
+                    .soft_high = 30,  // half of what the slender inner tube of Table II twists itself: -beta / GJ = 55
                     .hard_low = -30,
                     .hard_high = 100,
                     .per_tube = true,

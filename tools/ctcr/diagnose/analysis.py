@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import jump, unsteady, varying
+from ctcr.diagnose import jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
 from ctcr.diagnose.engine import Engine, values_of
@@ -40,6 +40,7 @@ class Accepted:
     log_evidence: float
     margin: float
     share: float
+    rms_mm: float = np.nan  # of the runs that no fit saw, once it was in, with those accepted before
     aside: dict[str, float] = field(default_factory=dict)  # of its other variants, as the race left them
 
 
@@ -231,14 +232,14 @@ def _diagnose(
         more = np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
         before = values_of(first)
-        first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
+        first, settled = _grow(part, first, pool, accepted, rounds, locked, progress, more)
         start = values_of(first)
     calibrated = fit = racing.baseline(engine, [], before, progress)
     if accepted:
         engine.robust = True
         fit = racing.baseline(engine, [a.entry for a in accepted], start, progress)
     if not settled:
-        fit, _ = _grow(engine, fit, pool, accepted, rounds, progress)
+        fit, _ = _grow(engine, fit, pool, accepted, rounds, locked, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
@@ -247,12 +248,13 @@ def _diagnose(
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
+    explained = other_runs.explained(engine, calibrated, after) if accepted else np.nan
     varies, outdone = None, False
     if leftover.rejected:
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated, leftover.sample)
         outdone = bool(accepted) and varies is not None and varies.outdoes(engine, calibrated, after)
-    verdict = judge(alone, after, accepted, leftover, locked, outdone)
+    verdict = judge(alone, after, accepted, leftover, locked, explained, outdone)
     if leftover.rejected and not verdict.names_no_cause:
         varies = varying.found(engine, fit, leftover.sample)
     return Diagnosis(
@@ -268,6 +270,7 @@ def _grow(
     pool: list[Candidate],
     accepted: list[Accepted],
     rounds: list[Round],
+    locked: NDArray[np.bool_],
     progress: Progress,
     more: float = 1.0,
 ) -> tuple[identify.Fit, bool]:
@@ -287,12 +290,13 @@ def _grow(
         if round_.accepted is None:
             break
         entry, engine.robust = round_.accepted, True
-        rest = entry.refit, round_.margin, entry.share, racing.aside(round_)
-        accepted.append(Accepted(entry, round_.ids, *rest))
+        rest = {"share": entry.share, "aside": racing.aside(round_)}
+        accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, **rest))
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
         rejected = racing.is_rejected(engine, fit)
         fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
+        accepted[-1].rms_mm = fit.rms_mm(locked)
         if rejected and accepted[0].share < HARDLY:
             break  # no effect is stacked on one that hardly explains anything
     for a in accepted[:-1]:  # what the others hid of their forms shows now

@@ -23,9 +23,9 @@ def waterfall(figure, d: "Diagnosis") -> None:
     axes = figure.subplots()
     rms = d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
-    if d.accepted:
-        names = "\n+ ".join(" or ".join(a.ids[:2]) for a in d.accepted)
-        bars.append((f"+ {names}", rms["with_effects"], GOOD))
+    for k, a in enumerate(d.accepted, start=1):
+        reached = rms["with_effects"] if k == len(d.accepted) else a.rms_mm
+        bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
         axes.text(
@@ -38,7 +38,7 @@ def waterfall(figure, d: "Diagnosis") -> None:
         last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom"
     )
     axes.set_xlim(right=last + 0.75)
-    axes.set_xticks(range(len(bars)), [name.replace("_", " ") for name, _, _ in bars])
+    axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
     axes.set_ylabel("RMS error on locked runs, mm")
     axes.set_yscale("log")
     axes.set_ylim(0.5 * min([rms["noise_floor"], *[v for _, v, _ in bars]]), 2 * max(v for _, v, _ in bars))

@@ -7,7 +7,7 @@ further prediction is needed.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ctcr import free_parameters
 from ctcr.compare.covariates import HARMONICS, Covariate, covariates
 from ctcr.compare.sample import Sample
+from ctcr.diagnose import other_runs
 from ctcr.diagnose.engine import Engine, Linear
 from ctcr.identify import Fit
 
@@ -26,7 +27,8 @@ MOST = 4  # variations, one found after the other
 EVIDENCE = 5.0  # of a variation, beyond the price of having looked at many
 SHARE = 0.3  # of what noise does not explain of the runs that no fit saw, that they must explain together
 LITTLE = 0.05  # ... and for which no further one is named
-FAR_LESS = 0.5  # of what effects leave there, which says that they are stand-ins
+MUCH = 0.1  # of what noise does not explain there, that effects leave, and
+FAR_LESS = 0.25  # part of that which parameters that vary leave, which says that those effects are stand-ins
 MOST_TEETH = 24  # of a wheel whose errors are looked for
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
@@ -61,13 +63,14 @@ class Varying:
 
     variations: list[Variation]
     log_evidence: float
-    share: float  # of what noise does not explain of the runs that no fit saw, that they explain, by slopes
+    share: float  # of what noise does not explain of the runs that no fit saw, that they explain
+    residual: Array  # (M, 6) that they leave, by slopes
 
     def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
         """Whether effects leave far more of the runs that were not fitted than what was found to vary without them."""
-        excess = excess_of_unseen(engine, calibrated)
-        left = excess(with_effects.residual) / max(excess(calibrated.residual), 1.0)
-        return 1 - self.share < FAR_LESS * left
+        excess = other_runs.excess_of(engine, with_effects, ~engine.rows)
+        left = excess(with_effects.residual)
+        return left > MUCH * excess(calibrated.residual) and excess(self.residual) < FAR_LESS * left
 
     @property
     def depends_on(self) -> list[str]:
@@ -101,7 +104,7 @@ class _Trial:
 
 def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
     """What explains most of the rest of a fit, if that holds on the runs that it did not see."""
-    excess = excess_of_unseen(engine, fit)
+    excess = other_runs.excess_of(engine, fit, ~engine.rows)
     thin, at = engine.thinned(fit, ROWS)
     if at is not fit:  # that is in balance with all readings, not with these
         at = thin.linear_fit(at, weights=at.weights, inflation=at.inflation)
@@ -135,21 +138,9 @@ def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
         return None
     pairs = [pair for trial in chosen[:count] for pair in trial.pairs]
     variations = _variations(engine, at, sample, pairs, moved[len(at.names) :])
-    return Varying(variations, evidence, 1 - after / before)
-
-
-def excess_of_unseen(engine: Engine, fit: Fit) -> Callable[[Array], float]:
-    """What a residual (M, 6) of the runs that were not fitted holds beyond noise as stated: chi-square, less that of
-    noise. Readings that are outliers of the fit count for little."""
-    rest = replace(engine, rows=~engine.rows)
-    usual = rest.linear_fit(fit, max_iterations=0)
-    noise = rest.linear_fit(fit, weights=usual.weights, inflation=np.ones(2), max_iterations=0)
-
-    def excess(residual: Array) -> float:
-        whitened = noise.whiten(np.nan_to_num(residual))
-        return max(float(np.sum(whitened**2)) - len(whitened), 0.0)
-
-    return excess
+    return Varying(
+        variations, evidence, 1 - after / before, at.residual + columns[:, :, : len(moved)] @ moved
+    )
 
 
 def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator[_Trial]:

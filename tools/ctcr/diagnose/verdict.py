@@ -13,10 +13,9 @@ from ctcr.diagnose.leftover import Leftover
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Accepted
 
-# Share of the excess that effects must remove to be no stand-ins: of the squared error on locked runs, or where that is
-# mere noise, of chi-square.
-EXPLAINED, MORE_THAN_NOISE = 0.6, 0.25
-MOSTLY = 0.8  # ... and to be identified where more than noise is left
+# Share of what noise does not explain of locked runs that effects must explain to be no stand-ins, and
+EXPLAINED = 0.75
+MOSTLY = 0.8  # ... to be identified where more than noise is left
 MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
 
@@ -37,12 +36,13 @@ def judge(
     accepted: "list[Accepted]",
     leftover: Leftover,
     locked: NDArray[np.bool_],
-    outdone: bool = False,
+    explained: float,
+    outdone: bool,
 ) -> Verdict:
-    """outdone: whether parameters that are not constant explain far more than the effects that were accepted."""
+    """explained: share of what noise does not explain of locked runs that effects explain; NaN where noise explains it
+    all. outdone: whether parameters that are not constant explain far more."""
     jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
     before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
-    explained = 1 - after / before
     if not accepted:
         if not leftover.structured:
             return Verdict(
@@ -51,8 +51,7 @@ def judge(
         missing = "Something is missing that no effect of the catalogue explains."
         return Verdict("not_in_catalogue", [missing, *leftover.at_places])
     first = accepted[0]
-    noise = before < MORE_THAN_NOISE * jitter**2
-    share = max(explained, first.share) if noise else explained
+    share = first.share if np.isnan(explained) else explained
     if leftover.rejected and share < EXPLAINED:
         return Verdict(
             "stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."]
@@ -74,6 +73,6 @@ def judge(
     names = " and ".join(a.entry.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
     if leftover.rejected and share < MOSTLY:
-        most = f"Of the squared error beyond noise, {names} {verb} {share:.0%}; more than noise is left"
+        most = f"{names} {verb} {share:.0%} of what noise does not; more than noise is left"
         return Verdict("probable", [f"{most}: the law may be another one, or something else acts too."])
     return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])

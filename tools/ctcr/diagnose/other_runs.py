@@ -1,0 +1,48 @@
+"""What the runs that no fit saw hold beyond noise, and how much of it a model explains.
+
+In units of the noise as stated, the tracker's smooth error included: where that is large, millimetres say little.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.diagnose import split
+from ctcr.diagnose.engine import Engine
+from ctcr.identify import Fit
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def excess_of(
+    engine: Engine, fit: Fit, rows: Mask, *, positions_alone: bool = False
+) -> Callable[[Array], float]:
+    """What a residual (M, 6) holds in some rows (M,) beyond noise: chi-square, less that of noise. Readings that are
+    outliers of the fit, the better the model, count for little."""
+    there = replace(engine, rows=rows)
+    weights = there.linear_fit(fit, max_iterations=0).weights.copy()
+    if positions_alone:
+        weights[:, 1] = 0.0
+    noise = there.linear_fit(fit, weights=weights, inflation=np.ones(2), max_iterations=0)
+
+    def excess(residual: Array) -> float:
+        whitened = noise.whiten(np.nan_to_num(residual))
+        return max(float(np.sum(whitened**2)) - len(whitened), 0.0)
+
+    return excess
+
+
+def explained(engine: Engine, before: Fit, after: Fit) -> float:
+    """Share of the excess of positions that `after` explains, of the median run that `before` does not explain: one
+    run that is off for reasons of its own does not decide. NaN where `before` explains all of them."""
+    group, shares = split.groups(engine.measurements), []
+    for k in np.unique(group[~engine.rows]):
+        rows = (group == k) & ~engine.rows & engine.measured
+        excess = excess_of(engine, after, rows, positions_alone=True)
+        unexplained = excess(before.residual)
+        if unexplained > 3 * np.sum(rows):  # as much again as noise
+            shares.append(1 - excess(after.residual) / unexplained)
+    return float(np.median(shares)) if shares else np.nan
