@@ -28,6 +28,14 @@ VISIBLE = (
     30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 )
 
+# Causes outside the catalogue that depend on one quantity: how the ids of such quantities begin.
+DEPENDS = {
+    "rotation_with_translation": "length",
+    "tooth_error": "alpha",
+    "temperature": "time",
+    "grip_slip": "time",
+}
+
 
 def wilson(hits: int, count: int) -> str:
     """`hits` of `count` with the 95 % Wilson interval."""
@@ -80,6 +88,11 @@ def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
     elif truth["verdict"] == "not_in_catalogue":
         scores["outside the catalogue: never identified"] = word != "identified"
         scores["outside the catalogue: flagged"] = word in ("not_in_catalogue", "stand_in")
+        [cause] = truth["causes"]
+        if cause["name"] in DEPENDS:
+            named = said["leftover"]["depends_on"] if said else []
+            dependence = any(name.startswith(DEPENDS[cause["name"]]) for name in named)
+            scores["outside the catalogue: the quantity it depends on named, where it is one"] = dependence
     elif unseen:
         scores["below what the data can show: nothing else named"] = not classes or all(found)
     elif hidden:
