@@ -166,16 +166,18 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
 @pytest.mark.parametrize(("before", "after", "explained", "structured", "outdone", "word"), [
     (0.3, 0.1, 0.95, True, False, "identified"), (0.3, 0.25, 0.3, True, False, "stand_in"),
     (0.3, 0.29, 0.3, False, False, "identified"), (0.3, 0.45, 0.9, False, False, "stand_in"),
-    (0.061, 0.062, np.nan, True, False, "identified"), (0.3, 0.16, 0.78, True, False, "probable"),
+    (0.061, 0.062, 0, True, False, "identified"), (0.3, 0.16, 0.78, True, False, "probable"),
     (0.3, 0.1, 0.95, True, True, "stand_in"),
 ])  # fmt: skip
 def test_what_other_runs_do_not_confirm_is_a_stand_in(before, after, explained, structured, outdone, word):
     noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
     fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (before, after)]
     entry = SimpleNamespace(id="delay", implausible=())
-    accepted = [SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)]
-    said = judge(*fits, accepted, leftover(structured), np.ones(3, bool), explained, outdone)
-    assert said.word == word
+    found = SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)
+    runs = {"run 3": explained, "run 5": 0.99, "run 8": -0.2} if explained else {}  # the median decides
+    said = judge(*fits, [found], leftover(structured), np.ones(3, bool), runs, outdone)
+    named = any("run 8" in text for text in said.sentences)
+    assert said.word == word and named == (word != "stand_in" and structured and explained > 0)
 
 
 def leftover(rejected, places=()):
@@ -191,7 +193,7 @@ def test_what_happens_at_a_place_is_missing_and_what_strikes_a_reading_is_not(ro
     fit = fit_with(table, struck, np.random.default_rng(3))
     assert far_off(fit).sum() == (0 if struck == "nothing" else 8)
     left = leftover(rejected, table.row[come_together(table, fit)])
-    said = judge(fit, fit, [], left, np.zeros(len(table), bool), np.nan, False)
+    said = judge(fit, fit, [], left, np.zeros(len(table), bool), {}, False)
     assert said.word == word and left.structured == (word == "not_in_catalogue")
     assert (struck == "places") == ("8 readings (rows" in " ".join(said.sentences))
 

@@ -138,22 +138,26 @@ def test_where_noise_explains_the_rest_nothing_is_said_to_vary(robot, plan):
     assert "What does not stay constant" not in report.page(found, "a test")
 
 
-def test_the_median_run_says_how_much_is_explained(robot, recorded):
+def test_each_run_says_how_much_of_it_is_explained(robot, recorded):
     engine, before, _ = looked_at(robot, readings_of(robot, recorded, twisted(recorded)))
     runs = np.unique(recorded.run[~engine.rows])
-    assert len(runs) >= 3 and other_runs.explained(engine, before, before) == pytest.approx(0, abs=0.1)
+    names = {f"run {run}" for run in runs}
+    same = other_runs.explained(engine, before, before)
+    assert len(runs) >= 3 and set(same) <= names and [*same.values()] == pytest.approx(len(same) * [0])
 
     def with_residual(residual):
         found = replace(before, core=NoResidual(before))
         found.core.report = lambda _: (residual.ravel(), before.jacobian_all, 0 * residual.ravel(), None)
         return found
 
-    one_is_off = before.residual * (recorded.run == runs[0])[:, None]
-    assert other_runs.explained(engine, before, with_residual(one_is_off)) > 0.99
-    far, half = with_residual(20 * before.residual), with_residual(10 * before.residual)
-    assert other_runs.explained(engine, far, half) == pytest.approx(0.75, abs=0.02)
+    far = 20 * before.residual
+    one_is_off = far * (recorded.run == runs[0])[:, None]
+    shares = other_runs.explained(engine, with_residual(far), with_residual(one_is_off))
+    assert shares == pytest.approx({name: float(name != f"run {runs[0]}") for name in names}, abs=1e-6)
+    half = other_runs.explained(engine, with_residual(far), with_residual(far / 2))
+    assert half == pytest.approx(dict.fromkeys(names, 0.75), abs=0.02)
 
 
 def test_where_noise_explains_other_runs_nothing_is_left_to_explain(robot, recorded):
     engine, fit, _ = looked_at(robot, readings_of(robot, recorded, recorded.alpha))
-    assert np.isnan(other_runs.explained(engine, fit, fit))
+    assert other_runs.explained(engine, fit, fit) == {}

@@ -248,7 +248,7 @@ def _diagnose(
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
-    explained = other_runs.explained(engine, calibrated, after) if accepted else np.nan
+    explained = other_runs.explained(engine, calibrated, after) if accepted else {}
     varies, outdone = None, False
     if leftover.rejected:
         progress("parameters that are not constant")

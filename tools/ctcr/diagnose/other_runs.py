@@ -35,14 +35,18 @@ def excess_of(
     return excess
 
 
-def explained(engine: Engine, before: Fit, after: Fit) -> float:
-    """Share of the excess of positions that `after` explains, of the median run that `before` does not explain: one
-    run that is off for reasons of its own does not decide. NaN where `before` explains all of them."""
-    group, shares = split.groups(engine.measurements), []
+def explained(engine: Engine, before: Fit, after: Fit) -> dict[str, float]:
+    """Share of the excess of positions that `after` explains, of each run that was not fitted, by what it is called.
+    Not of those that noise explains under `before`."""
+    table = engine.measurements
+    group, shares = split.groups(table), {}
     for k in np.unique(group[~engine.rows]):
         rows = (group == k) & ~engine.rows & engine.measured
         excess = excess_of(engine, after, rows, positions_alone=True)
         unexplained = excess(before.residual)
         if unexplained > 3 * np.sum(rows):  # as much again as noise
-            shares.append(1 - excess(after.residual) / unexplained)
-    return float(np.median(shares)) if shares else np.nan
+            run, lines = np.unique(table.run[rows]), table.row[rows]
+            is_run = len(run) == 1 and not np.any((table.run == run[0]) & (group != k))
+            name = f"run {run[0]}" if is_run else f"rows {lines.min()} to {lines.max()}"
+            shares[name] = 1 - excess(after.residual) / unexplained
+    return shares

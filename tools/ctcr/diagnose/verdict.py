@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ctcr import identify
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.leftover import Leftover
+from ctcr.output import listed
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Accepted
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 # Share of what noise does not explain of locked runs that effects must explain to be no stand-ins, and
 EXPLAINED = 0.75
 MOSTLY = 0.8  # ... to be identified where more than noise is left
+SHOWN = 6  # runs that are named
 MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
 
@@ -36,11 +38,12 @@ def judge(
     accepted: "list[Accepted]",
     leftover: Leftover,
     locked: NDArray[np.bool_],
-    explained: float,
+    explained: dict[str, float],
     outdone: bool,
 ) -> Verdict:
-    """explained: share of what noise does not explain of locked runs that effects explain; NaN where noise explains it
-    all. outdone: whether parameters that are not constant explain far more."""
+    """explained: of each locked run, the share that effects explain of what noise does not, as of other_runs.explained.
+    The median run decides: one may be off for reasons of its own. outdone: whether parameters that are not constant
+    explain far more."""
     jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
     before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     if not accepted:
@@ -51,7 +54,7 @@ def judge(
         missing = "Something is missing that no effect of the catalogue explains."
         return Verdict("not_in_catalogue", [missing, *leftover.at_places])
     first = accepted[0]
-    share = first.share if np.isnan(explained) else explained
+    share = float(np.median([*explained.values()])) if explained else first.share
     if leftover.rejected and share < EXPLAINED:
         return Verdict(
             "stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."]
@@ -72,7 +75,9 @@ def judge(
         return Verdict("probable", ["Another effect is nearly as likely."])
     names = " and ".join(a.entry.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
+    odd = [run for run, part in explained.items() if part < EXPLAINED] if leftover.rejected else []
+    but = [f"But most of the error in {listed(odd, SHOWN)} stays: there something else acts."] if odd else []
     if leftover.rejected and share < MOSTLY:
         most = f"{names} {verb} {share:.0%} of what noise does not; more than noise is left"
-        return Verdict("probable", [f"{most}: the law may be another one, or something else acts too."])
-    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])
+        return Verdict("probable", [f"{most}: the law may be another one, or something else acts too.", *but])
+    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error.", *but])
