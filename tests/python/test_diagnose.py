@@ -163,23 +163,6 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
     assert racing.Round("a fit", [], {}).is_hopeless(1e6)
 
 
-@pytest.mark.parametrize(("before", "after", "explained", "structured", "outdone", "word"), [
-    (0.3, 0.1, 0.95, True, False, "identified"), (0.3, 0.25, 0.3, True, False, "stand_in"),
-    (0.3, 0.29, 0.3, False, False, "identified"), (0.3, 0.45, 0.9, False, False, "stand_in"),
-    (0.061, 0.062, 0, True, False, "identified"), (0.3, 0.16, 0.78, True, False, "probable"),
-    (0.3, 0.1, 0.95, True, True, "stand_in"),
-])  # fmt: skip
-def test_what_other_runs_do_not_confirm_is_a_stand_in(before, after, explained, structured, outdone, word):
-    noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
-    fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (before, after)]
-    entry = SimpleNamespace(id="delay", implausible=())
-    found = SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)
-    runs = {"run 3": explained, "run 5": 0.99, "run 8": -0.2} if explained else {}  # the median decides
-    said = judge(*fits, [found], leftover(structured), np.ones(3, bool), runs, outdone)
-    named = any("run 8" in text for text in said.sentences)
-    assert said.word == word and named == (word != "stand_in" and structured and explained > 0)
-
-
 def leftover(rejected, places=()):
     return Leftover(rejected, list(places), None, SimpleNamespace(chosen=[]), None)
 

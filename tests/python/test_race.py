@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
 from ctcr.diagnose import race as racing
-from ctcr.diagnose import verdict
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, Gain
 from ctcr.effects import get
@@ -37,15 +36,6 @@ def test_a_fit_that_did_not_end_gives_no_further_effect_its_gain(robot, plan):
     assert round_.accepted is None
     assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
     assert max(entry.score for entry in round_.entries) < racing.EVIDENCE
-
-
-def test_the_tutorial_explains_every_verdict_with_its_limits():
-    text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
-    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
-    words = ["nothing_missing", "identified", "probable", "ambiguous", "stand_in", "not_in_catalogue"]
-    assert [word for word in rows if word in words] == words
-    assert f"less than {100 * verdict.MOSTLY:.0f} %" in rows["probable"]
-    assert f"less than {100 * verdict.EXPLAINED:.0f} %" in rows["stand_in"]
 
 
 def test_a_delay_whose_moments_are_spread_is_freed_from_where_it_entered(robot, plan):
