@@ -152,11 +152,11 @@ def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator
         quantities = [quantity for quantity in quantities if quantity.name != "order"]
     kinds: dict[tuple, list[_Trial]] = defaultdict(list)
     for quantity in quantities:
-        for richness, (covariate, basis) in enumerate(_shapes(quantity)):
+        for richness, (covariate, basis, kind) in enumerate(_shapes(quantity)):
             columns = np.zeros((len(engine.measurements), basis.shape[1]))
             columns[rows] = np.nan_to_num(basis)
             for p, name in enumerate(fit.names):
-                if name not in engine.base:
+                if name not in engine.base or kind not in name:
                     continue
                 whitened = fit.whiten(slopes[:, :, p, None] * columns[:, None, :])
                 trial = _Trial(((p, covariate, columns),), whitened)
@@ -170,15 +170,16 @@ def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator
             yield _Trial(pairs, np.hstack([trial.whitened for trial in alike]))
 
 
-def _shapes(quantity: Covariate) -> Iterator[tuple[Covariate, Array]]:
-    """Ways in which a parameter may change with a quantity: its smooth curves, and those of a wheel with teeth."""
+def _shapes(quantity: Covariate) -> Iterator[tuple[Covariate, Array, str]]:
+    """Ways in which a parameter may change with a quantity, and what is in the names of those that may: its smooth
+    curves, and the errors of a wheel with teeth, which turns a tube."""
     for basis in quantity.bases():
-        yield quantity, basis
+        yield quantity, basis, ""
     if quantity.kind == "angle" and quantity.tube:
         for teeth in range(HARMONICS + 1, MOST_TEETH + 1):
             label = f"{quantity.label}, {teeth} times a turn"
             angle = teeth * quantity.value[:, None]
-            yield replace(quantity, label=label), np.hstack([np.cos(angle), np.sin(angle)])
+            yield replace(quantity, label=label), np.hstack([np.cos(angle), np.sin(angle)]), "home_rotation"
 
 
 def _variations(
