@@ -61,7 +61,8 @@ def test_a_twist_while_pushing_is_seen_with_its_gain(robot, recorded):
     assert (only.parameter, only.covariate.name, only.unit) == ("actuation.home_rotation.1", "length1", "deg")
     assert np.polyfit(only.covariate.value, only.change, 1)[0] == pytest.approx(np.rad2deg(GAIN), rel=0.1)
     assert found.share > 0.9 and found.depends_on == ["length1"]
-    assert "home rotation of tube 1" in only.in_words and "deployed length of tube 1" in only.in_words
+    for text in (only.in_words, only.measure):
+        assert "home rotation of tube 1" in text and "deployed length of tube 1" in text
 
 
 def test_worn_teeth_are_counted(robot, recorded):
@@ -76,6 +77,7 @@ def test_worn_teeth_are_counted(robot, recorded):
 def test_a_slip_shows_in_time(robot, recorded):
     first = looked_at(robot, readings_of(robot, recorded, slipped(recorded)))[2].variations[0]
     assert (first.parameter, first.covariate.name) == ("actuation.home_rotation.2", "time")
+    assert "again and again" in first.measure
     early, late = first.change[: len(recorded) // 4].mean(), first.change[-len(recorded) // 4 :].mean()
     assert late - early == pytest.approx(np.rad2deg(SLIP), rel=0.4)
 

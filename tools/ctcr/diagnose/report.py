@@ -129,14 +129,14 @@ def _candidates(d: "Diagnosis") -> str:
 
 def _next(d: "Diagnosis") -> str:
     """What to measure to be surer."""
-    ids = list(dict.fromkeys(identity for a in d.accepted for identity in a.ids))
-    if not ids:
-        return ""
+    named = [] if d.verdict.names_no_cause else d.accepted
+    ids = list(dict.fromkeys(identity for a in named for identity in a.ids))
     advice = [f"<li><b>{i}</b>: {html.escape(effects.get(i, d.robot.n_tubes).measure)}</li>" for i in ids]
-    return (
-        f"<h2>What to measure next</h2><ul>{''.join(advice)}</ul>"
-        "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
-    )
+    advice += [f"<li>{html.escape(text)}</li>" for text in (d.varying.measure if d.varying else [])]
+    if not advice:
+        return ""
+    runs = "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
+    return f"<h2>What to measure next</h2><ul>{''.join(advice)}</ul>{runs if ids else ''}"
 
 
 def _parameters(d: "Diagnosis") -> str:

@@ -53,6 +53,7 @@ def show(console: Any, result: "Diagnosis") -> None:
         for variation in result.varying.variations:
             console.print(f"  • {variation.in_words}", markup=False)
         console.print(result.varying.advice, markup=False)
+        console.print(f"What to measure next: {result.varying.measure[0]}", markup=False)
     for notice in result.notices:
         console.print(f"{notice}.", markup=False)
     for identity, reason in result.unseen.items():

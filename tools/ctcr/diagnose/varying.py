@@ -32,6 +32,15 @@ FAR_LESS = 0.25  # part of that which parameters that vary leave, which says tha
 MOST_TEETH = 24  # of a wheel whose errors are looked for
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
+MEASURE = {  # by how the id of a quantity begins: what shows it best
+    "time": "Come back to the same joints again and again, from the first reading to the last",
+    "order": "Come back to the same joints again and again, from the first reading to the last",
+    "speed": "Pass the same joints at several speeds, and rest there",
+    "tip_speed": "Pass the same joints at several speeds, and rest there",
+    "direction": "Come to the same joints from both sides",
+    "force": "Come to the same joints with several loads",
+}
+
 
 @dataclass(frozen=True)
 class Variation:
@@ -51,6 +60,14 @@ class Variation:
         return f"{last} of tube {middle}" if first == "tubes" else f"{middle} of tube {last}"
 
     @property
+    def measure(self) -> str:
+        """What would show it best."""
+        of = self.covariate.name
+        known = (text for start, text in MEASURE.items() if of.startswith(start))
+        alone = f"Change the {self.covariate.label} alone, there and back, all else held"
+        return f"{next(known, alone)}: does the {self.label} follow?"
+
+    @property
     def in_words(self) -> str:
         return (
             f"{self.label}: by {np.ptp(self.change):.2g} {self.unit} in all, with the {self.covariate.label}"
@@ -65,6 +82,11 @@ class Varying:
     log_evidence: float
     share: float  # of what noise does not explain of the runs that no fit saw, that they explain
     residual: Array  # (M, 6) that they leave, by slopes
+
+    @property
+    def measure(self) -> list[str]:
+        """What to measure next, each once."""
+        return list(dict.fromkeys(v.measure for v in self.variations))
 
     def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
         """Whether effects leave far more of the runs that were not fitted than what was found to vary without them."""
