@@ -249,14 +249,15 @@ def _diagnose(
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
     explained = other_runs.explained(engine, calibrated, after) if accepted else {}
-    varies, outdone = None, False
-    if leftover.rejected:
+    varies = None
+    if leftover.rejected and accepted and varying.may_outdo(engine, calibrated, after):
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated, leftover.sample)
-        outdone = bool(accepted) and varies is not None and varies.outdoes(engine, calibrated, after)
+    outdone = varies is not None and varies.outdoes(engine, calibrated, after)
     verdict = judge(alone, after, accepted, leftover, locked, explained, outdone)
-    if leftover.rejected and not verdict.names_no_cause:
-        varies = varying.found(engine, fit, leftover.sample)
+    if leftover.rejected and not (varies and verdict.names_no_cause):
+        progress("parameters that are not constant")
+        varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)
     return Diagnosis(
         robot, measurements, locked, unseen, alone, open_side.widened(after),
         unsteady.widened(engine, open_side.widened(fit)),

@@ -27,8 +27,8 @@ MOST = 4  # variations, one found after the other
 EVIDENCE = 5.0  # of a variation, beyond the price of having looked at many
 SHARE = 0.3  # of what noise does not explain of the runs that no fit saw, that they must explain together
 LITTLE = 0.05  # ... and for which no further one is named
-MUCH = 0.1  # of what noise does not explain there, that effects leave, and
-FAR_LESS = 0.25  # part of that which parameters that vary leave, which says that those effects are stand-ins
+MUCH = 0.15  # of what noise does not explain there: effects that leave less are not outdone by anything
+FAR_LESS = 0.25  # part of what effects leave there, that parameters leave which vary, where the effects are stand-ins
 MOST_TEETH = 24  # of a wheel whose errors are looked for
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
@@ -90,9 +90,8 @@ class Varying:
 
     def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
         """Whether effects leave far more of the runs that were not fitted than what was found to vary without them."""
-        excess = other_runs.excess_of(engine, with_effects, ~engine.rows)
-        left = excess(with_effects.residual)
-        return left > MUCH * excess(calibrated.residual) and excess(self.residual) < FAR_LESS * left
+        excess = other_runs.excess_of(engine, calibrated, ~engine.rows)
+        return excess(self.residual) < FAR_LESS * excess(with_effects.residual)
 
     @property
     def depends_on(self) -> list[str]:
@@ -122,6 +121,12 @@ class _Trial:
     @property
     def ids(self) -> set[tuple[int, str]]:
         return {(p, covariate.name) for p, covariate, _ in self.pairs}
+
+
+def may_outdo(engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
+    """Whether effects leave enough of the runs that were not fitted for something else to explain far more."""
+    excess = other_runs.excess_of(engine, calibrated, ~engine.rows)
+    return excess(with_effects.residual) > MUCH * excess(calibrated.residual)
 
 
 def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
