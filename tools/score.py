@@ -133,7 +133,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--suite", type=Path, default=ROOT / "build" / "suite")
+    parser.add_argument("--suite", type=lambda text: Path(text).resolve(), default=ROOT / "build" / "suite")
     parser.add_argument("--half", choices=("tuning", "reporting", "both"), default="reporting")
     parser.add_argument("--every", type=int, default=1, help="score every n-th set only")
     parser.add_argument("--jobs", type=int, default=2)
