@@ -248,7 +248,7 @@ def _diagnose(
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
-    explained = other_runs.explained(engine, calibrated, after) if accepted else {}
+    explained = other_runs.explained(engine, alone, after) if accepted else {}
     varies = None
     if leftover.rejected and accepted and varying.may_outdo(engine, calibrated, after):
         progress("parameters that are not constant")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Share of what noise does not explain of locked runs that effects must explain to be no stand-ins, and
 EXPLAINED = 0.75
-MOSTLY = 0.8  # ... to be identified where more than noise is left
+MOSTLY = 0.8  # ... to be identified where more than noise is left, if no run is left by a stand-in's share
 SHOWN = 6  # runs that are named
 MISLED = 2.0  # times the square of that error beyond noise, at which effects predict worse than none
 
@@ -42,8 +42,9 @@ def judge(
     outdone: bool,
 ) -> Verdict:
     """explained: of each locked run, the share that effects explain of what noise does not, as of other_runs.explained.
-    The median run decides: one may be off for reasons of its own. outdone: whether parameters that are not constant
-    explain far more."""
+    The median run says whether they are stand-ins: one may be off for reasons of its own. outdone: whether parameters
+    that are not constant explain far more.
+    """
     jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
     before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     if not accepted:
@@ -75,9 +76,12 @@ def judge(
         return Verdict("probable", ["Another effect is nearly as likely."])
     names = " and ".join(a.entry.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
-    odd = [run for run, part in explained.items() if part < EXPLAINED] if leftover.rejected else []
-    but = [f"But most of the error in {listed(odd, SHOWN)} stays: there something else acts."] if odd else []
-    if leftover.rejected and share < MOSTLY:
-        most = f"{names} {verb} {share:.0%} of what noise does not; more than noise is left"
-        return Verdict("probable", [f"{most}: the law may be another one, or something else acts too.", *but])
-    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error.", *but])
+    odd = [run for run, part in explained.items() if part < EXPLAINED]
+    if leftover.rejected and (share < MOSTLY or odd):
+        stays = [f"Most of the error in {listed(odd, SHOWN)} stays."] if odd else []
+        return Verdict(
+            "probable",
+            [f"Of what noise does not explain of a run that no fit saw, {names} {verb} {share:.0%} (median).", *stays,
+             "More than noise is left: the law may be another one, or something else acts too."],
+        )  # fmt: skip
+    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])
