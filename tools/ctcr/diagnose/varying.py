@@ -79,7 +79,6 @@ class Varying:
     """What would have to vary, and what that would do."""
 
     variations: list[Variation]
-    log_evidence: float
     share: float  # of what noise does not explain of the runs that no fit saw, that they explain
     residual: Array  # (M, 6) that they leave, by slopes
 
@@ -140,8 +139,8 @@ def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
     slopes = np.nan_to_num(at.jacobian_all).reshape(*at.residual.shape, -1) * at.prior_sd
     trials = list(_trials(engine, at, sample, slopes))
     whitened, columns, moved = jacobian, slopes, np.zeros(len(at.names))
-    chosen, evidence = [], 0.0
-    reached = [(excess(at.residual + columns @ moved), evidence, moved)]
+    chosen: list[_Trial] = []
+    reached = [(excess(at.residual), moved)]
     while len(chosen) < MOST and trials:
         linear = Linear(residual + whitened @ moved, whitened)
         gains = [linear.gain(trial.whitened).log_evidence for trial in trials]
@@ -150,24 +149,21 @@ def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
             break
         chosen.append(trials[best])
         trials = [trial for trial in trials if not trial.ids & chosen[-1].ids]
-        evidence += gains[best]
         added = [slopes[:, :, p, None] * basis[:, None, :] for p, _, basis in chosen[-1].pairs]
         whitened = np.hstack([whitened, chosen[-1].whitened])
         columns = np.concatenate([columns, *added], axis=2)
         gradient = whitened.T @ residual
         gradient[: len(at.names)] = 0.0  # the fit is where prior and readings are in balance
         moved = -np.linalg.solve(whitened.T @ whitened + np.eye(len(gradient)), gradient)
-        reached.append((excess(at.residual + columns @ moved), evidence, moved))
-    before, least = reached[0][0], min(left for left, *_ in reached)
-    count = next(k for k, (left, *_) in enumerate(reached) if left - least <= LITTLE * before)
-    after, evidence, moved = reached[count]
+        reached.append((excess(at.residual + columns @ moved), moved))
+    before, least = reached[0][0], min(left for left, _ in reached)
+    count = next(k for k, (left, _) in enumerate(reached) if left - least <= LITTLE * before)
+    after, moved = reached[count]
     if after >= (1 - SHARE) * before:
         return None
     pairs = [pair for trial in chosen[:count] for pair in trial.pairs]
     variations = _variations(engine, at, sample, pairs, moved[len(at.names) :])
-    return Varying(
-        variations, evidence, 1 - after / before, at.residual + columns[:, :, : len(moved)] @ moved
-    )
+    return Varying(variations, 1 - after / before, at.residual + columns[:, :, : len(moved)] @ moved)
 
 
 def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator[_Trial]:
@@ -190,7 +186,8 @@ def _trials(engine: Engine, fit: Fit, sample: Sample, slopes: Array) -> Iterator
                 yield trial
                 tube = next((part for part in name.split(".") if part.isdigit()), "")
                 if tube and covariate.tube in (0, int(tube)):
-                    kinds[name.replace(tube, "*"), covariate.name.replace(tube, "*"), richness].append(trial)
+                    of = covariate.name.replace(tube, "*") if covariate.tube else covariate.name
+                    kinds[name.replace(tube, "*"), of, richness].append(trial)
     for alike in kinds.values():
         if len(alike) > 1:
             pairs = tuple(pair for trial in alike for pair in trial.pairs)
