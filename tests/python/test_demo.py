@@ -17,7 +17,7 @@ from ctcr.errors import InputError
 from ctcr.record.joined import PAUSE_S, joined, start_of
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROOT, ctcr, skip_without_bench  # noqa: E402
+from simulated_bench import ROOT, ctcr, skip_without_bench, was_starved  # noqa: E402
 
 TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
 
@@ -83,11 +83,15 @@ def test_foreign_folders_are_left_alone(tmp_path):
 def run_demo(tmp_path, *options):
     """What the demonstration printed, and its folder."""
     skip_without_bench()
-    target = tmp_path / "demo"
-    command = ctcr("demo", "bench", "-o", target, "--folder", tmp_path / "wires", *options)
-    done = subprocess.run(
-        command, capture_output=True, text=True, env=os.environ | {"COLUMNS": "150"}, timeout=600
-    )
+    for attempt in ("1", "2"):
+        target = tmp_path / attempt / "demo"
+        target.parent.mkdir()
+        command = ctcr("demo", "bench", "-o", target, "--folder", tmp_path / attempt / "wires", *options)
+        done = subprocess.run(
+            command, capture_output=True, text=True, env=os.environ | {"COLUMNS": "150"}, timeout=600
+        )
+        if done.returncode == 0 or not was_starved(done.stdout + done.stderr):
+            break
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout, target
 
