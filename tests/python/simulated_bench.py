@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -37,6 +37,12 @@ def was_starved(said: str) -> bool:
     return any(sign in said for sign in BUS_STARVED)
 
 
+def before_others() -> None:
+    """Lets this process and its children run before other tests, where that is permitted: a `preexec_fn`."""
+    with suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, -15)
+
+
 def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) -> None:
     """Runs pytest beside the simulators that `ctcr sim bench` starts with `bench`; tests find what they need in the
     environment, and the fixtures of bench_fixtures.py. Processes of different folders do not meet."""
@@ -48,7 +54,7 @@ def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) ->
             "--durations=9", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "bench_fixtures", *tests,
         )  # fmt: skip
         done = subprocess.run(
-            command, capture_output=True, text=True, cwd=ROOT, timeout=900,
+            command, capture_output=True, text=True, cwd=ROOT, timeout=900, preexec_fn=before_others,
             env=os.environ | {name: str(value) for name, value in known.items()},
         )  # fmt: skip
         print(done.stdout)

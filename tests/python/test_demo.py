@@ -17,7 +17,7 @@ from ctcr.errors import InputError
 from ctcr.record.joined import PAUSE_S, joined, start_of
 
 sys.path.insert(0, str(Path(__file__).parent))
-from simulated_bench import ROOT, ctcr, skip_without_bench, was_starved  # noqa: E402
+from simulated_bench import ROOT, before_others, ctcr, skip_without_bench, was_starved  # noqa: E402
 
 TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
 
@@ -88,8 +88,9 @@ def run_demo(tmp_path, *options):
         target.parent.mkdir()
         command = ctcr("demo", "bench", "-o", target, "--folder", tmp_path / attempt / "wires", *options)
         done = subprocess.run(
-            command, capture_output=True, text=True, env=os.environ | {"COLUMNS": "150"}, timeout=600
-        )
+            command, capture_output=True, text=True, env=os.environ | {"COLUMNS": "150"}, timeout=600,
+            preexec_fn=before_others,
+        )  # fmt: skip
         if done.returncode == 0 or not was_starved(done.stdout + done.stderr):
             break
     assert done.returncode == 0, done.stdout + done.stderr
@@ -113,6 +114,7 @@ def check_story(said, folder):
     assert not re.search(r'(src|href)="http', tags) and page.count("<svg") >= 3
 
 
+@pytest.mark.alone
 def test_demo_on_the_simulated_bench(tmp_path):
     """Shortened, but through the same serial line and the same bus."""
     check_story(*run_demo(tmp_path, "--short"))

@@ -224,6 +224,7 @@ def on_bench(tmp_path, *options):
     run_on_bench(tmp_path / "bench", around, [*ON_BENCH, *options], ROBOT_FILE=robot, BENCH_FILE=bench)
 
 
+@pytest.mark.alone
 def test_on_the_simulated_bench(tmp_path):
     on_bench(tmp_path)
 

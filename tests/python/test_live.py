@@ -271,6 +271,7 @@ def on_bench(tmp_path, *options):
     run_on_bench(tmp_path / "bench", [real], ["-s", ON_BENCH, *options], ROBOT_FILE=known)
 
 
+@pytest.mark.alone
 def test_on_the_simulated_bench(tmp_path):
     on_bench(tmp_path)
 
