@@ -78,7 +78,7 @@ def judge(
     verb = "explains" if len(accepted) == 1 else "explain"
     odd = [run for run, part in explained.items() if part < EXPLAINED]
     if leftover.rejected and (share < MOSTLY or odd):
-        stays = [f"Most of the error in {listed(odd, SHOWN)} stays."] if odd else []
+        stays = [f"Much of the error in {listed(odd, SHOWN)} stays."] if odd else []
         return Verdict(
             "probable",
             [f"Of what noise does not explain of a run that no fit saw, {names} {verb} {share:.0%} (median).", *stays,
