@@ -303,8 +303,9 @@ TEST(Delay, VanishesAtRestAndWhereAClockStartsAnew) {
   EXPECT_EQ(lag(walk.to(at(0, 0), 0)), none);
   EXPECT_NE(lag(walk.to(at(1, 0), 1)), none);
   EXPECT_EQ(lag(walk.to(at(1, 0), 2)), none);
-  EXPECT_EQ(lag(walk.to(at(2, 0), 0)), none);                                         // the first row of another run
-  EXPECT_NEAR(lag(walk.to(at(2.2, 0), 0.2))[2], -0.3, 1e-12);                         // along its first move, extended
+  EXPECT_EQ(lag(walk.to(at(2, 0), 0)), none);
+  // The mean of 0.18 s ago and of 0.42 s ago, before the run began.
+  EXPECT_NEAR(lag(walk.to(at(2.2, 0), 0.4))[2], 0.5 * (2 - 2.2) + 0.5 * (2.11 - 2.2), 1e-12);
   EXPECT_EQ(lag(walk.to(at(3, 0), std::numeric_limits<double>::quiet_NaN())), none);  // without times there is none
 }
 

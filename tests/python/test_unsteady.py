@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr import effect_fit, robot_file, simulation
-from ctcr.diagnose import diagnose, figures
+from ctcr import effect_fit, identify, robot_file, simulation
+from ctcr.diagnose import diagnose, figures, unsteady
+from ctcr.diagnose.engine import Engine
 from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
@@ -18,17 +19,12 @@ def robot():
     return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
 
 
-def late(robot, table, delays):
-    """Readings with jitter, each half of a run late by one of the delays in turn of chance."""
+def late(robot, table, delays, later):
+    """Readings with jitter, late by the first of two delays, or `later` (M,) by the second."""
     made = []
     for delay in delays:
         late = effect_fit.with_values(robot, ["delay"], {"effects.delay.delay": delay})
         made.append(simulation.simulate(late, table, "jitter", seed=1))
-    random = np.random.default_rng(5)
-    later = np.zeros(len(table), bool)
-    for run in np.unique(table.run):
-        for half in np.array_split(np.flatnonzero(table.run == run), 2):
-            later[half] = random.random() < 0.5
     choose = later[:, None]
     return replace(
         made[0],
@@ -39,12 +35,18 @@ def late(robot, table, delays):
 
 @pytest.fixture(scope="module")
 def steps(robot, recorded):
-    return diagnose(robot, late(robot, recorded, DELAYS))
+    """Each half of a run late by one of the delays, by chance."""
+    random = np.random.default_rng(5)
+    later = np.zeros(len(recorded), bool)
+    for run in np.unique(recorded.run):
+        for half in np.array_split(np.flatnonzero(recorded.run == run), 2):
+            later[half] = random.random() < 0.5
+    return diagnose(robot, late(robot, recorded, DELAYS, later))
 
 
 @pytest.fixture(scope="module")
 def steady(robot, recorded):
-    return diagnose(robot, late(robot, recorded, (DELAYS[0], DELAYS[0])))
+    return diagnose(robot, late(robot, recorded, DELAYS, np.zeros(len(recorded), bool)))
 
 
 def delay_of(found) -> tuple[float, float]:
@@ -84,3 +86,34 @@ def test_a_delay_is_drawn_over_the_speed_of_the_tip(steady):
     known = np.isfinite(error) & np.isfinite(explained)
     assert np.corrcoef(error[known], explained[known])[0, 1] > 0.98
     assert "along the motion" in axes.get_ylabel()
+
+
+@pytest.fixture(scope="module")
+def slipped(robot, recorded):
+    """Late by the longer delay between two moments of the session, one of them in a run that is locked."""
+    part = np.arange(len(recorded)) / len(recorded)
+    return diagnose(robot, late(robot, recorded, DELAYS, (part > 0.3) & (part < 0.7)))
+
+
+def test_what_lags_explain_is_no_leftover(slipped):
+    assert [accepted.ids for accepted in slipped.accepted] == [["delay"]]
+    assert not slipped.leftover.structured
+    assert any("not the same throughout" in line for line in slipped.leftover.in_words)
+
+
+def test_runs_that_no_fit_saw_are_as_late_as_their_neighbours(slipped):
+    """One delay for all leaves far more of them beyond noise."""
+    rms, one_delay = slipped.rms_mm, slipped.final.rms_mm(slipped.locked)
+    noise = rms["noise_floor"] ** 2
+    assert one_delay**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
+    assert unsteady.FOLLOWED in slipped.leftover.in_words
+
+
+def test_a_frame_of_the_tracker_is_told(robot, slipped):
+    """A tracker whose frames come as slowly as the delays differ."""
+    slow = robot.model_copy(deep=True)
+    slow.tracker.rate_Hz = 1 / (DELAYS[1] - DELAYS[0])
+    noise = identify.noise_of_readings(slow, slipped.measurements)
+    engine = Engine(slow, slipped.measurements, noise, ~slipped.locked)
+    assert "about one frame of the tracker (250 ms)" in unsteady.in_words(engine, slipped.final)
+    assert "frame" not in unsteady.in_words(replace(engine, robot=robot), slipped.final)

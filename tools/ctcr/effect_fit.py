@@ -121,6 +121,8 @@ def add(
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
+    is_followed = unsteady.followed(stage.engine, fit) is not fit
+    varies = [unsteady.in_words(stage.engine, fit)] if is_followed else []
     fit = unsteady.widened(stage.engine, open_side.widened(fit))
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(
@@ -129,7 +131,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*said, *_notices(robot, fit, ids)],
+        [*said, *_notices(robot, fit, ids), *varies],
     )
 
 

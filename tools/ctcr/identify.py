@@ -321,10 +321,14 @@ def linear_fit(
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
     max_iterations: int = 50,
+    more: ArrayLike = 0.0,
 ) -> Fit:
     """As identify_with() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or
-    weights (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any."""
-    shown = at.residual if weights is not None or rows is None else np.where(rows[:, None], at.residual, nan)
+    weights (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any. `more` (M, 6) is added
+    to the residual."""
+    shown = at.residual + more
+    if weights is None and rows is not None:
+        shown = np.where(rows[:, None], shown, nan)
     residual = shown.ravel()
 
     def predict(x: Array, _: bool) -> tuple[Array, Array]:

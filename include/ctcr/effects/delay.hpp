@@ -6,7 +6,7 @@ namespace delay {
 inline constexpr EffectInfo info{
     .id = "delay",
     .title = "Time delay between joints and tracker",
-    .physics = "The tracker filters and transmits: a pose belongs to joints of a while ago.",
+    .physics = "The tracker filters and transmits: a pose belongs to joints of a while ago. A run begins at rest.",
     .signature =
         "The error is the velocity of the tip times the delay: it grows with speed, reverses with direction and "
         "vanishes at rest.",
@@ -39,7 +39,8 @@ inline constexpr std::array parameters{
 }  // namespace delay
 
 /// Poses are logged later than joints: the joints that count are those of a time ago, or where the tracker averages, the
-/// mean of those of two moments, delay (1 - spread) and delay (1 + spread) ago: to second order that of any filter.
+/// mean of those of two moments, delay (1 - spread) and delay (1 + spread) ago: to second order that of any filter. Before
+/// its first row a run is at rest.
 template <int N, class P = double>
 struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = delay::info;
@@ -48,14 +49,16 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   void remember(const Path<N, P>& path, std::size_t row) noexcept {
     auto& state = this->past.state;
     for (auto& x : state) x = 0.0;
-    if (path.time.empty() || row == 0 || !(path.time[row - 1] < path.time[row])) return;
+    const std::size_t first = path.first.empty() ? 0 : path.first[row];
+    if (path.time.empty() || row <= first || !(path.time[row - 1] < path.time[row])) return;
     const P &delay = this->template get<0>(), apart = delay * this->template get<1>();
     const double now = path.time[row];
     const auto add_half = [&](const P& late) {
       const double then = now - value(late);
-      std::size_t k = row;  // then lies between rows k - 1 and k, or before the first of a clock that started anew
-      while (k > 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
-      const P part = (path.time[k] - now + late) * (1 / (path.time[k] - path.time[k - 1]));
+      std::size_t k = row;  // then lies between places k - 1 and k, or before the first that is known
+      while (k > first + 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
+      const bool at_rest = !path.first.empty() && then < path.time[first];
+      const P part = at_rest ? P(1.0) : (path.time[k] - now + late) * (1 / (path.time[k] - path.time[k - 1]));
       const auto &a = path.q[k], &b = path.q[k - 1], &here = path.q[row];
       for (std::size_t i = 0; i < N; ++i) {
         state[i] = state[i] + 0.5 * ((a.beta[i] - here.beta[i]) + part * (b.beta[i] - a.beta[i]));

@@ -85,7 +85,8 @@ struct Path {
     MomentJumps<N> jumps;          ///< the same
   };
   std::span<const Row> q;
-  std::span<const double> time;  ///< [s]; empty: unknown
+  std::span<const double> time;        ///< [s]; empty: unknown
+  std::span<const std::size_t> first;  ///< place at which the run of each place begins; empty: unknown
 };
 
 /// An effect of the tip's surroundings.

@@ -34,11 +34,16 @@ void joints_of(const Transmission<N>& t, const MotorAngles<N>& theta, const auto
 template <int N, class P>
 struct RecordedPath {
   std::vector<typename Path<N, P>::Row> q;
-  std::vector<double> time;      ///< [s]; empty where it is not known of each row
-  std::vector<std::size_t> end;  ///< place of each row
+  std::vector<double> time;        ///< [s]; empty where it is not known of each row
+  std::vector<std::size_t> end;    ///< place of each row
+  std::vector<std::size_t> first;  ///< as in Path; with the clock a run begins anew
 
   RecordedPath(const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows, const auto& seed) {
     for (std::size_t row = 0; row < rows.size(); ++row) {
+      const std::size_t last = q.size() + rows[row].places() - 1;
+      const bool begins =
+          row == 0 || rows[row].at.run != rows[row - 1].at.run || !(rows[row].at.time > rows[row - 1].at.time);
+      first.resize(last + 1, begins ? last : first.back());
       for (std::size_t place = 0; place < rows[row].places(); ++place) {
         const RecordedRow<N> here = on_the_way<N>(rows, row, place);
         auto& now = q.emplace_back();
@@ -52,7 +57,7 @@ struct RecordedPath {
     if (time.size() < q.size()) time.clear();
   }
 
-  operator Path<N, P>() const noexcept { return {q, time}; }
+  operator Path<N, P>() const noexcept { return {q, time, first}; }
 };
 
 /// What an effect remembers of each row, by the motion before it, without slopes.

@@ -11,7 +11,7 @@ from ctcr import effects, identify, open_side
 from ctcr.diagnose import jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
-from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.engine import FITS, Engine, values_of
 from ctcr.diagnose.far_off import far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.prediction import predictive
@@ -77,7 +77,7 @@ class Diagnosis:
         """Whether more readings are taken for outliers than there may be, and effects do not tell why."""
         most = racing.MOST_OUTLIERS
         left = self.outliers > most and racing.outliers(self.final) > max(most, 0.5 * self.outliers)
-        others_fit = np.max(self.rounds[0].before.inflation) < racing.FITS
+        others_fit = np.max(self.rounds[0].before.inflation) < FITS
         is_wrong = self.outliers > MANY and np.max(self.final.inflation) > WRONG
         return left and bool(self.explained < HARDLY or others_fit or is_wrong)
 
@@ -243,11 +243,14 @@ def _diagnose(
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
-    leftover = leftover_of(engine, calibrated, fit)
+    seen = unsteady.followed(engine, fit)
+    lags = [unsteady.in_words(engine, fit), unsteady.FOLLOWED] if seen is not fit else []
+    leftover = leftover_of(engine, calibrated, seen, lags)
     progress("prediction of other runs")
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
+        after = unsteady.followed(engine, after) if seen is not fit else after
     explained = other_runs.explained(engine, alone, after) if accepted else {}
     varies = None
     if leftover.rejected and accepted and varying.may_outdo(engine, calibrated, after):
@@ -295,7 +298,7 @@ def _grow(
         accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, **rest))
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
         fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
-        rejected = racing.is_rejected(engine, fit)
+        rejected = engine.rejects(fit)
         fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
         accepted[-1].rms_mm = fit.rms_mm(locked)
         if rejected and accepted[0].share < HARDLY:

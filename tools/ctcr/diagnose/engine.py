@@ -17,6 +17,8 @@ Mask = NDArray[np.bool_]
 
 SLOPES = 1500  # rows by whose slopes candidates are screened where there are twice as many or more
 OUTLIER = 0.3  # weight below which a reading is taken for one
+SIGNIFICANCE = 0.01
+FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
 CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 
@@ -155,13 +157,20 @@ class Engine:
         weights: Array | None = None,
         inflation: Array | None = None,
         max_iterations: int = 50,
+        more: Array | float = 0.0,
     ) -> identify.Fit:
-        """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap."""
+        """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap,
+        and so is `more` (M, 6) residual."""
         _, _, low, high = self.priors(at.names)
         return identify.linear_fit(
             at, low, high, self.places, noise=noise, rows=self.rows, weights=weights, inflation=inflation,
-            max_iterations=max_iterations,
+            max_iterations=max_iterations, more=more,
         )  # fmt: skip
+
+    def likeliest_noise(self, fit: identify.Fit) -> Any:
+        """The noise of a fit with the part of the field error that its readings ask for."""
+        _, _, low, high = self.priors(fit.names)
+        return identify.likeliest_field(fit, low, high, self.places)
 
     def thinned(self, fit: identify.Fit, least: int = SLOPES) -> tuple["Engine", identify.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
@@ -175,6 +184,10 @@ class Engine:
     def as_stated(self, fit: identify.Fit) -> identify.Fit:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
+
+    def rejects(self, fit: identify.Fit) -> bool:
+        """Whether noise alone, as stated, does not explain what is left."""
+        return bool(np.max(fit.inflation) > FITS or self.as_stated(fit).p_value < SIGNIFICANCE)
 
     def linear(self, fit: identify.Fit) -> Linear:
         residual, jacobian = fit.whitened()

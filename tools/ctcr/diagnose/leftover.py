@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 from ctcr import effect_model, identify
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
-from ctcr.diagnose import unsteady
 from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.far_off import come_together
-from ctcr.diagnose.race import is_rejected
 from ctcr.output import listed
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
@@ -49,22 +47,21 @@ class Leftover:
     @property
     def in_words(self) -> list[str]:
         if not self.structured:
-            return ["What is left is noise."]
+            return [*self.lags, "What is left is noise."]
         on = ", ".join(item.label for item in self.after.chosen)
         depends = f"it depends on {on}" if on else "no quantity alone tells how large it is on other runs"
         rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
         return rejected + self.lags + self.at_places
 
 
-def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit) -> Leftover:
+def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit, lags: list[str]) -> Leftover:
     sample = take_sample(
         engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements)
     )
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     places = engine.measurements.row[come_together(engine.measurements, fit)].tolist()
-    lags = unsteady.in_words(engine, fit)
-    return Leftover(is_rejected(engine, fit), places, ranked, after, sample, lags)
+    return Leftover(engine.rejects(fit), places, ranked, after, sample, lags)
 
 
 def _rank(engine: Engine, sample: Sample, fit: identify.Fit) -> Ranking:

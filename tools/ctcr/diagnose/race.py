@@ -30,8 +30,6 @@ ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be 
 IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
-SIGNIFICANCE = 0.01
-FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 
 
@@ -133,13 +131,6 @@ def outliers(fit: identify.Fit) -> float:
     return float(np.mean(fit.weights[used, 0] < OUTLIER)) if used.any() else 0.0
 
 
-def is_rejected(engine: Engine, fit: identify.Fit) -> bool:
-    """Whether noise alone, as stated, does not explain what is left."""
-    if np.max(fit.inflation) > FITS:
-        return True
-    return engine.as_stated(fit).p_value < SIGNIFICANCE
-
-
 def parameters(entries: Collection[Entry]) -> tuple[list[str], dict[str, float]]:
     """Names of all parameters of effects that are fitted, and the values at which others are held."""
     names = [name for entry in entries for name in entry.candidate.names]
@@ -181,8 +172,7 @@ def likeliest(
 
     full = engine.fit(names, start=start, fixed=fixed, near=bool(start))
     full = open_side.crossed(full, again)
-    _, _, low, high = engine.priors(full.names)
-    noise = identify.likeliest_field(full, low, high, engine.places)
+    noise = engine.likeliest_noise(full)
     # From the full model's place: what effects do far from there, slopes do not tell.
     if noise is full.noise:
         return full
@@ -229,7 +219,7 @@ def race(
     entries += [entry for entry in screened if entry.candidate not in refitted]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
-    decide(round_, len({c.id for c in candidates}), bool(accepted), is_rejected(engine, before))
+    decide(round_, len({c.id for c in candidates}), bool(accepted), engine.rejects(before))
     if round_.accepted and accepted and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"{round_.accepted.id} would not predict other runs better"
         round_.accepted, round_.ids = None, []

@@ -1,10 +1,10 @@
 """A delay that is not always the same: stretches of readings that are late by more or by less than the fitted time.
 
 A tracker answers with its last frame: readings may be late by one frame more for a while, and then no longer. What that
-leaves follows the motion, so that hysteresis imitates it.
+leaves follows the motion, so that hysteresis imitates it. Stretches that follow each other are often late alike.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,30 +12,52 @@ from numpy.typing import NDArray
 from ctcr.diagnose import split
 from ctcr.diagnose.engine import Engine, Gain, Linear
 from ctcr.identify import Fit
-from ctcr.measurements import Measurements
 
 Array = NDArray[np.float64]
 
 DELAY = "effects.delay.delay"
-STRETCHES = 2  # of each run: out and back
-MOST = 48  # stretches: of more runs several share one, as each is a column of all readings
+STRETCHES = 2  # of each run, at least: out and back
+MOST = 96  # stretches: of more runs several share one, as each is a column of all readings
 SPREAD = 0.2  # standard deviation of a stretch's lag, over the delay
-TOLD = 5.0  # log evidence from which it is said
+MEMORIES = (
+    0.0,
+    1 / 16,
+    1 / 4,
+)  # times over which lags stay alike, over that of all readings; of these the likeliest
+SURE = 5.0  # log evidence from which lags are followed, and told
+LEFT = 0.5  # share that they may leave of what noise does not explain
+ONE_FRAME = 0.3  # by how much lags may differ by more or less than a frame of the tracker, over it
+
+FOLLOWED = (
+    "Errors with the effects found are those of readings as late as their stretch is: in runs that no fit saw, as late "
+    "as those measured before and after tell."
+)
+
+
+@dataclass(frozen=True)
+class Lags:
+    """How much later than the fitted delay each stretch is, by slopes at a fit."""
+
+    log_evidence: float  # over a delay that is the same throughout
+    gain: Gain
+    columns: Array  # whitened slopes by independent lags (K, stretches) that give the lags of stretches
+    lag: Array  # [s] of each row (M,), in rows that were not fitted too
+    stretch: NDArray[np.int64]  # of each row (M,)
 
 
 def linear(engine: Engine, fit: Fit) -> Linear:
     """Of a fit, where the data ask for it with a lag of each stretch."""
-    plain, lags, gain = _stretched(engine, fit)
-    if gain is None or gain.log_evidence <= 0:
+    plain, lags = engine.linear(fit), lags_of(engine, fit)
+    if lags is None or lags.log_evidence <= 0:
         return plain
-    residual = plain.residual + lags @ gain.values + plain.jacobian @ gain.calibration
-    return Linear(residual, np.hstack([plain.jacobian, lags]))
+    residual = plain.residual + lags.columns @ lags.gain.values + plain.jacobian @ lags.gain.calibration
+    return Linear(residual, np.hstack([plain.jacobian, lags.columns]))
 
 
 def evidence(engine: Engine, fit: Fit) -> float:
     """Log evidence of a fit whose stretches may have lags of their own."""
-    gain = _stretched(engine, fit)[2]
-    return fit.log_evidence + (0.0 if gain is None else max(0.0, gain.log_evidence))
+    lags = lags_of(engine, fit)
+    return fit.log_evidence + (0.0 if lags is None else max(0.0, lags.log_evidence))
 
 
 def widened(engine: Engine, fit: Fit) -> Fit:
@@ -50,40 +72,89 @@ def widened(engine: Engine, fit: Fit) -> Fit:
     return replace(fit, covariance=covariance, sd=sd, ratio=sd / fit.prior_sd)
 
 
-def in_words(engine: Engine, fit: Fit) -> list[str]:
-    """How the delay varies; nothing where it does not, or there is none."""
-    gain = _stretched(engine, fit)[2]
-    if gain is None or gain.log_evidence < TOLD:
-        return []
-    spread = 1e3 * SPREAD * abs(_delay(fit)) * float(np.sqrt(np.mean(gain.values**2)))
-    return [
-        f"The delay is not the same throughout: between the halves of runs it varies by {spread:.2g} ms (standard "
-        "deviation). Where the tracker and the computer keep their own time, no model foretells that."
-    ]
+def followed(engine: Engine, fit: Fit) -> Fit:
+    """The fit by slopes to readings that are as late as their stretch: of rows that were not fitted, as late as those
+    before and after them tell. Itself where lags are not sure, or not most of what noise leaves unexplained: then they
+    may be due to the rest."""
+    lags = lags_of(engine, fit)
+    if lags is None or lags.log_evidence < SURE:
+        return fit
+    more = lags.lag[:, None] * _slope(fit)
+    noise = engine.likeliest_noise(engine.linear_fit(fit, more=more, noise=engine.noise))
+    there = engine.linear_fit(fit, more=more, noise=noise)
+    if _beyond_noise(engine, there) > LEFT * _beyond_noise(engine, fit):
+        return fit
+    # Once more with its weights: rows that were not fitted have a residual, too.
+    return engine.linear_fit(fit, more=more, noise=noise, weights=there.weights, inflation=there.inflation)
 
 
-def _stretched(engine: Engine, fit: Fit) -> tuple[Linear, Array, Gain | None]:
-    """The fit's slopes, those of a lag of each stretch (K, stretches) in units of its prior, and what these bring."""
-    plain = engine.linear(fit)
-    if DELAY not in fit.names or not _delay(fit):
-        return plain, np.empty((len(plain.residual), 0)), None
-    slope = np.nan_to_num(fit.jacobian_all[:, fit.names.index(DELAY)].reshape(-1, 6))
-    stretch = _stretches(engine.measurements)
+def _beyond_noise(engine: Engine, fit: Fit) -> float:
+    """Chi-square that noise as stated does not explain."""
+    stated = engine.as_stated(fit)
+    return max(stated.chi_square + stated.shift_square - stated.bulk_observations, 0.0)
+
+
+def in_words(engine: Engine, fit: Fit) -> str:
+    """How the delay of a fit varies that can be followed."""
+    lags = lags_of(engine, fit)
+    fitted = np.unique(lags.stretch[engine.fitted])
+    each = np.array([lags.lag[lags.stretch == k][0] for k in fitted])
+    told = f"from stretch to stretch it varies by {1e3 * each.std():.2g} ms (standard deviation)"
+    rate = engine.robot.tracker.rate_Hz
+    early, late = _delay(fit) + np.quantile(each, [0.1, 0.9])
+    if rate and abs((late - early) * rate - 1) < ONE_FRAME:
+        told += f", {1e3 * early:.2g} to {1e3 * late:.2g} ms, about one frame of the tracker ({1e3 / rate:.3g} ms)"
+    return (
+        f"The delay is not the same throughout: {told}. Where the tracker and the computer keep their own time, no "
+        "model foretells that; a robot file holds one delay."
+    )
+
+
+def lags_of(engine: Engine, fit: Fit) -> Lags | None:
+    """None of a fit without a delay."""
+    time = engine.measurements.t
+    if DELAY not in fit.names or not _delay(fit) or not np.ptp(time) > 0:
+        return None
+    plain, stretch = engine.linear(fit), _stretches(engine)
     each = np.arange(stretch.max() + 1)
-    lags = fit.whiten(SPREAD * _delay(fit) * slope[:, :, None] * (stretch[:, None] == each)[:, None, :])
-    return plain, lags, plain.gain(lags)
+    columns = fit.whiten(_slope(fit)[:, :, None] * (stretch[:, None] == each)[:, None, :])
+    middle = np.array([time[stretch == k].mean() for k in each])
+    apart, spread = np.abs(middle[:, None] - middle), SPREAD * abs(_delay(fit))
+    own = columns - plain.jacobian @ plain.imitation(columns)
+    information, slope = columns.T @ own, columns.T @ plain.residual
+    roots = []
+    for memory in MEMORIES:
+        alike = np.exp(-apart / (memory * np.ptp(time))) if memory else np.eye(len(each))
+        roots.append(spread * np.linalg.cholesky(alike + 1e-9 * np.eye(len(each))))
+    root = max(roots, key=lambda root: _worth(root, information, slope))
+    gain = plain.gain(columns @ root)
+    return Lags(gain.log_evidence, gain, columns @ root, (root @ gain.values)[stretch], stretch)
+
+
+def _worth(root: Array, information: Array, slope: Array) -> float:
+    """Log evidence of lags whose covariance has this root, as Linear.gain() gives it."""
+    S, g = root.T @ information @ root + np.eye(len(root)), root.T @ slope
+    return float(0.5 * g @ np.linalg.solve(S, g) - 0.5 * np.linalg.slogdet(S)[1])
+
+
+def _slope(fit: Fit) -> Array:
+    """Of the residual by the delay (M, 6)."""
+    return np.nan_to_num(fit.jacobian_all[:, fit.names.index(DELAY)].reshape(-1, 6))
 
 
 def _delay(fit: Fit) -> float:
     return float(fit.values[fit.names.index(DELAY)])
 
 
-def _stretches(measurements: Measurements) -> NDArray[np.int64]:
+def _stretches(engine: Engine) -> NDArray[np.int64]:
     """The stretch of each row (M,), numbered from 0."""
-    group = split.groups(measurements)
+    group = split.groups(engine.measurements)
+    known = np.unique(group)
+    parts = max(STRETCHES, MOST // len(known))
     stretch = np.zeros(len(group), np.int64)
-    for k in np.unique(group):
+    for k in known:
         rows = np.flatnonzero(group == k)
-        stretch[rows] = STRETCHES * k + np.arange(len(rows)) * STRETCHES // len(rows)
+        stretch[rows] = parts * k + np.arange(len(rows)) * parts // len(rows)
+    stretch = np.unique(stretch, return_inverse=True)[1]  # a short run has fewer
     count = int(stretch.max()) + 1
     return stretch if count <= MOST else stretch * MOST // count
