@@ -351,7 +351,7 @@ def test_what_is_locked_holds_poses(robot):
 def test_of_many_rows_the_best_candidate_is_always_refitted(monkeypatch, scores, kept):
     """Also where a few rows alone do not speak for it."""
     entries = [dataclasses.replace(blank, refit=score) for score in scores]
-    monkeypatch.setattr(racing, "refit", lambda engine, base, entry, fixed, progress: entry)
+    monkeypatch.setattr(racing, "refitted", lambda engine, base, tried, fixed, progress: tried)
     monkeypatch.setattr(identify, "few_of", lambda rows: rows)
     engine = ManyRows(np.ones(4, bool))
     before = SimpleNamespace(names=[], values=[], noise=None, weights=None, inflation=None)

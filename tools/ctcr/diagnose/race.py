@@ -211,12 +211,9 @@ def race(
         same = [other for other in chosen if other.id == entry.id]
         if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
             chosen.append(entry)
-    entries = [
-        refit(engine, before, entry, fixed, progress)
-        for entry in _in_reach(engine, before, chosen, fixed, progress)
-    ]
-    refitted = [entry.candidate for entry in entries]
-    entries += [entry for entry in screened if entry.candidate not in refitted]
+    entries = refitted(engine, before, _in_reach(engine, before, chosen, fixed, progress), fixed, progress)
+    fitted = [entry.candidate for entry in entries]
+    entries += [entry for entry in screened if entry.candidate not in fitted]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
     decide(round_, len({c.id for c in candidates}), bool(accepted), engine.rejects(before))
@@ -271,7 +268,7 @@ def _in_reach(
     small = replace(engine, rows=few)
     added = [name for name in before.names if name.startswith("effects.")]
     base = small.fit_like(before, added, start=values_of(before), fixed=fixed, near=True)
-    tried = [refit(small, base, entry, fixed, progress) for entry in chosen]
+    tried = refitted(small, base, chosen, fixed, progress)
     best = max(entry.score for entry in tried)
     reach = min(best, IN_REACH * best)  # the best itself always is
     return [
@@ -281,10 +278,23 @@ def _in_reach(
     ]
 
 
-def refit(
-    engine: Engine, before: identify.Fit, entry: Entry, fixed: dict[str, float], progress: Progress
+def refitted(
+    engine: Engine, before: identify.Fit, entries: list[Entry], fixed: dict[str, float], progress: Progress
+) -> list[Entry]:
+    """The entries after a joint fit with calibration and what was accepted before, at the same weights and noise."""
+    evidence = unsteady.evidence(engine, before)
+    return [_refit(engine, before, evidence, entry, fixed, progress) for entry in entries]
+
+
+def _refit(
+    engine: Engine,
+    before: identify.Fit,
+    evidence: float,
+    entry: Entry,
+    fixed: dict[str, float],
+    progress: Progress,
 ) -> Entry:
-    """The entry after a joint fit with calibration and what was accepted before, at the same weights and noise."""
+    """One of them; `evidence` is that of the fit before."""
     candidate = entry.candidate
     progress(f"fitting {candidate.label}")
     added = [name for name in before.names if name.startswith("effects.")]
@@ -303,7 +313,7 @@ def refit(
     share = share_of(before, fit, len(candidate.names))
     return replace(
         entry,
-        refit=unsteady.evidence(engine, fit) - unsteady.evidence(engine, before),
+        refit=unsteady.evidence(engine, fit) - evidence,
         share=share,
         # A chi-square removed has a standard deviation of twice its root.
         spread=2 * np.sqrt(max(share, 0.0) / max(excess(before), 1.0)),
