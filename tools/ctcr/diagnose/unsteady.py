@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 DELAY = "effects.delay.delay"
 STRETCHES = 2  # of each run, at least: out and back
 MOST = 96  # stretches: of more runs several share one, as each is a column of all readings
+AT_ONCE = 16  # of these columns are made at a time
 SPREAD = 0.2  # standard deviation of a stretch's lag, over the delay
 MEMORIES = (
     0.0,
@@ -38,20 +39,29 @@ FOLLOWED = (
 class Lags:
     """How much later than the fitted delay each stretch is, by slopes at a fit."""
 
-    log_evidence: float  # over a delay that is the same throughout
-    gain: Gain
+    plain: Linear  # with one delay
     columns: Array  # whitened slopes by independent lags (K, stretches) that give the lags of stretches
+    gain: Gain  # of these
     lag: Array  # [s] of each row (M,), in rows that were not fitted too
     stretch: NDArray[np.int64]  # of each row (M,)
+
+    @property
+    def log_evidence(self) -> float:
+        """Over a delay that is the same throughout."""
+        return self.gain.log_evidence
+
+    @property
+    def linear(self) -> Linear:
+        """With a lag of each stretch."""
+        plain, gain = self.plain, self.gain
+        residual = plain.residual + self.columns @ gain.values + plain.jacobian @ gain.calibration
+        return Linear(residual, np.hstack([plain.jacobian, self.columns]))
 
 
 def linear(engine: Engine, fit: Fit) -> Linear:
     """Of a fit, where the data ask for it with a lag of each stretch."""
-    plain, lags = engine.linear(fit), lags_of(engine, fit)
-    if lags is None or lags.log_evidence <= 0:
-        return plain
-    residual = plain.residual + lags.columns @ lags.gain.values + plain.jacobian @ lags.gain.calibration
-    return Linear(residual, np.hstack([plain.jacobian, lags.columns]))
+    lags = lags_of(engine, fit)
+    return engine.linear(fit) if lags is None or lags.log_evidence <= 0 else lags.linear
 
 
 def evidence(engine: Engine, fit: Fit) -> float:
@@ -62,11 +72,10 @@ def evidence(engine: Engine, fit: Fit) -> float:
 
 def widened(engine: Engine, fit: Fit) -> Fit:
     """The fit with the deviations of its values that lags of stretches call for."""
-    plain, stretched = engine.linear(fit), linear(engine, fit)
-    n = len(fit.names)
-    if stretched.jacobian.shape[1] == n:
+    lags, n = lags_of(engine, fit), len(fit.names)
+    if lags is None or lags.log_evidence <= 0:
         return fit
-    more = stretched.covariance()[:n, :n] - plain.covariance()
+    more = lags.linear.covariance()[:n, :n] - lags.plain.covariance()
     covariance = fit.covariance + more * np.outer(fit.prior_sd, fit.prior_sd)
     sd = np.sqrt(np.diag(covariance))
     return replace(fit, covariance=covariance, sd=sd, ratio=sd / fit.prior_sd)
@@ -117,18 +126,21 @@ def lags_of(engine: Engine, fit: Fit) -> Lags | None:
         return None
     plain, stretch = engine.linear(fit), _stretches(engine)
     each = np.arange(stretch.max() + 1)
-    columns = fit.whiten(_slope(fit)[:, :, None] * (stretch[:, None] == each)[:, None, :])
+    columns = np.empty((len(plain.residual), len(each)))
+    for some in np.array_split(each, max(1, len(each) // AT_ONCE)):
+        columns[:, some] = fit.whiten(_slope(fit)[:, :, None] * (stretch[:, None] == some)[:, None, :])
     middle = np.array([time[stretch == k].mean() for k in each])
     apart, spread = np.abs(middle[:, None] - middle), SPREAD * abs(_delay(fit))
-    own = columns - plain.jacobian @ plain.imitation(columns)
-    information, slope = columns.T @ own, columns.T @ plain.residual
+    crossed, slope = plain.jacobian.T @ columns, columns.T @ plain.residual
+    information = columns.T @ columns - crossed.T @ plain.imitation(columns)
     roots = []
     for memory in MEMORIES:
         alike = np.exp(-apart / (memory * np.ptp(time))) if memory else np.eye(len(each))
         roots.append(spread * np.linalg.cholesky(alike + 1e-9 * np.eye(len(each))))
     root = max(roots, key=lambda root: _worth(root, information, slope))
-    gain = plain.gain(columns @ root)
-    return Lags(gain.log_evidence, gain, columns @ root, (root @ gain.values)[stretch], stretch)
+    columns = columns @ root
+    gain = plain.gain(columns)
+    return Lags(plain, columns, gain, (root @ gain.values)[stretch], stretch)
 
 
 def _worth(root: Array, information: Array, slope: Array) -> float:
