@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,6 +48,17 @@ def steps(robot, recorded):
 @pytest.fixture(scope="module")
 def steady(robot, recorded):
     return diagnose(robot, late(robot, recorded, DELAYS, np.zeros(len(recorded), bool)))
+
+
+@pytest.mark.parametrize(("readings", "parts"), [(1, 1), (28, 2), (100, 8)])
+def test_a_run_has_two_stretches_or_more_of_a_dozen_readings(robot, recorded, readings, parts):
+    runs = np.repeat(np.arange(12), readings)
+    there = np.arange(len(runs)) % len(recorded)
+    columns = {name: value[there] for name, value in vars(recorded).items() if isinstance(value, np.ndarray)}
+    engine = SimpleNamespace(measurements=replace(recorded, **columns | {"run": runs}))
+    stretch = unsteady._stretches(engine)
+    assert stretch.max() + 1 == 12 * parts == len(np.unique(stretch))
+    assert all(len(np.unique(stretch[runs == run])) == parts for run in range(12))
 
 
 def delay_of(found) -> tuple[float, float]:

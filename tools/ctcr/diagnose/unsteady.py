@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 
 DELAY = "effects.delay.delay"
 STRETCHES = 2  # of each run, at least: out and back
+FEWEST = 12  # readings in each of more than these
 MOST = 96  # stretches: of more runs several share one, as each is a column of all readings
 AT_ONCE = 16  # of these columns are made at a time
 SPREAD = 0.2  # standard deviation of a stretch's lag, over the delay
@@ -24,14 +25,14 @@ MEMORIES = (
     0.0,
     1 / 16,
     1 / 4,
-)  # times over which lags stay alike, over that of all readings; of these the likeliest
+)  # times, over that of all readings, for which lags stay alike: the likeliest of these
 SURE = 5.0  # log evidence from which lags are followed, and told
 LEFT = 0.5  # share that they may leave of what noise does not explain
 ONE_FRAME = 0.3  # by how much lags may differ by more or less than a frame of the tracker, over it
 
 FOLLOWED = (
-    "Errors with the effects found are those of readings as late as their stretch is: in runs that no fit saw, as late "
-    "as those measured before and after tell."
+    "Errors with the effects found allow for that: readings of runs that no fit saw count as late as those before and "
+    "after them."
 )
 
 
@@ -161,12 +162,11 @@ def _delay(fit: Fit) -> float:
 def _stretches(engine: Engine) -> NDArray[np.int64]:
     """The stretch of each row (M,), numbered from 0."""
     group = split.groups(engine.measurements)
-    known = np.unique(group)
-    parts = max(STRETCHES, MOST // len(known))
-    stretch = np.zeros(len(group), np.int64)
-    for k in known:
+    stretch, count = np.zeros(len(group), np.int64), 0
+    for k in np.unique(group):
         rows = np.flatnonzero(group == k)
-        stretch[rows] = parts * k + np.arange(len(rows)) * parts // len(rows)
-    stretch = np.unique(stretch, return_inverse=True)[1]  # a short run has fewer
-    count = int(stretch.max()) + 1
+        parts = min(MOST // (group.max() + 1), len(rows) // FEWEST)
+        parts = min(max(parts, STRETCHES), len(rows))
+        stretch[rows] = count + np.arange(len(rows)) * parts // len(rows)
+        count += parts
     return stretch if count <= MOST else stretch * MOST // count
