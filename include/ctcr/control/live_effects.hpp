@@ -26,7 +26,7 @@ public:
     const auto remembered = [&](const Twist<N>& twist) {
       Effects now = effects_;
       rows_[row].twist = twist;
-      now.remember({{rows_.data(), count_}, {times_.data(), count_}}, row);
+      now.remember({{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}}, row);
       return now;
     };
     if constexpr (Effects::follows_twist) {
@@ -55,10 +55,12 @@ public:
   [[nodiscard]] const Occasion& occasion() const noexcept { return at_; }
 
 private:
-  static constexpr int most = 8;  // equilibria of a period
+  static constexpr int most = 8;                             // equilibria of a period
+  static constexpr std::array<std::size_t, window> start{};  // where the run of each period begins: at the first one
 
   std::size_t add(const Joints<N>& motors, double time) noexcept {
     if (count_ == window) {
+      forgot_ = true;
       std::copy(rows_.begin() + 1, rows_.end(), rows_.begin());
       std::copy(times_.begin() + 1, times_.end(), times_.begin());
       --count_;
@@ -83,6 +85,7 @@ private:
   std::array<typename Path<N, double>::Row, window> rows_{};
   std::array<double, window> times_{};
   std::size_t count_ = 0;
+  bool forgot_ = false;  // the first period
   Twist<N> twist_{};
   MomentJumps<N> jumps_;
   TwistBalance<N, Fx> balance_;
