@@ -127,5 +127,5 @@ def test_a_frame_of_the_tracker_is_told(robot, slipped):
     slow.tracker.rate_Hz = 1 / (DELAYS[1] - DELAYS[0])
     noise = identify.noise_of_readings(slow, slipped.measurements)
     engine = Engine(slow, slipped.measurements, noise, ~slipped.locked)
-    assert "about one frame of the tracker (250 ms)" in unsteady.in_words(engine, slipped.final)
-    assert "frame" not in unsteady.in_words(replace(engine, robot=robot), slipped.final)
+    assert "about one frame of the tracker (250 ms)" in unsteady.followed(engine, slipped.final)[1][0]
+    assert "frame" not in unsteady.followed(replace(engine, robot=robot), slipped.final)[1][0]

@@ -121,8 +121,7 @@ def add(
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
-    is_followed = unsteady.followed(stage.engine, fit) is not fit
-    varies = [unsteady.in_words(stage.engine, fit)] if is_followed else []
+    varies = unsteady.followed(stage.engine, fit)[1]
     fit = unsteady.widened(stage.engine, open_side.widened(fit))
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(

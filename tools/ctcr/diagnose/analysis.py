@@ -243,14 +243,14 @@ def _diagnose(
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
-    seen = unsteady.followed(engine, fit)
-    lags = [unsteady.in_words(engine, fit), unsteady.FOLLOWED] if seen is not fit else []
+    seen, told = unsteady.followed(engine, fit)
+    lags = [*told, unsteady.FOLLOWED] if told else []
     leftover = leftover_of(engine, calibrated, seen, lags)
     progress("prediction of other runs")
     alone = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
-        after = unsteady.followed(engine, after) if seen is not fit else after
+        after = unsteady.followed(engine, after)[0] if lags else after
     explained = other_runs.explained(engine, alone, after) if accepted else {}
     varies = None
     if leftover.rejected and accepted and varying.may_outdo(engine, calibrated, after):

@@ -33,6 +33,15 @@ class Gain:
     columns: Array  # whitened slopes that calibration cannot imitate (K, k)
 
 
+def laplace(information: Array, gradient: Array) -> tuple[float, Array]:
+    """Log evidence of adding parameters, and their values, in units of their prior sd: of what the readings tell of
+    them beside calibration, and the gradient of half the chi-square."""
+    S = information + np.eye(len(information))
+    S = 0.5 * (S + S.T)
+    eta = -np.linalg.solve(S, gradient)
+    return float(-0.5 * gradient @ eta - 0.5 * np.linalg.slogdet(S)[1]), eta
+
+
 class Linear:
     """Whitened residual and slopes at a fit, everything in units of prior sd."""
 
@@ -53,12 +62,8 @@ class Linear:
         """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
         imitation = self.imitation(columns)
         left = columns - self.jacobian @ imitation
-        S = columns.T @ left + np.eye(columns.shape[1])
-        S = 0.5 * (S + S.T)
-        g = columns.T @ self.residual
-        eta = -np.linalg.solve(S, g)
-        log_evidence = -0.5 * g @ eta - 0.5 * np.linalg.slogdet(S)[1]
-        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left)
+        log_evidence, eta = laplace(columns.T @ left, columns.T @ self.residual)
+        return Gain(log_evidence, eta, -imitation @ eta, left @ eta, left)
 
 
 @dataclass

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.diagnose import split
-from ctcr.diagnose.engine import Engine, Gain, Linear
+from ctcr.diagnose.engine import Engine, Gain, Linear, laplace
 from ctcr.identify import Fit
 
 Array = NDArray[np.float64]
@@ -82,20 +82,21 @@ def widened(engine: Engine, fit: Fit) -> Fit:
     return replace(fit, covariance=covariance, sd=sd, ratio=sd / fit.prior_sd)
 
 
-def followed(engine: Engine, fit: Fit) -> Fit:
-    """The fit by slopes to readings that are as late as their stretch: of rows that were not fitted, as late as those
-    before and after them tell. Itself where lags are not sure, or not most of what noise leaves unexplained: then they
-    may be due to the rest."""
+def followed(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
+    """The fit by slopes to readings that are as late as their stretch, and how these differ: in rows that were not
+    fitted, as late as those before and after them tell. The fit itself and nothing to say where lags are not sure, or
+    not most of what noise leaves unexplained: then they may be due to the rest."""
     lags = lags_of(engine, fit)
     if lags is None or lags.log_evidence < SURE:
-        return fit
+        return fit, []
     more = lags.lag[:, None] * _slope(fit)
     noise = engine.likeliest_noise(engine.linear_fit(fit, more=more, noise=engine.noise))
     there = engine.linear_fit(fit, more=more, noise=noise)
     if _beyond_noise(engine, there) > LEFT * _beyond_noise(engine, fit):
-        return fit
+        return fit, []
     # Once more with its weights: rows that were not fitted have a residual, too.
-    return engine.linear_fit(fit, more=more, noise=noise, weights=there.weights, inflation=there.inflation)
+    seen = engine.linear_fit(fit, more=more, noise=noise, weights=there.weights, inflation=there.inflation)
+    return seen, [_in_words(engine, fit, lags)]
 
 
 def _beyond_noise(engine: Engine, fit: Fit) -> float:
@@ -104,9 +105,8 @@ def _beyond_noise(engine: Engine, fit: Fit) -> float:
     return max(stated.chi_square + stated.shift_square - stated.bulk_observations, 0.0)
 
 
-def in_words(engine: Engine, fit: Fit) -> str:
-    """How the delay of a fit varies that can be followed."""
-    lags = lags_of(engine, fit)
+def _in_words(engine: Engine, fit: Fit, lags: Lags) -> str:
+    """How the delay of a fit varies."""
     fitted = np.unique(lags.stretch[engine.fitted])
     each = np.array([lags.lag[lags.stretch == k][0] for k in fitted])
     told = f"from stretch to stretch it varies by {1e3 * each.std():.2g} ms (standard deviation)"
@@ -132,22 +132,16 @@ def lags_of(engine: Engine, fit: Fit) -> Lags | None:
         columns[:, some] = fit.whiten(_slope(fit)[:, :, None] * (stretch[:, None] == some)[:, None, :])
     middle = np.array([time[stretch == k].mean() for k in each])
     apart, spread = np.abs(middle[:, None] - middle), SPREAD * abs(_delay(fit))
-    crossed, slope = plain.jacobian.T @ columns, columns.T @ plain.residual
+    crossed, gradient = plain.jacobian.T @ columns, columns.T @ plain.residual
     information = columns.T @ columns - crossed.T @ plain.imitation(columns)
     roots = []
     for memory in MEMORIES:
         alike = np.exp(-apart / (memory * np.ptp(time))) if memory else np.eye(len(each))
         roots.append(spread * np.linalg.cholesky(alike + 1e-9 * np.eye(len(each))))
-    root = max(roots, key=lambda root: _worth(root, information, slope))
+    root = max(roots, key=lambda root: laplace(root.T @ information @ root, root.T @ gradient)[0])
     columns = columns @ root
     gain = plain.gain(columns)
     return Lags(plain, columns, gain, (root @ gain.values)[stretch], stretch)
-
-
-def _worth(root: Array, information: Array, slope: Array) -> float:
-    """Log evidence of lags whose covariance has this root, as Linear.gain() gives it."""
-    S, g = root.T @ information @ root + np.eye(len(root)), root.T @ slope
-    return float(0.5 * g @ np.linalg.solve(S, g) - 0.5 * np.linalg.slogdet(S)[1])
 
 
 def _slope(fit: Fit) -> Array:
