@@ -34,8 +34,9 @@ TEST(LiveEffects, RememberWhatRecordedRowsDo) {
     }
     rows.push_back({{q.beta, q.alpha}, {}, {.time = 0.025 * k}});
   }
+  rows.front().radius = ContactRadii<3>(system.model.robot());
   const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
-  LiveEffects<3, Path3> live(effects);
+  LiveEffects<3, Path3> live(system.model);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     (void)live.advance({rows[k].theta.translation, rows[k].theta.rotation}, rows[k].at.time);
     const auto check = [&]<std::size_t I>(std::integral_constant<std::size_t, I>) {
@@ -76,7 +77,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   add_twist<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
   EXPECT_GT(wind_up(system, std::span(rows)), 0.05);
   const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
-  LiveEffects<3, Rubbing> live(system.model.effects());
+  LiveEffects<3, Rubbing> live(system.model);
   Workspace<3> ws;
   Solution<3> solution;
   Model<3, Rubbing> model = system.model;

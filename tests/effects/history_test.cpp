@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "ctcr/mechanics/shape.hpp"
+#include "ctcr/pipeline/wind_up.hpp"
 #include "support/walk.hpp"
 
 namespace ctcr {
@@ -70,6 +71,49 @@ TEST(Friction, FollowsWhatTheTwistLeavesOfARotation) {
   walk.rows[1].twist[0].fill(-0.06);  // half of it
   walk.rows[2].twist[0].fill(-0.14);  // no more motion where they touch
   EXPECT_NEAR(walk.remembered<Friction>()[0], straight.to(at(0, 0)).to(at(0.06, 0)).remembered<Friction>()[0], 1e-12);
+}
+
+TEST(Friction, TurnsAwayFromRotationByWhatSlidesAtTheContact) {
+  for (const double radius : {0.4e-3, 1.2e-3}) {
+    Walk<2> walk(two_tubes(), with_friction(0.03, 1, 1));
+    const auto slid = [&](double turn, double slide) {
+      Walk<2> other = walk;
+      other.to(at(0, 0, -0.35)).to(at(turn, 0, -0.35 + slide));
+      other.rows[0].radius.fill(radius);
+      return other.remembered<Friction>();
+    };
+    const auto h = slid(0.03, 0.04 * radius);  // a tenth of the way to slip, 3 : 4
+    EXPECT_NEAR(h[0], 0.1, 1e-12);
+    EXPECT_NEAR(h[Contacts<2>::count + 1], 4.0 / 3 * h[0], 1e-12) << "what slides at the radius counts like rotation";
+  }
+  EXPECT_DOUBLE_EQ(ContactRadii<2>(two_tubes())[1], 0.5 * two_tubes().tubes[1].outer_diameter);
+}
+
+TEST(History, AFirstRowMayComeFromHome) {
+  Catalogue::On<2> effects = with_friction(0.03, 0.7, 1);
+  effect<BacklashRotation, 2>(effects).values = {0.1, 0.05};
+  Walk<2> recorded(two_tubes(), effects), from_home(two_tubes(), effects);
+  Transmission<2>& transmission = recorded.system.transmission;
+  transmission.home_translation = at(0, 0).beta;
+  from_home.system.transmission = transmission;
+  const auto motors = [&](const Joints<2>& q) { return motor_angles(transmission, q); };
+  const Joints<2> first = at(1.1, -0.4, -0.33), next = at(0.7, -0.2, -0.34);
+  recorded.rows = {{motors(at(0, 0)), {}, {}}, {motors(first), {}, {}}, {motors(next), {}, {}}};
+  from_home.rows = {{motors(first), {}, {}}, {motors(next), {}, {}}};
+  from_home.rows[0].from_home = true;
+  const System<2> plain{transmission, Model<2>(two_tubes()), {}, recorded.system.settings};
+  for (const bool wound : {false, true}) {
+    if (wound)
+      for (Walk<2>* walk : {&recorded, &from_home}) {
+        add_twist<2>(plain, walk->rows);
+        wind_up(walk->system, std::span(walk->rows));
+      }
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_NEAR(from_home.remembered<Friction>()[k], recorded.remembered<Friction>()[k], 1e-4) << wound;
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_NEAR(from_home.remembered<BacklashRotation>()[i], recorded.remembered<BacklashRotation>()[i], 1e-12);
+  }
+  EXPECT_GT(from_home.rows[0].twist.size(), 5u) << "a long way is cut into parts";
 }
 
 TEST(Friction, KnowsTheTwistOfTheEquilibrium) {

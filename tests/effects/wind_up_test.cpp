@@ -83,23 +83,27 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
       slopes = twist_slopes(model, ws, steps);
       return twist_of(model, ws, steps, {});
     };
-    Eigen::Matrix<double, Contacts<3>::count, Contacts<3>::count> slopes, ignored;
+    TwistSlopes<3, Friction<3>::count> slopes, ignored;
     (void)twist(effects, slopes);
-    for (int k = 0; k < Contacts<3>::count; ++k) {
-      constexpr double change = 1e-4;
+    const auto check = [&](const auto& column, double change, double tolerance, const auto& place) {
       const auto moved = [&](double by) {
         auto other = effects;
-        effect<Friction, 3>(other).past.state[std::size_t(k)] += by;
+        place(effect<Friction, 3>(other)) += by;
         return twist(other, ignored);
       };
       const auto more = moved(change), less = moved(-change);
       for (int i = 0; i < Contacts<3>::count; ++i) {
         const auto at_contact = std::size_t(i);
-        EXPECT_NEAR(slopes(i, k), wrapped(more[at_contact] - less[at_contact]) / (2 * change), 1e-6)
-            << n << ": contact " << i << " by " << k;
+        EXPECT_NEAR(column[i], wrapped(more[at_contact] - less[at_contact]) / (2 * change), tolerance)
+            << n << ": contact " << i;
       }
-    }
-    EXPECT_GT(slopes.norm(), 1e-3);
+    };
+    for (int k = 0; k < Contacts<3>::count; ++k)
+      check(slopes.by_rubbing.col(k), 1e-4, 1e-6, [&](auto& f) -> double& { return f.past.state[std::size_t(k)]; });
+    for (int k = 0; k < Friction<3>::count; ++k)
+      check(slopes.by_values.col(k), 1e-5, 1e-4, [&](auto& f) -> double& { return f.values[std::size_t(k)]; });
+    EXPECT_GT(slopes.by_rubbing.norm(), 1e-3);
+    EXPECT_GT(slopes.by_values.norm(), 1e-2);
   }
 }
 
@@ -152,6 +156,44 @@ TEST(WindUp, FollowsContactsThatComeAndGo) {
   add_twist<3>(System<3>{walk.system.transmission, Model<3>(robot), {}, walk.system.settings}, walk.rows);
   EXPECT_GT(wind_up(walk.system, std::span(walk.rows)), 0.1);
   EXPECT_LT(wind_up(walk.system, std::span(walk.rows)), 1e-3);
+}
+
+/// Which contacts stick and which slip changes with the parameters: there slopes jump, and few places have such kinks.
+TEST(WindUp, KnowsHowTheTwistChangesWithWhatRubs) {
+  for (const double law : {0.0, elastic}) {
+    Walk<2> walk = curved_walk(law, 4);
+    Winding<2> winding, ignored;
+    const auto wound = [&](const std::array<double, 6>& values, Winding<2>& at_them) {
+      Walk<2> other = walk;
+      auto effects = walk.system.model.effects();
+      effect<Friction, 2>(effects).values = values;
+      other.system.model = Model<2, Catalogue>(two_tubes(), effects);
+      for (int again = 0; again < 3; ++again) wind_up(other.system, std::span(other.rows), &at_them);
+      std::vector<double> twist;
+      for (const auto& row : other.rows)
+        for (const auto& place : row.twist) twist.insert(twist.end(), place.begin(), place.end());
+      return twist;
+    };
+    const std::array<double, 6> values{0.03, 0.02, 0.01, 0.3, 0.7, law};
+    (void)wound(values, winding);
+    const auto change = std::array{2e-4, 2e-4, 2e-4, 5e-3, 5e-3};
+    int looked_at = 0;
+    for (std::size_t j = 0; j < change.size(); ++j) {
+      auto more = values, less = values;
+      more[j] += change[j], less[j] -= change[j];
+      const Eigen::VectorXd there = Eigen::VectorXd::Map(wound(more, ignored).data(), winding.slopes.rows()),
+                            back = Eigen::VectorXd::Map(wound(less, ignored).data(), winding.slopes.rows());
+      const Eigen::VectorXd found = (there - back) / (2 * change[j]), slope = winding.slopes.col(Eigen::Index(j));
+      if (found.norm() < 0.1) continue;  // the outer tube touches nothing but the plate
+      ++looked_at;
+      EXPECT_LT((found - slope).norm(), 0.05 * found.norm()) << "law " << law << ", parameter " << j;
+      std::vector<double> far;
+      for (Eigen::Index k = 0; k < slope.size(); ++k) far.push_back(std::abs(found[k] - slope[k]));
+      std::ranges::nth_element(far, far.begin() + std::ptrdiff_t(far.size() / 2));
+      EXPECT_LT(far[far.size() / 2], 0.01 * found.cwiseAbs().maxCoeff()) << "law " << law << ", parameter " << j;
+    }
+    EXPECT_EQ(looked_at, 4) << "law " << law;
+  }
 }
 
 TEST(WindUp, IsNothingWhereNothingRubs) {

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ctcr import effect_fit, effects, free_parameters, identify, recording, robot_file
-from ctcr.diagnose import diagnose, jump
+from ctcr.diagnose import decision, diagnose, jump
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.analysis import _beyond_judging
 from ctcr.diagnose.coverage import Coverage
@@ -157,7 +157,7 @@ def test_a_round_is_hopeless_only_where_all_readings_could_not_change_it():
     assert round_.is_hopeless(2) and not round_.is_hopeless(3)
     round_ = decided(100.0, 0.01, is_further=True, is_rejected=True)
     assert round_.accepted is None and not round_.is_hopeless(1.5)
-    share = racing.SHARE - 0.05
+    share = decision.SHARE - 0.05
     assert decided(100.0, share, True, True, spread=0.02).is_hopeless(1.5)
     assert not decided(100.0, share, True, True, spread=0.03).is_hopeless(1.5)
     assert racing.Round("a fit", [], {}).is_hopeless(1e6)
@@ -367,7 +367,7 @@ def decided(score, share, is_further, is_rejected, spread=np.inf):
     delay = SimpleNamespace(id="delay", shape=())
     only = dataclasses.replace(blank, candidate=delay, refit=score, share=share, spread=spread, fit="a fit")
     round_ = racing.Round("a fit", [only], {})
-    racing.decide(round_, 21, is_further, is_rejected)
+    decision.decide(round_, 21, is_further, is_rejected)
     return round_
 
 

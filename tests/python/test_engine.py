@@ -1,10 +1,11 @@
 """What a diagnosis asks of its fits: slopes by parameters that were fitted or are neutral, and memory given back."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr import identify, measurements, robot_file
+from ctcr import effect_fit, identify, measurements, robot_file, simulation
 from ctcr.diagnose.engine import Engine, values_of
 
 DEMO = Path(__file__).parents[2] / "examples" / "data" / "demo"
@@ -49,3 +50,16 @@ def test_a_fit_at_rest_holds_no_table_and_says_the_same(fit):
     assert "_report" not in rested.__dict__
     np.testing.assert_array_equal(rested.jacobian_all, before)
     np.testing.assert_array_equal(rested.residual, fit.residual)
+
+
+@pytest.mark.parametrize("from_home", [True, False])
+def test_readings_say_how_the_robot_came_to_its_first_row(engine, plan, from_home):
+    play = [f"effects.backlash_translation.play.{i}" for i in (1, 2, 3)]
+    made = effect_fit.with_values(engine.robot, ["backlash_translation"], dict.fromkeys(play, 2e-4))
+    readings = simulation.simulate(made, replace(plan, from_home=from_home), "jitter", seed=3)
+    noise = identify.noise_of_readings(engine.robot, readings)
+    taken = Engine(engine.robot, replace(readings, from_home=True), noise, np.ones(len(readings), bool))
+    fit = taken.fit(play)
+    assert taken.begins_otherwise(fit, play) is not from_home
+    assert taken.measurements.from_home is from_home
+    assert not taken.begins_otherwise(taken.fit(play), play)

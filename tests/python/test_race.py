@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
+from ctcr.diagnose import decision
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, Gain
@@ -29,13 +30,13 @@ def test_a_fit_that_did_not_end_gives_no_further_effect_its_gain(robot, plan):
     candidate = Candidate("tip_load", (MASS,))
     ended = engine.fit([MASS])
     early = engine.fit_like(ended, [MASS], max_iterations=1)
-    assert ended.log_evidence - early.log_evidence > 2 * racing.UNASKED
+    assert ended.log_evidence - early.log_evidence > 2 * decision.UNASKED
     accepted = racing.Entry(candidate, Gain(0.0, *4 * [np.zeros(1)]), fit=early)
     pool = [c for c in candidates(robot, made)[0] if c.id not in ("tip_load", "contact")]
     round_ = racing.race(engine, early, pool, [accepted], lambda _: None)
     assert round_.accepted is None
     assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
-    assert max(entry.score for entry in round_.entries) < racing.EVIDENCE
+    assert max(entry.score for entry in round_.entries) < decision.EVIDENCE
 
 
 def test_a_delay_whose_moments_are_spread_is_freed_from_where_it_entered(robot, plan):
@@ -60,7 +61,7 @@ def test_of_forms_that_are_as_likely_the_plainest_is_taken(better, chosen):
         )
     )
     round_ = racing.Round(None, [spread, plain, other], {})
-    racing.decide(round_, tried=20, is_further=False, is_rejected=True)
+    decision.decide(round_, tried=20, is_further=False, is_rejected=True)
     assert dict(round_.accepted.candidate.shape) == chosen
     assert round_.ids == ["delay"] and [entry.id for entry in round_.best] == ["delay", "tip_load"]
     assert round_.best[0] is round_.accepted
@@ -77,7 +78,7 @@ def test_a_further_effect_with_a_value_that_is_hardly_possible_is_said_to_be_tha
         implausible=(f"{MASS} = 3 kg",),
     )
     round_ = racing.Round(None, [entry], {})
-    racing.decide(round_, tried=20, is_further=True, is_rejected=True)
+    decision.decide(round_, tried=20, is_further=True, is_rejected=True)
     assert round_.accepted is None
     assert round_.why_not == (
         f"Nothing accepted: the best candidate, tip_load, wants what is hardly possible, {MASS} = 3 kg."

@@ -129,8 +129,10 @@ def test_an_effect_written_again_in_python_is_that_of_the_library(robot, reading
 
         def joints(self, rows, values):
             alpha = rows.alpha.copy()
-            for i in range(1, len(alpha)):
-                alpha[i] = np.clip(alpha[i - 1], rows.alpha[i] - values.gap, rows.alpha[i] + values.gap)
+            stands = np.zeros(alpha.shape[1])  # as in the library: the robot comes from home
+            for i in range(len(alpha)):
+                stands = np.clip(stands, rows.alpha[i] - values.gap, rows.alpha[i] + values.gap)
+                alpha[i] = stands
             return rows.beta, alpha
 
     twins = {

@@ -36,8 +36,8 @@ def test_stiff_friction_is_found(robot, plan):
     for i in (1, 2):
         name = f"effects.friction.coefficient.{i}"
         assert abs(found[name]["value"] - 0.03) < 0.02 * 0.03, found[name]
-    # Without what the tubes wind each other up it would be 0.18, and the error ten times as large.
-    assert found["effects.friction.slip_angle"]["value"] < 0.1
+    # The fit begins at 0.105. Without what the tubes wind each other up it would end at 0.18.
+    assert abs(found["effects.friction.slip_angle"]["value"] - 0.03) < 0.003
     rms = added.rms("rms_mm")
     assert rms["friction"] < 2 * rms["noise_floor"] < 0.05 * rms["calibrated"]
 
@@ -77,7 +77,8 @@ def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
     coefficient = effect.names("coefficient")
     held = Candidate("friction", tuple(coefficient), (("effects.friction.insertion", 0.0),))
     laws = [dict(form.shape) for form in forms(effect, held)]
-    assert laws == [{"effects.friction.insertion": 0.0}, {"effects.friction.insertion": 0.0, LAW: 1.0}]
+    held_or_begun = {"effects.friction.insertion": 0.0, LAW: 1.0, "effects.friction.slip_angle": 0.03}
+    assert laws == [{"effects.friction.insertion": 0.0}, held_or_begun]
     for form in forms(
         effect, held
     ):  # a torque per length enters the race alone, never beside the coefficient

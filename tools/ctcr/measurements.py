@@ -45,6 +45,9 @@ class Measurements:
     quaternion: Array | None  # (M, 4) sensor (w, x, y, z), unit, tracker frame
     row: NDArray[np.int64]  # (M,) row of the file; the header is row 1
     warnings: list[Problem] = field(default_factory=list)
+    from_home: bool = (
+        True  # whether the robot came to the first row straight from home; else it was at rest there
+    )
 
     def __len__(self) -> int:
         return len(self.run)

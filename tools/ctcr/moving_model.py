@@ -51,8 +51,9 @@ class MovingModel:
         n = self.robot.n_tubes
         joints, force = (np.vstack([column, column[-1:]]) for column in (joints, force))
         table = Measurements(
-            t, np.zeros(rows, np.int64), joints[:, :n], joints[:, n:], force, None, None, np.arange(rows)
-        )
+            t, np.zeros(rows, np.int64), joints[:, :n], joints[:, n:], force, None, None, np.arange(rows),
+            from_home=False,
+        )  # fmt: skip
         model = user_effects.recording_of(self.robot, table, steps=self._steps, threads=1)
         now = np.arange(rows) == rows - 2
         model.activate(now.tolist())

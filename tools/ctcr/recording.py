@@ -95,6 +95,7 @@ def recording_of(
         free=[known.index(name) for name in names],
         steps=steps,
         threads=threads,
+        from_home=measurements.from_home,
         profiles=profiles,
     )
 

@@ -58,7 +58,7 @@ public:
   /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const System<N, Fx> system = this->system(x);
-    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, jacobian != nullptr);
+    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, jacobian != nullptr, winding_);
     const Mat3 turning = left_jacobian(turn_of(x));
     residual.resize(6 * size());
     if (jacobian) jacobian->resize(6 * size(), x.size());
@@ -89,24 +89,33 @@ public:
     return unsolved_.empty();
   }
 
-  /// Lets the tubes wind each other up in all rows by what they rub at x (see ctcr::wind_up); residuals and derivatives
-  /// keep that twist until the next call. @return its largest change [rad]; 0 where nothing rubs
+  /// Lets the tubes wind each other up in all rows by what they rub at x (see ctcr::wind_up). Until the next call the twist
+  /// changes with the parameters of what rubs them by its slopes there; with others it does not. @return how far it was
+  /// from where it ends [rad], 1e-4 at least; 0 where nothing rubs
   double wind_up(const Eigen::VectorXd& x) {
-    if constexpr (Fx::template On<N>::follows_twist) {
+    if constexpr (Fx::template On<N>::follows_twist && N > 1) {
+      constexpr double settled = 1e-4;  // [rad]: what is left of no account
       const System<N, Fx> rubbing = system(x);
       if (!rubbing.model.effects().act_by_twist()) return 0;
-      for (std::size_t i = 0; i < std::min(rows_.size(), begin_.size()); ++i)
-        if (begin_[i].size() == rows_[i].twist.size()) rows_[i].twist = begin_[i];
-      begin_.clear();
-      return ctcr::wind_up<N, Fx>(rubbing, rows_);
+      const Eigen::VectorXd at = P::values(rubbing);
+      if (at.size() == wound_at_.size() && at == wound_at_) return settled;
+      const auto& values = std::get<Fx::template On<N>::follower>(rubbing.model.effects().list).values;
+      std::size_t place = 0;
+      for (RecordedRow<N>& row : rows_)
+        for (Twist<N>& twist : row.twist) winding_.extrapolate(values, place++, twist);
+      wound_at_ = at;
+      return std::max(settled, ctcr::wind_up<N, Fx>(rubbing, rows_, &winding_));
     }
     return 0;
   }
 
-  /// The next wind_up() begins at the twist of another recording of the same table: with like values little is left to do.
+  /// Takes over how another recording of the same table is wound up: with like values little is left to do.
   void begin_at(const Recording& other) {
-    begin_.clear();
-    for (const RecordedRow<N>& row : other.rows_) begin_.push_back(row.twist);
+    const auto like = [](const RecordedRow<N>& a, const RecordedRow<N>& b) { return a.places() == b.places(); };
+    if (!std::ranges::equal(rows_, other.rows_, like)) return;
+    for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].twist = other.rows_[i].twist;
+    winding_ = other.winding_;
+    wound_at_ = other.wound_at_;
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
@@ -184,7 +193,8 @@ private:
 
   System<N, Fx> nominal_;
   std::vector<RecordedRow<N>> rows_;
-  std::vector<decltype(RecordedRow<N>::twist)> begin_;  ///< of the next wind_up(); or none
+  Winding<N> winding_;
+  Eigen::VectorXd wound_at_;  ///< all parameters of the system with which the tubes were wound up; or empty
   std::vector<Pose> measured_;
   std::vector<int> parameters_, columns_;
   ThreadPool* pool_;

@@ -58,7 +58,7 @@ public:
       limits_(limits),
       allowed_(system.model.robot(), limits),
       period_(period),
-      now_{LiveEffects<N, Fx>(system.model.effects()), system.model, {}, {}} {}
+      now_{LiveEffects<N, Fx>(system.model), system.model, {}, {}} {}
 
   /// Whether the robot may be controlled from these motor angles.
   /// @return ok; joints_out_of_order: the limits exclude them, or allow no joints at all; else as solve()

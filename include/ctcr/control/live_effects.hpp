@@ -13,7 +13,7 @@ public:
   static constexpr std::size_t window = 64;
   using Effects = typename Fx::template On<N>;
 
-  explicit LiveEffects(const Effects& effects) noexcept : effects_(effects) {}
+  explicit LiveEffects(const Model<N, Fx>& model) noexcept : effects_(model.effects()), radius_(model.robot()) {}
 
   /// Takes the next joints of the motors, and their time [s]; returns the joints that the tubes have.
   /// @param steps        of integration, per segment
@@ -26,7 +26,8 @@ public:
     const auto remembered = [&](const Twist<N>& twist) {
       Effects now = effects_;
       rows_[row].twist = twist;
-      now.remember({{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}}, row);
+      now.remember({{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}, radius_},
+                   row);
       return now;
     };
     if constexpr (Effects::follows_twist) {
@@ -82,6 +83,7 @@ private:
   }
 
   Effects effects_;
+  ContactRadii<N> radius_;
   std::array<typename Path<N, double>::Row, window> rows_{};
   std::array<double, window> times_{};
   std::size_t count_ = 0;

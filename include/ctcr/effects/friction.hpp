@@ -66,7 +66,7 @@ inline constexpr std::array parameters{
                     .hard_high = 4,
                     .role = Role::shape,
                     .meaning = "share of the sliding by insertion that turns friction away from rotation: 0 none, 1 "
-                               "as much as sliding by rotation on a contact radius of 0.8 mm"},
+                               "as much as sliding by rotation at the outer radius of the inner tube"},
     EffectParameter{.name = "law",
                     .unit = "",
                     .neutral = 0,
@@ -120,7 +120,6 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
   void remember(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
     const auto &from = path.q[row - 1], &to = path.q[row];
-    constexpr double per_radius = 1 / 0.8e-3;
     const bool bends = value(this->template get<4>()) < 0.5;
     const auto follow = [&](int tube, std::size_t contact, const P& turn, const P& slide) {
       P &h = this->past.state[contact], &k = this->past.state[limits + contact];
@@ -129,12 +128,13 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
       stretch(slip_angle(tube, from.jumps[contact]) * inverse(angle), h, k);
       slip(turn, slide, angle, h, k);
     };
-    follow(N - 1, in_plate, to.alpha[N - 1] - from.alpha[N - 1], per_radius * (to.beta[N - 1] - from.beta[N - 1]));
+    follow(N - 1, in_plate, to.alpha[N - 1] - from.alpha[N - 1],
+           (to.beta[N - 1] - from.beta[N - 1]) * (1 / path.radius[N - 1]));
     for (int j = 0; j + 1 < N; ++j) {
       const auto i = std::size_t(j);
       const auto against_next = [&](const std::array<P, N>& v) -> P { return v[i] - v[i + 1]; };
       const P turn = against_next(to.alpha) - against_next(from.alpha);
-      const P slide = per_radius * (against_next(to.beta) - against_next(from.beta));
+      const P slide = (against_next(to.beta) - against_next(from.beta)) * (1 / path.radius[i]);
       for (int station = 0; station < Contacts<N>::stations; ++station) {
         const std::size_t contact = Contacts<N>::place(j, station);
         follow(j, contact, turn + (to.twist[contact] - from.twist[contact]), slide);

@@ -11,6 +11,7 @@
 //   actuate(Occasion, beta&, alpha&)            joints that the tubes really have
 //   sense(Occasion, Frame<P>& reading)          what the tracker makes of the sensor's pose, tracker frame
 //   remember(Path<N, P>, row)                    makes past.state, left by the rows before, that of this row
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <span>
@@ -81,12 +82,13 @@ template <int N, class P>
 struct Path {
   struct Row {
     std::array<P, N> beta, alpha;  ///< [m], [rad]
-    Twist<N> twist{};              ///< as in RecordedRow
+    Twist<N, P> twist{};           ///< as in RecordedRow
     MomentJumps<N> jumps;          ///< the same
   };
   std::span<const Row> q;
   std::span<const double> time;        ///< [s]; empty: unknown
   std::span<const std::size_t> first;  ///< place at which the run of each place begins; empty: unknown
+  ContactRadii<N> radius{};
 };
 
 /// An effect of the tip's surroundings.
@@ -107,6 +109,10 @@ concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effe
 template <class Effect, class P>
 concept HasMaterial =
     requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) { effect.material(place, m); };
+
+/// An effect that remembers how the tubes were turned against one another.
+template <class Effect>
+concept FollowsTwist = requires { Effect::follows_twist; };
 
 /// An effect that changes the equilibrium of the rod.
 template <class Effect, class P, int N>
@@ -157,7 +163,12 @@ struct EffectList {
     /// Whether tubes rub along their length.
     static constexpr bool has_rub = (false || ... || HasRub<E<N, P>, P, N>);
     /// Whether it matters how the tips are turned against one another.
-    static constexpr bool follows_twist = (false || ... || requires { E<N, P>::follows_twist; });
+    static constexpr bool follows_twist = (false || ... || FollowsTwist<E<N, P>>);
+    /// Place of the effect that does, in the list.
+    static constexpr std::size_t follower = [] {
+      constexpr std::array<bool, sizeof...(E)> follows{FollowsTwist<E<N, P>>...};
+      return std::size_t(std::ranges::find(follows, true) - follows.begin());
+    }();
     /// Whether the tip's surroundings act on it.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 

@@ -93,14 +93,24 @@ template <int N, class Fx>
   return jumps;
 }
 
-/// Slopes of the twist by what is rubbed at each contact: by the first states of the effect that follows the twist. Rows
-/// are contacts whose twist changes. Arguments as above. Real time: yes; an integration for each 16 of the contacts and unknowns.
+/// Slopes of the twist. Rows are contacts whose twist changes.
+template <int N, int count>
+struct TwistSlopes {
+  using ByContact = Eigen::Matrix<double, Contacts<N>::count, Contacts<N>::count>;
+  ByContact by_rubbing = ByContact::Zero();  ///< by what is rubbed at each contact: the first states of what follows it
+  Eigen::Matrix<double, Contacts<N>::count, count> by_values;  ///< by the parameters of that effect, states held
+};
+
+/// Arguments as above. Real time: yes; an integration for each 16 of the contacts, unknowns and parameters.
 template <int N, class Fx>
 [[nodiscard]] auto twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps) noexcept {
+  using On = typename Fx::template On<N>;
+  constexpr int count = std::tuple_element_t<On::follower, decltype(On::list)>::count;
   using Window = detail::Window<4>;
   using Pass = detail::EffectPass<N, Fx, Window::groups>;
   using S = typename Window::S;
-  constexpr int unknowns = Pass::unknowns, contacts = Contacts<N>::count, variables = unknowns + contacts;
+  constexpr int unknowns = Pass::unknowns, contacts = Contacts<N>::count, known = contacts + count;
+  constexpr int variables = unknowns + known;
   constexpr int groups = Window::groups_for(variables);
   const auto& c = model.coefficients();
   LaneRow<groups> row[Pass::rows];
@@ -121,8 +131,10 @@ template <int N, class Fx>
     }
     in.effects = c.effects.template seeded<S>([](double value, int) { return S(value); });
     in.effects.for_each([&](auto& effect, int) {
-      if constexpr (requires { effect.follows_twist; })
+      if constexpr (requires { effect.follows_twist; }) {
         for (int k = 0; k < contacts; ++k) window.add(effect.past.state[std::size_t(k)], unknowns + k, 1);
+        for (int k = 0; k < count; ++k) window.add(effect.values[std::size_t(k)], unknowns + contacts + k, 1);
+      }
     });
     detail::ContactAngles<N, S> angles;
     const Pass pass(in, sort_events(c.plain, ws.q.beta), ws.guess, 0, steps, window,
@@ -133,15 +145,15 @@ template <int N, class Fx>
         turned(k, window.first + lane) = angles.angle[std::size_t(k)].d[lane / lane_count][lane % lane_count];
   }
   Eigen::Matrix<double, unknowns, unknowns> by_unknown;
-  Eigen::Matrix<double, unknowns, contacts> by_rubbing;
+  Eigen::Matrix<double, unknowns, known> by_known;
   for (int i = 0; i < unknowns; ++i) {
     for (int j = 0; j < unknowns; ++j) by_unknown(i, j) = row[i][j];
-    for (int j = 0; j < contacts; ++j) by_rubbing(i, j) = row[i][unknowns + j];
+    for (int j = 0; j < known; ++j) by_known(i, j) = row[i][unknowns + j];
   }
-  const Eigen::Matrix<double, contacts, contacts> slopes =
-      turned.template middleCols<contacts>(unknowns) -
-      turned.template leftCols<unknowns>() * by_unknown.partialPivLu().solve(by_rubbing).eval();
-  return slopes;
+  const Eigen::Matrix<double, contacts, known> slopes =
+      turned.template middleCols<known>(unknowns) -
+      turned.template leftCols<unknowns>() * by_unknown.partialPivLu().solve(by_known).eval();
+  return TwistSlopes<N, count>{slopes.template leftCols<contacts>(), slopes.template rightCols<count>()};
 }
 
 }  // namespace ctcr

@@ -10,6 +10,7 @@
 #include "ctcr/pipeline/parameters.hpp"
 #include "ctcr/pipeline/predict.hpp"
 #include "ctcr/pipeline/recorded_row.hpp"
+#include "ctcr/pipeline/winding.hpp"
 
 namespace ctcr {
 
@@ -37,6 +38,7 @@ struct RecordedPath {
   std::vector<double> time;        ///< [s]; empty where it is not known of each row
   std::vector<std::size_t> end;    ///< place of each row
   std::vector<std::size_t> first;  ///< as in Path; with the clock a run begins anew
+  ContactRadii<N> radius;
 
   RecordedPath(const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows, const auto& seed) {
     for (std::size_t row = 0; row < rows.size(); ++row) {
@@ -48,23 +50,30 @@ struct RecordedPath {
         const RecordedRow<N> here = on_the_way<N>(rows, row, place);
         auto& now = q.emplace_back();
         joints_of<N, P>(transmission, here.theta, seed, now.beta, now.alpha);
-        if (!rows[row].twist.empty()) now.twist = rows[row].twist[place];
+        if (!rows[row].twist.empty()) std::ranges::copy(rows[row].twist[place], now.twist.begin());
         if (!rows[row].jumps.empty()) now.jumps = rows[row].jumps[place];
         if (std::isfinite(here.at.time)) time.push_back(here.at.time);
       }
       end.push_back(q.size() - 1);
     }
     if (time.size() < q.size()) time.clear();
+    if (!rows.empty()) radius = rows.front().radius;
   }
 
-  operator Path<N, P>() const noexcept { return {q, time, first}; }
+  /// Moves the twist to what it is with other values of the effect that follows it.
+  void unwind(const Winding<N>& winding, const auto& values) noexcept {
+    for (std::size_t place = 0; place < q.size(); ++place) winding.extrapolate(values, place, q[place].twist);
+  }
+
+  operator Path<N, P>() const noexcept { return {q, time, first, radius}; }
 };
 
 /// What an effect remembers of each row, by the motion before it, without slopes.
 template <int N, class Effect>
 void remember_values(Effect effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
-                     const auto& keep) {
-  const RecordedPath<N, double> path(transmission, rows, [](double x, int) { return x; });
+                     const Winding<N>& winding, const auto& keep) {
+  RecordedPath<N, double> path(transmission, rows, [](double x, int) { return x; });
+  if constexpr (requires { effect.follows_twist; }) path.unwind(winding, effect.values);
   effect.past = {};
   for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
     for (; place <= path.end[row]; ++place) effect.remember(path, place);
@@ -75,7 +84,7 @@ void remember_values(Effect effect, const Transmission<N>& transmission, std::sp
 /// The same with its slopes.
 template <int N, template <int, class> class E>
 void remember(const E<N, double>& effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
-              const auto& keep) {
+              const Winding<N>& winding, const auto& keep) {
   using V = ParameterVector<N>;
   constexpr int count = E<N, double>::count, slopes = count + E<N, double>::transmission_count;
   using P = Dual<lane_groups(slopes)>;
@@ -84,11 +93,12 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
     p.d[lane / lane_count] = unit_lane(lane % lane_count);
     return p;
   };
-  const RecordedPath<N, P> path(transmission, rows, [&](double x, int index) {
+  RecordedPath<N, P> path(transmission, rows, [&](double x, int index) {
     return seeded(x, count + index - V::index(Parameter::translation_ratio));
   });
   E<N, P> dual;
   for (int k = 0; k < count; ++k) dual.values[std::size_t(k)] = seeded(effect.values[std::size_t(k)], k);
+  if constexpr (requires { effect.follows_twist; }) path.unwind(winding, dual.values);
   for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
     for (; place <= path.end[row]; ++place) dual.remember(path, place);
     auto& past = keep(row);
@@ -104,18 +114,21 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
 
 /// What the motion before each row left behind in the effects. Rows in the order of recording; between them joints move
 /// in a straight line.
-/// @param slopes  whether derivatives are wanted, too   Real time: no (allocates).
+/// @param slopes   whether derivatives are wanted, too
+/// @param winding  how the rows' twist changes with the effect that follows it; as it stands, if that is not known
+/// Real time: no (allocates).
 template <int N, class Fx>
 std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
-                                                          std::span<const RecordedRow<N>> rows, bool slopes = true) {
+                                                          std::span<const RecordedRow<N>> rows, bool slopes = true,
+                                                          const Winding<N>& winding = {}) {
   std::vector<typename Fx::template On<N>::Memory> memory(rows.size());
   const auto& list = system.model.effects().list;
   [&]<std::size_t... I>(std::index_sequence<I...>) {
     [[maybe_unused]] const auto fill = [&]<std::size_t J>(std::integral_constant<std::size_t, J>) {
       if constexpr (!std::get<J>(typename Fx::template On<N>::Memory{}).state.empty()) {
         const auto keep = [&](std::size_t row) -> auto& { return std::get<J>(memory[row]); };
-        slopes ? detail::remember<N>(std::get<J>(list), system.transmission, rows, keep)
-               : detail::remember_values<N>(std::get<J>(list), system.transmission, rows, keep);
+        slopes ? detail::remember<N>(std::get<J>(list), system.transmission, rows, winding, keep)
+               : detail::remember_values<N>(std::get<J>(list), system.transmission, rows, winding, keep);
       }
     };
     (fill(std::integral_constant<std::size_t, I>{}), ...);

@@ -21,17 +21,25 @@ struct RecordedRow {
   std::vector<Twist<N>> twist{};
   /// The moment_jumps() of a robot without effects at these places, as add_twist() gives them [N m].
   std::vector<MomentJumps<N>> jumps{};
+  ContactRadii<N> radius{};  ///< as add_twist() gives them
+  /// Of a first row: whether the robot came straight from home, where all motors are at 0. Home is the first place then.
+  bool from_home = false;
 
-  [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), 1); }
+  [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), from_home ? 2 : 1); }
 };
 
 /// What stands at a place on the way to a row, from 0 to places() - 1: joints and time on a straight line, the load of the
-/// row. A first row has no way. Real time: no (allocates).
+/// row. A first row has no way, or one from home, all of it at its own time. Real time: no (allocates).
 template <int N>
 RecordedRow<N> on_the_way(std::span<const RecordedRow<N>> rows, std::size_t row, std::size_t place) {
   const RecordedRow<N>& end = rows[row];
   RecordedRow<N> here{end.theta, end.load, end.at};
-  if (row == 0 || place + 1 >= end.places()) return here;
+  if (place + 1 >= end.places()) return here;
+  if (row == 0) {
+    const double done = double(place) / double(end.places() - 1);
+    here.theta = {done * end.theta.translation, done * end.theta.rotation};
+    return here;
+  }
   const RecordedRow<N>& start = rows[row - 1];
   const double left = 1 - double(place + 1) / double(end.places());
   here.theta.translation += left * (start.theta.translation - end.theta.translation);
@@ -41,7 +49,7 @@ RecordedRow<N> on_the_way(std::span<const RecordedRow<N>> rows, std::size_t row,
 }
 
 /// Gives each row the twist and the jumps of a robot without effects in its equilibrium on the way there; a place without
-/// one keeps those of the place before. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
+/// one keeps those of the place before; and where the tubes touch. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
 template <int N>
 void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
   constexpr double most_rotation = 0.175, most_translation = 5e-3;  // of a part [rad], [m]
@@ -51,14 +59,17 @@ void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
   MomentJumps<N> jumps;
   bool known = false;
   for (std::size_t row = 0; row < rows.size(); ++row) {
+    rows[row].radius = ContactRadii<N>(system.model.robot());
     double parts = 1;
-    if (row > 0) {
-      const Joints<N> from = joints(system.transmission, rows[row - 1].theta),
+    const bool from_home = row == 0 && rows[row].from_home;
+    if (row > 0 || from_home) {
+      const MotorAngles<N> home{VecN<N>::Zero(), VecN<N>::Zero()};
+      const Joints<N> from = joints(system.transmission, from_home ? home : rows[row - 1].theta),
                       to = joints(system.transmission, rows[row].theta);
       parts = std::max({parts, (to.alpha - from.alpha).cwiseAbs().maxCoeff() / most_rotation,
                         (to.beta - from.beta).cwiseAbs().maxCoeff() / most_translation});
     }
-    rows[row].twist.resize(std::size_t(std::ceil(parts)));
+    rows[row].twist.resize(std::size_t(std::ceil(parts)) + from_home);
     rows[row].jumps.resize(rows[row].twist.size());
     for (std::size_t place = 0; place < rows[row].twist.size(); ++place) {
       const RecordedRow<N> here = on_the_way<N>(rows, row, place);

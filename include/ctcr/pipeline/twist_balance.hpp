@@ -32,6 +32,15 @@ public:
       return balanced(equilibrium, remembered, ws, steps, twist, most);
   }
 
+  /// Takes slopes of the twist by what is rubbed, at a place like the next one.
+  void take(const Eigen::Matrix<double, contacts, contacts>& by_rubbing) noexcept {
+    by_rubbing_ = by_rubbing;
+    weight_ = by_rubbing_.colwise().squaredNorm().transpose();
+  }
+
+  /// Whether the equilibrium that was asked for last is that of the solution, so that ws holds it.
+  [[nodiscard]] bool left_there() const noexcept { return left_there_; }
+
 private:
   Effects balanced(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, int steps, Twist<N>& twist,
                    int most) noexcept {
@@ -48,20 +57,20 @@ private:
     bool renewed = false;  // the slopes
     for (int k = 0; k < most; ++k) {
       Point here{twist, remembered(twist), Vec::Zero()};
-      const bool found = find(here);
+      const bool found = left_there_ = find(here);
       if (!found && k == 0) return here.effects;
       if (found && k > 0) learn(best, here);
       const bool worse = k > 0 && !(found && here.left.norm() <= best.left.norm());
-      if (!worse) best = here;
+      if (worse)
+        left_there_ = false;
+      else
+        best = here;
       if (best.left.norm() < tolerance) break;
       if (worse && renewed) {
         part *= 0.5;
       } else {
         if (worse) {
-          if (const Model<N, Fx>* model = equilibrium(best.effects)) {
-            by_rubbing_ = twist_slopes(*model, ws, steps);
-            weight_ = by_rubbing_.colwise().squaredNorm().transpose();
-          }
+          if (const Model<N, Fx>* model = equilibrium(best.effects)) take(twist_slopes(*model, ws, steps).by_rubbing);
           renewed = true;
         }
         step = newton_step(best, remembered);
@@ -84,11 +93,7 @@ private:
 
   /// What is rubbed.
   static Vec rubbing(const Effects& effects) noexcept {
-    Vec all;
-    effects.for_each([&](const auto& e, int) {
-      if constexpr (requires { e.follows_twist; }) all = Vec::Map(e.past.state.data());
-    });
-    return all;
+    return Vec::Map(std::get<Effects::follower>(effects.list).past.state.data());
   }
 
   /// What a change of the rubbing did to the equilibrium's twist, by the contacts that may have done it: where tubes hardly
@@ -111,6 +116,7 @@ private:
     return slope.partialPivLu().solve(at.left);
   }
 
+  bool left_there_ = false;
   Vec weight_ = Vec::Ones();
   Eigen::Matrix<double, contacts, contacts> by_rubbing_ = Eigen::Matrix<double, contacts, contacts>::Zero();
 };

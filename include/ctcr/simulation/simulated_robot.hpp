@@ -28,7 +28,7 @@ public:
       load_(load),
       noise_(noise),
       random_(seed),
-      live_(system.model.effects()),
+      live_(system.model),
       model_(system.model) {
     settle();
   }

@@ -26,6 +26,7 @@ struct Table {
   Eigen::Vector3d centre;   ///< of all measured positions, tracker frame [m]
   std::vector<int> free;    ///< places in SystemParameters<N, Catalogue>
   int steps, threads;
+  bool from_home;     ///< whether the robot came to the first row straight from home
   RowMajor profiles;  ///< (nodes, 3 N) of each tube: curvature x, y added [1/m], relative change of EI; or empty
 };
 

@@ -33,15 +33,29 @@ void bind_recording(nb::module_& m) {
              const RowMajor& beta, const RowMajor& alpha, const RowMajor& force, const RowMajor& position,
              const RowMajor& quaternion, const Eigen::VectorXd& time, const Eigen::VectorXd& part,
              const Eigen::VectorXi& run, const Eigen::Vector3d& centre, const std::vector<int>& free, int steps,
-             int threads, const std::optional<RowMajor>& profiles) {
-            const Table table{
-                parameters, effects, sensor_tube, beta,   alpha, force, position, quaternion,
-                time,       part,    run,         centre, free,  steps, threads,  profiles.value_or(RowMajor())};
+             int threads, bool from_home, const std::optional<RowMajor>& profiles) {
+            const Table table{parameters,
+                              effects,
+                              sensor_tube,
+                              beta,
+                              alpha,
+                              force,
+                              position,
+                              quaternion,
+                              time,
+                              part,
+                              run,
+                              centre,
+                              free,
+                              steps,
+                              threads,
+                              from_home,
+                              profiles.value_or(RowMajor())};
             new (self) BoundRecording(with_tubes(beta.cols(), [&](auto n) { return make_recording<n>(table); }));
           },
           nb::kw_only(), "parameters"_a, "effects"_a, "sensor_tube"_a, "beta"_a, "alpha"_a, "force"_a, "position"_a,
           "quaternion"_a, "time"_a, "part"_a, "run"_a, "centre"_a, "free"_a, "steps"_a, "threads"_a = 0,
-          "profiles"_a.none() = nb::none())
+          "from_home"_a = true, "profiles"_a.none() = nb::none())
       .def(
           "nominal", [](const BoundRecording& self) { return (*self).nominal(); }, "Values of the free parameters.")
       .def(
@@ -56,7 +70,7 @@ void bind_recording(nb::module_& m) {
           "Lets tubes that rub wind each other up as they do at x; returns the largest change of a twist [rad].")
       .def(
           "begin_at", [](const BoundRecording& self, const BoundRecording& other) { (*self).begin_at(*other); },
-          "other"_a, "The next wind_up begins at the twist of another recording of the same table.")
+          "other"_a, "Takes over how another recording of the same table is wound up.")
       .def("active", [](const BoundRecording& self) { return (*self).active(); })
       .def(
           "unsolved", [](const BoundRecording& self) { return (*self).unsolved(); },

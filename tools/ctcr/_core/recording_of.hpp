@@ -33,6 +33,7 @@ std::vector<RecordedRow<N>> rows_of(const Table& table) {
     rows[i].load.force = table.force.row(k).transpose();
     rows[i].at = {table.time[k], table.part[k], table.run[k], table.centre};
   }
+  if (!rows.empty()) rows.front().from_home = table.from_home;
   if (any_effect<N>(table, [](const auto& effect) { return requires { effect.follows_twist; }; }))
     add_twist<N>(plain, rows);
   return rows;
