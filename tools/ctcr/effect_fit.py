@@ -18,7 +18,7 @@ from ctcr import (
 from ctcr.calibrate import parameters
 from ctcr.calibrate.checks import sentence
 from ctcr.diagnose import unsteady
-from ctcr.diagnose.candidates import candidates, starts
+from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import begin, likeliest, screen
@@ -263,6 +263,8 @@ class _Fitter:
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
         likely = likeliest(engine, own, self._best(own, begins), {})
+        if any("order" in effect.needs for effect in known) and engine.begins_otherwise(likely, own):
+            likely = likeliest(engine, own, values_of(likely), {})
         # The robot is to predict; how sure its values are is another question.
         fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
         fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
@@ -291,7 +293,7 @@ class _Fitter:
 
     def _best(self, own: Sequence[str], begins: Sequence[Mapping[str, float]]) -> dict[str, float]:
         """The best of all starts for these parameters of effects."""
-        first, *others = [start for values in begins for start in starts(own, values)]
+        first, *others = [dict(values) for values in begins]
         if not others:
             return first
         fit = self.engine.fit(own, start=first, near=True, tolerance=identify.COARSE)

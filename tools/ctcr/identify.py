@@ -25,7 +25,8 @@ Mask = NDArray[np.bool_]
 FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or more
 COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
 WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
-WINDINGS = 2  # and at most so often
+WINDINGS = 10  # and at most so often
+BETWEEN = 4  # iterations
 FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
 Noise = _core.Noise
 expand = free_parameters.expand
@@ -271,19 +272,24 @@ def identify_with(
     began = perf_counter()
     wind_up = getattr(predict, "wind_up", lambda x: 0.0)
     try:
-        if start is not None:
-            wind_up(start)
-        for left in reversed(range(WINDINGS if tolerance < COARSE else 1)):
+        moved = wind_up(start) if start is not None else 0.0
+        evidence = -np.inf
+        for left in reversed(range(WINDINGS if moved > 0 and tolerance < COARSE else 1)):
+            whole = not left or moved < WOUND  # few iterations do while the twist still changes much
             core, excluded = _core.identify(
                 predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
                 places=np.asarray(places, dtype=float), robust=robust,
                 admit_model_error=admit_model_error, weights=weights,
                 inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start,
-                starts=starts, max_iterations=max_iterations, tolerance=tolerance, known=list(known),
-                within=list(within),
+                starts=starts, max_iterations=max_iterations if whole else min(max_iterations, BETWEEN),
+                tolerance=tolerance if whole else max(tolerance, COARSE), known=list(known), within=list(within),
             )  # fmt: skip
             start, starts = core.values, 1
-            if not left or wind_up(start) < WOUND:
+            gained, evidence = core.log_evidence - evidence, core.log_evidence
+            if not left:
+                break
+            moved = wind_up(start)
+            if core.converged and (abs(gained) < COARSE or (whole and moved < WOUND)):
                 break
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import jump, other_runs, unsteady, varying
+from ctcr.diagnose import decision, jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates, forms, starts
+from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import FITS, Engine, values_of
 from ctcr.diagnose.far_off import far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
@@ -28,6 +28,10 @@ TURNS = 2  # quarters that are locked away in turn, where that is needed
 WRONG = 3.0  # times the stated noise that a fit admits, and
 MANY = 0.1  # ... share of outliers that calibration takes, beyond which it is hardly right
 HARDLY = 0.4  # share of the excess that the first effect removes, below which it hardly explains anything
+LOST = (
+    10.0  # log evidence by which a fit with weights of its own has lost an effect on few readings to outliers
+)
+SAFE = 100.0  # log evidence of an effect that others have surely not made superfluous
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 
 
@@ -162,6 +166,11 @@ def diagnose(
                 result = again
         if result.accepted or not _surprises(result):
             break
+    if not result.measurements.from_home:
+        notices = [
+            *notices,
+            "taken to have been at rest at the first reading, not to have come from home: it fits better",
+        ]
     result.notices = notices
     result.seconds = perf_counter() - began
     return result
@@ -234,6 +243,7 @@ def _diagnose(
         before = values_of(first)
         first, settled = _grow(part, first, pool, accepted, rounds, locked, progress, more)
         start = values_of(first)
+        engine.measurements = part.measurements
     calibrated = fit = racing.baseline(engine, [], before, progress)
     if accepted:
         engine.robust = True
@@ -262,7 +272,7 @@ def _diagnose(
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)
     return Diagnosis(
-        robot, measurements, locked, unseen, alone, open_side.widened(after),
+        robot, engine.measurements, locked, unseen, alone, open_side.widened(after),
         unsteady.widened(engine, open_side.widened(fit)),
         identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
     )  # fmt: skip
@@ -297,8 +307,13 @@ def _grow(
         rest = {"share": entry.share, "aside": racing.aside(round_)}
         accepted.append(Accepted(entry, round_.ids, entry.refit, round_.margin, **rest))
         start = racing.arrived(engine, fit, [a.entry for a in accepted])
-        fit = racing.baseline(engine, [a.entry for a in accepted], values_of(start), progress)
+        before, entries = fit, [a.entry for a in accepted]
+        fit = racing.baseline(engine, entries, values_of(start), progress)
+        if fit.log_evidence < start.log_evidence - LOST:
+            names, fixed = racing.parameters(entries)
+            fit = engine.fit_like(before, names, start=values_of(start), fixed=fixed, near=True)
         rejected = engine.rejects(fit)
+        fit = _begun(engine, accepted, fit, progress)
         fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
         accepted[-1].rms_mm = fit.rms_mm(locked)
         if rejected and accepted[0].share < HARDLY:
@@ -306,6 +321,16 @@ def _grow(
     for a in accepted[:-1]:  # what the others hid of their forms shows now
         fit = _with_shapes(engine, accepted, a, fit, progress)
     return fit, True
+
+
+def _begun(engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress: Progress) -> identify.Fit:
+    """Where the effect accepted last remembers: the fit with the way to the first row that the readings ask for."""
+    if "order" not in effects.get(accepted[-1].entry.id, engine.robot.n_tubes).needs:
+        return fit
+    entries = [a.entry for a in accepted]
+    if not engine.begins_otherwise(fit, *racing.parameters(entries)):
+        return fit
+    return racing.baseline(engine, entries, values_of(fit), progress)
 
 
 def _with_shapes(
@@ -321,19 +346,28 @@ def _with_shapes(
         entry = replace(one.entry, candidate=form)
         names, fixed = racing.parameters([entry if a is one else a.entry for a in accepted])
         neutral = dict(zip(form.names, engine.priors(form.names)[0], strict=True))
-        for start in starts(form.names, neutral | one.aside | dict(form.shape) | values_of(fit)):
-            freed = engine.fit_like(
-                fit, names, start=start, fixed=fixed, near=True, tolerance=identify.COARSE
-            )
-            tried.append((entry, freed))
-    if not tried:
+        start = neutral | one.aside | dict(form.shape) | values_of(fit)
+        freed = engine.fit_like(fit, names, start=start, fixed=fixed, near=True)
+        tried.append((entry, freed))
+    best = max((freed.log_evidence for _, freed in tried), default=-np.inf)
+    if best - fit.log_evidence < decision.TIE:
         return fit
-    entry, freed = max(tried, key=lambda pair: pair[1].log_evidence)
-    if freed.log_evidence - fit.log_evidence < racing.TIE:
-        return fit
+    laws: dict[tuple, tuple[Entry, identify.Fit]] = {}
+    for entry, freed in sorted(tried, key=lambda pair: pair[1].log_evidence):
+        held = (pair for pair in entry.candidate.shape if pair[0] not in entry.candidate.names)
+        laws[tuple(held)] = entry, freed
+    # In the noise that a wrong law asks for, laws can hardly be told apart: then each is fitted with its own.
+    open_laws = [
+        pair for pair in laws.values() if pair[1].log_evidence == best or np.max(fit.inflation) > WRONG
+    ]
+    ended = []
+    for entry, freed in open_laws:
+        entries = [entry if a is one else a.entry for a in accepted]
+        ended.append((racing.baseline(engine, entries, values_of(freed), progress), entry, freed))
+    fit_with, entry, freed = max(ended, key=lambda one: one[0].log_evidence)
     one.entry = replace(entry, fit=freed.without_readings())
     one.share += (1 - one.share) * racing.share_of(fit, freed, len(freed.names) - len(fit.names))
-    return racing.baseline(engine, [a.entry for a in accepted], values_of(freed), progress)
+    return fit_with
 
 
 def _backward(
@@ -344,9 +378,16 @@ def _backward(
         rest = [b for b in accepted if b is not a]
         progress(f"without {a.entry.id}")
         names, fixed = racing.parameters([b.entry for b in rest])
-        without = engine.fit_like(fit, names, start=values_of(fit), fixed=fixed, tolerance=identify.COARSE)
-        a.log_evidence = unsteady.evidence(engine, fit) - unsteady.evidence(engine, without)
-        if a.log_evidence < racing.EVIDENCE:
+        start = values_of(fit)
+        for iterations in (racing.ITERATIONS, 50):  # what is far behind need not be followed to the end
+            without = engine.fit_like(
+                fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=identify.COARSE
+            )
+            a.log_evidence = unsteady.evidence(engine, fit) - unsteady.evidence(engine, without)
+            if a.log_evidence > SAFE:
+                break
+            start = values_of(without)
+        if a.log_evidence < decision.EVIDENCE:
             accepted.remove(a)
             return racing.baseline(engine, [b.entry for b in accepted], values_of(without), progress)
     return fit

@@ -3,9 +3,8 @@
 An effect may enter in several variants, from few parameters to all; the evidence pays for the parameters that it needs.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -29,9 +28,6 @@ VARIANTS = {
 }  # None: all amplitudes; (): all parameters but those of a piece of metal
 # Values of choices and shapes with which an effect enters the race besides its usual ones.
 FORMS = {"friction": ({"law": 1.0, "slip_angle": 0.03}, {"insertion": 0.0}), "delay": ({"spread": 0.5},)}
-# Shape parameters whose slope does not lead far, since it leaves out what tubes wind each other up: parts of the value
-# reached so far from which a fit begins, too.
-STARTS = {"effects.friction.slip_angle": (1.0, 0.5, 0.25)}
 TOLD = 6  # parameters of a candidate that its label names
 
 
@@ -86,7 +82,7 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     shapes = [candidate.shape]
     for form in ({}, *FORMS.get(effect.id, ())):
         full = {f"effects.{effect.id}.{name}": value for name, value in form.items()}
-        law = {name: value for name, value in full.items() if name in laws}
+        law = full if laws & set(full) else {}  # with the shape from which it begins
         shapes.append(tuple((rest | law).items()))
     strengths = [_names(effect, variant) for variant in VARIANTS.get(effect.id, ())]
     wider = [name for names in strengths if set(candidate.names) <= set(names) for name in names]
@@ -98,16 +94,6 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     free = [tuple(dict.fromkeys((*candidate.names, *names))) for names in more]
     return [
         Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in dict.fromkeys(shapes)
-    ]
-
-
-def starts(names: Collection[str], values: Mapping[str, float]) -> list[dict[str, float]]:
-    """From where a fit of these parameters begins: from `values` by full name, and from others of shapes."""
-    free = [name for name in STARTS if name in names and name in values]
-    parts = product(*(STARTS[name] for name in free))
-    return [
-        dict(values) | {name: part * values[name] for name, part in zip(free, some, strict=True)}
-        for some in parts
     ]
 
 

@@ -19,6 +19,7 @@ SLOPES = 1500  # rows by whose slopes candidates are screened where there are tw
 OUTLIER = 0.3  # weight below which a reading is taken for one
 SIGNIFICANCE = 0.01
 FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
+SAID = 5.0  # log evidence by which readings say how the robot came to its first row
 CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 
@@ -153,6 +154,22 @@ class Engine:
     def fit_like(self, other: identify.Fit, added: Iterable[str] = (), **options: Any) -> identify.Fit:
         """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
         return self.fit(added, noise=other.noise, weights=other.weights, inflation=other.inflation, **options)
+
+    def begins_otherwise(
+        self, fit: identify.Fit, added: Iterable[str], fixed: dict[str, float] | None = None
+    ) -> bool:
+        """Whether the robot came to its first row the other way than a fit has it, straight from home or at rest there:
+        where the readings say so, that is taken for all fits to come."""
+        other = replace(
+            self, measurements=replace(self.measurements, from_home=not self.measurements.from_home)
+        )
+        there = other.fit_like(
+            fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=identify.COARSE
+        )
+        if there.log_evidence - fit.log_evidence < SAID:
+            return False
+        self.measurements = other.measurements
+        return True
 
     def linear_fit(
         self,

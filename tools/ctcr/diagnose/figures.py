@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ctcr.compare.figures import ERROR, FAINT, INK, NOISE, drawable
-from ctcr.diagnose.race import imitated
+from ctcr.diagnose.decision import imitated
 from ctcr.html_page import short
 
 if TYPE_CHECKING:

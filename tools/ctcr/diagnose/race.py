@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ctcr import effects, identify, open_side
 from ctcr.diagnose import contact, jump, metal, unsteady
 from ctcr.diagnose.candidates import Candidate, is_of_metal
+from ctcr.diagnose.decision import decide
 from ctcr.diagnose.engine import OUTLIER, Engine, Gain, values_of
 from ctcr.diagnose.prediction import predicts_better
 from ctcr.errors import InputError
@@ -16,15 +17,7 @@ from ctcr.errors import InputError
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having looked at many: log(number of candidates)
-UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains what is left, and
-FIRST_UNASKED = 5.0  # of the first one
-SHARE = 0.25  # of the excess that a further effect must remove, and
-FIRST_SHARE = 0.1  # the first one
-TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
-ALIKE = 0.5  # ... and of forms of one effect the plainest is taken
-SURE = 5.0  # ... and beyond this they are
-SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
+SURE = 5.0  # log evidence beyond which candidates can surely be told apart
 REFITS = 6  # effects that are refitted, the best by their slopes
 ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be followed to the end
 IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
@@ -199,9 +192,10 @@ def race(
     progress("screening all candidates")
     names, fixed = parameters(accepted)
     if accepted:  # what a refit without a further effect finds too is no gain of one
-        before = engine.fit_like(
+        again = engine.fit_like(
             before, names, start=values_of(before), fixed=fixed, near=True, tolerance=identify.COARSE
         )
+        before = max(before, again, key=lambda fit: fit.log_evidence)
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
         return Round(before, [], {}, reason="no effect is left to try")
@@ -211,7 +205,10 @@ def race(
         same = [other for other in chosen if other.id == entry.id]
         if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
             chosen.append(entry)
-    entries = refitted(engine, before, _in_reach(engine, before, chosen, fixed, progress), fixed, progress)
+    chosen = _in_reach(engine, before, chosen, fixed, progress)
+    entries = refitted(engine, before, chosen, fixed, progress)
+    if accepted:
+        before, entries = _without_candidate(engine, before, entries, names, fixed)
     fitted = [entry.candidate for entry in entries]
     entries += [entry for entry in screened if entry.candidate not in fitted]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
@@ -286,6 +283,33 @@ def refitted(
     return [_refit(engine, before, evidence, entry, fixed, progress) for entry in entries]
 
 
+def _without_candidate(
+    engine: Engine, before: identify.Fit, entries: list[Entry], names: list[str], fixed: dict[str, float]
+) -> tuple[identify.Fit, list[Entry]]:
+    """The fit before and the entries, after a fit without the best candidate from where it led: what that finds too, as
+    another place of the effects accepted before, is no gain of it."""
+    best = max((entry for entry in entries if entry.fit), key=lambda entry: entry.score, default=None)
+    if best is None:
+        return before, entries
+    there = engine.fit_like(
+        before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=identify.COARSE
+    )
+    found = there.log_evidence - before.log_evidence
+    if found <= 0:
+        return before, entries
+    entries = [
+        entry
+        if entry.fit is None
+        else replace(
+            entry,
+            refit=entry.refit - found,
+            share=share_of(there, entry.fit, len(entry.candidate.names)),
+        )
+        for entry in entries
+    ]
+    return there, entries
+
+
 def _refit(
     engine: Engine,
     before: identify.Fit,
@@ -342,53 +366,3 @@ def implausible(engine: Engine, fit: identify.Fit, candidate: Candidate) -> list
         if value + 2 * sd < low or value - 2 * sd > high:
             found.append(f"{name} = {value:.3g} {known[name].unit}".rstrip())
     return found
-
-
-def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool) -> None:
-    """Accepts the best entry, with all that the data cannot tell from it, or says why not.
-
-    tried: number of effects that were looked at; is_further: whether others are in the model already; is_rejected:
-    whether the noise as stated does not explain what is left.
-    """
-    unasked = UNASKED if is_further else FIRST_UNASKED
-    round_.needed = EVIDENCE + np.log(tried)
-    threshold = round_.needed + (0.0 if is_rejected else unasked)
-    refitted = [entry for entry in round_.entries if entry.fit is not None]
-    fitted = [entry for entry in refitted if not (is_further and entry.implausible)]
-    if not fitted:
-        round_.reason = "no candidate explains anything"
-        if refitted:
-            wanted = ", ".join(refitted[0].implausible)
-            round_.reason = f"the best candidate, {refitted[0].id}, wants what is hardly possible, {wanted}"
-        return
-    best = fitted[0]
-    alike = [entry for entry in fitted if entry.id == best.id and best.score - entry.score < ALIKE]
-    best = min(alike, key=lambda entry: len(entry.candidate.shape))
-    if best.score < threshold:
-        round_.reason = (
-            f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
-        )
-        return
-    needed = SHARE if is_further else FIRST_SHARE
-    if best.share < needed:
-        round_.is_stand_in = best.share + 2 * best.spread < needed
-        share = f"{best.share:.0%} of what is left: below {needed:.0%}"
-        round_.reason = f"the best candidate, {best.id}, removes {share}, as stand-ins do"
-        return
-    rivals = [entry for entry in round_.entries if entry.fit is not None and entry.id != best.id]
-    for rival in rivals:
-        overlap = min(imitated(best, rival), imitated(rival, best))
-        round_.overlaps[rival.id] = max(overlap, round_.overlaps.get(rival.id, 0.0))
-    same = [entry for entry in rivals if best.score - entry.score < TIE or round_.overlaps[entry.id] >= SAME]
-    round_.accepted = best
-    round_.ids = [best.id, *dict.fromkeys(entry.id for entry in same)]
-    others = [entry.score for entry in rivals if entry.id not in round_.ids]
-    round_.margin = best.score - max(others, default=-np.inf)
-
-
-def imitated(entry: Entry, by: Entry) -> float:
-    """Share of an entry's signal that another one can imitate together with the calibration."""
-    signal = entry.gain.signal
-    q, r = np.linalg.qr(by.gain.columns)
-    keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
-    return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))
