@@ -312,7 +312,7 @@ def test_moving_model_is_that_of_a_whole_table(robot, effect, strength, shares, 
     rows = np.arange(40)
     names = ("t", "run", "beta", "alpha", "force", "row")
     few = replace(plan, **{name: getattr(plan, name)[rows] for name in names}, position=None, quaternion=None)
-    few = replace(few, run=np.zeros(len(rows), np.int64))
+    few = replace(few, run=np.zeros(len(rows), np.int64), from_home=False)
     expected = simulation.simulate(true, few, "none", steps=2)
     moving = MovingModel(true)
     for i in rows:

@@ -36,7 +36,9 @@ def sweeps(plan: Measurements) -> tuple[Measurements, np.ndarray]:
 
 
 def rows_of(table: Measurements, kept: np.ndarray) -> Measurements:
-    columns = {f.name: getattr(table, f.name) for f in fields(table) if f.name != "warnings"}
+    columns = {
+        f.name: getattr(table, f.name) for f in fields(table) if f.name not in ("warnings", "from_home")
+    }
     return replace(table, **{name: None if old is None else old[kept] for name, old in columns.items()})
 
 
