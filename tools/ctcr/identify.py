@@ -26,7 +26,7 @@ FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or 
 COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
 WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
 WINDINGS = 10  # and at most so often
-BETWEEN = 4  # iterations
+BETWEEN = 4  # iterations in between, as long as the twist still changes much
 FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
 Noise = _core.Noise
 expand = free_parameters.expand
@@ -275,7 +275,7 @@ def identify_with(
         moved = wind_up(start) if start is not None else 0.0
         evidence = -np.inf
         for left in reversed(range(WINDINGS if moved > 0 and tolerance < COARSE else 1)):
-            whole = not left or moved < WOUND  # few iterations do while the twist still changes much
+            whole = not left or moved < WOUND
             core, excluded = _core.identify(
                 predict=predict, names=list(names), mean=mean, sd=sd, low=low, high=high, noise=noise,
                 places=np.asarray(places, dtype=float), robust=robust,

@@ -28,9 +28,7 @@ TURNS = 2  # quarters that are locked away in turn, where that is needed
 WRONG = 3.0  # times the stated noise that a fit admits, and
 MANY = 0.1  # ... share of outliers that calibration takes, beyond which it is hardly right
 HARDLY = 0.4  # share of the excess that the first effect removes, below which it hardly explains anything
-LOST = (
-    10.0  # log evidence by which a fit with weights of its own has lost an effect on few readings to outliers
-)
+LOST = 10.0  # log evidence below the race's by which a fit with its own weights lost the effect to outliers
 SAFE = 100.0  # log evidence of an effect that others have surely not made superfluous
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
 
