@@ -8,7 +8,7 @@
 #include "ctcr/effects/backlash_rotation.hpp"
 #include "ctcr/effects/delay.hpp"
 #include "ctcr/effects/friction.hpp"
-#include "ctcr/pipeline/wind_up.hpp"
+#include "ctcr/parallel/wind_up.hpp"
 #include "ctcr/simulation/simulated_robot.hpp"
 #include "random_control.hpp"
 #include "support/no_alloc.hpp"
@@ -75,7 +75,8 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
     rows.push_back({motor_angles(system.transmission, q), {}, {.time = 0.025 * k}});
   }
   add_twist<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
-  EXPECT_GT(wind_up(system, std::span(rows)), 0.05);
+  ThreadPool pool(1);
+  EXPECT_GT(wind_up(system, std::span(rows), pool), 0.05);
   const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
   LiveEffects<3, Rubbing> live(system.model);
   Workspace<3> ws;

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "ctcr/mechanics/shape.hpp"
-#include "ctcr/pipeline/wind_up.hpp"
+#include "ctcr/parallel/wind_up.hpp"
 #include "support/walk.hpp"
 
 namespace ctcr {
@@ -102,11 +102,12 @@ TEST(History, AFirstRowMayComeFromHome) {
   from_home.rows = {{motors(first), {}, {}}, {motors(next), {}, {}}};
   from_home.rows[0].from_home = true;
   const System<2> plain{transmission, Model<2>(two_tubes()), {}, recorded.system.settings};
+  ThreadPool pool(1);
   for (const bool wound : {false, true}) {
     if (wound)
       for (Walk<2>* walk : {&recorded, &from_home}) {
         add_twist<2>(plain, walk->rows);
-        wind_up(walk->system, std::span(walk->rows));
+        wind_up(walk->system, std::span(walk->rows), pool);
       }
     for (std::size_t k = 0; k < 4; ++k)
       EXPECT_NEAR(from_home.remembered<Friction>()[k], recorded.remembered<Friction>()[k], 1e-4) << wound;

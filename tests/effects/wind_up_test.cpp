@@ -1,5 +1,5 @@
 // Tubes that rub wind each other up.
-#include "ctcr/pipeline/wind_up.hpp"
+#include "ctcr/parallel/wind_up.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,6 +14,8 @@ namespace wind_up_test {
 using test::at, test::effect, test::Random, test::two_tubes, test::Walk, test::with_friction;
 
 constexpr double elastic = 1;  // the second law of friction
+
+ThreadPool pool(2);
 
 Robot<2> straight() {
   Robot<2> robot = two_tubes();
@@ -52,7 +54,7 @@ TEST(WindUp, ElasticContactsAndTubesShareARotation) {
     Walk<2> walk(robot, rubbing_along(torque, slip));
     const Joints<2> q = at(turn, 0);
     walk.to(at(0, 0)).to(q);
-    wind_up(walk.system, std::span(walk.rows));
+    wind_up(walk.system, std::span(walk.rows), pool);
     const Bound bound(robot, q, turn, torque, slip);
     const auto h = walk.remembered<Friction>();
     double differ = 0;
@@ -121,7 +123,7 @@ TEST(WindUp, TwistIsThatOfTheEquilibrium) {
   for (const double law : {0.0, elastic}) {
     Walk<2> walk = curved_walk(law, 1);
     const std::vector<RecordedRow<2>> plain = walk.rows;
-    EXPECT_GT(wind_up(walk.system, std::span(walk.rows)), 0.05);
+    EXPECT_GT(wind_up(walk.system, std::span(walk.rows), pool), 0.05);
     const auto memory = memories<2, Catalogue>(walk.system, walk.rows);
     double wound = 0;
     for (std::size_t row = 0; row < walk.rows.size(); ++row) {
@@ -134,7 +136,7 @@ TEST(WindUp, TwistIsThatOfTheEquilibrium) {
       wound = std::max(wound, std::abs(twist[0] - plain[row].twist.back()[0]));
     }
     EXPECT_GT(wound, 0.05);
-    EXPECT_LT(wind_up(walk.system, std::span(walk.rows)), 1e-3) << "it was not wound up to its end";
+    EXPECT_LT(wind_up(walk.system, std::span(walk.rows), pool), 1e-3) << "it was not wound up to its end";
   }
 }
 
@@ -154,8 +156,8 @@ TEST(WindUp, FollowsContactsThatComeAndGo) {
     walk.to(q);
   }
   add_twist<3>(System<3>{walk.system.transmission, Model<3>(robot), {}, walk.system.settings}, walk.rows);
-  EXPECT_GT(wind_up(walk.system, std::span(walk.rows)), 0.1);
-  EXPECT_LT(wind_up(walk.system, std::span(walk.rows)), 1e-3);
+  EXPECT_GT(wind_up(walk.system, std::span(walk.rows), pool), 0.1);
+  EXPECT_LT(wind_up(walk.system, std::span(walk.rows), pool), 1e-3);
 }
 
 /// Which contacts stick and which slip changes with the parameters: there slopes jump, and few places have such kinks.
@@ -168,7 +170,7 @@ TEST(WindUp, KnowsHowTheTwistChangesWithWhatRubs) {
       auto effects = walk.system.model.effects();
       effect<Friction, 2>(effects).values = values;
       other.system.model = Model<2, Catalogue>(two_tubes(), effects);
-      for (int again = 0; again < 3; ++again) wind_up(other.system, std::span(other.rows), &at_them);
+      for (int again = 0; again < 3; ++again) wind_up(other.system, std::span(other.rows), pool, &at_them);
       std::vector<double> twist;
       for (const auto& row : other.rows)
         for (const auto& place : row.twist) twist.insert(twist.end(), place.begin(), place.end());
@@ -196,10 +198,40 @@ TEST(WindUp, KnowsHowTheTwistChangesWithWhatRubs) {
   }
 }
 
+/// Pieces of a recording are walked at once; some end otherwise than the next one began.
+TEST(WindUp, IsThatOfOneWalkAndOfAnyNumberOfThreads) {
+  for (const double law : {0.0, elastic}) {
+    Random random(6);
+    Walk<2> walk(two_tubes(), with_friction(0.03, 0.7, law));
+    for (int k = 0; k < 160; ++k)
+      walk.to(at(test::uniform(random, -1.5, 1.5), test::uniform(random, -1, 1), -0.35 + 6e-5 * k));
+    add_twist<2>(System<2>{walk.system.transmission, Model<2>(two_tubes()), {}, walk.system.settings}, walk.rows);
+    Walk<2> other = walk;
+    const std::vector<RecordedRow<2>> plain = walk.rows;
+    ThreadPool alone(1);
+    Winding<2> winding, same;
+    EXPECT_EQ(wind_up(walk.system, std::span(walk.rows), pool, &winding),
+              wind_up(other.system, std::span(other.rows), alone, &same));
+    EXPECT_EQ(winding.slopes, same.slopes);
+    detail::RecordedPath<2, double> path(walk.system.transmission, plain, [](double x, int) { return x; });
+    ASSERT_GT(path.q.size(), (detail::WoundPlaces<2, Catalogue>::most)) << "all of it fits into one go";
+    detail::Winder<2, Catalogue> winder(walk.system.model.effects());
+    double differ = 0;
+    for (std::size_t row = 0, k = 0; row < plain.size(); ++row)
+      for (std::size_t way = 0; way < plain[row].places(); ++way, ++k) {
+        winder.wind(walk.system, on_the_way<2>(plain, row, way), plain[row].twist[way], path, k, nullptr);
+        EXPECT_EQ(walk.rows[row].twist[way], other.rows[row].twist[way]) << "row " << row;
+        const Twist<2> one_walk = winder.stand().twist;
+        for (std::size_t c = 0; c < one_walk.size(); ++c)
+          differ = std::max(differ, std::abs(one_walk[c] - walk.rows[row].twist[way][c]));
+      }
+    EXPECT_LT(differ, 1e-3) << "law " << law;
+  }
+}
+
 TEST(WindUp, IsNothingWhereNothingRubs) {
   Walk<2> walk(two_tubes(), with_friction(0));
   walk.to(at(0, 0)).to(at(1, 0));
-  ThreadPool pool(1);
   Recording<2, Catalogue> recording(walk.system, walk.rows, std::vector<Pose>(walk.rows.size()), {}, pool);
   EXPECT_EQ(recording.wind_up(Eigen::VectorXd(0)), 0);
 }
@@ -218,7 +250,7 @@ TEST(WindUp, DoesNotDependOnHowAWayIsRecorded) {
     add_twist<2>(System<2>{walk.system.transmission, Model<2>(two_tubes()), {}, walk.system.settings}, walk.rows);
     if (!cut)
       for (auto& row : walk.rows) row.twist = {row.twist.back()}, row.jumps = {row.jumps.back()};
-    wind_up(walk.system, std::span(walk.rows));
+    wind_up(walk.system, std::span(walk.rows), pool);
     return walk;
   };
   const Walk<2> whole = walked(1, true), divided = walked(60, true), uncut = walked(1, false);

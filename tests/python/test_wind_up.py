@@ -14,6 +14,7 @@ from ctcr import (
     user_effects,
 )
 from ctcr.diagnose.candidates import Candidate, forms
+from ctcr.diagnose.engine import Engine
 
 ROOT = Path(__file__).parents[2]
 FREE = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
@@ -65,6 +66,22 @@ def test_a_recording_begins_at_the_twist_of_another(robot, plan):
     np.testing.assert_allclose(predicted(like, x), predicted(first, x), atol=1e-6)
     assert unlike.wind_up(still) == 0  # where nothing rubs, tubes are not wound up
     np.testing.assert_array_equal(predicted(unlike, still), predicted(fresh, still))
+
+
+def test_candidates_are_screened_where_the_tubes_of_a_fit_are_wound_up(robot, plan):
+    made = simulation.simulate(effect_fit.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
+    noise = identify.noise_of_readings(robot, made)
+    engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
+    rubbing = [name for name in TRUE if name != LAW]
+    fit = engine.fit(rubbing, start=TRUE, fixed={LAW: 1.0})
+    assert fit.predict.is_wound
+    own = fit.jacobian_all.reshape(*fit.residual.shape, -1) * fit.prior_sd
+    np.testing.assert_allclose(engine.slopes(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
+    # A fit in which nothing rubs comes between: what was wound up is not forgotten.
+    assert not engine.fit().predict.is_wound
+    again = engine.recording(fit.names, {LAW: 1.0})
+    again.begin_at(engine._wound)
+    assert again.wind_up(fit.values) < identify.WOUND
 
 
 def predicted(table, x):

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "ctcr/parallel/batch.hpp"
+#include "ctcr/parallel/wind_up.hpp"
 #include "ctcr/pipeline/recorded_derivatives.hpp"
-#include "ctcr/pipeline/wind_up.hpp"
 
 namespace ctcr {
 
@@ -104,10 +104,13 @@ public:
       for (RecordedRow<N>& row : rows_)
         for (Twist<N>& twist : row.twist) winding_.extrapolate(values, place++, twist);
       wound_at_ = at;
-      return std::max(settled, ctcr::wind_up<N, Fx>(rubbing, rows_, &winding_));
+      return std::max(settled, ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, &winding_));
     }
     return 0;
   }
+
+  /// Whether they are wound up.
+  [[nodiscard]] bool is_wound() const { return wound_at_.size() > 0; }
 
   /// Takes over how another recording of the same table is wound up: with like values little is left to do.
   void begin_at(const Recording& other) {

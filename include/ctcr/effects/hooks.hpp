@@ -128,6 +128,10 @@ template <class Effect, class P, int N>
 concept ActsOnJoints =
     requires(const Effect& effect, const Occasion& at, std::array<P, N>& q) { effect.actuate(at, q, q); };
 
+/// An effect on what the tracker makes of the sensor's pose.
+template <class Effect, class P>
+concept HasSense = requires(const Effect& effect, const Occasion& at, Frame<P>& reading) { effect.sense(at, reading); };
+
 /// Numbers without derivatives.
 struct Constant {};
 
@@ -135,15 +139,17 @@ template <template <int, class> class... E>
 struct EffectList;
 
 namespace detail {
-/// Kept, and those of E that change the equilibrium of the rod.
-template <class Kept, template <int, class> class... E>
-struct WithThoseOnRod {
+/// Kept, and those of E that `picked` says.
+template <auto picked, class Kept, template <int, class> class... E>
+struct Picked {
   using List = Kept;
 };
-template <template <int, class> class... Kept, template <int, class> class E, template <int, class> class... Rest>
-struct WithThoseOnRod<EffectList<Kept...>, E, Rest...>
-  : WithThoseOnRod<std::conditional_t<ActsOnRod<E<2, double>, double, 2>, EffectList<Kept..., E>, EffectList<Kept...>>,
-                   Rest...> {};
+template <auto picked, template <int, class> class... Kept, template <int, class> class E,
+          template <int, class> class... Rest>
+struct Picked<picked, EffectList<Kept...>, E, Rest...>
+  : Picked<picked,
+           std::conditional_t<picked.template operator()<E<2, double>>(), EffectList<Kept..., E>, EffectList<Kept...>>,
+           Rest...> {};
 }  // namespace detail
 
 /// Effects that act together, in their order.
@@ -151,13 +157,25 @@ template <template <int, class> class... E>
 struct EffectList {
   static constexpr bool none = sizeof...(E) == 0;
   /// Those that change the equilibrium of the rod, in the same order.
-  using OnRod = typename detail::WithThoseOnRod<EffectList<>, E...>::List;
+  using OnRod =
+      typename detail::Picked<[]<class Effect> { return ActsOnRod<Effect, double, 2>; }, EffectList<>, E...>::List;
+  /// Those of the tip's surroundings.
+  using OnTip =
+      typename detail::Picked<[]<class Effect> { return HasEnvironment<Effect, double>; }, EffectList<>, E...>::List;
+  /// Those on joints.
+  using OnJoints =
+      typename detail::Picked<[]<class Effect> { return ActsOnJoints<Effect, double, 2>; }, EffectList<>, E...>::List;
+  /// Those on what the tracker reads.
+  using OnReading =
+      typename detail::Picked<[]<class Effect> { return HasSense<Effect, double>; }, EffectList<>, E...>::List;
 
   template <int N, class P = double>
   struct On {
     [[no_unique_address]] std::tuple<E<N, P>...> list{};
 
     static constexpr int count = (0 + ... + E<N, P>::count);  ///< values of all parameters
+    template <class One>
+    static constexpr bool contains = (false || ... || std::is_same_v<One, E<N, P>>);
     /// Whether anything happens where tubes end or start to curve.
     static constexpr bool has_station = (false || ... || HasStation<E<N, P>, P, N>);
     /// Whether tubes rub along their length.
@@ -192,16 +210,18 @@ struct EffectList {
 
     /// The same effects with the scalar S; value(x, place) gives a parameter's value its derivatives, and those of what
     /// the past left behind follow.
+    /// @tparam Some  EffectList of those that are wanted
     /// @param transmission  transmission(k): 0, with the derivatives of the transmission's parameter k
-    template <class S, class Value, class Transmission = Constant>
-    [[nodiscard]] On<N, S> seeded(const Value& value, const Transmission& transmission = {}) const noexcept {
-      On<N, S> r;
+    template <class S, class Some = EffectList, class Value, class Transmission = Constant>
+    [[nodiscard]] auto seeded(const Value& value, const Transmission& transmission = {}) const noexcept {
+      using Chosen = typename Some::template On<N, S>;
+      Chosen r;
       int first = 0;
-      [&]<std::size_t... I>(std::index_sequence<I...>) {
-        (seed(std::get<I>(list), std::get<I>(r.list), std::exchange(first, first + E<N, P>::count), value,
-              transmission),
-         ...);
-      }(std::index_sequence_for<E<N, P>...>{});
+      const auto seed_if_wanted = [&]<class To>(const auto& from, std::type_identity<To>) {
+        if constexpr (Chosen::template contains<To>) seed(from, std::get<To>(r.list), first, value, transmission);
+        first += from.count;
+      };
+      (seed_if_wanted(std::get<E<N, P>>(list), std::type_identity<E<N, S>>{}), ...);
       return r;
     }
 
@@ -242,7 +262,7 @@ struct EffectList {
     /// Whether any effect that follows the twist of the tubes acts.
     [[nodiscard]] bool act_by_twist() const noexcept {
       return any([](const auto& e) {
-        if constexpr (requires { e.follows_twist; }) return acts(e);
+        if constexpr (FollowsTwist<std::remove_cvref_t<decltype(e)>>) return acts(e);
         return false;
       });
     }

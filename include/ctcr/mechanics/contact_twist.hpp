@@ -131,7 +131,7 @@ template <int N, class Fx>
     }
     in.effects = c.effects.template seeded<S>([](double value, int) { return S(value); });
     in.effects.for_each([&](auto& effect, int) {
-      if constexpr (requires { effect.follows_twist; }) {
+      if constexpr (FollowsTwist<std::remove_cvref_t<decltype(effect)>>) {
         for (int k = 0; k < contacts; ++k) window.add(effect.past.state[std::size_t(k)], unknowns + k, 1);
         for (int k = 0; k < count; ++k) window.add(effect.values[std::size_t(k)], unknowns + contacts + k, 1);
       }

@@ -73,7 +73,7 @@ template <int N, class Effect>
 void remember_values(Effect effect, const Transmission<N>& transmission, std::span<const RecordedRow<N>> rows,
                      const Winding<N>& winding, const auto& keep) {
   RecordedPath<N, double> path(transmission, rows, [](double x, int) { return x; });
-  if constexpr (requires { effect.follows_twist; }) path.unwind(winding, effect.values);
+  if constexpr (FollowsTwist<Effect>) path.unwind(winding, effect.values);
   effect.past = {};
   for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
     for (; place <= path.end[row]; ++place) effect.remember(path, place);
@@ -98,7 +98,7 @@ void remember(const E<N, double>& effect, const Transmission<N>& transmission, s
   });
   E<N, P> dual;
   for (int k = 0; k < count; ++k) dual.values[std::size_t(k)] = seeded(effect.values[std::size_t(k)], k);
-  if constexpr (requires { effect.follows_twist; }) path.unwind(winding, dual.values);
+  if constexpr (FollowsTwist<E<N, P>>) path.unwind(winding, dual.values);
   for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
     for (; place <= path.end[row]; ++place) dual.remember(path, place);
     auto& past = keep(row);
@@ -154,7 +154,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
   constexpr double tolerance = 1e-10;  // [N]
   Status status = solve(out.model, out.q, out.load, ws, out.solution, settings);
   const Vec3 known = out.load.force;
-  const auto effects = out.model.effects().template seeded<S>([](double x, int) { return S(x); });
+  const auto effects = out.model.effects().template seeded<S, typename Fx::OnTip>([](double x, int) { return S(x); });
   Vec3 push, added = Vec3::Zero(), change = Vec3::Zero();
   Mat3 slope;
   const auto look = [&] {

@@ -103,15 +103,16 @@ private:
       return lane < 0 ? S(x) : window(x, lane);
     };
   }
+  /// Those of the list Some.
+  template <class Some>
   [[nodiscard]] auto effects(const auto& seed) const noexcept {
-    return model().effects().template seeded<S>(
+    return model().effects().template seeded<S, Some>(
         [&](double x, int k) { return seed(x, V::count + k); },
         [&](int k) { return seed(0, V::index(Parameter::translation_ratio) + k); });
   }
-  void find_joints(const auto& seed, const auto& effects, std::array<S, N>& beta,
-                   std::array<S, N>& alpha) const noexcept {
+  void find_joints(const auto& seed, std::array<S, N>& beta, std::array<S, N>& alpha) const noexcept {
     joints_of<N, S>(system_.transmission, row_.theta, seed, beta, alpha);
-    effects.actuate(row_.at, beta, alpha);
+    effects<typename Fx::OnJoints>(seed).actuate(row_.at, beta, alpha);
   }
 
   /// What the surroundings add, and its slopes by the parameters: it may be nothing and yet have some.
@@ -121,7 +122,7 @@ private:
       const Vec3& p = prediction_.solution.position;
       for (Window window; window.first < force_; window.first += window.size) {
         auto& f = push_[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
-        effects(seeding(window)).environment({p[0], p[1], p[2]}, f);
+        effects<typename Fx::OnTip>(seeding(window)).environment({p[0], p[1], p[2]}, f);
         for (const S& x : f) pushed = pushed || !vanishes(x);
       }
     }
@@ -136,9 +137,8 @@ private:
     for (Window window; window.first < count; window.first += window.size) {
       const auto seed = seeding(window);
       RodInputs<N, S, Fx> in;
-      const auto all = effects(seed);
-      in.effects = all.on_rod();
-      find_joints(seed, all, in.beta, in.alpha);
+      in.effects = effects<typename Fx::OnRod>(seed);
+      find_joints(seed, in.beta, in.alpha);
       for (int i = 0; i < N; ++i) in.tubes[std::size_t(i)] = tube_of<N, S>(robot.tubes[std::size_t(i)], i, seed);
       for (int i = 0; i < 3; ++i) {
         const auto k = std::size_t(i);
@@ -163,7 +163,7 @@ private:
     for (Window window; window.first < force_; window.first += window.size) {
       const auto seed = seeding(window);
       std::array<S, N> beta, alpha;
-      find_joints(seed, effects(seed), beta, alpha);
+      find_joints(seed, beta, alpha);
       for (int g = 0; g < Window::groups; ++g)
         for (int k = 0; k < 6; ++k)
           for (int i = 0; i < N; ++i)
@@ -180,7 +180,10 @@ private:
       const Vec3& p = prediction_.solution.position;
       std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
       for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
-      model().effects().template seeded<Slope>([](double x, int) { return Slope(x); }).environment(at, f);
+      model()
+          .effects()
+          .template seeded<Slope, typename Fx::OnTip>([](double x, int) { return Slope(x); })
+          .environment(at, f);
       Mat3 slope, C;
       Eigen::Matrix<double, 6, 3> by_force;
       for (int j = 0; j < 3; ++j) {
@@ -230,7 +233,7 @@ private:
         }
       }
       Frame<S> reading = composed(T_ref, tip);
-      effects(seed).sense(row_.at, reading);
+      effects<typename Fx::OnReading>(seed).sense(row_.at, reading);
       for (int g = 0; g < Window::groups; ++g)
         reading.rotation_twist[2][g] += seed(0, V::index(Parameter::sensor_roll)).d[g];
       const Mat3 R = reading.rotation();

@@ -68,6 +68,9 @@ void bind_recording(nb::module_& m) {
       .def(
           "wind_up", [](const BoundRecording& self, const Eigen::VectorXd& x) { return (*self).wind_up(x); }, "x"_a,
           "Lets tubes that rub wind each other up as they do at x; returns the largest change of a twist [rad].")
+      .def_prop_ro(
+          "is_wound", [](const BoundRecording& self) { return (*self).is_wound(); },
+          "Whether tubes have wound each other up.")
       .def(
           "begin_at", [](const BoundRecording& self, const BoundRecording& other) { (*self).begin_at(*other); },
           "other"_a, "Takes over how another recording of the same table is wound up.")

@@ -78,6 +78,7 @@ public:
     return recording_(x, residual, jacobian);
   }
   double wind_up(const Eigen::VectorXd& x) override { return recording_.wind_up(x); }
+  bool is_wound() const override { return recording_.is_wound(); }
   void begin_at(const AnyRecording& other) override {
     if (const auto* like = dynamic_cast<const RecordingOf*>(&other)) recording_.begin_at(like->recording_);
   }

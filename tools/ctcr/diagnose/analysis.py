@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from ctcr import effects, identify, open_side
 from ctcr.diagnose import decision, jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates, forms
+from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
+from ctcr.diagnose.candidates import Candidate, candidates
 from ctcr.diagnose.engine import FITS, Engine, values_of
 from ctcr.diagnose.far_off import far_off
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.prediction import predictive
-from ctcr.diagnose.race import Entry, Progress, Round
+from ctcr.diagnose.race import Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.measurements import Measurements
@@ -25,25 +26,11 @@ from ctcr.robot import Robot
 Array = NDArray[np.float64]
 
 TURNS = 2  # quarters that are locked away in turn, where that is needed
-WRONG = 3.0  # times the stated noise that a fit admits, and
-MANY = 0.1  # ... share of outliers that calibration takes, beyond which it is hardly right
+MANY = 0.1  # share of outliers that calibration takes beyond which it is hardly right
 HARDLY = 0.4  # share of the excess that the first effect removes, below which it hardly explains anything
 LOST = 10.0  # log evidence below the race's by which a fit with its own weights lost the effect to outliers
 SAFE = 100.0  # log evidence of an effect that others have surely not made superfluous
 MOST_OPEN = 1.5  # expected mean square error of a locked run over that of the others
-
-
-@dataclass
-class Accepted:
-    """An effect that was accepted, with all that the data cannot tell from it."""
-
-    entry: Entry
-    ids: list[str]
-    log_evidence: float
-    margin: float
-    share: float
-    rms_mm: float = np.nan  # of the runs that no fit saw, once it was in, with those accepted before
-    aside: dict[str, float] = field(default_factory=dict)  # of its other variants, as the race left them
 
 
 @dataclass
@@ -312,12 +299,12 @@ def _grow(
             fit = engine.fit_like(before, names, start=values_of(start), fixed=fixed, near=True)
         rejected = engine.rejects(fit)
         fit = _begun(engine, accepted, fit, progress)
-        fit = _with_shapes(engine, accepted, accepted[-1], fit, progress)
+        fit = with_shapes(engine, accepted, accepted[-1], fit, progress)
         accepted[-1].rms_mm = fit.rms_mm(locked)
         if rejected and accepted[0].share < HARDLY:
             break  # no effect is stacked on one that hardly explains anything
     for a in accepted[:-1]:  # what the others hid of their forms shows now
-        fit = _with_shapes(engine, accepted, a, fit, progress)
+        fit = with_shapes(engine, accepted, a, fit, progress)
     return fit, True
 
 
@@ -329,43 +316,6 @@ def _begun(engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress
     if not engine.begins_otherwise(fit, *racing.parameters(entries)):
         return fit
     return racing.baseline(engine, entries, values_of(fit), progress)
-
-
-def _with_shapes(
-    engine: Engine, accepted: list[Accepted], one: Accepted, fit: identify.Fit, progress: Progress
-) -> identify.Fit:
-    """Frees what an accepted effect was not given in the race where that helps: its form may be another one."""
-    given = one.entry.candidate
-    tried = []
-    for form in forms(effects.get(given.id, engine.robot.n_tubes), given, one.aside):
-        if form == given:
-            continue  # nothing is left to free
-        progress(f"freeing the shape of {given.id}")
-        entry = replace(one.entry, candidate=form)
-        names, fixed = racing.parameters([entry if a is one else a.entry for a in accepted])
-        neutral = dict(zip(form.names, engine.priors(form.names)[0], strict=True))
-        start = neutral | one.aside | dict(form.shape) | values_of(fit)
-        freed = engine.fit_like(fit, names, start=start, fixed=fixed, near=True)
-        tried.append((entry, freed))
-    best = max((freed.log_evidence for _, freed in tried), default=-np.inf)
-    if best - fit.log_evidence < decision.TIE:
-        return fit
-    laws: dict[tuple, tuple[Entry, identify.Fit]] = {}
-    for entry, freed in sorted(tried, key=lambda pair: pair[1].log_evidence):
-        held = (pair for pair in entry.candidate.shape if pair[0] not in entry.candidate.names)
-        laws[tuple(held)] = entry, freed
-    # In the noise that a wrong law asks for, laws can hardly be told apart: then each is fitted with its own.
-    open_laws = [
-        pair for pair in laws.values() if pair[1].log_evidence == best or np.max(fit.inflation) > WRONG
-    ]
-    ended = []
-    for entry, freed in open_laws:
-        entries = [entry if a is one else a.entry for a in accepted]
-        ended.append((racing.baseline(engine, entries, values_of(freed), progress), entry, freed))
-    fit_with, entry, freed = max(ended, key=lambda one: one[0].log_evidence)
-    one.entry = replace(entry, fit=freed.without_readings())
-    one.share += (1 - one.share) * racing.share_of(fit, freed, len(freed.names) - len(fit.names))
-    return fit_with
 
 
 def _backward(

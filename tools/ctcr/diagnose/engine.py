@@ -34,13 +34,13 @@ class Gain:
     columns: Array  # whitened slopes that calibration cannot imitate (K, k)
 
 
-def laplace(information: Array, gradient: Array) -> tuple[float, Array]:
+def laplace(information: Array, gradient: Array) -> tuple[Array, Array]:
     """Log evidence of adding parameters, and their values, in units of their prior sd: of what the readings tell of
-    them beside calibration, and the gradient of half the chi-square."""
-    S = information + np.eye(len(information))
-    S = 0.5 * (S + S.T)
-    eta = -np.linalg.solve(S, gradient)
-    return float(-0.5 * gradient @ eta - 0.5 * np.linalg.slogdet(S)[1]), eta
+    them beside calibration (..., k, k), and the gradient (..., k) of half the chi-square."""
+    S = information + np.eye(information.shape[-1])
+    S = 0.5 * (S + np.swapaxes(S, -1, -2))
+    eta = -np.linalg.solve(S, gradient[..., None])[..., 0]
+    return -0.5 * np.sum(gradient * eta, axis=-1) - 0.5 * np.linalg.slogdet(S)[1], eta
 
 
 class Linear:
@@ -53,7 +53,11 @@ class Linear:
 
     def imitation(self, columns: Array) -> Array:
         """The change of the fitted parameters that imitates whitened columns best, given their priors."""
-        return np.linalg.solve(self.cholesky.T, np.linalg.solve(self.cholesky, self.jacobian.T @ columns))
+        return self.imitation_by(self.jacobian.T @ columns)
+
+    def imitation_by(self, overlap: Array) -> Array:
+        """The same of columns of which this is jacobian.T @ columns."""
+        return np.linalg.solve(self.cholesky.T, np.linalg.solve(self.cholesky, overlap))
 
     def covariance(self) -> Array:
         """Of the parameters, given the readings and the priors."""
@@ -64,7 +68,7 @@ class Linear:
         imitation = self.imitation(columns)
         left = columns - self.jacobian @ imitation
         log_evidence, eta = laplace(columns.T @ left, columns.T @ self.residual)
-        return Gain(log_evidence, eta, -imitation @ eta, left @ eta, left)
+        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left)
 
 
 @dataclass
@@ -80,7 +84,7 @@ class Engine:
     steps: int = field(init=False)
     places: Array = field(init=False)
     base: list[str] = field(init=False)  # their names
-    _last: _core.Recording | None = field(init=False, default=None)  # what was fitted last
+    _wound: _core.Recording | None = field(init=False, default=None)  # of the last fit in which tubes rub
 
     def __post_init__(self) -> None:
         self.places = identify.places_of(self.robot, self.measurements)
@@ -137,19 +141,19 @@ class Engine:
         mean_of = dict(zip(names, mean, strict=True))
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
-        if isinstance(table, _core.Recording):
-            if self._last is not None:
-                table.begin_at(self._last)  # rubbing tubes are wound up much as in the fit before
-            self._last = table
+        _wind_as(table, self._wound)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
-        return identify.identify_rows(
+        fitted = identify.identify_rows(
             table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
             robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
             start=at, max_iterations=max_iterations, tolerance=tolerance or self.tolerance, few_first=not near,
             known=free_parameters.known_directions(self.robot, names),
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
+        if getattr(table, "is_wound", False):
+            self._wound = table
+        return fitted
 
     def fit_like(self, other: identify.Fit, added: Iterable[str] = (), **options: Any) -> identify.Fit:
         """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
@@ -224,6 +228,7 @@ class Engine:
         neutral, sd, _, _ = self.priors(everything)
         at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
         table = self.recording(everything, fixed)
+        _wind_as(table, fit.predict)
         table.activate(self.fitted.tolist())
         values = np.array([at[name] for name in everything])
         # A part of the table, scaled in place: of many rows this is the largest one of all.
@@ -231,6 +236,12 @@ class Engine:
         slopes *= sd[len(everything) - len(names) :]
         slopes[~np.isfinite(slopes)] = 0.0
         return slopes.reshape(len(self.measurements), 6, len(names))
+
+
+def _wind_as(table: Any, other: Any) -> None:
+    """Begins where another recording has wound up tubes that rub: much as it will be."""
+    if isinstance(table, _core.Recording) and isinstance(other, _core.Recording):
+        table.begin_at(other)
 
 
 def values_of(fit: identify.Fit) -> dict[str, float]:

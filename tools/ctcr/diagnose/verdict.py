@@ -1,18 +1,15 @@
 """The verdict: one word for programs, plain sentences for people."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import identify
 from ctcr.diagnose import race as racing
+from ctcr.diagnose.accepted import Accepted
 from ctcr.diagnose.leftover import Leftover
 from ctcr.output import listed
-
-if TYPE_CHECKING:
-    from ctcr.diagnose.analysis import Accepted
 
 # Share of what noise does not explain of locked runs that effects must explain to be no stand-ins, and
 EXPLAINED = 0.75
@@ -35,7 +32,7 @@ class Verdict:
 def judge(
     calibrated: identify.Fit,
     with_effects: identify.Fit,
-    accepted: "list[Accepted]",
+    accepted: list[Accepted],
     leftover: Leftover,
     locked: NDArray[np.bool_],
     explained: dict[str, float],
