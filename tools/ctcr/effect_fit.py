@@ -17,7 +17,7 @@ from ctcr import (
 )
 from ctcr.calibrate import parameters
 from ctcr.calibrate.checks import sentence
-from ctcr.diagnose import unsteady
+from ctcr.diagnose import distorted, unsteady
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
@@ -122,6 +122,8 @@ def add(
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
     varies = unsteady.followed(stage.engine, fit)[1]
+    if (smooth := distorted.noise_of(stage.engine, fit)) is not None:
+        varies.append(distorted.in_words(smooth))
     fit = unsteady.widened(stage.engine, open_side.widened(fit))
     stages.append(Stage("noise_floor", *identify.noise_floor(fit, fit.noise, stage.engine.places)))
     return Added(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import effects, identify, open_side
-from ctcr.diagnose import decision, jump, other_runs, unsteady, varying
+from ctcr.diagnose import decision, distorted, jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
 from ctcr.diagnose.candidates import Candidate, candidates
@@ -238,13 +238,14 @@ def _diagnose(
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
+    names, fixed = racing.parameters([a.entry for a in accepted])
     seen, told = unsteady.followed(engine, fit)
     lags = [*told, unsteady.FOLLOWED] if told else []
     leftover = leftover_of(engine, calibrated, seen, lags)
     progress("prediction of other runs")
     alone = after = predictive(engine, calibrated, {})
     if accepted:
-        after = predictive(engine, fit, racing.parameters([a.entry for a in accepted])[1])
+        after = predictive(engine, fit, fixed)
         after = unsteady.followed(engine, after)[0] if lags else after
     explained = other_runs.explained(engine, alone, after) if accepted else {}
     varies = None
@@ -253,13 +254,22 @@ def _diagnose(
         varies = varying.found(engine, calibrated, leftover.sample)
     outdone = varies is not None and varies.outdoes(engine, calibrated, after)
     verdict = judge(alone, after, accepted, leftover, locked, explained, outdone)
+    floor_noise = fit.noise
+    # A smooth error explains many causes that are none of the field's: only for one that is found by itself.
+    smooth = distorted.noise_of(engine, fit) if verdict.word == "identified" else None
+    if smooth is not None:
+        fit = engine.fit(names, start=values_of(fit), fixed=fixed, noise=smooth, near=True)
+        seen = unsteady.followed(engine, fit)[0] if lags else fit
+        after = distorted.taken_off(engine, seen, smooth)
+        told = [*lags, distorted.in_words(smooth), distorted.FOLLOWED]
+        leftover = leftover_of(engine, calibrated, seen, told)
     if leftover.rejected and not (varies and verdict.names_no_cause):
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)
     return Diagnosis(
         robot, engine.measurements, locked, unseen, alone, open_side.widened(after),
         unsteady.widened(engine, open_side.widened(fit)),
-        identify.noise_floor(after, fit.noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
+        identify.noise_floor(after, floor_noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
     )  # fmt: skip
 
 

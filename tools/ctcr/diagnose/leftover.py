@@ -23,7 +23,7 @@ class Leftover:
     before: Ranking  # of what depends on what before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
-    lags: list[str] = field(default_factory=list)  # what is to be said of a delay that varies
+    allowed: list[str] = field(default_factory=list)  # what else the errors with effects allow for
 
     @property
     def structured(self) -> bool:
@@ -47,21 +47,21 @@ class Leftover:
     @property
     def in_words(self) -> list[str]:
         if not self.structured:
-            return [*self.lags, "What is left is noise."]
+            return [*self.allowed, "What is left is noise."]
         on = ", ".join(item.label for item in self.after.chosen)
         depends = f"it depends on {on}" if on else "no quantity alone tells how large it is on other runs"
         rejected = [f"What is left is more than noise; {depends}."] if self.rejected else []
-        return rejected + self.lags + self.at_places
+        return rejected + self.allowed + self.at_places
 
 
-def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit, lags: list[str]) -> Leftover:
+def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit, allowed: list[str]) -> Leftover:
     sample = take_sample(
         engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements)
     )
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     places = engine.measurements.row[come_together(engine.measurements, fit)].tolist()
-    return Leftover(engine.rejects(fit), places, ranked, after, sample, lags)
+    return Leftover(engine.rejects(fit), places, ranked, after, sample, allowed)
 
 
 def _rank(engine: Engine, sample: Sample, fit: identify.Fit) -> Ranking:

@@ -1,0 +1,85 @@
+"""A field distorted by more than a small piece of metal: what that leaves is smooth, and errors allow for it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import effect_fit, identify, robot_file, simulation
+from ctcr.diagnose import diagnose, distorted
+from ctcr.diagnose.candidates import METAL
+from ctcr.diagnose.engine import Engine
+
+ROOT = Path(__file__).parents[2]
+NAMES = [distorted.EFFECT + name for name in METAL]
+LENGTH, SIZE = 0.04, 1.5e-4  # of the smooth error [m]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
+
+
+@pytest.fixture(scope="module")
+def piece(robot, recorded):
+    """A small piece of metal beside the robot."""
+    places = identify.places_of(robot, simulation.simulate(robot, recorded, "none"))
+    at = np.median(places, axis=0) + [0.06, -0.05, 0.06]
+    return dict(zip(NAMES, [6e-6, *at, 0, 0, 0], strict=True))
+
+
+@pytest.fixture(scope="module")
+def by_metal(robot, recorded, piece):
+    metal = effect_fit.with_values(robot, ["field_distortion"], piece)
+    return simulation.simulate(metal, recorded, "jitter", seed=3)
+
+
+def smooth(places, length, size):
+    """A random error of this standard deviation an axis that changes within this length, at places (M, 3)."""
+    random = np.random.default_rng(4)
+    error = np.zeros_like(places)
+    for _ in range(200):
+        wave = random.standard_normal(3) / length
+        error += np.cos(places @ wave + random.uniform(0, 2 * np.pi))[:, None] * random.standard_normal(3)
+    return size * error / 10  # of 200 waves of mean square 1/2
+
+
+@pytest.fixture(scope="module")
+def distorted_more(robot, by_metal):
+    error = smooth(by_metal.position, LENGTH, SIZE)
+    return diagnose(robot, replace(by_metal, position=by_metal.position + error))
+
+
+def fitted(robot, readings, start):
+    noise = identify.noise_of_readings(robot, readings)
+    engine = Engine(robot, readings, noise, np.ones(len(readings), bool), free=["tracker.position.*"])
+    return engine, engine.fit(list(start), start=start)
+
+
+def test_a_smooth_error_is_seen_as_large_and_as_long_as_it_is(robot, by_metal, piece):
+    more = replace(by_metal, position=by_metal.position + smooth(by_metal.position, LENGTH, SIZE))
+    noise = distorted.noise_of(*fitted(robot, more, piece))
+    assert noise.correlation_length == pytest.approx(LENGTH, rel=0.5)
+    assert SIZE / 2 < noise.position_field < 2 * SIZE
+    assert f"{1e3 * noise.position_field:.2g} mm" in distorted.in_words(noise)
+    # Of another cause it is no distortion of the field.
+    assert distorted.noise_of(*fitted(robot, more, {})) is None
+
+
+def test_runs_that_no_fit_saw_are_corrected_by_those_nearby(distorted_more):
+    assert [a.ids for a in distorted_more.accepted] == [["field_distortion"]]
+    assert distorted_more.verdict.word == "identified"
+    assert distorted.FOLLOWED in distorted_more.leftover.in_words
+    rms = distorted_more.rms_mm
+    plain = distorted_more.accepted[0].rms_mm
+    noise = rms["noise_floor"] ** 2
+    assert plain**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
+    jitter = 1e3 * np.sqrt(3) * distorted_more.with_effects.noise.position_jitter
+    assert rms["noise_floor"] == pytest.approx(jitter, rel=0.1)
+
+
+def test_what_a_piece_of_metal_does_leaves_nothing_smooth(robot, by_metal):
+    found = diagnose(robot, by_metal)
+    assert [a.ids for a in found.accepted] == [["field_distortion"]]
+    assert not any("more than the small piece" in line for line in found.leftover.in_words)
+    assert found.rms_mm["with_effects"] < 1.15 * found.rms_mm["noise_floor"]
