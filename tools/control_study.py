@@ -35,7 +35,7 @@ clearance. It was measured along `examples/data/plan.csv` with realistic noise, 
 then driven along the path of scenario S2. *Open loop*: the robot replays the joints that the controller planned on
 what it knows. *Closed loop*: the tracker corrects at 40 Hz, in ten runs that differ in its noise; behind the mean, in
 brackets, that of the best and of the worst run. Distances of the tip from the path; what lies near the obstacle is left
-out. What friction remembers from before the start of the path is unknown to all. Written by
+out. All robots begin at rest at the start of the path: friction remembers nothing before. Written by
 `tools/control_study.py`."""
 
 
@@ -96,6 +96,7 @@ def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.nd
         t=run.time, run=np.zeros(count, int), beta=run.joints[:, :n] - drive.translation_correction,
         alpha=run.joints[:, n:] - drive.rotation_correction,
         force=np.zeros((count, 3)), position=None, quaternion=None, row=np.arange(count) + 2,
+        from_home=False,  # as the controller planned: at rest at the start of the path
     )  # fmt: skip
     read = simulation.simulate(plant, replay, "none")
     return 1e3 * np.linalg.norm(read.position - in_tracker(controller, run.wanted), axis=1)[run.far]
