@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
-from ctcr.diagnose import diagnose, distorted
+from ctcr.diagnose import diagnose, distorted, varying
 from ctcr.diagnose.candidates import METAL
 from ctcr.diagnose.engine import Engine
 
@@ -45,9 +45,14 @@ def smooth(places, length, size):
 
 
 @pytest.fixture(scope="module")
-def distorted_more(robot, by_metal):
-    error = smooth(by_metal.position, LENGTH, SIZE)
-    return diagnose(robot, replace(by_metal, position=by_metal.position + error))
+def more(by_metal):
+    """Readings beside that piece and something else."""
+    return replace(by_metal, position=by_metal.position + smooth(by_metal.position, LENGTH, SIZE))
+
+
+@pytest.fixture(scope="module")
+def distorted_more(robot, more):
+    return diagnose(robot, more)
 
 
 def fitted(robot, readings, start):
@@ -56,8 +61,7 @@ def fitted(robot, readings, start):
     return engine, engine.fit(list(start), start=start)
 
 
-def test_a_smooth_error_is_seen_as_large_and_as_long_as_it_is(robot, by_metal, piece):
-    more = replace(by_metal, position=by_metal.position + smooth(by_metal.position, LENGTH, SIZE))
+def test_a_smooth_error_is_seen_as_large_and_as_long_as_it_is(robot, more, piece):
     noise = distorted.noise_of(*fitted(robot, more, piece))
     assert noise.correlation_length == pytest.approx(LENGTH, rel=0.5)
     assert SIZE / 2 < noise.position_field < 2 * SIZE
@@ -76,6 +80,21 @@ def test_runs_that_no_fit_saw_are_corrected_by_those_nearby(distorted_more):
     assert plain**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
     jitter = 1e3 * np.sqrt(3) * distorted_more.with_effects.noise.position_jitter
     assert rms["noise_floor"] == pytest.approx(jitter, rel=0.1)
+
+
+def test_what_seemed_to_vary_before_it_was_allowed_for_is_not_told(robot, by_metal, monkeypatch):
+    more = replace(by_metal, position=by_metal.position + smooth(by_metal.position, 0.025, 3e-4))
+    seen = []
+
+    def found(_engine, fit, _sample):
+        seen.append(fit)
+        return varying.Varying([], 0.5, fit.residual)
+
+    monkeypatch.setattr(varying, "may_outdo", lambda *_: True)
+    monkeypatch.setattr(varying, "found", found)
+    told = diagnose(robot, more)
+    assert seen, "no more than noise was left before it was allowed for"
+    assert not told.leftover.structured and told.varying is None
 
 
 def test_what_a_piece_of_metal_does_leaves_nothing_smooth(robot, by_metal):

@@ -263,6 +263,7 @@ def _diagnose(
         after = distorted.taken_off(engine, seen, smooth)
         told = [*lags, distorted.in_words(smooth), distorted.FOLLOWED]
         leftover = leftover_of(engine, calibrated, seen, told)
+        varies = None  # without it more was left
     if leftover.rejected and not (varies and verdict.names_no_cause):
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)

@@ -151,7 +151,7 @@ class Engine:
             known=free_parameters.known_directions(self.robot, names),
             within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )  # fmt: skip
-        if getattr(table, "is_wound", False):
+        if isinstance(table, _core.Recording) and table.is_wound:
             self._wound = table
         return fitted
 
