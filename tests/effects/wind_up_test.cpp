@@ -69,6 +69,8 @@ TEST(WindUp, ElasticContactsAndTubesShareARotation) {
 }
 
 TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
+  using P = SystemParameters<3, Catalogue>;
+  using V = ParameterVector<3>;
   Random random(3);
   for (int n = 0; n < test::cases(5); ++n) {
     const auto c = test::smooth_case<3>(random, 0.1, 0.3, test::tilted_gravity);
@@ -76,36 +78,68 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
     auto& friction = effect<Friction, 3>(effects);
     friction.values = {0.03, 0.02, 0.05, 0.01, 0.3, 0, 0};
     for (double& h : friction.past.state) h = test::uniform(random, -0.9, 0.9);
-    constexpr int steps = 3;
+    effect<Contact, 3>(effects).values[0] = 0;  // what surroundings push is held
+    const System<3, Catalogue> system{{2e-4, -1, {-0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}},
+                                      Model<3, Catalogue>(c.robot, effects),
+                                      {},
+                                      {.tolerance = 1e-12, .steps = 3}};
+    const RecordedRow<3> row{motor_angles(system.transmission, c.q), c.load, {}};
     Workspace<3> ws;
-    const auto twist = [&](const Catalogue::On<3>& now, auto& slopes) {
-      Solution<3> solution;
-      const Model<3, Catalogue> model(c.robot, now);
-      EXPECT_EQ(solve(model, c.q, c.load, ws, solution, {.tolerance = 1e-12, .steps = steps}), Status::ok);
-      slopes = twist_slopes(model, ws, steps);
-      return twist_of(model, ws, steps, {});
+    RecordedPrediction<3, Catalogue> prediction;
+    const auto twist = [&](const System<3, Catalogue>& now) {
+      EXPECT_EQ(predict(now, row, now.model.effects().memory(), ws, prediction), Status::ok);
+      return twist_of(prediction.model, ws, now.settings.steps, {});
     };
-    TwistSlopes<3, Friction<3>::count> slopes, ignored;
-    (void)twist(effects, slopes);
-    const auto check = [&](const auto& column, double change, double tolerance, const auto& place) {
-      const auto moved = [&](double by) {
-        auto other = effects;
-        place(effect<Friction, 3>(other)) += by;
-        return twist(other, ignored);
-      };
-      const auto more = moved(change), less = moved(-change);
-      for (int i = 0; i < Contacts<3>::count; ++i) {
-        const auto at_contact = std::size_t(i);
-        EXPECT_NEAR(column[i], wrapped(more[at_contact] - less[at_contact]) / (2 * change), tolerance)
+    (void)twist(system);
+    const std::vector<int> parameters{V::index(Parameter::curvature, 0),
+                                      V::index(Parameter::youngs_modulus, 1),
+                                      V::index(Parameter::length, 1),
+                                      V::index(Parameter::gravity, 0),
+                                      V::index(Parameter::rotation_ratio),
+                                      V::index(Parameter::home_rotation, 1),
+                                      V::count,
+                                      V::count + 3};
+    detail::Variables<3, Catalogue> variables;
+    for (int j = 0; j < int(parameters.size()); ++j)
+      variables.put(first_variable<3> + j, j, parameters[std::size_t(j)]);
+    const auto& acting = prediction.model.effects();
+    const auto slopes = twist_slopes<P::count>(
+        prediction.model, ws, system.settings.steps, int(parameters.size()), [&](const auto& window) {
+          using S = typename std::remove_cvref_t<decltype(window)>::S;
+          const auto seed = variables.seeding(window);
+          auto in = detail::rod_inputs<S>(system, row, prediction.load, seed, [&](auto& beta, auto& alpha) {
+            variables.effects<Catalogue::OnJoints>(acting, window).actuate(row.at, beta, alpha);
+          });
+          in.effects = variables.effects<Catalogue::OnRod>(acting, window);
+          return in;
+        });
+    const auto plain = twist_slopes(prediction.model, ws, system.settings.steps);
+    EXPECT_LT((slopes.by_rubbing - plain.by_rubbing).norm(), 1e-10);
+    const auto check = [&](const auto& column, double change, double tolerance, const auto& moved) {
+      const auto more = twist(moved(change)), less = twist(moved(-change));
+      for (int i = 0; i < Contacts<3>::count; ++i)
+        EXPECT_NEAR(column[i], wrapped(more[std::size_t(i)] - less[std::size_t(i)]) / (2 * change), tolerance)
             << n << ": contact " << i;
-      }
     };
     for (int k = 0; k < Contacts<3>::count; ++k)
-      check(slopes.by_rubbing.col(k), 1e-4, 1e-6, [&](auto& f) -> double& { return f.past.state[std::size_t(k)]; });
-    for (int k = 0; k < Friction<3>::count; ++k)
-      check(slopes.by_values.col(k), 1e-5, 1e-4, [&](auto& f) -> double& { return f.values[std::size_t(k)]; });
+      check(slopes.by_rubbing.col(k), 1e-4, 1e-6, [&](double by) {
+        auto other = effects;
+        effect<Friction, 3>(other).past.state[std::size_t(k)] += by;
+        System<3, Catalogue> moved = system;
+        moved.model = Model<3, Catalogue>(c.robot, other);
+        return moved;
+      });
+    for (std::size_t j = 0; j < parameters.size(); ++j) {
+      const Eigen::VectorXd x = P::values(system);
+      const double size = std::max(0.05, std::abs(x[parameters[j]])), change = 1e-5 * size;
+      check(slopes.by_variables.col(Eigen::Index(j)), change, 1e-4 / size, [&](double by) {
+        Eigen::VectorXd there = x;
+        there[parameters[j]] += by;
+        return P::with_values(system, there);
+      });
+      EXPECT_GT(slopes.by_variables.col(Eigen::Index(j)).norm() * size, 1e-5) << P::name(parameters[j]);
+    }
     EXPECT_GT(slopes.by_rubbing.norm(), 1e-3);
-    EXPECT_GT(slopes.by_values.norm(), 1e-2);
   }
 }
 
@@ -161,40 +195,64 @@ TEST(WindUp, FollowsContactsThatComeAndGo) {
 }
 
 /// Which contacts stick and which slip changes with the parameters: there slopes jump, and few places have such kinks.
-TEST(WindUp, KnowsHowTheTwistChangesWithWhatRubs) {
+TEST(WindUp, KnowsHowTheTwistChangesWithTheParameters) {
+  using P = SystemParameters<2, Catalogue>;
+  using V = ParameterVector<2>;
   for (const double law : {0.0, elastic}) {
     Walk<2> walk = curved_walk(law, 4);
-    Winding<2> winding, ignored;
-    const auto wound = [&](const std::array<double, 6>& values, Winding<2>& at_them) {
+    auto effects = walk.system.model.effects();
+    effect<Friction, 2>(effects).values = {0.03, 0.02, 0.01, 0.3, 0.7, law};
+    walk.system.model = Model<2, Catalogue>(two_tubes(), effects);
+    const auto wound = [&](const Eigen::VectorXd& x, Winding<2>* winding) {
       Walk<2> other = walk;
-      auto effects = walk.system.model.effects();
-      effect<Friction, 2>(effects).values = values;
-      other.system.model = Model<2, Catalogue>(two_tubes(), effects);
-      for (int again = 0; again < 3; ++again) wind_up(other.system, std::span(other.rows), pool, &at_them);
-      std::vector<double> twist;
+      other.system = P::with_values(walk.system, x);
+      for (int again = 0; again < 3; ++again) wind_up(other.system, std::span(other.rows), pool, winding);
+      Eigen::Matrix<double, Contacts<2>::count, Eigen::Dynamic> twist(Contacts<2>::count, 0);
       for (const auto& row : other.rows)
-        for (const auto& place : row.twist) twist.insert(twist.end(), place.begin(), place.end());
+        for (const auto& place : row.twist) {
+          twist.conservativeResize(Eigen::NoChange, twist.cols() + 1);
+          twist.rightCols<1>() = VecN<Contacts<2>::count>::Map(place.data());
+        }
       return twist;
     };
-    const std::array<double, 6> values{0.03, 0.02, 0.01, 0.3, 0.7, law};
-    (void)wound(values, winding);
-    const auto change = std::array{2e-4, 2e-4, 2e-4, 5e-3, 5e-3};
+    const std::vector<std::pair<int, double>> changes{{V::count, 2e-4},
+                                                      {V::count + 1, 2e-4},
+                                                      {V::count + 2, 2e-4},
+                                                      {V::count + 3, 5e-3},
+                                                      {V::count + 4, 5e-3},
+                                                      {V::index(Parameter::curvature, 0), 0.02},
+                                                      {V::index(Parameter::home_rotation, 0), 2e-3},
+                                                      {V::index(Parameter::youngs_modulus, 1), 4e9},
+                                                      {V::index(Parameter::rotation_ratio), 1e-3},
+                                                      {V::index(Parameter::home_translation, 1), 1e-4}};
+    Winding<2> winding;
+    for (const auto& [parameter, change] : changes) winding.variables.push_back(parameter);
+    const Eigen::VectorXd x = P::values(walk.system);
+    const auto twist = wound(x, &winding);
     int looked_at = 0;
-    for (std::size_t j = 0; j < change.size(); ++j) {
-      auto more = values, less = values;
-      more[j] += change[j], less[j] -= change[j];
-      const Eigen::VectorXd there = Eigen::VectorXd::Map(wound(more, ignored).data(), winding.slopes.rows()),
-                            back = Eigen::VectorXd::Map(wound(less, ignored).data(), winding.slopes.rows());
-      const Eigen::VectorXd found = (there - back) / (2 * change[j]), slope = winding.slopes.col(Eigen::Index(j));
-      if (found.norm() < 0.1) continue;  // the outer tube touches nothing but the plate
+    for (std::size_t j = 0; j < changes.size(); ++j) {
+      const auto [parameter, change] = changes[j];
+      Eigen::VectorXd more = x, less = x;
+      more[parameter] += change, less[parameter] -= change;
+      const Eigen::MatrixXd found = (wound(more, nullptr) - wound(less, nullptr)) / (2 * change);
+      Eigen::MatrixXd slope(found.rows(), found.cols());
+      for (Eigen::Index k = 0; k < found.cols(); ++k) slope.col(k) = winding.at(std::size_t(k)).col(Eigen::Index(j));
+      if (found.norm() * change < 1e-5) continue;  // the outer tube touches nothing but the plate
       ++looked_at;
-      EXPECT_LT((found - slope).norm(), 0.05 * found.norm()) << "law " << law << ", parameter " << j;
+      const std::string what = P::name(parameter) + ", law " + std::to_string(law);
+      EXPECT_LT((found - slope).norm(), 0.05 * found.norm()) << what;
       std::vector<double> far;
-      for (Eigen::Index k = 0; k < slope.size(); ++k) far.push_back(std::abs(found[k] - slope[k]));
+      for (Eigen::Index k = 0; k < slope.size(); ++k) far.push_back(std::abs(found.data()[k] - slope.data()[k]));
       std::ranges::nth_element(far, far.begin() + std::ptrdiff_t(far.size() / 2));
-      EXPECT_LT(far[far.size() / 2], 0.01 * found.cwiseAbs().maxCoeff()) << "law " << law << ", parameter " << j;
+      EXPECT_LT(far[far.size() / 2], 0.01 * found.cwiseAbs().maxCoeff()) << what;
     }
-    EXPECT_EQ(looked_at, 4) << "law " << law;
+    EXPECT_EQ(looked_at, 9) << "law " << law;
+    const Eigen::VectorXd there = x + 0.5 * (Eigen::VectorXd::Unit(x.size(), V::count) * 2e-4);
+    Twist<2> extrapolated;
+    VecN<Contacts<2>::count>::Map(extrapolated.data()) = twist.rightCols<1>();
+    winding.extrapolate(there, std::size_t(twist.cols()) - 1, extrapolated);
+    const Eigen::VectorXd expected = twist.rightCols<1>() + 1e-4 * winding.at(std::size_t(twist.cols()) - 1).col(0);
+    for (std::size_t c = 0; c < extrapolated.size(); ++c) EXPECT_DOUBLE_EQ(extrapolated[c], expected[Eigen::Index(c)]);
   }
 }
 
@@ -209,7 +267,7 @@ TEST(WindUp, IsThatOfOneWalkAndOfAnyNumberOfThreads) {
     Walk<2> other = walk;
     const std::vector<RecordedRow<2>> plain = walk.rows;
     ThreadPool alone(1);
-    Winding<2> winding, same;
+    Winding<2> winding{.variables = {0, ParameterVector<2>::count}}, same = winding;
     EXPECT_EQ(wind_up(walk.system, std::span(walk.rows), pool, &winding),
               wind_up(other.system, std::span(other.rows), alone, &same));
     EXPECT_EQ(winding.slopes, same.slopes);
@@ -219,7 +277,7 @@ TEST(WindUp, IsThatOfOneWalkAndOfAnyNumberOfThreads) {
     double differ = 0;
     for (std::size_t row = 0, k = 0; row < plain.size(); ++row)
       for (std::size_t way = 0; way < plain[row].places(); ++way, ++k) {
-        winder.wind(walk.system, on_the_way<2>(plain, row, way), plain[row].twist[way], path, k, nullptr);
+        winder.wind(walk.system, on_the_way<2>(plain, row, way), plain[row].twist[way], path, k, nullptr, 0, nullptr);
         EXPECT_EQ(walk.rows[row].twist[way], other.rows[row].twist[way]) << "row " << row;
         const Twist<2> one_walk = winder.stand().twist;
         for (std::size_t c = 0; c < one_walk.size(); ++c)

@@ -81,6 +81,15 @@ void touch(test::Recorded<N>& recorded, double depth, double stiffness, double r
   recorded.system.model = Model<N, Catalogue>(recorded.system.model.robot(), effects);
 }
 
+/// Derivatives of the last row, with those of what came before.
+template <int N>
+Status slopes_of_last(const System<N, Catalogue>& system, const std::vector<RecordedRow<N>>& rows,
+                      const Workspace<N>& ws, const RecordedPrediction<N, Catalogue>& prediction,
+                      const std::vector<int>& parameters, Slopes& out) {
+  const auto past = past_slopes<N, Catalogue>(system, rows, parameters);
+  return differentiate<N, Catalogue>(system, rows.back(), ws, prediction, parameters, out, past.at(rows.size() - 1));
+}
+
 template <int N>
 void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
   const auto& [system, rows] = recorded;
@@ -88,7 +97,7 @@ void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
   RecordedPrediction<N, Catalogue> prediction;
   ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok) << what;
   Slopes exact(6, P<N>::count);
-  ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, all_parameters<N>(), exact)), Status::ok);
+  ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, all_parameters<N>(), exact), Status::ok);
   const Eigen::VectorXd x = P<N>::values(system);
   for (int place = 0; place < P<N>::count; ++place) {
     if (ParameterVector<N>::index(Parameter::bending_stiffness) <= place &&
@@ -143,10 +152,10 @@ TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
   RecordedPrediction<3, Catalogue> prediction;
   ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
   Slopes all(6, P<3>::count);
-  (void)differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all_parameters<3>(), all);
+  (void)slopes_of_last(system, rows, ws, prediction, all_parameters<3>(), all);
   for (const std::vector<int>& few : {std::vector<int>{}, {P<3>::count - 1}, {80, 3, 41}}) {
     Slopes some(6, Eigen::Index(few.size()));
-    ASSERT_EQ((differentiate<3, Catalogue>(system, rows.back(), ws, prediction, few, some)), Status::ok);
+    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, few, some), Status::ok);
     for (std::size_t k = 0; k < few.size(); ++k)
       EXPECT_LE((some.col(Eigen::Index(k)) - all.col(few[k])).norm(), 1e-12 * (1 + all.col(few[k]).norm()));
   }
@@ -177,8 +186,8 @@ void expect_same_slopes_by_the_standard_model(int cases) {
     RecordedPrediction<N, Catalogue> prediction;
     ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
     Slopes some(6, Eigen::Index(few.size())), every(6, Eigen::Index(all.size()));
-    ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, few, some)), Status::ok);
-    ASSERT_EQ((differentiate<N, Catalogue>(system, rows.back(), ws, prediction, all, every)), Status::ok);
+    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, few, some), Status::ok);
+    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, all, every), Status::ok);
     EXPECT_LT(few.size(), all.size());
     for (std::size_t k = 0; k < few.size(); ++k) {
       const Vec6 expected = every.col(few[k]);
@@ -216,25 +225,6 @@ TEST(Recorded, AnswersParametersThatAreNoNumbers) {
     }
 }
 
-TEST(Recorded, RemembersTheSameWithoutSlopes) {
-  test::Random random(6);
-  const auto recorded = test::random_recording<2>(test::random_effects<2>(random), 1, random);
-  const auto with = memories<2, Catalogue>(recorded.system, recorded.rows);
-  const auto without = memories<2, Catalogue>(recorded.system, recorded.rows, false);
-  const auto each = [&]<std::size_t... I>(const auto& f, std::index_sequence<I...>) {
-    (f(std::integral_constant<std::size_t, I>{}), ...);
-  };
-  double largest = 0;
-  const auto compare = [&]<std::size_t I>(std::integral_constant<std::size_t, I>) {
-    for (std::size_t row = 0; row < with.size(); ++row) {
-      EXPECT_EQ(std::get<I>(without[row]).state, std::get<I>(with[row]).state) << I << ", row " << row;
-      for (const double x : std::get<I>(with[row]).state) largest = std::max(largest, std::abs(x));
-    }
-  };
-  each(compare, std::make_index_sequence<std::tuple_size_v<Catalogue::On<2>::Memory>>{});
-  EXPECT_GT(largest, 0.1);
-}
-
 TEST(Recorded, DoesNotTouchTheHeap) {
   test::Random random(5);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
@@ -242,12 +232,14 @@ TEST(Recorded, DoesNotTouchTheHeap) {
   const auto& [system, rows] = recorded;
   const auto memory = memories<3, Catalogue>(system, rows);
   const std::vector<int> all = all_parameters<3>();
+  const auto past = past_slopes<3, Catalogue>(system, rows, all);
   Slopes slopes(6, P<3>::count);
   Workspace<3> ws;
   RecordedPrediction<3, Catalogue> prediction;
   const test::HeapGuard guard;
   const Status predicted = predict(system, rows.back(), memory.back(), ws, prediction);
-  const Status differentiated = differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all, slopes);
+  const Status differentiated =
+      differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all, slopes, past.at(rows.size() - 1));
   EXPECT_EQ(guard.uses(), 0);
   EXPECT_EQ(predicted, Status::ok);
   EXPECT_EQ(differentiated, Status::ok);

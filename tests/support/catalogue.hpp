@@ -17,9 +17,10 @@
                                     RecordedPrediction<N, Catalogue>&) noexcept;                                   \
   kind Status differentiate<N, Catalogue>(const System<N, Catalogue>&, const RecordedRow<N>&, const Workspace<N>&, \
                                           const RecordedPrediction<N, Catalogue>&, std::span<const int>,           \
-                                          Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>) noexcept;          \
+                                          Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,                    \
+                                          const PastSlopesOfRow&) noexcept;                                        \
   kind std::vector<Catalogue::On<N>::Memory> memories<N, Catalogue>(                                               \
-      const System<N, Catalogue>&, std::span<const RecordedRow<N>>, bool, const Winding<N>&);
+      const System<N, Catalogue>&, std::span<const RecordedRow<N>>, const Winding<N>&);
 
 namespace ctcr {
 CTCR_TEST_CATALOGUE(extern template, 1)

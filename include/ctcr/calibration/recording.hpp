@@ -2,6 +2,7 @@
 // A table of readings beside what a system with other parameters would have read.
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <span>
 #include <utility>
 #include <vector>
@@ -58,7 +59,8 @@ public:
   /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const System<N, Fx> system = this->system(x);
-    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, jacobian != nullptr, winding_);
+    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, *winding_);
+    const std::optional<PastSlopes<N, Fx>> past = jacobian ? std::optional(past_slopes(system)) : std::nullopt;
     const Mat3 turning = left_jacobian(turn_of(x));
     residual.resize(6 * size());
     if (jacobian) jacobian->resize(6 * size(), x.size());
@@ -72,7 +74,7 @@ public:
       for (std::size_t i = first; i < end; ++i) {
         const auto at = Eigen::Index(6 * i);
         bool solved = active_[i] && solve_row(system, memory[i], i, w);
-        if (solved && jacobian) solved = differentiate_row(system, i, turning, w, *jacobian);
+        if (solved && jacobian) solved = differentiate_row(system, i, past->at(i), turning, w, *jacobian);
         if (active_[i]) failed[i] = !solved;
         if (solved) {
           residual.segment<6>(at) = ctcr::residual(measured_[i], w.prediction.reading);
@@ -90,21 +92,26 @@ public:
   }
 
   /// Lets the tubes wind each other up in all rows by what they rub at x (see ctcr::wind_up). Until the next call the twist
-  /// changes with the parameters of what rubs them by its slopes there; with others it does not. @return how far it was
-  /// from where it ends [rad], 1e-4 at least; 0 where nothing rubs
+  /// changes with the parameters by its slopes there. @return how far it was from where it ends [rad], 1e-4 at least; 0
+  /// where nothing rubs
   double wind_up(const Eigen::VectorXd& x) {
     if constexpr (Fx::template On<N>::follows_twist && N > 1) {
       constexpr double settled = 1e-4;  // [rad]: what is left of no account
       const System<N, Fx> rubbing = system(x);
       if (!rubbing.model.effects().act_by_twist()) return 0;
       const Eigen::VectorXd at = P::values(rubbing);
-      if (at.size() == wound_at_.size() && at == wound_at_) return settled;
-      const auto& values = std::get<Fx::template On<N>::follower>(rubbing.model.effects().list).values;
+      auto winding = std::make_shared<Winding<N>>();
+      for (const int v : columns_)
+        if (detail::reaches<N, Fx>[std::size_t(v)] != detail::Reach::reading) winding->variables.push_back(v);
+      const bool is_there = at.size() == wound_at_.size() && at == wound_at_;
+      if (is_there && std::ranges::includes(sorted(winding_->variables), sorted(winding->variables))) return settled;
       std::size_t place = 0;
       for (RecordedRow<N>& row : rows_)
-        for (Twist<N>& twist : row.twist) winding_.extrapolate(values, place++, twist);
+        for (Twist<N>& twist : row.twist) winding_->extrapolate(at, place++, twist);
       wound_at_ = at;
-      return std::max(settled, ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, &winding_));
+      const double moved = ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, winding.get());
+      winding_ = std::move(winding);
+      return std::max(settled, moved);
     }
     return 0;
   }
@@ -158,10 +165,17 @@ private:
     return solved;
   }
 
-  bool differentiate_row(const System<N, Fx>& system, std::size_t i, const Mat3& turning, Worker& w,
-                         Eigen::MatrixXd& jacobian) noexcept {
+  PastSlopes<N, Fx> past_slopes(const System<N, Fx>& system) {
+    PastSlopes<N, Fx> slopes(system, rows_, columns_, *winding_, active_);
+    pool_->parallel_for(slopes.windows(), [&](int window, int) noexcept { slopes.fill(window); });
+    return slopes;
+  }
+
+  bool differentiate_row(const System<N, Fx>& system, std::size_t i, const PastSlopesOfRow& past, const Mat3& turning,
+                         Worker& w, Eigen::MatrixXd& jacobian) noexcept {
     w.slopes.resize(6, Eigen::Index(columns_.size()));
-    if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes) != Status::ok) return false;
+    if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes, past) != Status::ok)
+      return false;
     const Mat6 by_reading = residual_by_prediction(ctcr::residual(measured_[i], w.prediction.reading));
     constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
     Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();
@@ -174,6 +188,11 @@ private:
       jacobian.col(Eigen::Index(k)).template segment<6>(Eigen::Index(6 * i)) = by_reading * slope;
     }
     return true;
+  }
+
+  static std::vector<int> sorted(std::vector<int> v) {
+    std::ranges::sort(v);
+    return v;
   }
 
   /// The parameters, and all turns of T_ref where one is among them: each changes what the others do.
@@ -196,7 +215,7 @@ private:
 
   System<N, Fx> nominal_;
   std::vector<RecordedRow<N>> rows_;
-  Winding<N> winding_;
+  std::shared_ptr<const Winding<N>> winding_ = std::make_shared<const Winding<N>>();
   Eigen::VectorXd wound_at_;  ///< all parameters of the system with which the tubes were wound up; or empty
   std::vector<Pose> measured_;
   std::vector<int> parameters_, columns_;

@@ -51,16 +51,10 @@ struct EffectInfo {
   Needs needs{};
 };
 
-/// What the joints' past left behind in an effect: numbers, and for P = double their slopes by what they depend on: the
-/// effect's parameters, then those of the transmission (both ratios, home of beta, home of alpha).
-template <int States, int Slopes, class P>
+/// What the joints' past left behind in an effect.
+template <int States, class P>
 struct EffectPast {
   std::array<P, std::size_t(States)> state{};
-};
-template <int States, int Slopes>
-struct EffectPast<States, Slopes, double> {
-  std::array<double, std::size_t(States)> state{};
-  std::array<std::array<double, std::size_t(Slopes)>, std::size_t(States)> slope{};
 };
 
 /// The values of an effect's parameters: parameter after parameter, and within one tube after tube.
@@ -78,8 +72,8 @@ struct EffectValues {
   }
   static constexpr int count = place(int(List.size()));
 
-  static constexpr int transmission_count = 2 + 2 * N;
-  using Past = EffectPast<States, count + transmission_count, P>;
+  static constexpr int states = States;
+  using Past = EffectPast<States, P>;
 
   std::array<P, std::size_t(count)> values = neutral();
   Past past{};

@@ -133,7 +133,10 @@ template <class Effect, class P>
 concept HasSense = requires(const Effect& effect, const Occasion& at, Frame<P>& reading) { effect.sense(at, reading); };
 
 /// Numbers without derivatives.
-struct Constant {};
+template <class S>
+struct Constant {
+  S operator()(double x, int) const noexcept { return x; }
+};
 
 template <template <int, class> class... E>
 struct EffectList;
@@ -173,7 +176,9 @@ struct EffectList {
   struct On {
     [[no_unique_address]] std::tuple<E<N, P>...> list{};
 
-    static constexpr int count = (0 + ... + E<N, P>::count);  ///< values of all parameters
+    static constexpr int count = (0 + ... + E<N, P>::count);    ///< values of all parameters
+    static constexpr int states = (0 + ... + E<N, P>::states);  ///< numbers that the past left behind
+    /// Whether One is among them.
     template <class One>
     static constexpr bool contains = (false || ... || std::is_same_v<One, E<N, P>>);
     /// Whether anything happens where tubes end or start to curve.
@@ -208,18 +213,26 @@ struct EffectList {
       });
     }
 
-    /// The same effects with the scalar S; value(x, place) gives a parameter's value its derivatives, and those of what
-    /// the past left behind follow.
+    /// The same effects with the scalar S.
     /// @tparam Some  EffectList of those that are wanted
-    /// @param transmission  transmission(k): 0, with the derivatives of the transmission's parameter k
-    template <class S, class Some = EffectList, class Value, class Transmission = Constant>
-    [[nodiscard]] auto seeded(const Value& value, const Transmission& transmission = {}) const noexcept {
+    /// @param value  value(x, place) gives a parameter's value its derivatives
+    /// @param past   past(x, place) gives them to a number that the past left behind, of all of them in the list
+    template <class S, class Some = EffectList, class Value, class Past = Constant<S>>
+    [[nodiscard]] auto seeded(const Value& value, const Past& past = {}) const noexcept {
       using Chosen = typename Some::template On<N, S>;
       Chosen r;
-      int first = 0;
-      const auto seed_if_wanted = [&]<class To>(const auto& from, std::type_identity<To>) {
-        if constexpr (Chosen::template contains<To>) seed(from, std::get<To>(r.list), first, value, transmission);
+      int first = 0, first_state = 0;
+      [[maybe_unused]] const auto seed_if_wanted = [&]<class To>(const auto& from, std::type_identity<To>) {
+        if constexpr (Chosen::template contains<To>) {
+          To& to = std::get<To>(r.list);
+          for (std::size_t k = 0; k < to.values.size(); ++k) to.values[k] = value(from.values[k], first + int(k));
+          if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
+          to.active = acts(to);
+          for (std::size_t i = 0; to.active && i < to.past.state.size(); ++i)
+            to.past.state[i] = past(from.past.state[i], first_state + int(i));
+        }
         first += from.count;
+        first_state += from.states;
       };
       (seed_if_wanted(std::get<E<N, P>>(list), std::type_identity<E<N, S>>{}), ...);
       return r;
@@ -346,25 +359,6 @@ struct EffectList {
         }
       }
       return false;
-    }
-
-    template <class From, class To, class Value, class Transmission>
-    static void seed(const From& from, To& to, int first, const Value& value,
-                     const Transmission& transmission) noexcept {
-      constexpr auto count_ = std::size_t(From::count);
-      for (std::size_t k = 0; k < count_; ++k) to.values[k] = value(from.values[k], first + int(k));
-      if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
-      to.active = acts(to);
-      if (!to.active) return;
-      for (std::size_t i = 0; i < from.past.state.size(); ++i) {
-        auto& state = to.past.state[i] = from.past.state[i];
-        const auto& slope = from.past.slope[i];
-        for (std::size_t k = 0; k < count_; ++k)
-          if (slope[k] != 0) state = state + slope[k] * (to.values[k] - from.values[k]);
-        if constexpr (!std::is_same_v<Transmission, Constant>)
-          for (std::size_t k = 0; k < std::size_t(From::transmission_count); ++k)
-            state = state + slope[count_ + k] * transmission(int(k));
-      }
     }
   };
 };

@@ -94,66 +94,86 @@ template <int N, class Fx>
 }
 
 /// Slopes of the twist. Rows are contacts whose twist changes.
-template <int N, int count>
+template <int N>
 struct TwistSlopes {
   using ByContact = Eigen::Matrix<double, Contacts<N>::count, Contacts<N>::count>;
-  ByContact by_rubbing = ByContact::Zero();  ///< by what is rubbed at each contact: the first states of what follows it
-  Eigen::Matrix<double, Contacts<N>::count, count> by_values;  ///< by the parameters of that effect, states held
+  ByContact by_rubbing;  ///< by what is rubbed at each contact: the first states of what follows it
+  Eigen::Matrix<double, Contacts<N>::count, Eigen::Dynamic> by_variables;  ///< those states held
 };
 
-/// Arguments as above. Real time: yes; an integration for each 16 of the contacts, unknowns and parameters.
-template <int N, class Fx>
-[[nodiscard]] auto twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps) noexcept {
-  using On = typename Fx::template On<N>;
-  constexpr int count = std::tuple_element_t<On::follower, decltype(On::list)>::count;
+template <int N>
+inline constexpr int first_variable = N + 2 + Contacts<N>::count;
+
+/// Arguments as twist_of().
+/// @tparam Most      variables at most
+/// @param variables  how many there are besides what is rubbed
+/// @param inputs     inputs(window): RodInputs of the equilibrium, with derivatives by them, in lanes from
+///                   first_variable<N> on
+/// Real time: yes without variables, else it allocates; an integration for each 16 of unknowns, contacts and variables.
+template <int Most, int N, class Fx>
+[[nodiscard]] TwistSlopes<N> twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps, int variables,
+                                          const auto& inputs) noexcept {
   using Window = detail::Window<4>;
   using Pass = detail::EffectPass<N, Fx, Window::groups>;
   using S = typename Window::S;
-  constexpr int unknowns = Pass::unknowns, contacts = Contacts<N>::count, known = contacts + count;
-  constexpr int variables = unknowns + known;
-  constexpr int groups = Window::groups_for(variables);
-  const auto& c = model.coefficients();
-  LaneRow<groups> row[Pass::rows];
-  Eigen::Matrix<double, contacts, groups * lane_count> turned;
-  for (Window window; window.first < variables; window.first += window.size) {
-    RodInputs<N, S, Fx> in;
-    for (std::size_t i = 0; i < N; ++i) {
-      const TubeParameters<double>& t = c.tubes[i];
-      in.tubes[i] = {t.k, t.kz, t.kappa, t.length, t.curved_length, t.mass};
-      in.beta[i] = ws.q.beta[Eigen::Index(i)];
-      in.alpha[i] = ws.q.alpha[Eigen::Index(i)];
-    }
-    for (int i = 0; i < 3; ++i) {
-      const auto k = std::size_t(i);
-      in.force[k] = ws.load.force[i];
-      in.moment[k] = ws.load.moment[i];
-      in.gravity[k] = c.gravity[i];
-    }
-    in.effects = c.effects.template seeded<S>([](double value, int) { return S(value); });
+  constexpr int unknowns = Pass::unknowns, contacts = Contacts<N>::count;
+  static_assert(first_variable<N> == unknowns + contacts);
+  const int known = contacts + variables;
+  Eigen::Matrix<double, unknowns, unknowns> by_unknown;
+  Eigen::Matrix<double, contacts, unknowns> turned_by_unknown;
+  Eigen::Matrix<double, unknowns, Eigen::Dynamic, 0, unknowns, contacts + Most> by_known(unknowns, known);
+  Eigen::Matrix<double, contacts, Eigen::Dynamic, 0, contacts, contacts + Most> turned(contacts, known);
+  const auto put = [&](int lane, auto& unknown_part, auto& known_part, int row, double x) {
+    if (lane < unknowns)
+      unknown_part(row, lane) = x;
+    else if (lane < unknowns + known)
+      known_part(row, lane - unknowns) = x;
+  };
+  for (Window window; window.first < unknowns + known; window.first += window.size) {
+    RodInputs<N, S, Fx> in = inputs(window);
     in.effects.for_each([&](auto& effect, int) {
-      if constexpr (FollowsTwist<std::remove_cvref_t<decltype(effect)>>) {
+      if constexpr (FollowsTwist<std::remove_cvref_t<decltype(effect)>>)
         for (int k = 0; k < contacts; ++k) window.add(effect.past.state[std::size_t(k)], unknowns + k, 1);
-        for (int k = 0; k < count; ++k) window.add(effect.values[std::size_t(k)], unknowns + contacts + k, 1);
-      }
     });
     detail::ContactAngles<N, S> angles;
-    const Pass pass(in, sort_events(c.plain, ws.q.beta), ws.guess, 0, steps, window,
+    const Pass pass(in, sort_events(model.coefficients().plain, ws.q.beta), ws.guess, 0, steps, window,
                     [&](int station, const auto& state) { angles(station, state); });
-    pass.write(row, window.first / lane_count);
-    for (int k = 0; k < contacts; ++k)
-      for (int lane = 0; lane < window.size; ++lane)
-        turned(k, window.first + lane) = angles.angle[std::size_t(k)].d[lane / lane_count][lane % lane_count];
+    LaneRow<Window::groups> row[Pass::rows];
+    pass.write(row, 0);
+    for (int i = 0; i + 1 < N; ++i)
+      for (int station = 0; station < Contacts<N>::stations; ++station) {
+        const std::size_t k = Contacts<N>::place(i, station);
+        const S twist = angles.angle[k] - (in.alpha[std::size_t(i)] - in.alpha[std::size_t(i) + 1]);
+        for (int lane = 0; lane < window.size; ++lane)
+          put(window.first + lane, turned_by_unknown, turned, int(k), twist.d[lane / lane_count][lane % lane_count]);
+      }
+    for (int i = 0; i < unknowns; ++i)
+      for (int lane = 0; lane < window.size; ++lane) put(window.first + lane, by_unknown, by_known, i, row[i][lane]);
   }
-  Eigen::Matrix<double, unknowns, unknowns> by_unknown;
-  Eigen::Matrix<double, unknowns, known> by_known;
-  for (int i = 0; i < unknowns; ++i) {
-    for (int j = 0; j < unknowns; ++j) by_unknown(i, j) = row[i][j];
-    for (int j = 0; j < known; ++j) by_known(i, j) = row[i][unknowns + j];
+  turned.noalias() -= turned_by_unknown * by_unknown.partialPivLu().solve(by_known).eval();
+  return {turned.template leftCols<contacts>(), turned.rightCols(variables)};
+}
+
+/// By what is rubbed alone. Real time: yes.
+template <int N, class Fx>
+[[nodiscard]] TwistSlopes<N> twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps) noexcept {
+  using S = typename detail::Window<4>::S;
+  const auto& c = model.coefficients();
+  RodInputs<N, S, Fx> in;
+  for (std::size_t i = 0; i < N; ++i) {
+    const TubeParameters<double>& t = c.tubes[i];
+    in.tubes[i] = {t.k, t.kz, t.kappa, t.length, t.curved_length, t.mass};
+    in.beta[i] = ws.q.beta[Eigen::Index(i)];
+    in.alpha[i] = ws.q.alpha[Eigen::Index(i)];
   }
-  const Eigen::Matrix<double, contacts, known> slopes =
-      turned.template middleCols<known>(unknowns) -
-      turned.template leftCols<unknowns>() * by_unknown.partialPivLu().solve(by_known).eval();
-  return TwistSlopes<N, count>{slopes.template leftCols<contacts>(), slopes.template rightCols<count>()};
+  for (int i = 0; i < 3; ++i) {
+    const auto k = std::size_t(i);
+    in.force[k] = ws.load.force[i];
+    in.moment[k] = ws.load.moment[i];
+    in.gravity[k] = c.gravity[i];
+  }
+  in.effects = c.effects.template seeded<S>(Constant<S>{});
+  return twist_slopes<0>(model, ws, steps, 0, [&](const auto&) { return in; });
 }
 
 }  // namespace ctcr

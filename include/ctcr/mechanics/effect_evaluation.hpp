@@ -204,7 +204,7 @@ CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joi
       in.moment[k] = variable(Col::compliance, load.moment[i], moment + i);
       in.gravity[k] = c.gravity[i];
     }
-    in.effects = c.effects.template seeded<S>([](double value, int) { return S(value); });
+    in.effects = c.effects.template seeded<S>(Constant<S>{});
     const Pass pass(in, events, guess, 0, steps, window);
     pass.write(row, window.first / lane_count);
     if (window.first > 0) continue;

@@ -26,10 +26,11 @@ class WoundPlaces {
 public:
   static constexpr std::size_t most = 32 * piece;
 
-  /// @param path  of the rows, where this puts the twists that it finds
+  /// @param path       of the rows, where this puts the twists that it finds
+  /// @param variables  as Winder::wind() takes them, or null: no slopes
   WoundPlaces(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, RecordedPath<N, double>& path,
-              bool with_slopes, ThreadPool& pool)
-    : system_(system), rows_(rows), path_(path), with_slopes_(with_slopes), pool_(pool) {}
+              const Variables<N, Fx>* variables, int count, ThreadPool& pool)
+    : system_(system), rows_(rows), path_(path), variables_(variables), count_(count), pool_(pool) {}
 
   /// Winds up places first .. end - 1, at most `most`. @param winder  in: before the first of them; out: at the last one
   void wind(std::size_t first, std::size_t end, Winder& winder) {
@@ -67,10 +68,10 @@ private:
     auto row = std::size_t(std::ranges::lower_bound(path_.end, k) - path_.end.begin());
     for (; k < end; ++k) {
       row += k > path_.end[row];
-      const std::size_t way = k + rows_[row].places() - 1 - path_.end[row];
+      const std::size_t way = path_.way(rows_, row, k);
       Place& here = place_[k - first_];
-      winder.wind(system_, on_the_way(rows_, row, way), rows_[row].twist[way], path_, k,
-                  with_slopes_ ? &here.slopes : nullptr);
+      winder.wind(system_, on_the_way(rows_, row, way), rows_[row].twist[way], path_, k, variables_, count_,
+                  variables_ ? &here.slopes : nullptr);
       const bool was_so = here.stand && are_alike(*here.stand, winder.stand());
       here.stand = winder.stand();
       path_.q[k].twist = winder.stand().twist;
@@ -88,7 +89,8 @@ private:
   const System<N, Fx>& system_;
   std::span<const RecordedRow<N>> rows_;
   RecordedPath<N, double>& path_;
-  bool with_slopes_;
+  const Variables<N, Fx>* variables_;
+  int count_;
   ThreadPool& pool_;
   std::size_t first_ = 0;
   std::vector<Place> place_;
@@ -99,34 +101,42 @@ private:
 /// Gives each row the twist_of() the system with its effects in equilibrium on the way there. Rows bring the twist of a
 /// robot without effects, by add_twist(), or that of other values; a place without an equilibrium keeps it, with what the
 /// place before was wound up. Answers do not depend on the number of threads.
-/// @param winding  out: how the twist changes with the parameters of the effect that follows it; or null
+/// @param winding  in: its variables, places in SystemParameters<N, Fx>; out: how the twist changes with them; or null
 /// @return the largest change of a twist [rad]   Real time: no.
 template <int N, class Fx>
   requires(Fx::template On<N>::follows_twist && N > 1)
 double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows, ThreadPool& pool,
                Winding<N>* winding = nullptr) {
-  using Effects = typename Fx::template On<N>;
-  constexpr auto contacts = Eigen::Index(Contacts<N>::count);
+  using Window = detail::Window<4>;
   for (RecordedRow<N>& row : rows) row.twist.resize(row.places());
+  if (rows.empty()) return 0;
   detail::RecordedPath<N, double> path(system.transmission, rows, [](double x, int) { return x; });
   const std::size_t places = path.q.size();
-  const auto& follower = std::get<Effects::follower>(system.model.effects().list);
-  detail::WindingSlopes<std::remove_cvref_t<decltype(follower)>> slopes(follower, path.radius);
+  const int count = winding ? int(winding->variables.size()) : 0;
+  detail::Variables<N, Fx> from_contacts, alone;
+  std::vector<detail::WindingSlopes<N, Fx>> ways;
   if (winding) {
-    winding->values = Eigen::VectorXd::Map(follower.values.data(), follower.count);
-    winding->slopes = Eigen::MatrixXd::Zero(contacts * Eigen::Index(places), follower.count);
+    for (int j = 0; j < count; ++j) {
+      from_contacts.put(first_variable<N> + j, j, winding->variables[std::size_t(j)]);
+      alone.put(j, j, winding->variables[std::size_t(j)]);
+    }
+    for (Window window; window.first < count; window.first += window.size)
+      ways.emplace_back(system, rows, alone, window);
+    winding->values = SystemParameters<N, Fx>::values(system)(winding->variables);
+    winding->slopes = Eigen::MatrixXd::Zero(Contacts<N>::count, Eigen::Index(places) * count);
   }
   using Together = detail::WoundPlaces<N, Fx>;
-  Together together(system, rows, path, winding != nullptr, pool);
+  Together together(system, rows, path, count > 0 ? &from_contacts : nullptr, count, pool);
   detail::Winder<N, Fx> winder(system.model.effects());
   for (std::size_t first = 0; first < places; first += Together::most) {
     const std::size_t end = std::min(first + Together::most, places);
     together.wind(first, end, winder);
-    for (std::size_t k = std::max<std::size_t>(first, 1); winding && k < end; ++k) {
-      const auto& there = together.slopes(k);
-      winding->slopes.middleRows(contacts * Eigen::Index(k), contacts) =
-          slopes.advance(path.q[k - 1], path.q[k], there ? &*there : nullptr);
-    }
+    pool.parallel_for(int(ways.size()), [&](int i, int) noexcept {
+      for (std::size_t k = first; k < end; ++k) {
+        const auto& there = together.slopes(k);
+        ways[std::size_t(i)].advance(path, k, there ? &*there : nullptr, *winding);
+      }
+    });
   }
   double largest = 0;
   for (std::size_t row = 0, k = 0; row < rows.size(); ++row)

@@ -2,51 +2,12 @@
 // Derivatives of what the tracker reads in a recorded row, along the way of recorded.hpp: exact ones of the discretised
 // model. (Where nothing loads the rod and no effect acts on it they are those of the unloaded equations, which differ
 // by their discretisation error.)
-#include <numbers>
-
+#include "ctcr/pipeline/past_slopes.hpp"
 #include "ctcr/pipeline/recorded.hpp"
 
 namespace ctcr {
 
 namespace detail {
-
-/// What a parameter of a system changes: what the tracker makes of the tip, the tip by the equations of the standard
-/// model, or these equations.
-enum class Reach { reading, tip, equations };
-
-/// Of each parameter of SystemParameters<N, Fx>.
-template <int N, class Fx>
-inline constexpr auto reaches = [] {
-  using V = ParameterVector<N>;
-  std::array<Reach, std::size_t(SystemParameters<N, Fx>::count)> reach{};
-  for (int k = 0; k < V::index(Parameter::tracker_position); ++k) reach[std::size_t(k)] = Reach::tip;
-  typename Fx::template On<N>{}.for_each([&](const auto& effect, int first) {
-    using E = std::remove_cvref_t<decltype(effect)>;
-    for (int k = 0; k < E::count; ++k)
-      reach[std::size_t(V::count + first + k)] = ActsOnRod<E, double, N> || HasEnvironment<E, double> ? Reach::equations
-                                                 : ActsOnJoints<E, double, N>                         ? Reach::tip
-                                                                                                      : Reach::reading;
-  });
-  return reach;
-}();
-
-template <int N, class S>
-TubeParameters<S> tube_of(const Tube& t, int i, const auto& seed) noexcept {
-  using P = ParameterVector<N>;
-  const auto field = [&](Parameter kind) { return S(seed(t.*P::info(kind).field, P::index(kind, i))); };
-  constexpr double pi = std::numbers::pi;
-  const S inner = field(Parameter::inner_diameter), outer = field(Parameter::outer_diameter);
-  const S inner2 = inner * inner, outer2 = outer * outer;
-  const S k = t.bending_stiffness > 0
-                  ? field(Parameter::bending_stiffness)
-                  : field(Parameter::youngs_modulus) * ((pi / 64) * (outer2 * outer2 - inner2 * inner2));
-  return {k,
-          k * inverse(1.0 + field(Parameter::poisson_ratio)),
-          field(Parameter::curvature),
-          field(Parameter::length),
-          field(Parameter::curved_length),
-          field(Parameter::density) * ((pi / 4) * (outer2 - inner2))};
-}
 
 /// The derivatives of one reading. In the lanes stand first the unknowns of the equations, then the parameters that move
 /// the tip, a force at the robot tip, and the parameters that change the reading alone, which need no integration.
@@ -63,18 +24,19 @@ class RecordedSlopes {
 
 public:
   RecordedSlopes(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
-                 const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables) noexcept
-    : system_(system), row_(row), ws_(ws), prediction_(prediction), variables_(variables) {
-    slot_.fill(-1);
+                 const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
+                 const PastSlopesOfRow& past) noexcept
+    : system_(system), row_(row), ws_(ws), prediction_(prediction), past_(past), asked_(variables) {
     equations_ = model().coefficients().on_rod;
-    for (const int v : variables) {
+    for (std::size_t j = 0; j < variables.size(); ++j) {
+      const int v = variables[j];
       const Reach reach = reaches<N, Fx>[std::size_t(v)];
       equations_ = equations_ || reach == Reach::equations;
-      if (reach != Reach::reading) slot_[std::size_t(v)] = force_++;
+      if (reach != Reach::reading) variables_.put(force_++, int(j), v);
     }
     lanes_ = force_ + 3;
-    for (const int v : variables)
-      if (slot_[std::size_t(v)] < 0) slot_[std::size_t(v)] = lanes_++;
+    for (std::size_t j = 0; j < variables.size(); ++j)
+      if (variables_.lane(variables[j]) < 0) variables_.put(lanes_++, int(j), variables[j]);
     for (auto& r : rows_)
       for (auto& x : r.x) x = Lanes{};
   }
@@ -96,23 +58,20 @@ public:
 private:
   [[nodiscard]] const Model<N, Fx>& model() const noexcept { return prediction_.model; }
 
-  /// value(x, index) of a window: x with its derivative by parameter `index`.
-  [[nodiscard]] auto seeding(const Window& window) const noexcept {
-    return [this, window](double x, int index) noexcept {
-      const int lane = slot_[std::size_t(index)];
-      return lane < 0 ? S(x) : window(x, lane);
-    };
-  }
   /// Those of the list Some.
   template <class Some>
-  [[nodiscard]] auto effects(const auto& seed) const noexcept {
-    return model().effects().template seeded<S, Some>(
-        [&](double x, int k) { return seed(x, V::count + k); },
-        [&](int k) { return seed(0, V::index(Parameter::translation_ratio) + k); });
+  [[nodiscard]] auto effects(const Window& window) const noexcept {
+    return variables_.template effects<Some>(model().effects(), window, [&](double x, int state) {
+      S seeded = x;
+      if (const double* slope = past_(state))
+        variables_.for_each_in(window, [&](int lane, int j) { window.add(seeded, lane, slope[j]); });
+      return seeded;
+    });
   }
-  void find_joints(const auto& seed, std::array<S, N>& beta, std::array<S, N>& alpha) const noexcept {
-    joints_of<N, S>(system_.transmission, row_.theta, seed, beta, alpha);
-    effects<typename Fx::OnJoints>(seed).actuate(row_.at, beta, alpha);
+  [[nodiscard]] auto actuating(const Window& window) const noexcept {
+    return [this, window](auto& beta, auto& alpha) {
+      effects<typename Fx::OnJoints>(window).actuate(row_.at, beta, alpha);
+    };
   }
 
   /// What the surroundings add, and its slopes by the parameters: it may be nothing and yet have some.
@@ -122,7 +81,7 @@ private:
       const Vec3& p = prediction_.solution.position;
       for (Window window; window.first < force_; window.first += window.size) {
         auto& f = push_[std::size_t(window.first / window.size)] = {0.0, 0.0, 0.0};
-        effects<typename Fx::OnTip>(seeding(window)).environment({p[0], p[1], p[2]}, f);
+        effects<typename Fx::OnTip>(window).environment({p[0], p[1], p[2]}, f);
         for (const S& x : f) pushed = pushed || !vanishes(x);
       }
     }
@@ -131,21 +90,12 @@ private:
 
   /// The tip by everything, from the equations with their effects.
   void integrate(bool pushed) noexcept {
-    const Robot<N>& robot = model().robot();
-    const Events<N> events = sort_events(with_all_curves(robot), prediction_.q.beta);
+    const Events<N> events = sort_events(with_all_curves(model().robot()), prediction_.q.beta);
     const int count = force_ + (pushed ? 3 : 0);
     for (Window window; window.first < count; window.first += window.size) {
-      const auto seed = seeding(window);
-      RodInputs<N, S, Fx> in;
-      in.effects = effects<typename Fx::OnRod>(seed);
-      find_joints(seed, in.beta, in.alpha);
-      for (int i = 0; i < N; ++i) in.tubes[std::size_t(i)] = tube_of<N, S>(robot.tubes[std::size_t(i)], i, seed);
-      for (int i = 0; i < 3; ++i) {
-        const auto k = std::size_t(i);
-        in.gravity[k] = seed(robot.gravity[i], V::index(Parameter::gravity, i));
-        in.moment[k] = prediction_.load.moment[i];
-        in.force[k] = pushed ? window(prediction_.load.force[i], force_ + i) : S(prediction_.load.force[i]);
-      }
+      auto in = rod_inputs<S>(system_, row_, prediction_.load, variables_.seeding(window), actuating(window));
+      in.effects = effects<typename Fx::OnRod>(window);
+      for (int i = 0; pushed && i < 3; ++i) window.add(in.force[std::size_t(i)], force_ + i, 1);
       Pass(in, events, ws_.guess, system_.sensor.tube, system_.settings.steps, window)
           .write(rows_, window.first / lane_count);
     }
@@ -157,13 +107,13 @@ private:
   Status take_standard() noexcept {
     TipDerivatives<N> tip;
     const Status status = differentiate_tip(Model<N>(model().robot()), ws_, system_.sensor.tube, tip, system_.settings);
-    for (const int v : variables_)
+    for (const int v : asked_)
       if (v < V::robot_count)
-        for (int k = 0; k < 6; ++k) rows_[unknowns + k].add(slot_[std::size_t(v)], tip.by_parameters(k, v));
+        for (int k = 0; k < 6; ++k) rows_[unknowns + k].add(variables_.lane(v), tip.by_parameters(k, v));
     for (Window window; window.first < force_; window.first += window.size) {
-      const auto seed = seeding(window);
       std::array<S, N> beta, alpha;
-      find_joints(seed, beta, alpha);
+      joints_of<N, S>(system_.transmission, row_.theta, variables_.seeding(window), beta, alpha);
+      actuating(window)(beta, alpha);
       for (int g = 0; g < Window::groups; ++g)
         for (int k = 0; k < 6; ++k)
           for (int i = 0; i < N; ++i)
@@ -180,10 +130,7 @@ private:
       const Vec3& p = prediction_.solution.position;
       std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
       for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
-      model()
-          .effects()
-          .template seeded<Slope, typename Fx::OnTip>([](double x, int) { return Slope(x); })
-          .environment(at, f);
+      model().effects().template seeded<Slope, typename Fx::OnTip>(Constant<Slope>{}).environment(at, f);
       Mat3 slope, C;
       Eigen::Matrix<double, 6, 3> by_force;
       for (int j = 0; j < 3; ++j) {
@@ -211,7 +158,7 @@ private:
     const Pose& T_tracker_base = system_.sensor.T_tracker_base;
     const Mat3 R_tip_base = T_base_tip.rotation.transpose(), R_base_tracker = T_tracker_base.rotation.transpose();
     for (Window window; window.first < lanes_; window.first += window.size) {
-      const auto seed = seeding(window);
+      const auto seed = variables_.seeding(window);
       Frame<S> tip = frame_of<S>(T_base_tip), T_ref = frame_of<S>(T_tracker_base);
       for (int g = 0; g < Window::groups; ++g) {
         const auto twist = [&](int first) {
@@ -233,19 +180,17 @@ private:
         }
       }
       Frame<S> reading = composed(T_ref, tip);
-      effects<typename Fx::OnReading>(seed).sense(row_.at, reading);
+      effects<typename Fx::OnReading>(window).sense(row_.at, reading);
       for (int g = 0; g < Window::groups; ++g)
         reading.rotation_twist[2][g] += seed(0, V::index(Parameter::sensor_roll)).d[g];
       const Mat3 R = reading.rotation();
-      for (std::size_t j = 0; j < variables_.size(); ++j) {
-        const int lane = slot_[std::size_t(variables_[j])] - window.first;
-        if (lane < 0 || lane >= window.size) continue;
-        const int g = lane / lane_count, i = lane % lane_count;
+      variables_.for_each_in(window, [&](int lane, int j) {
+        const int g = (lane - window.first) / lane_count, i = (lane - window.first) % lane_count;
         Vec3 v, w;
         for (int k = 0; k < 3; ++k) v[k] = reading.translation_twist[k][g][i], w[k] = reading.rotation_twist[k][g][i];
-        out.template block<3, 1>(0, Eigen::Index(j)) = R * v;
-        out.template block<3, 1>(3, Eigen::Index(j)) = R * w;
-      }
+        out.template block<3, 1>(0, j) = R * v;
+        out.template block<3, 1>(3, j) = R * w;
+      });
     }
   }
 
@@ -253,10 +198,11 @@ private:
   const RecordedRow<N>& row_;
   const Workspace<N>& ws_;
   const RecordedPrediction<N, Fx>& prediction_;
-  std::span<const int> variables_;
-  std::array<int, std::size_t(P::count)> slot_;  ///< lane of each parameter, -1 if it is not asked for
-  int force_ = unknowns, lanes_ = 0;             ///< lane of the force; end of all
-  bool equations_ = false;                       ///< whether effects change the equations
+  PastSlopesOfRow past_;
+  std::span<const int> asked_;
+  Variables<N, Fx> variables_;
+  int force_ = unknowns, lanes_ = 0;  ///< lane of the force; end of all
+  bool equations_ = false;            ///< whether effects change the equations
   LaneRow<groups> rows_[Pass::rows + (On::has_environment ? 3 : 0)];
   std::array<std::array<S, 3>, groups / Window::groups> push_;
 };
@@ -267,16 +213,18 @@ private:
 /// Rows: position [m], rotation [rad], tracker axes.
 /// @param variables  places in SystemParameters<N, Fx>, each once
 /// @param out        6 x variables.size()
+/// @param past       slopes of what the row's memory holds, by the variables; none: it is held
 /// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for sixteen variables.
 template <int N, class Fx>
   requires(!Fx::none)
 CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                                    const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
+                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out,
+                                   const PastSlopesOfRow& past = {}) noexcept {
   out.setZero();
   const Status status = prediction.solution.status;
   if (!has_equilibrium(status)) return status;
-  return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables).write(out);
+  return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables, past).write(out);
 }
 
 /// As above without effects, by the faster way of predict.hpp.
@@ -284,7 +232,7 @@ template <int N, class Fx>
   requires(Fx::none)
 Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                      const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
+                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out, const PastSlopesOfRow& = {}) noexcept {
   PredictionDerivatives<N> all;
   const Status status = differentiate(system, row.theta, ws, prediction, all);
   for (std::size_t j = 0; j < variables.size(); ++j) out.col(Eigen::Index(j)) = all.by_parameters.col(variables[j]);

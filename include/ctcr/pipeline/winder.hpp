@@ -4,6 +4,7 @@
 
 #include "ctcr/pipeline/recorded.hpp"
 #include "ctcr/pipeline/twist_balance.hpp"
+#include "ctcr/pipeline/variables.hpp"
 
 namespace ctcr::detail {
 
@@ -16,7 +17,7 @@ class Winder {
   using Follower = std::tuple_element_t<On::follower, decltype(On::list)>;
 
 public:
-  using Slopes = TwistSlopes<N, Follower::count>;
+  using Slopes = TwistSlopes<N>;
   struct Stand {
     decltype(Follower::Past::state) rubbed;  ///< on the way to here
     Twist<N> twist;
@@ -41,9 +42,11 @@ public:
   /// @param here    what stands at the place, by on_the_way()
   /// @param given   the twist of a robot without effects there, or that of other values
   /// @param path    of other places its joints alone are looked at: others may be winding them up
-  /// @param slopes  out: those of the twist there, nothing without an equilibrium; or null
+  /// @param variables  by which slopes are asked for, in lanes from first_variable<N> on   @param count  of them
+  /// @param slopes     out: those of the twist there by what is rubbed on the way to here, and by these variables; nothing
+  ///                   without an equilibrium; or null
   void wind(const System<N, Fx>& system, const RecordedRow<N>& here, const Twist<N>& given, const Path<N, double>& path,
-            std::size_t k, std::optional<Slopes>* slopes) noexcept {
+            std::size_t k, const Variables<N, Fx>* variables, int count, std::optional<Slopes>* slopes) noexcept {
     constexpr int most = 40;  // equilibria of a place
     const On others = effects_at(path, k);
     Twist<N> found = given;
@@ -55,16 +58,66 @@ public:
     effects_ = balance_.solve(
         equilibrium, [&](const Twist<N>& twist) { return remembered(others, path, k, twist); }, ws_, steps, found,
         most);
-    from_ = path.q[k];
-    from_.twist = found;
     wound_ = Vec::Map(found.data()) - Vec::Map(given.data());
-    if (!slopes) return;
-    const Model<N, Fx>* model = balance_.left_there() ? &prediction_.model : equilibrium(effects_);
-    *slopes = model ? std::optional(twist_slopes(*model, ws_, steps)) : std::nullopt;
-    if (*slopes) balance_.take((*slopes)->by_rubbing);
+    Row to = path.q[k];
+    to.twist = found;
+    if (slopes) {
+      slopes->reset();
+      if (balance_.left_there() || equilibrium(effects_)) {
+        *slopes = by_all(system, here, *variables, count);
+        balance_.take((*slopes)->by_rubbing);
+        close((*slopes).value(), law(others, to, path.radius, k));
+      }
+    }
+    from_ = to;
   }
 
 private:
+  /// Slopes in the equilibrium that ws_ holds; what the surroundings push, and what other effects remember, is held.
+  Slopes by_all(const System<N, Fx>& system, const RecordedRow<N>& here, const Variables<N, Fx>& variables,
+                int count) const noexcept {
+    const On& effects = prediction_.model.effects();
+    return twist_slopes<SystemParameters<N, Fx>::count>(
+        prediction_.model, ws_, system.settings.steps, count, [&](const auto& window) {
+          using S = typename std::remove_cvref_t<decltype(window)>::S;
+          auto in =
+              rod_inputs<S>(system, here, prediction_.load, variables.seeding(window), [&](auto& beta, auto& alpha) {
+                variables.template effects<typename Fx::OnJoints>(effects, window).actuate(here.at, beta, alpha);
+              });
+          in.effects = variables.template effects<typename Fx::OnRod>(effects, window);
+          return in;
+        });
+  }
+
+  /// Slope of what is rubbed at each contact on the way to here by the twist of that contact.
+  Vec law(const On& before, const Row& to, const ContactRadii<N>& radius, std::size_t k) const noexcept {
+    using S = Dual<1>;
+    Vec slopes = Vec::Zero();
+    if (k == 0) return slopes;
+    const auto dual = [](const Row& plain) {
+      typename Path<N, S>::Row row;
+      std::ranges::copy(plain.beta, row.beta.begin());
+      std::ranges::copy(plain.alpha, row.alpha.begin());
+      std::ranges::copy(plain.twist, row.twist.begin());
+      row.jumps = plain.jumps;
+      return row;
+    };
+    std::array way{dual(from_), dual(to)};
+    for (S& twist : way[1].twist) twist.d[0] = unit_lane(0);
+    auto effects = before.template seeded<S>(Constant<S>{});
+    follower(effects).remember({way, {}, {}, radius}, 1);
+    for (int c = 0; c < Contacts<N>::count; ++c) slopes[c] = follower(effects).past.state[std::size_t(c)].d[0][0];
+    return slopes;
+  }
+
+  /// Makes slopes of the equilibrium's twist those of the twist that this rubbing leaves.
+  static void close(Slopes& slopes, const Vec& law) noexcept {
+    using ByContact = typename Slopes::ByContact;
+    const auto lu = (ByContact::Identity() - slopes.by_rubbing * law.asDiagonal()).eval().partialPivLu();
+    slopes.by_rubbing = lu.solve(slopes.by_rubbing).eval();
+    slopes.by_variables = lu.solve(slopes.by_variables).eval();
+  }
+
   static auto& follower(auto& effects) noexcept { return std::get<On::follower>(effects.list); }
 
   /// The effects at place k, but for what follows the twist, which remembers what it did.

@@ -1,94 +1,90 @@
 #pragma once
-// How the twist of tubes that rub changes with the parameters of what rubs them.
+// How the twist of tubes that rub changes with the parameters of their system.
 #include <Eigen/LU>
+#include <vector>
 
-#include "ctcr/effects/hooks.hpp"
-#include "ctcr/mechanics/contact_twist.hpp"
+#include "ctcr/pipeline/follower_way.hpp"
 
 namespace ctcr {
 
-/// The twist at each place of a recording, near the parameters with which the tubes were wound up: linear in those of the
-/// effect that follows it.
+/// The twist at each place of a recording, near the parameters with which the tubes were wound up: linear in some of them.
 template <int N>
 struct Winding {
-  Eigen::VectorXd values;  ///< of these parameters, with which the tubes were wound up; empty: it is not known
-  Eigen::MatrixXd slopes;  ///< (contacts x places, parameters)
+  std::vector<int> variables{};  ///< these, by their places in SystemParameters
+  Eigen::VectorXd values{};      ///< theirs, with which the tubes were wound up; empty: it is not known
+  Eigen::MatrixXd slopes{};      ///< (contacts, variables x places)
 
-  /// Adds to the twist at a place what other values change.
-  template <class P>
-  void extrapolate(const auto& to, std::size_t place, Twist<N, P>& twist) const noexcept {
-    constexpr auto contacts = Eigen::Index(Contacts<N>::count);
+  /// Slopes of the twist at a place: (contacts, variables).
+  [[nodiscard]] auto at(std::size_t place) { return slopes.middleCols(first(place), Eigen::Index(variables.size())); }
+  [[nodiscard]] auto at(std::size_t place) const {
+    return slopes.middleCols(first(place), Eigen::Index(variables.size()));
+  }
+
+  /// Adds to the twist along a path what other values of all parameters change.
+  void unwind(const Eigen::VectorXd& to, detail::RecordedPath<N, double>& path) const noexcept {
+    for (std::size_t place = 0; place < path.q.size(); ++place) extrapolate(to, place, path.q[place].twist);
+  }
+  /// The same at a place.
+  void extrapolate(const Eigen::VectorXd& to, std::size_t place, Twist<N>& twist) const noexcept {
+    auto sum = VecN<Contacts<N>::count>::Map(twist.data());
+    const auto here = at(place);
     for (Eigen::Index j = 0; j < values.size(); ++j) {
-      const P change = to[std::size_t(j)] - values[j];
-      for (Eigen::Index c = 0; c < contacts; ++c)
-        twist[std::size_t(c)] = twist[std::size_t(c)] + change * slopes(contacts * Eigen::Index(place) + c, j);
+      const double change = to[variables[std::size_t(j)]] - values[j];
+      if (change != 0) sum += change * here.col(j);
     }
   }
+
+private:
+  [[nodiscard]] Eigen::Index first(std::size_t place) const noexcept { return Eigen::Index(place * variables.size()); }
 };
 
 namespace detail {
 
-template <class Effect>
-class WindingSlopes;
-
-/// Follows the slopes of the twist, and of what E remembers of it, from place to place.
-template <int N, template <int, class> class E>
-class WindingSlopes<E<N, double>> {
-  static constexpr int count = E<N, double>::count, contacts = Contacts<N>::count;
-  using Lane =
-      Window<lane_groups(count + 1)>;  // of each parameter, and at last of the twist of each contact at a place
-  using P = typename Lane::S;
-  using Row = typename Path<N, P>::Row;
+/// Follows the slopes of the twist, and of what is remembered of it, from place to place, for a window of variables.
+template <int N, class Fx>
+class WindingSlopes {
+  static constexpr int contacts = Contacts<N>::count;
+  using Window = detail::Window<4>;
 
 public:
-  using Slopes = Eigen::Matrix<double, contacts, count>;
+  WindingSlopes(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, const Variables<N, Fx>& variables,
+                const Window& window) noexcept
+    : rows_(rows), variables_(&variables), window_(window), way_(system, rows.front().radius, variables, window) {}
 
-  WindingSlopes(const E<N, double>& effect, const ContactRadii<N>& radius) noexcept : radius_(radius) {
-    for (int j = 0; j < count; ++j) effect_.values[std::size_t(j)] = Lane{}(effect.values[std::size_t(j)], j);
-  }
-
-  /// At a place, reached from the one before.
-  /// @param there  what rubbing and parameters do to the twist, as twist_slopes() gives them; or null where there is no
-  ///               equilibrium: then the twist keeps its slopes
-  const Slopes& advance(const typename Path<N, double>::Row& from, const typename Path<N, double>::Row& to,
-                        const TwistSlopes<N, count>* there) noexcept {
-    std::array<Row, 2> q{row(from, slopes_), row(to, Slopes::Zero())};
-    const Path<N, P> path{q, {}, {}, radius_};
+  /// At place k, the one after that of the call before.
+  /// @param there  slopes of the twist by what is rubbed on the way to this place and by the variables; or null where
+  ///               there is no equilibrium: then the twist keeps its slopes
+  void advance(const RecordedPath<N, double>& path, std::size_t k, const TwistSlopes<N>* there,
+               Winding<N>& out) noexcept {
+    auto to = way_.row(path.standing_at(rows_, k), path.q[k]);
     if (there) {
-      E<N, P> moved = effect_;
-      for (P& twist : q[1].twist) Lane{}.add(twist, count, 1);
-      moved.remember(path, 1);
+      const auto next = way_.reached(to);
       Slopes rubbed;
-      Eigen::Matrix<double, contacts, 1> law;  // slope of what is rubbed at each contact by its own twist
-      for (int c = 0; c < contacts; ++c) {
-        const P& h = moved.past.state[std::size_t(c)];
-        for (int j = 0; j < count; ++j) rubbed(c, j) = h.d[j / lane_count][j % lane_count];
-        law[c] = h.d[count / lane_count][count % lane_count];
-      }
-      const Eigen::Matrix<double, contacts, contacts> left =
-          Eigen::Matrix<double, contacts, contacts>::Identity() - there->by_rubbing * law.asDiagonal();
-      slopes_ = left.partialPivLu().solve(there->by_rubbing * rubbed + there->by_values);
+      for (int c = 0; c < contacts; ++c)
+        for (int i = 0; i < Window::size; ++i)
+          rubbed(c, i) = next.past.state[std::size_t(c)].d[i / lane_count][i % lane_count];
+      slopes_.noalias() = there->by_rubbing * rubbed;
+      variables_->for_each_in(window_, [&](int lane, int variable) {
+        slopes_.col(lane - window_.first) += there->by_variables.col(variable);
+      });
     }
-    q[1] = row(to, slopes_);
-    effect_.remember(path, 1);
-    return slopes_;
+    for (int c = 0; c < contacts; ++c)
+      for (int i = 0; i < Window::size; ++i)
+        to.twist[std::size_t(c)].d[i / lane_count] += slopes_(c, i) * unit_lane(i % lane_count);
+    way_.go(to);
+    auto all = out.at(k);
+    variables_->for_each_in(window_,
+                            [&](int lane, int variable) { all.col(variable) = slopes_.col(lane - window_.first); });
   }
 
 private:
-  static Row row(const typename Path<N, double>::Row& plain, const Slopes& slopes) noexcept {
-    Row r;
-    for (std::size_t i = 0; i < std::size_t(N); ++i) r.beta[i] = plain.beta[i], r.alpha[i] = plain.alpha[i];
-    for (int c = 0; c < contacts; ++c) {
-      P& twist = r.twist[std::size_t(c)] = plain.twist[std::size_t(c)];
-      for (int j = 0; j < count; ++j) Lane{}.add(twist, j, slopes(c, j));
-    }
-    r.jumps = plain.jumps;
-    return r;
-  }
+  using Slopes = Eigen::Matrix<double, contacts, Window::size>;
 
-  E<N, P> effect_;
+  std::span<const RecordedRow<N>> rows_;
+  const Variables<N, Fx>* variables_;
+  Window window_;
+  FollowerWay<N, Fx, Window> way_;
   Slopes slopes_ = Slopes::Zero();
-  ContactRadii<N> radius_;
 };
 
 }  // namespace detail
