@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
-from ctcr.diagnose import decision
+from ctcr.diagnose import decision, prediction
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine, Gain
@@ -83,3 +84,54 @@ def test_a_further_effect_with_a_value_that_is_hardly_possible_is_said_to_be_tha
     assert round_.why_not == (
         f"Nothing accepted: the best candidate, tip_load, wants what is hardly possible, {MASS} = 3 kg."
     )
+
+
+@pytest.mark.parametrize(("stand_ins", "accepted"), [((), True), (("tip_load",), False)])
+def test_what_may_stand_in_for_an_unknown_law_must_explain_more(stand_ins, accepted):
+    gain = Gain(0.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
+    entry = racing.Entry(Candidate("tip_load", (MASS,)), gain, refit=60.0, share=0.4, fit=object())
+    round_ = racing.Round(None, [entry], {})
+    decision.decide(round_, tried=20, is_further=True, is_rejected=True, stand_ins=stand_ins)
+    assert (round_.accepted is entry) == accepted
+    assert accepted or "40% of what is left: below 50%" in round_.reason
+
+
+def test_look_alikes_of_friction_whose_law_is_one_of_several_may_stand_in(robot):
+    engine = SimpleNamespace(robot=robot)
+
+    def stand_ins(*ids):
+        return racing._stand_ins(engine, [racing.Entry(Candidate(name, ()), gain=None) for name in ids])
+
+    assert stand_ins("softening", "friction") == set(get("friction", 3).look_alikes)
+    assert stand_ins("softening") == set()
+
+
+def test_candidates_that_contend_are_followed_to_the_end(monkeypatch):
+    """One that is slow to fit must not lose to one that is quick."""
+    asked = []
+
+    def refit(engine, before, evidence, entry, fixed, progress, iterations):
+        asked.append((entry.id, iterations))
+        ended = iterations == racing.END or entry.id == "delay"
+        score = {"delay": 80.0, "contact": 110.0 if ended else 64.0, "softening": 9.0}[entry.id]
+        return replace(entry, refit=score, fit=SimpleNamespace(converged=ended))
+
+    monkeypatch.setattr(racing, "_refit", refit)
+    monkeypatch.setattr(racing.unsteady, "evidence", lambda engine, fit: 0.0)
+    names = ("delay", "contact", "softening")
+    entries = [racing.Entry(Candidate(name, ()), gain=None) for name in names]
+    found = racing.refitted(None, None, entries, {}, lambda _: None)
+    assert [entry.score for entry in found] == [80.0, 110.0, 9.0]
+    assert asked == [(name, racing.ITERATIONS) for name in names] + [("contact", racing.END)]
+
+
+def test_what_predicts_the_typical_run_better_predicts_better(monkeypatch):
+    """One run that goes where no other went does not outweigh all."""
+    before = np.full(9, 0.09)
+    after = np.array([*np.full(8, 0.04), 1.4])
+    errors = {"before": before, "after": after, "same": before * 0.99}
+    monkeypatch.setattr(prediction, "held_out", lambda engine, fit: errors[fit])
+    engine = SimpleNamespace(noise=SimpleNamespace(position_jitter=35e-6))
+    assert prediction.predicts_better(engine, "before", "after")
+    assert not prediction.predicts_better(engine, "before", "same")
+    assert not prediction.predicts_better(engine, "after", "before")

@@ -8,7 +8,7 @@ from ctcr import effects, identify
 from ctcr.diagnose import decision
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import forms
-from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.engine import FITS, Engine, values_of
 from ctcr.diagnose.race import Entry, Progress
 
 WRONG = 3.0  # times the stated noise that a fit admits which is hardly right
@@ -39,6 +39,8 @@ def with_shapes(
     for entry, freed in _open_laws(tried, fit):
         entries = [entry if a is one else a.entry for a in accepted]
         ended.append((racing.baseline(engine, entries, values_of(freed), progress), entry, freed))
+        if np.max(ended[-1][0].inflation) < FITS:
+            break  # it explains the readings: no other law can do more
     fit_with, entry, freed = max(ended, key=lambda one: one[0].log_evidence)
     one.entry = replace(entry, fit=freed.without_readings())
     one.share += (1 - one.share) * racing.share_of(fit, freed, len(freed.names) - len(fit.names))
@@ -66,13 +68,13 @@ def _freed(
 def _open_laws(
     tried: list[tuple[Entry, identify.Fit]], fit: identify.Fit
 ) -> list[tuple[Entry, identify.Fit]]:
-    """The best form, or that of each law where the noise of the fit before is what a wrong law asks for: in it laws can
-    hardly be told apart."""
-    tried = sorted(tried, key=lambda pair: pair[1].log_evidence)
+    """The best form; or that of each law, the best first, where the noise of the fit before is what a wrong law asks
+    for: in it laws can hardly be told apart."""
+    tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)
     if np.max(fit.inflation) <= WRONG:
-        return tried[-1:]
+        return tried[:1]
     laws = {}
     for entry, freed in tried:
         held = (pair for pair in entry.candidate.shape if pair[0] not in entry.candidate.names)
-        laws[tuple(held)] = entry, freed
+        laws.setdefault(tuple(held), (entry, freed))
     return list(laws.values())

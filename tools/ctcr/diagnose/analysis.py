@@ -338,7 +338,7 @@ def _backward(
         progress(f"without {a.entry.id}")
         names, fixed = racing.parameters([b.entry for b in rest])
         start = values_of(fit)
-        for iterations in (racing.ITERATIONS, 50):  # what is far behind need not be followed to the end
+        for iterations in (racing.ITERATIONS, racing.END):  # what is far behind need not be followed there
             without = engine.fit_like(
                 fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=identify.COARSE
             )

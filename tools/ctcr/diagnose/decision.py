@@ -1,5 +1,6 @@
 """What comes of a round of the race: an effect is accepted, with those the data cannot tell from it, or none is."""
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,17 +12,23 @@ EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having lo
 UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains what is left, and
 FIRST_UNASKED = 5.0  # of the first one
 SHARE = 0.25  # of the excess that a further effect must remove, and
-FIRST_SHARE = 0.1  # the first one
+FIRST_SHARE = 0.1  # the first one, and
+STAND_IN_SHARE = (
+    0.5  # a look-alike of one whose law is not known: what is not right of it they imitate in part
+)
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
 ALIKE = 0.5  # ... and of forms of one effect the plainest is taken
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 
 
-def decide(round_: "Round", tried: int, is_further: bool, is_rejected: bool) -> None:
+def decide(
+    round_: "Round", tried: int, is_further: bool, is_rejected: bool, stand_ins: Collection[str] = ()
+) -> None:
     """Accepts the best entry, with all that the data cannot tell from it, or says why not.
 
     tried: number of effects that were looked at; is_further: whether others are in the model already; is_rejected:
-    whether the noise as stated does not explain what is left.
+    whether the noise as stated does not explain what is left; stand_ins: look-alikes of those in the model whose law is
+    not known.
     """
     unasked = UNASKED if is_further else FIRST_UNASKED
     round_.needed = EVIDENCE + np.log(tried)
@@ -43,6 +50,8 @@ def decide(round_: "Round", tried: int, is_further: bool, is_rejected: bool) -> 
         )
         return
     needed = SHARE if is_further else FIRST_SHARE
+    if best.id in stand_ins:
+        needed = STAND_IN_SHARE
     if best.share < needed:
         round_.is_stand_in = best.share + 2 * best.spread < needed
         share = f"{best.share:.0%} of what is left: below {needed:.0%}"

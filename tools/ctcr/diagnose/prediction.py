@@ -33,14 +33,18 @@ def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
     return np.array(squares)
 
 
+def typical(squares: Array) -> float:
+    """Of the typical run: one that goes where no other went would outweigh all."""
+    return float(np.exp(np.log(squares).mean()))
+
+
 def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
     """The noise of a fit, or that with the part of the field error that predicts other runs better.
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
     tried = {part: engine.noise_with(part) for part in identify.FIELDS}
-    # Of the typical run: one that goes where no other went would outweigh all.
-    errors = {part: np.exp(np.log(held_out(engine, fit, noise)).mean()) for part, noise in tried.items()}
+    errors = {part: typical(held_out(engine, fit, noise)) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
     usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
     needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
@@ -64,5 +68,5 @@ def predictive(
 def predicts_better(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:
     """Whether a further effect makes errors of runs left out smaller by its share of what noise does not explain."""
     jitter = 3e6 * engine.noise.position_jitter**2
-    old, new = held_out(engine, before).mean(), held_out(engine, after).mean()
+    old, new = typical(held_out(engine, before)), typical(held_out(engine, after))
     return old - new >= HELD_OUT_SHARE * max(old - jitter, 0.0)

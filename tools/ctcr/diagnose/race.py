@@ -20,6 +20,8 @@ Progress = Callable[[str], None]
 SURE = 5.0  # log evidence beyond which candidates can surely be told apart
 REFITS = 6  # effects that are refitted, the best by their slopes
 ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be followed to the end
+CONTENDS = 0.5  # of the best gain: with more a candidate is followed to the
+END = 50  # iteration
 IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
 NEAR = 0.2  # of the best gain by slopes: candidates below it are not refitted
 MAX_EFFECTS = 4
@@ -213,12 +215,20 @@ def race(
     entries += [entry for entry in screened if entry.candidate not in fitted]
     entries.sort(key=lambda entry: (-entry.score, -entry.linear))
     round_ = Round(before, entries, {})
-    decide(round_, len({c.id for c in candidates}), bool(accepted), engine.rejects(before))
+    tried = len({c.id for c in candidates})
+    decide(round_, tried, bool(accepted), engine.rejects(before), _stand_ins(engine, accepted))
     if round_.accepted and accepted and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"{round_.accepted.id} would not predict other runs better"
         round_.accepted, round_.ids = None, []
     round_.shed()
     return round_
+
+
+def _stand_ins(engine: Engine, accepted: list[Entry]) -> set[str]:
+    """Look-alikes of accepted effects whose law is not known: it may be none of those that are offered."""
+    known = (effects.get(entry.id, engine.robot.n_tubes) for entry in accepted)
+    unsure = (effect for effect in known if any(p.kind == "choice" for p in effect.parameters))
+    return {identity for effect in unsure for identity in effect.look_alikes}
 
 
 def screen(
@@ -280,7 +290,14 @@ def refitted(
 ) -> list[Entry]:
     """The entries after a joint fit with calibration and what was accepted before, at the same weights and noise."""
     evidence = unsteady.evidence(engine, before)
-    return [_refit(engine, before, evidence, entry, fixed, progress) for entry in entries]
+    tried = [_refit(engine, before, evidence, entry, fixed, progress, ITERATIONS) for entry in entries]
+    near = CONTENDS * max((entry.score for entry in tried), default=0.0)
+    return [
+        _refit(engine, before, evidence, entry, fixed, progress, END)
+        if entry.fit and not entry.fit.converged and entry.score > near
+        else entry
+        for entry in tried
+    ]
 
 
 def _without_candidate(
@@ -317,6 +334,7 @@ def _refit(
     entry: Entry,
     fixed: dict[str, float],
     progress: Progress,
+    iterations: int,
 ) -> Entry:
     """One of them; `evidence` is that of the fit before."""
     candidate = entry.candidate
@@ -327,7 +345,7 @@ def _refit(
         try:
             fit = engine.fit_like(
                 before, [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape),
-                max_iterations=ITERATIONS, tolerance=identify.COARSE, near=entry.fit is not None,
+                max_iterations=iterations, tolerance=identify.COARSE, near=entry.fit is not None,
             )  # fmt: skip
             break
         except InputError:
