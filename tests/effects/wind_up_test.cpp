@@ -91,14 +91,11 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
       return twist_of(prediction.model, ws, now.settings.steps, {});
     };
     (void)twist(system);
-    const std::vector<int> parameters{V::index(Parameter::curvature, 0),
-                                      V::index(Parameter::youngs_modulus, 1),
-                                      V::index(Parameter::length, 1),
-                                      V::index(Parameter::gravity, 0),
-                                      V::index(Parameter::rotation_ratio),
-                                      V::index(Parameter::home_rotation, 1),
-                                      V::count,
-                                      V::count + 3};
+    std::vector<int> parameters{V::index(Parameter::curvature, 0),   V::index(Parameter::youngs_modulus, 1),
+                                V::index(Parameter::length, 1),      V::index(Parameter::gravity, 0),
+                                V::index(Parameter::rotation_ratio), V::index(Parameter::home_rotation, 1)};
+    const std::size_t first_of_friction = parameters.size();
+    for (int k = 0; k < Friction<3>::count; ++k) parameters.push_back(V::count + k);
     detail::Variables<3, Catalogue> variables;
     for (int j = 0; j < int(parameters.size()); ++j)
       variables.put(first_variable<3> + j, j, parameters[std::size_t(j)]);
@@ -131,15 +128,17 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
       });
     for (std::size_t j = 0; j < parameters.size(); ++j) {
       const Eigen::VectorXd x = P::values(system);
-      const double size = std::max(0.05, std::abs(x[parameters[j]])), change = 1e-5 * size;
+      const bool rubs = j >= first_of_friction;
+      const double size = rubs ? 1.0 : std::max(0.05, std::abs(x[parameters[j]])), change = 1e-5 * size;
       check(slopes.by_variables.col(Eigen::Index(j)), change, 1e-4 / size, [&](double by) {
         Eigen::VectorXd there = x;
         there[parameters[j]] += by;
         return P::with_values(system, there);
       });
-      EXPECT_GT(slopes.by_variables.col(Eigen::Index(j)).norm() * size, 1e-5) << P::name(parameters[j]);
+      if (!rubs) EXPECT_GT(slopes.by_variables.col(Eigen::Index(j)).norm() * size, 1e-5) << P::name(parameters[j]);
     }
     EXPECT_GT(slopes.by_rubbing.norm(), 1e-3);
+    EXPECT_GT(slopes.by_variables.rightCols<Friction<3>::count>().norm(), 1e-2);
   }
 }
 

@@ -13,9 +13,7 @@ UNASKED = 10.0  # evidence needed of a further effect besides where noise alone 
 FIRST_UNASKED = 5.0  # of the first one
 SHARE = 0.25  # of the excess that a further effect must remove, and
 FIRST_SHARE = 0.1  # the first one, and
-STAND_IN_SHARE = (
-    0.5  # a look-alike of one whose law is not known: what is not right of it they imitate in part
-)
+STAND_IN_SHARE = 0.5  # a look-alike of one whose law is not known, which it imitates in part
 TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
 ALIKE = 0.5  # ... and of forms of one effect the plainest is taken
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
