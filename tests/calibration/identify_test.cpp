@@ -107,6 +107,15 @@ TEST(Identify, IsHardlyMovedByOutliers) {
                                          {.weights = robust.weights, .inflation = robust.inflation});
   EXPECT_LT((frozen.values - robust.values).cwiseQuotient(robust.sd).cwiseAbs().maxCoeff(), 1e-2);
   EXPECT_NEAR(frozen.log_evidence, robust.log_evidence, 1e-2);
+  // A fit that goes on from there is told whom to trust.
+  const auto from_there = [&](std::optional<RowWeights> weights) {
+    return identify(toy.predictor(), toy.parameters(), noise, toy.places,
+                    {.start = robust.values, .first_weights = std::move(weights), .starts = 1});
+  };
+  const Identification on = from_there(robust.weights), anew = from_there({});
+  EXPECT_LT((on.values - robust.values).cwiseQuotient(robust.sd).cwiseAbs().maxCoeff(), 1e-2);
+  EXPECT_NEAR(on.log_evidence, robust.log_evidence, 0.1);
+  EXPECT_LT(on.evaluations, anew.evaluations);
 }
 
 TEST(Identify, NamesWhatTheReadingsDoNotDetermine) {

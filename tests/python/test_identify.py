@@ -146,6 +146,17 @@ def test_whitened_columns_are_those_of_the_fit():
     information = jacobian.T @ jacobian + np.diag(1 / fit.prior_sd**2)
     np.testing.assert_allclose(np.linalg.inv(information), fit.covariance, rtol=1e-4, atol=1e-15)
     np.testing.assert_allclose(fit.whiten(fit.residual)[:, 0], residual)
+    # They take rows that were fitted alone; all that is said of every row is said after them, too.
+    some = identify.fit(bench, table(bench), "tracker.frame", rows=table(bench).run < 2)
+    residual, jacobian = some.whitened()
+    slope = some.slope_where_used("tracker.position.x")
+    assert np.isnan(some._of_used[0].reshape(-1, 6)[~some.used]).all() and np.isfinite(some.residual).all()
+    np.testing.assert_allclose(some.whiten(some.residual)[:, 0], residual, atol=1e-9)
+    column = some.names.index("tracker.position.x")
+    np.testing.assert_allclose(some.whiten(slope)[:, 0], jacobian[:, column], atol=1e-9)
+    every = some.jacobian_all[:, column].reshape(-1, 6)
+    np.testing.assert_allclose(slope[some.used], every[some.used])
+    assert not slope[~some.used].any() and every[~some.used].any()
 
 
 def test_the_gauge_of_a_robot_is_named():

@@ -100,6 +100,9 @@ def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
         effect, held
     ):  # a torque per length enters the race alone, never beside the coefficient
         assert list(form.names) == coefficient + effect.shapes
+    second = Candidate("friction", tuple(coefficient), tuple(held_or_begun.items())[::-1])
+    once = [held_or_begun, {name: value for name, value in held_or_begun.items() if name != LAW}]
+    assert [dict(form.shape) for form in forms(effect, second)] == once
     softening = effects.get("softening", 3)
     alone = Candidate("softening", tuple(softening.amplitudes))
     assert forms(softening, alone) == [replace(alone, names=(*alone.names, *softening.shapes))]

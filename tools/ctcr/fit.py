@@ -67,7 +67,7 @@ class Fit:
         """Itself without what it can compute again of its readings."""
         return replace(self)
 
-    @cached_property
+    @property
     def _every_row(self) -> Any:
         """The predictor, of rows that were not fitted too."""
         if hasattr(self.predict, "activate"):
@@ -79,6 +79,15 @@ class Fit:
     @cached_property
     def _report(self) -> tuple[Array, Array, Array, Array]:
         return self.core.report(self._every_row)
+
+    @cached_property
+    def _of_used(self) -> tuple[Array, Array]:
+        """`residual` (6 M,) and `jacobian_all` in the rows that were fitted; in others they may be missing."""
+        if "_report" in self.__dict__ or not hasattr(self.predict, "residual"):
+            return self._report[:2]
+        self.predict.activate(self.used.tolist())
+        residual, slopes, _ = self.predict.residual(self.values, True)
+        return residual, slopes
 
     @property
     def residual(self) -> Array:
@@ -152,9 +161,14 @@ class Fit:
 
     def whitened(self) -> tuple[Array, Array]:
         """Whitened residual (K,) and its derivative (K, n) by the parameters; the prior is not in it."""
-        slopes = self.jacobian_all.reshape(*self.residual.shape, -1)
-        both = self.whiten(np.concatenate([self.residual[:, :, None], slopes], axis=2))
+        residual, slopes = self._of_used
+        both = self.whiten(np.column_stack([residual, slopes]).reshape(len(self.weights), 6, -1))
         return both[:, 0], both[:, 1:]
+
+    def slope_where_used(self, name: str) -> Array:
+        """Derivative (M, 6) of `residual` by one parameter in the rows that were fitted; 0 in others."""
+        slope = np.nan_to_num(self._of_used[1][:, self.names.index(name)].reshape(-1, 6))
+        return np.where(self.used[:, None], slope, 0.0)
 
     @cached_property
     def _fitted_numbers(self) -> NDArray[np.int64]:

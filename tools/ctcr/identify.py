@@ -273,7 +273,7 @@ def identify_with(
     wind_up = getattr(predict, "wind_up", lambda x: 0.0)
     try:
         moved = wind_up(start) if start is not None else 0.0
-        evidence = -np.inf
+        evidence, found = -np.inf, None
         for left in reversed(range(WINDINGS if moved > 0 and tolerance < COARSE else 1)):
             whole = not left or moved < WOUND
             core, excluded = _core.identify(
@@ -281,10 +281,11 @@ def identify_with(
                 places=np.asarray(places, dtype=float), robust=robust,
                 admit_model_error=admit_model_error, weights=weights,
                 inflation=None if inflation is None else np.asarray(inflation, dtype=float), start=start,
-                starts=starts, max_iterations=max_iterations if whole else min(max_iterations, BETWEEN),
+                first_weights=found, starts=starts,
+                max_iterations=max_iterations if whole else min(max_iterations, BETWEEN),
                 tolerance=tolerance if whole else max(tolerance, COARSE), known=list(known), within=list(within),
             )  # fmt: skip
-            start, starts = core.values, 1
+            start, starts, found = core.values, 1, core.weights
             gained, evidence = core.log_evidence - evidence, core.log_evidence
             if not left:
                 break

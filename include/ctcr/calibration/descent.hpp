@@ -38,6 +38,10 @@ public:
     Eigen::MatrixXd jacobian;  ///< by x
     bool predicted = false;
   };
+  /// What was predicted at z already.
+  void know(const Eigen::VectorXd& z, Eigen::VectorXd residual, Eigen::MatrixXd jacobian) {
+    point_ = {z, std::move(residual), std::move(jacobian), true};
+  }
   /// Residual and derivatives are predicted at once, and kept: of what a descent tries it keeps nearly all, and asks for
   /// it again. Null where the prediction fails; valid until the next call.
   const Point* at(const Eigen::VectorXd& z) {

@@ -20,6 +20,7 @@ struct IdentifyOptions {
   std::optional<RowWeights> weights = {};        ///< frozen; a weight of 0 leaves a position or a rotation out
   std::optional<Eigen::Array2d> inflation = {};  ///< frozen, see Identification
   std::optional<Eigen::VectorXd> start = {};     ///< where to start; the prior means otherwise
+  std::optional<RowWeights> first_weights = {};  ///< of a fit near the start, to begin with; all count otherwise
   int starts = 3;                                ///< the first and others drawn from the prior, compared at the end
   int max_iterations = 50;                       ///< of each descent
   double tolerance = 0.02;                 ///< of minus the log posterior: where less is to gain, a descent may end

@@ -117,14 +117,18 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   const auto set_whitening = [&] { out.whitening = Whitening(noise, field, inflated()); };
   set_whitening();
   // Without a prior a parameter is scaled by what the readings say of it.
-  out.whitening.apply(jacobian);
   for (Eigen::Index k = 0; k < n; ++k)
-    if (!std::isfinite(sd[k])) sd[k] = jacobian.col(k).norm() > 0 ? 1 / jacobian.col(k).norm() : 1.0;
+    if (!std::isfinite(sd[k])) {
+      Eigen::VectorXd slope = jacobian.col(k);
+      out.whitening.apply(slope);
+      sd[k] = slope.norm() > 0 ? 1 / slope.norm() : 1.0;
+    }
   detail::Objective objective(predict_fitted, parameters, sd);
   objective.set_whitening(out.whitening);
   const detail::Bounds bounds(parameters, options.within, sd);
 
   Eigen::VectorXd z = objective.z(x);
+  objective.know(z, residual, std::move(jacobian));
   detail::Descent best;
   detail::Linearised here;
   const auto precision = [&] {
@@ -136,6 +140,7 @@ inline Identification identify(const Predictor& predict, const std::vector<FreeP
   };
   const bool finds_weights = options.robust && !options.weights;
   const bool finds_inflation = options.admit_model_error && !options.inflation;
+  if (finds_weights && options.first_weights) out.weights = use.cwiseProduct(fitted.weights(*options.first_weights));
   // The inflation with which a residual would be no surprise.
   const auto inflate = [&](const Eigen::VectorXd& left) {
     const Whitening stated(noise, field, out.weights);

@@ -25,28 +25,30 @@ Identification identify_readings(Table& table, const std::vector<FreeParameter>&
     table.activate(active);
     excluded.insert(excluded.end(), rows.begin(), rows.end());
   };
-  Eigen::VectorXd x(Eigen::Index(parameters.size())), solved;
-  for (Eigen::Index k = 0; k < x.size(); ++k)
-    x[k] = options.start ? (*options.start)[k] : parameters[std::size_t(k)].mean;
-  if (!table(x, solved, nullptr)) exclude(table.unsolved());
-  const auto active = std::count(table.active().begin(), table.active().end(), true);
-
+  Eigen::VectorXd solved;  // of the last prediction, unsolved rows as they were before
   for (int round = 1;; ++round) {
     std::size_t blocked = 0;
+    bool all_solved = true;
     const Predictor predict = [&](const Eigen::VectorXd& at, Eigen::VectorXd& out, Eigen::MatrixXd* jacobian) {
-      (void)table(at, out, jacobian);
+      const bool begins = solved.size() == 0;
+      if (!table(at, out, jacobian) && begins) {
+        exclude(table.unsolved());
+        (void)table(at, out, jacobian);
+      }
       const std::vector<int>& unsolved = table.unsolved();
+      const auto active = std::ranges::count(table.active(), true);
       const bool few = round < rounds && 10 * std::ssize(unsolved) <= active;
       if (!few && !unsolved.empty()) {
         blocked = unsolved.size();
         return false;
       }
+      all_solved = all_solved && unsolved.empty();
       for (const int row : unsolved) out.segment<6>(6 * row) = solved.segment<6>(6 * row);
       solved = out;
       return true;
     };
     Identification fit = identify(predict, parameters, noise, places, options);
-    if (table(fit.values, solved, nullptr) || round == rounds) {
+    if (all_solved || table(fit.values, solved, nullptr) || round == rounds) {
       if (!fit.converged && blocked > 0)
         fit.status += "; " + std::to_string(blocked) + " readings cannot be solved where it leads";
       std::sort(excluded.begin(), excluded.end());

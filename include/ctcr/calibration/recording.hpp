@@ -100,14 +100,12 @@ public:
       const System<N, Fx> rubbing = system(x);
       if (!rubbing.model.effects().act_by_twist()) return 0;
       const Eigen::VectorXd at = P::values(rubbing);
-      auto winding = std::make_shared<Winding<N>>();
+      auto winding = std::make_shared<Winding<N>>(Winding<N>{.equilibria = winding_->equilibria});
       for (const int v : columns_)
         if (detail::reaches<N, Fx>[std::size_t(v)] != detail::Reach::reading) winding->variables.push_back(v);
       const bool is_there = at.size() == wound_at_.size() && at == wound_at_;
       if (is_there && std::ranges::includes(sorted(winding_->variables), sorted(winding->variables))) return settled;
-      std::size_t place = 0;
-      for (RecordedRow<N>& row : rows_)
-        for (Twist<N>& twist : row.twist) winding_->extrapolate(at, place++, twist);
+      winding_->unwind(at, rows_);
       wound_at_ = at;
       const double moved = ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, winding.get());
       winding_ = std::move(winding);

@@ -22,15 +22,21 @@ class WoundPlaces {
   static constexpr std::size_t piece = 32;     // places; fixed, so that answers do not depend on the number of threads
   static constexpr double alike = 1e-3;        // share of a limit of friction: no difference
   static constexpr double alike_twist = 1e-4;  // [rad]
+  static constexpr double enough = 1e-6;       // tolerance of an equilibrium [rad]: far less than that
 
 public:
   static constexpr std::size_t most = 32 * piece;
 
-  /// @param path       of the rows, where this puts the twists that it finds
+  /// @param path        of the rows, where this puts the twists that it finds
+  /// @param equilibria  as Winder::wind() takes them, of all places
   /// @param variables  as Winder::wind() takes them, or null: no slopes
   WoundPlaces(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, RecordedPath<N, double>& path,
-              const Variables<N, Fx>* variables, int count, ThreadPool& pool)
-    : system_(system), rows_(rows), path_(path), variables_(variables), count_(count), pool_(pool) {}
+              std::span<std::optional<TipGuess<N>>> equilibria, const Variables<N, Fx>* variables, ThreadPool& pool)
+    : system_(system), rows_(rows), path_(path), equilibria_(equilibria), variables_(variables), pool_(pool) {
+    // Friction feels what readings show: the twist may be less exact than these.
+    system_.settings.tolerance = std::max(system_.settings.tolerance, enough);
+    system_.settings.steps = (system_.settings.steps + 1) / 2;
+  }
 
   /// Winds up places first .. end - 1, at most `most`. @param winder  in: before the first of them; out: at the last one
   void wind(std::size_t first, std::size_t end, Winder& winder) {
@@ -70,7 +76,7 @@ private:
       row += k > path_.end[row];
       const std::size_t way = path_.way(rows_, row, k);
       Place& here = place_[k - first_];
-      winder.wind(system_, on_the_way(rows_, row, way), rows_[row].twist[way], path_, k, variables_, count_,
+      winder.wind(system_, on_the_way(rows_, row, way), rows_[row].twist[way], path_, k, equilibria_[k], variables_,
                   variables_ ? &here.slopes : nullptr);
       const bool was_so = here.stand && are_alike(*here.stand, winder.stand());
       here.stand = winder.stand();
@@ -86,11 +92,11 @@ private:
            std::ranges::equal(a.twist, b.twist, within(alike_twist));
   }
 
-  const System<N, Fx>& system_;
+  System<N, Fx> system_;
   std::span<const RecordedRow<N>> rows_;
   RecordedPath<N, double>& path_;
+  std::span<std::optional<TipGuess<N>>> equilibria_;
   const Variables<N, Fx>* variables_;
-  int count_;
   ThreadPool& pool_;
   std::size_t first_ = 0;
   std::vector<Place> place_;
@@ -101,7 +107,8 @@ private:
 /// Gives each row the twist_of() the system with its effects in equilibrium on the way there. Rows bring the twist of a
 /// robot without effects, by add_twist(), or that of other values; a place without an equilibrium keeps it, with what the
 /// place before was wound up. Answers do not depend on the number of threads.
-/// @param winding  in: its variables, places in SystemParameters<N, Fx>; out: how the twist changes with them; or null
+/// @param winding  in: its variables, places in SystemParameters<N, Fx>, and the equilibria of a winding before or none;
+///                 out: how the twist changes with them; or null
 /// @return the largest change of a twist [rad]   Real time: no.
 template <int N, class Fx>
   requires(Fx::template On<N>::follows_twist && N > 1)
@@ -113,6 +120,9 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows, Thre
   detail::RecordedPath<N, double> path(system.transmission, rows, [](double x, int) { return x; });
   const std::size_t places = path.q.size();
   const int count = winding ? int(winding->variables.size()) : 0;
+  std::vector<std::optional<TipGuess<N>>> own;
+  auto& equilibria = winding ? winding->equilibria : own;
+  if (equilibria.size() != places) equilibria.assign(places, {});
   detail::Variables<N, Fx> from_contacts, alone;
   std::vector<detail::WindingSlopes<N, Fx>> ways;
   if (winding) {
@@ -126,7 +136,7 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows, Thre
     winding->slopes = Eigen::MatrixXd::Zero(Contacts<N>::count, Eigen::Index(places) * count);
   }
   using Together = detail::WoundPlaces<N, Fx>;
-  Together together(system, rows, path, count > 0 ? &from_contacts : nullptr, count, pool);
+  Together together(system, rows, path, equilibria, count > 0 ? &from_contacts : nullptr, pool);
   detail::Winder<N, Fx> winder(system.model.effects());
   for (std::size_t first = 0; first < places; first += Together::most) {
     const std::size_t end = std::min(first + Together::most, places);

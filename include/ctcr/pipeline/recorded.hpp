@@ -50,7 +50,6 @@ template <int N, class Fx>
 Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, const Settings& settings) noexcept {
   using S = Dual<1>;
   constexpr int iterations = 30;
-  constexpr double tolerance = 1e-10;  // [N]
   Status status = solve(out.model, out.q, out.load, ws, out.solution, settings);
   const Vec3 known = out.load.force;
   const auto effects = out.model.effects().template seeded<S, typename Fx::OnTip>(Constant<S>{});
@@ -79,7 +78,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
     } else {
       const Mat3 C = out.solution.compliance.template topLeftCorner<3, 3>();
       change = (Mat3::Identity() - slope * C).partialPivLu().solve(push - added);
-      if (change.norm() < tolerance) return status;
+      if (change.norm() < settings.tolerance) return status;
       added += change;
     }
     out.load.force = known + added;

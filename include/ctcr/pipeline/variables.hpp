@@ -39,7 +39,9 @@ public:
   void put(int lane, int variable, int parameter) noexcept {
     lane_[std::size_t(parameter)] = lane;
     variable_[std::size_t(lane)] = variable;
+    ++size_;
   }
+  [[nodiscard]] int size() const noexcept { return size_; }
   /// Of a parameter; -1 if it has none.
   [[nodiscard]] int lane(int parameter) const noexcept { return lane_[std::size_t(parameter)]; }
 
@@ -71,6 +73,7 @@ private:
   static constexpr int lanes = count + N + 5 + Contacts<N>::count;  // unknowns, a force and contacts may have some, too
   std::array<int, std::size_t(count)> lane_;
   std::array<int, std::size_t(lanes)> variable_;
+  int size_ = 0;
 };
 
 template <int N, class S>

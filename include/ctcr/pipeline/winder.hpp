@@ -8,6 +8,25 @@
 
 namespace ctcr::detail {
 
+/// Slopes of the twist in the equilibrium of a row that was predicted; what the surroundings push, and what other effects
+/// remember, is held.
+/// @param variables  in lanes from first_variable<N> on   Real time: yes without variables, else it allocates.
+template <int N, class Fx>
+TwistSlopes<N> twist_slopes(const System<N, Fx>& system, const RecordedRow<N>& here,
+                            const RecordedPrediction<N, Fx>& prediction, const Workspace<N>& ws,
+                            const Variables<N, Fx>& variables) noexcept {
+  const auto& effects = prediction.model.effects();
+  return ctcr::twist_slopes<SystemParameters<N, Fx>::count>(
+      prediction.model, ws, system.settings.steps, variables.size(), [&](const auto& window) {
+        using S = typename std::remove_cvref_t<decltype(window)>::S;
+        auto in = rod_inputs<S>(system, here, prediction.load, variables.seeding(window), [&](auto& beta, auto& alpha) {
+          variables.template effects<typename Fx::OnJoints>(effects, window).actuate(here.at, beta, alpha);
+        });
+        in.effects = variables.template effects<typename Fx::OnRod>(effects, window);
+        return in;
+      });
+}
+
 /// Stands at a place of a recording, and knows what the effects remember there. A copy goes on from where this one stands.
 template <int N, class Fx>
 class Winder {
@@ -42,53 +61,45 @@ public:
   /// @param here    what stands at the place, by on_the_way()
   /// @param given   the twist of a robot without effects there, or that of other values
   /// @param path    of other places its joints alone are looked at: others may be winding them up
-  /// @param variables  by which slopes are asked for, in lanes from first_variable<N> on   @param count  of them
+  /// @param equilibrium  in: where to look for that of this place, or nothing: near the place before; out: where it is
+  /// @param variables  as twist_slopes() takes them; or null, and so is
   /// @param slopes     out: those of the twist there by what is rubbed on the way to here, and by these variables; nothing
-  ///                   without an equilibrium; or null
+  ///                   without an equilibrium
   void wind(const System<N, Fx>& system, const RecordedRow<N>& here, const Twist<N>& given, const Path<N, double>& path,
-            std::size_t k, const Variables<N, Fx>* variables, int count, std::optional<Slopes>* slopes) noexcept {
+            std::size_t k, std::optional<TipGuess<N>>& equilibrium, const Variables<N, Fx>* variables,
+            std::optional<Slopes>* slopes) noexcept {
     constexpr int most = 40;  // equilibria of a place
+    if (equilibrium) {
+      ws_.reset();
+      ws_.guess = *equilibrium;
+      ws_.warm = true;
+    }
     const On others = effects_at(path, k);
     Twist<N> found = given;
     Vec::Map(found.data()) += wound_;
-    const auto equilibrium = [&](const On& with) {
+    const auto in_equilibrium = [&](const On& with) {
       return has_equilibrium(predict(system, here, with.memory(), ws_, prediction_)) ? &prediction_.model : nullptr;
     };
     const int steps = system.settings.steps;
     effects_ = balance_.solve(
-        equilibrium, [&](const Twist<N>& twist) { return remembered(others, path, k, twist); }, ws_, steps, found,
+        in_equilibrium, [&](const Twist<N>& twist) { return remembered(others, path, k, twist); }, ws_, steps, found,
         most);
     wound_ = Vec::Map(found.data()) - Vec::Map(given.data());
     Row to = path.q[k];
     to.twist = found;
     if (slopes) {
       slopes->reset();
-      if (balance_.left_there() || equilibrium(effects_)) {
-        *slopes = by_all(system, here, *variables, count);
+      if (balance_.left_there() || in_equilibrium(effects_)) {
+        *slopes = twist_slopes(system, here, prediction_, ws_, *variables);
         balance_.take((*slopes)->by_rubbing);
         close((*slopes).value(), law(others, to, path.radius, k));
       }
     }
+    equilibrium = ws_.warm ? std::optional(ws_.guess) : std::nullopt;
     from_ = to;
   }
 
 private:
-  /// Slopes in the equilibrium that ws_ holds; what the surroundings push, and what other effects remember, is held.
-  Slopes by_all(const System<N, Fx>& system, const RecordedRow<N>& here, const Variables<N, Fx>& variables,
-                int count) const noexcept {
-    const On& effects = prediction_.model.effects();
-    return twist_slopes<SystemParameters<N, Fx>::count>(
-        prediction_.model, ws_, system.settings.steps, count, [&](const auto& window) {
-          using S = typename std::remove_cvref_t<decltype(window)>::S;
-          auto in =
-              rod_inputs<S>(system, here, prediction_.load, variables.seeding(window), [&](auto& beta, auto& alpha) {
-                variables.template effects<typename Fx::OnJoints>(effects, window).actuate(here.at, beta, alpha);
-              });
-          in.effects = variables.template effects<typename Fx::OnRod>(effects, window);
-          return in;
-        });
-  }
-
   /// Slope of what is rubbed at each contact on the way to here by the twist of that contact.
   Vec law(const On& before, const Row& to, const ContactRadii<N>& radius, std::size_t k) const noexcept {
     using S = Dual<1>;

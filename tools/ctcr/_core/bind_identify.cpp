@@ -51,7 +51,8 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
                             const Eigen::VectorXd& high, const Noise& noise, const Eigen::MatrixX3d& places,
                             bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
                             const std::optional<Eigen::Vector2d>& inflation,
-                            const std::optional<Eigen::VectorXd>& start, int starts, int max_iterations,
+                            const std::optional<Eigen::VectorXd>& start,
+                            const std::optional<Eigen::MatrixX2d>& first_weights, int starts, int max_iterations,
                             double tolerance, const Known& known, const Within& within, std::vector<int>& excluded) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
@@ -60,6 +61,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
   options.weights = weights;
   if (inflation) options.inflation = inflation->array();
   options.start = start;
+  options.first_weights = first_weights;
   options.starts = starts;
   options.max_iterations = max_iterations;
   options.tolerance = tolerance;
@@ -166,18 +168,18 @@ void bind_identify(nb::module_& m) {
          const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
          const Eigen::MatrixX3d& places, bool robust, bool admit_model_error,
          const std::optional<Eigen::MatrixX2d>& weights, const std::optional<Eigen::Vector2d>& inflation,
-         const std::optional<Eigen::VectorXd>& start, int starts, int max_iterations, double tolerance,
-         const Known& known, const Within& within) {
+         const std::optional<Eigen::VectorXd>& start, const std::optional<Eigen::MatrixX2d>& first_weights, int starts,
+         int max_iterations, double tolerance, const Known& known, const Within& within) {
         std::vector<int> excluded;
         Identification fit =
             identify_any(predict, names, mean, sd, low, high, noise, places, robust, admit_model_error, weights,
-                         inflation, start, starts, max_iterations, tolerance, known, within, excluded);
+                         inflation, start, first_weights, starts, max_iterations, tolerance, known, within, excluded);
         return std::pair(std::move(fit), std::move(excluded));
       },
       nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a, "places"_a,
       "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
-      "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50,
-      "tolerance"_a = 0.02, "known"_a = Known{}, "within"_a = Within{},
+      "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "first_weights"_a.none() = nb::none(),
+      "starts"_a = 3, "max_iterations"_a = 50, "tolerance"_a = 0.02, "known"_a = Known{}, "within"_a = Within{},
       "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
       "rows.");
 }

@@ -92,9 +92,8 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     if is_of_metal(candidate.names[0]):  # besides it, the field of what is farther away
         more = [effect.amplitudes, [*effect.amplitudes, *details]]
     free = [tuple(dict.fromkeys((*candidate.names, *names))) for names in more]
-    return [
-        Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in dict.fromkeys(shapes)
-    ]
+    unlike = list({frozenset(shape): shape for shape in shapes}.values())  # in whatever order it is told
+    return [Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in unlike]
 
 
 def is_of_metal(name: str) -> bool:

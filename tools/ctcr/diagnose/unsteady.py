@@ -127,9 +127,9 @@ def lags_of(engine: Engine, fit: Fit) -> Lags | None:
         return None
     plain, stretch = engine.linear(fit), _stretches(engine)
     each = np.arange(stretch.max() + 1)
-    columns = np.empty((len(plain.residual), len(each)))
+    columns, slope = np.empty((len(plain.residual), len(each))), fit.slope_where_used(DELAY)
     for some in np.array_split(each, max(1, len(each) // AT_ONCE)):
-        columns[:, some] = fit.whiten(_slope(fit)[:, :, None] * (stretch[:, None] == some)[:, None, :])
+        columns[:, some] = fit.whiten(slope[:, :, None] * (stretch[:, None] == some)[:, None, :])
     middle = np.array([time[stretch == k].mean() for k in each])
     apart, spread = np.abs(middle[:, None] - middle), SPREAD * abs(_delay(fit))
     crossed, gradient = plain.jacobian.T @ columns, columns.T @ plain.residual
