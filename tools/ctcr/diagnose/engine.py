@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 
 from ctcr import _core, effects, free_parameters, identify, recording, user_effects
 from ctcr.measurements import Measurements
@@ -57,11 +58,11 @@ class Linear:
 
     def imitation_by(self, overlap: Array) -> Array:
         """The same of columns of which this is jacobian.T @ columns."""
-        return np.linalg.solve(self.cholesky.T, np.linalg.solve(self.cholesky, overlap))
+        return cho_solve((self.cholesky, True), overlap, check_finite=False)
 
     def covariance(self) -> Array:
         """Of the parameters, given the readings and the priors."""
-        return np.linalg.inv(self.cholesky @ self.cholesky.T)
+        return self.imitation_by(np.eye(len(self.cholesky)))
 
     def gain(self, columns: Array) -> Gain:
         """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
