@@ -125,7 +125,9 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
         there[parameters[j]] += by;
         return P::with_values(system, there);
       });
-      if (!rubs) EXPECT_GT(slopes.by_variables.col(Eigen::Index(j)).norm() * size, 1e-5) << P::name(parameters[j]);
+      if (!rubs) {
+        EXPECT_GT(slopes.by_variables.col(Eigen::Index(j)).norm() * size, 1e-5) << P::name(parameters[j]);
+      }
     }
     EXPECT_GT(slopes.by_rubbing.norm(), 1e-3);
     EXPECT_GT(slopes.by_variables.rightCols<Friction<3>::count>().norm(), 1e-2);
