@@ -100,11 +100,12 @@ public:
       const System<N, Fx> rubbing = system(x);
       if (!rubbing.model.effects().act_by_twist()) return 0;
       const Eigen::VectorXd at = P::values(rubbing);
-      auto winding = std::make_shared<Winding<N>>(Winding<N>{.equilibria = winding_->equilibria});
+      auto winding = std::make_shared<Winding<N>>();
       for (const int v : columns_)
         if (detail::reaches<N, Fx>[std::size_t(v)] != detail::Reach::reading) winding->variables.push_back(v);
       const bool is_there = at.size() == wound_at_.size() && at == wound_at_;
       if (is_there && std::ranges::includes(sorted(winding_->variables), sorted(winding->variables))) return settled;
+      winding->equilibria = winding_->equilibria;
       winding_->unwind(at, rows_);
       wound_at_ = at;
       const double moved = ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, winding.get());
@@ -147,16 +148,11 @@ private:
 
   bool solve_row(const System<N, Fx>& system, const MemoryOfRow& memory, std::size_t i, Worker& w) noexcept {
     Workspace<N>& ws = w.workspace;
-    const Joints<N> q = joints(system.transmission, rows_[i].theta);
-    if (start_[i].known) {
-      ws.guess = start_[i].guess;
-      ws.q = q;
-      ws.load = rows_[i].load;
-      ws.knows_joints = ws.knows_load = false;
-      ws.warm = true;
-    } else if (ws.warm && !detail::nearby(ws, Configuration<N>{q, rows_[i].load})) {
+    if (start_[i].known)
+      ws.begin_at(start_[i].guess);
+    else if (ws.warm &&
+             !detail::nearby(ws, Configuration<N>{joints(system.transmission, rows_[i].theta), rows_[i].load}))
       ws.reset();
-    }
     const bool solved = predict(system, rows_[i], memory, ws, w.prediction) == Status::ok;
     if (!solved) ws.reset();
     start_[i] = {ws.guess, solved};

@@ -47,6 +47,12 @@ struct Workspace {
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 
   void reset() noexcept { warm = knows_joints = knows_load = false; }
+  /// Lets the next solve begin at a guess, whatever was solved before.
+  void begin_at(const TipGuess<N>& other) noexcept {
+    reset();
+    guess = other;
+    warm = true;
+  }
 };
 
 }  // namespace ctcr

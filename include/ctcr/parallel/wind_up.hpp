@@ -29,7 +29,7 @@ public:
 
   /// @param path        of the rows, where this puts the twists that it finds
   /// @param equilibria  as Winder::wind() takes them, of all places
-  /// @param variables  as Winder::wind() takes them, or null: no slopes
+  /// @param variables   as Winder::wind() takes them, or null: no slopes
   WoundPlaces(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, RecordedPath<N, double>& path,
               std::span<std::optional<TipGuess<N>>> equilibria, const Variables<N, Fx>* variables, ThreadPool& pool)
     : system_(system), rows_(rows), path_(path), equilibria_(equilibria), variables_(variables), pool_(pool) {
@@ -106,7 +106,8 @@ private:
 
 /// Gives each row the twist_of() the system with its effects in equilibrium on the way there. Rows bring the twist of a
 /// robot without effects, by add_twist(), or that of other values; a place without an equilibrium keeps it, with what the
-/// place before was wound up. Answers do not depend on the number of threads.
+/// place before was wound up. Answers do not depend on the number of threads. The twist is integrated with half of the
+/// system's steps.
 /// @param winding  in: its variables, places in SystemParameters<N, Fx>, and the equilibria of a winding before or none;
 ///                 out: how the twist changes with them; or null
 /// @return the largest change of a twist [rad]   Real time: no.
@@ -119,24 +120,21 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows, Thre
   if (rows.empty()) return 0;
   detail::RecordedPath<N, double> path(system.transmission, rows, [](double x, int) { return x; });
   const std::size_t places = path.q.size();
-  const int count = winding ? int(winding->variables.size()) : 0;
-  std::vector<std::optional<TipGuess<N>>> own;
-  auto& equilibria = winding ? winding->equilibria : own;
-  if (equilibria.size() != places) equilibria.assign(places, {});
+  Winding<N> own;
+  Winding<N>& wound = winding ? *winding : own;
+  const int count = int(wound.variables.size());
   detail::Variables<N, Fx> from_contacts, alone;
-  std::vector<detail::WindingSlopes<N, Fx>> ways;
-  if (winding) {
-    for (int j = 0; j < count; ++j) {
-      from_contacts.put(first_variable<N> + j, j, winding->variables[std::size_t(j)]);
-      alone.put(j, j, winding->variables[std::size_t(j)]);
-    }
-    for (Window window; window.first < count; window.first += window.size)
-      ways.emplace_back(system, rows, alone, window);
-    winding->values = SystemParameters<N, Fx>::values(system)(winding->variables);
-    winding->slopes = Eigen::MatrixXd::Zero(Contacts<N>::count, Eigen::Index(places) * count);
+  for (int j = 0; j < count; ++j) {
+    from_contacts.put(first_variable<N> + j, j, wound.variables[std::size_t(j)]);
+    alone.put(j, j, wound.variables[std::size_t(j)]);
   }
+  std::vector<detail::WindingSlopes<N, Fx>> ways;
+  for (Window window; window.first < count; window.first += window.size) ways.emplace_back(system, rows, alone, window);
+  wound.values = SystemParameters<N, Fx>::values(system)(wound.variables);
+  wound.slopes = Eigen::MatrixXd::Zero(Contacts<N>::count, Eigen::Index(places) * count);
+  if (wound.equilibria.size() != places) wound.equilibria.assign(places, {});
   using Together = detail::WoundPlaces<N, Fx>;
-  Together together(system, rows, path, equilibria, count > 0 ? &from_contacts : nullptr, pool);
+  Together together(system, rows, path, wound.equilibria, count > 0 ? &from_contacts : nullptr, pool);
   detail::Winder<N, Fx> winder(system.model.effects());
   for (std::size_t first = 0; first < places; first += Together::most) {
     const std::size_t end = std::min(first + Together::most, places);
@@ -144,7 +142,7 @@ double wind_up(const System<N, Fx>& system, std::span<RecordedRow<N>> rows, Thre
     pool.parallel_for(int(ways.size()), [&](int i, int) noexcept {
       for (std::size_t k = first; k < end; ++k) {
         const auto& there = together.slopes(k);
-        ways[std::size_t(i)].advance(path, k, there ? &*there : nullptr, *winding);
+        ways[std::size_t(i)].advance(path, k, there ? &*there : nullptr, wound);
       }
     });
   }

@@ -69,11 +69,7 @@ public:
             std::size_t k, std::optional<TipGuess<N>>& equilibrium, const Variables<N, Fx>* variables,
             std::optional<Slopes>* slopes) noexcept {
     constexpr int most = 40;  // equilibria of a place
-    if (equilibrium) {
-      ws_.reset();
-      ws_.guess = *equilibrium;
-      ws_.warm = true;
-    }
+    if (equilibrium) ws_.begin_at(*equilibrium);
     const On others = effects_at(path, k);
     Twist<N> found = given;
     Vec::Map(found.data()) += wound_;
