@@ -14,60 +14,25 @@ inline constexpr EffectInfo info{
     .look_alikes = "sensor_offset softening field_distortion",
     .reference = "Gilbert & Webster 2016 (shape setting)",
 };
+/// The weight of a Legendre polynomial.
+consteval EffectParameter weight(std::string_view name, double sigma, std::string_view meaning,
+                                 Role role = Role::amplitude) {
+  return {.name = name,
+          .unit = "",
+          .neutral = 0,
+          .sigma = sigma,
+          .soft_low = -0.5,
+          .soft_high = 0.5,
+          .hard_low = -1.5,
+          .hard_high = 1.5,
+          .per_tube = true,
+          .role = role,
+          .meaning = meaning};
+}
 inline constexpr std::array parameters{
-    EffectParameter{.name = "linear",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 0.15,
-                    .soft_low = -0.5,
-                    .soft_high = 0.5,
-                    .hard_low = -1.5,
-                    .hard_high = 1.5,
-                    .per_tube = true,
-                    .meaning = "relative change from the middle to the tip"},
-    EffectParameter{.name = "quadratic",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 0.15,
-                    .soft_low = -0.5,
-                    .soft_high = 0.5,
-                    .hard_low = -1.5,
-                    .hard_high = 1.5,
-                    .per_tube = true,
-                    .meaning = "of the ends against the middle"},
-    EffectParameter{.name = "cubic",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 0.1,
-                    .soft_low = -0.5,
-                    .soft_high = 0.5,
-                    .hard_low = -1.5,
-                    .hard_high = 1.5,
-                    .per_tube = true,
-                    .meaning = "of third order"},
-    EffectParameter{.name = "quartic",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 0.07,
-                    .soft_low = -0.5,
-                    .soft_high = 0.5,
-                    .hard_low = -1.5,
-                    .hard_high = 1.5,
-                    .per_tube = true,
-                    .role = Role::detail,
-                    .meaning = "of fourth order"},
-    EffectParameter{.name = "quintic",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 0.07,
-                    .soft_low = -0.5,
-                    .soft_high = 0.5,
-                    .hard_low = -1.5,
-                    .hard_high = 1.5,
-                    .per_tube = true,
-                    .role = Role::detail,
-                    .meaning = "of fifth order"},
-};
+    weight("linear", 0.15, "relative change from the middle to the tip"),
+    weight("quadratic", 0.15, "of the ends against the middle"), weight("cubic", 0.1, "of third order"),
+    weight("quartic", 0.07, "of fourth order", Role::detail), weight("quintic", 0.07, "of fifth order", Role::detail)};
 }  // namespace precurvature_profile
 
 /// kappa (1 + a P1 + b P2 + ...), Legendre polynomials over the curved part: the mean stays that of the data sheet.
@@ -78,8 +43,9 @@ struct PrecurvatureProfile : EffectValues<precurvature_profile::parameters, N, P
   void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
     if (!place.curved) return;
     const int i = place.tube;
-    const P change = legendre_sum(2.0 * place.part - 1.0, this->template get<0>(i), this->template get<1>(i),
-                                  this->template get<2>(i), this->template get<3>(i), this->template get<4>(i));
+    const P change = [&]<std::size_t... K>(std::index_sequence<K...>) {
+      return legendre_sum(2.0 * place.part - 1.0, this->template get<K>(i)...);
+    }(std::make_index_sequence<precurvature_profile::parameters.size()>{});
     m.curvature[0] = m.curvature[0] + m.curvature[0] * change;
   }
 };

@@ -24,8 +24,8 @@ bool is_even(const Material<S>& m) noexcept {
 }
 
 /// A d, d = (x, y): the unsoftened bending moment is EI times that.
-template <class T, class S>
-std::array<T, 2> weighed(const Material<S>& m, const T& x, const T& y) noexcept {
+template <class T, class S, class D>
+std::array<T, 2> weighed(const Material<S>& m, const D& x, const D& y) noexcept {
   const T a = as<T>(m.anisotropy[0]), c = as<T>(m.anisotropy[1]);
   return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
 }
@@ -86,10 +86,11 @@ struct Response {
   Slope slope;              ///< of the moment by the curvature [N m^2]
 };
 
-/// Response of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [1/m].
-template <class T, class S>
-Response<T> response(const Material<S>& m, const T& dx, const T& dy) noexcept {
-  const std::array<T, 2> e = weighed(m, dx, dy);
+/// Response of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [1/m]. Where D is
+/// double, that difference has no derivatives, and the answer those by the material alone.
+template <class T, class S, class D>
+Response<T> response(const Material<S>& m, const D& dx, const D& dy) noexcept {
+  const std::array<T, 2> e = weighed<T>(m, dx, dy);
   T k = as<T>(m.bending_stiffness);
   if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
   const T z = dx * e[0] + dy * e[1];

@@ -2,7 +2,7 @@
 // The general path: the rod with effects, for any scalar S, from the robot tip to the front plate. Every tube may bend
 // anywhere and by any law of hooks.hpp; tubes may exchange torque along their length and where tubes end or start to
 // curve, and there the frame may kink. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
-#include "ctcr/mechanics/bending.hpp"
+#include "ctcr/mechanics/bend.hpp"
 #include "ctcr/mechanics/effect_state.hpp"
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
@@ -14,26 +14,8 @@ class EffectRod {
 public:
   using State = EffectState<N, S>;
   using Inputs = RodInputs<N, S, Fx>;
-
-  /// How the tubes bend at a place.
-  struct Bend {
-    std::array<S, 2> u;                         ///< curvature of the centreline, Bishop axes [1/m]
-    std::array<S, N> sine, cosine;              ///< of psi
-    std::array<std::array<S, 2>, N> curvature;  ///< of each tube, its own axes [1/m]
-    std::array<std::array<S, 2>, N> moment;     ///< of each tube, its own axes [N m]
-    std::array<S, N> twist;                     ///< rate of psi [rad/m]
-  };
-
-  /// Tubes of the current segment, and where on them it stands.
-  struct Place {
-    int present = 0;  ///< tubes 1..present
-    std::array<bool, N> curved{};
-    std::array<S, N> along;          ///< arc length of each present tube here [m]
-    std::array<S, N> rub, rub_rate;  ///< torque per length on each tube from the next outer one [N], its rate [N/m]
-    std::array<Material<S>, N> material;  ///< of each present tube here
-    std::array<double, 2> u{};            ///< curvature a little further out, where iterations may begin [1/m]
-    bool bent = false;                    ///< whether it is known
-  };
+  using Place = TubesHere<N, S>;
+  using Bend = ctcr::Bend<N, S>;
 
   explicit EffectRod(const Inputs& inputs) noexcept
     : in_(inputs), varied_(inputs.effects.acts_on_material()), rubs_(inputs.effects.acts_by_rubbing()) {}
@@ -88,16 +70,12 @@ public:
 
   /// How the tubes bend under the moment of a state.
   [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
-    Bend b;
-    bool even = true;
-    for (int j = 0; j < place.present; ++j) {
-      const auto i = std::size_t(j);
-      sincos(y.psi(j), b.sine[i], b.cosine[i]);
-      b.twist[i] = y.torque(j) * inverse(in_.tubes[i].kz);
-      even = even && (!varied_ || bending::is_even(place.material[i]));
-    }
-    even ? bend_evenly(place, y, b) : bend_by_iteration(place, y, b);
-    return b;
+    return {place, y, varied_};
+  }
+
+  /// Rate of the angle of a tube [rad/m].
+  [[nodiscard]] S twist(int i, const State& y) const noexcept {
+    return y.torque(i) * inverse(in_.tubes[std::size_t(i)].kz);
   }
 
   /// One integration step of length h inside a segment: the scheme of MagnusRk4.
@@ -129,75 +107,6 @@ public:
   }
 
 private:
-  static constexpr int softening_iterations = 12;  ///< convex and quadratic: 3 are usual
-
-  /// Where all tubes are even, by one division.
-  static void bend_evenly(const Place& place, const State& y, Bend& b) noexcept {
-    S stiffness = 0.0;
-    std::array<S, 2> moment{y.m(0), y.m(1)};
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = place.material[i];
-      const S &k = m.bending_stiffness, &s = b.sine[i], &c = b.cosine[i];
-      const std::array<S, 2> q{k * m.curvature[0], k * m.curvature[1]};
-      moment = {moment[0] + (c * q[0] - s * q[1]), moment[1] + (s * q[0] + c * q[1])};
-      stiffness = stiffness + k;
-    }
-    const S compliance = inverse(stiffness);
-    b.u = {compliance * moment[0], compliance * moment[1]};
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = place.material[i];
-      b.curvature[i] = seen_by_tube(b, i, b.u);
-      for (std::size_t k = 0; k < 2; ++k) b.moment[i][k] = m.bending_stiffness * (b.curvature[i][k] - m.curvature[k]);
-    }
-  }
-
-  /// The value by Newton's method; one more step of it with derivatives then makes both exact to rounding.
-  static void bend_by_iteration(const Place& place, const State& y, Bend& b) noexcept {
-    std::array<double, 2> u = place.u;
-    bool is_linear = true;
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i)
-      is_linear = is_linear && value(place.material[i].softening) == 0;
-    if (is_linear || !place.bent) u = bent_without_softening(place, y, b);
-    double left = is_linear ? 0 : 1;  // (relative change)^2
-    for (int k = 0; k < softening_iterations && left > 1e-8; ++k) {
-      Tubes<double> ignored;
-      const auto change = newton_step(place, y, b, u, ignored);
-      u = {u[0] + change[0], u[1] + change[1]};
-      left = (change[0] * change[0] + change[1] * change[1]) / (1 + u[0] * u[0] + u[1] * u[1]);
-    }
-    Tubes<S> tubes;
-    const std::array<S, 2> change = newton_step(place, y, b, {S(u[0]), S(u[1])}, tubes);
-    b.u = {u[0] + change[0], u[1] + change[1]};
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      // The value of the change is rounding: the angles' derivatives times it are nothing.
-      const double s = value(b.sine[i]), c = value(b.cosine[i]);
-      const std::array<S, 2> more{c * change[0] + s * change[1], c * change[1] - s * change[0]};
-      const std::array<S, 2> moment_more = tubes[i].slope * more;
-      for (std::size_t k = 0; k < 2; ++k) {
-        b.curvature[i][k] = b.curvature[i][k] + more[k];
-        b.moment[i][k] = tubes[i].moment[k] + moment_more[k];
-      }
-    }
-  }
-
-  static std::array<double, 2> bent_without_softening(const Place& place, const State& y, const Bend& b) noexcept {
-    bending::Slope slope;
-    std::array<double, 2> moment{value(y.m(0)), value(y.m(1))};
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = place.material[i];
-      const bending::Slope unsoftened = bending::stiffness(m, 1.0);
-      const auto q = unsoftened * std::array{value(m.curvature[0]), value(m.curvature[1])};
-      const double s = value(b.sine[i]), c = value(b.cosine[i]);
-      moment[0] += c * q[0] - s * q[1];
-      moment[1] += s * q[0] + c * q[1];
-      slope += unsoftened.turned(s, c);
-    }
-    return slope.inverted() * moment;
-  }
-
-  template <class T>
-  using Tubes = std::array<bending::Response<T>, N>;
-
   [[nodiscard]] bool has_curve(int i) const noexcept { return value(in_.tubes[std::size_t(i)].curved_length) > 0; }
 
   [[nodiscard]] S event_place(int id) const noexcept {
@@ -243,33 +152,6 @@ private:
     return m;
   }
 
-  /// A vector of the Bishop frame in the axes of a tube.
-  template <class T>
-  static std::array<T, 2> seen_by_tube(const Bend& b, std::size_t i, const std::array<T, 2>& v) noexcept {
-    const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
-    return {c * v[0] + s * v[1], c * v[1] - s * v[0]};
-  }
-
-  /// By how much curvature u must change so that the tubes balance the moment, and how each of them answers to u.
-  template <class T>
-  static std::array<T, 2> newton_step(const Place& place, const State& y, Bend& b, const std::array<T, 2>& u,
-                                      Tubes<T>& tubes) noexcept {
-    bending::Slope slope;
-    std::array<T, 2> rest{bending::as<T>(y.m(0)), bending::as<T>(y.m(1))};
-    for (std::size_t i = 0; i < std::size_t(place.present); ++i) {
-      const Material<S>& m = place.material[i];
-      const T s = bending::as<T>(b.sine[i]), c = bending::as<T>(b.cosine[i]);
-      const std::array<T, 2> w = seen_by_tube(b, i, u);
-      tubes[i] =
-          bending::response(m, T(w[0] - bending::as<T>(m.curvature[0])), T(w[1] - bending::as<T>(m.curvature[1])));
-      const std::array<T, 2>& q = tubes[i].moment;
-      rest = {rest[0] - (c * q[0] - s * q[1]), rest[1] - (s * q[0] + c * q[1])};
-      slope += tubes[i].slope.turned(value(s), value(c));
-      if constexpr (std::is_same_v<T, S>) b.curvature[i] = w;
-    }
-    return slope.inverted() * rest;
-  }
-
   State rates(Place& place, const State& y, std::array<S, 2>& u) const noexcept {
     const Bend b = bend(place, y);
     u = b.u;
@@ -280,7 +162,7 @@ private:
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       if (j < place.present) {
-        d.psi(j) = b.twist[i];
+        d.psi(j) = twist(j, y);
         d.torque(j) = b.curvature[i][1] * b.moment[i][0] - b.curvature[i][0] * b.moment[i][1];
         mz = mz + y.torque(j);
         mass = mass + in_.tubes[i].mass;
@@ -353,7 +235,7 @@ private:
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       const Material<S> mat = material_of(place, j);
-      const std::array<S, 2> q = bending::response(mat, mat.curvature[0], mat.curvature[1]).moment;
+      const std::array<S, 2> q = bending::response<S>(mat, mat.curvature[0], mat.curvature[1]).moment;
       S s, c;
       sincos(y.psi(j), s, c);
       m[i] = {s * q[1] - c * q[0], -(s * q[0] + c * q[1])};

@@ -216,7 +216,7 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
       TubeShape& t = out.tube[k];
       t.present = true;
       t.angle = here.y.psi(i) + base.turn;
-      t.curvature << bend.curvature[k][0], bend.curvature[k][1], bend.twist[k];
+      t.curvature << bend.curvature[k][0], bend.curvature[k][1], rod.twist(i, here.y);
       t.moment << bend.moment[k][0], bend.moment[k][1], here.y.torque(i);
       moment[2] += here.y.torque(i);
     }
