@@ -2,13 +2,14 @@
 
 import dataclasses
 import json
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from ctcr import effect_fit, effects, free_parameters, identify, recording, robot_file
-from ctcr.diagnose import decision, diagnose, jump
+from ctcr.diagnose import decision, diagnose
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.analysis import _beyond_judging
 from ctcr.diagnose.coverage import Coverage
@@ -17,7 +18,10 @@ from ctcr.diagnose.far_off import come_together, far_off
 from ctcr.diagnose.leftover import Leftover
 from ctcr.diagnose.split import OPEN, groups, locked_rows
 from ctcr.diagnose.verdict import judge
-from ctcr.measurements import Measurements
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from hidden_sessions import measured, measured_session, session  # noqa: E402
 
 ROBOT = Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml"
 IDS = {
@@ -31,51 +35,6 @@ IDS = {
 @pytest.fixture(scope="module")
 def robot():
     return robot_file.load(ROBOT)
-
-
-def session(robot, random, runs=8, stops=6):
-    """Joints of runs that go out and come back through the same stops, every second one with a weight."""
-    home = 1e-3 * np.array(robot.actuation.home_translation_mm)
-    rows = []
-    for run in range(runs):
-        ends = [
-            (
-                home - random.uniform(0, 0.03) + np.array([-0.02, -0.01, 0]) * random.uniform(0.2, 1),
-                random.uniform(-3, 3, 3),
-            )
-            for _ in range(3)
-        ]
-        way = [
-            (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]))
-            for a, b in zip(ends, ends[1:], strict=False)
-            for u in np.linspace(0, 1, stops // 2, endpoint=False)
-        ]
-        for beta, alpha in [*way, *reversed(way)]:
-            rows.append((2.0 * len(rows), run, beta, alpha, (0, -0.1 * (run % 2), 0)))
-    t, run, beta, alpha, force = (np.array(column) for column in zip(*rows, strict=True))
-    empty = np.full((len(t), 3), np.nan)
-    return Measurements(
-        t, run, beta, alpha, force.astype(float), empty, np.full((len(t), 4), np.nan), np.arange(len(t)) + 2
-    )
-
-
-def measured(robot, random, hidden, calibration=0.5, fixed=None):
-    """Readings of a robot that differs from its file as its uncertainties say, and has a hidden effect."""
-    from ctcr.frames import product, quaternion_from_rotation_vector
-
-    names = free_parameters.expand("standard", robot)
-    mean, sd, _, _ = free_parameters.priors(robot, names)
-    truth = mean + calibration * sd * random.normal(size=len(names))
-    table = session(robot, random)
-    centred = dataclasses.replace(table, position=np.zeros((len(table), 3)))
-    core = recording.recording_of(robot, centred, [*names, *hidden], fixed=fixed, steps=4)
-    core.residual(np.array([*truth, *hidden.values()]))
-    position, quaternion = core.predicted()
-    jitter = quaternion_from_rotation_vector(
-        np.deg2rad(robot.tracker.jitter_deg) * random.normal(size=(len(table), 3))
-    )
-    position = position + 1e-3 * robot.tracker.jitter_mm * random.normal(size=position.shape)
-    return dataclasses.replace(table, position=position, quaternion=product(jitter, quaternion))
 
 
 def test_the_catalogue_has_its_stable_ids():
@@ -225,11 +184,6 @@ def test_linear_gain_is_the_evidence_of_a_linear_model():
         assert gain.log_evidence == pytest.approx(log_evidence(np.hstack([A, B])) - log_evidence(A), abs=1e-9)
 
 
-def measured_session(robot, runs=8):
-    table = session(robot, np.random.default_rng(0), runs)
-    return dataclasses.replace(table, position=np.zeros((len(table), 3)))
-
-
 def test_rows_are_locked_by_run(robot):
     table = measured_session(robot)
     locked = locked_rows(robot, table)
@@ -304,36 +258,6 @@ def test_what_is_left_open_is_the_variance_of_a_prediction(robot):
     open_ = Coverage(robot, table, groups(table)).left_open([7])[0]
     part = np.mean(seen) / (3 * noise.position_jitter**2) / open_
     assert 0.6 < part < 1.15, part  # open_ is the worst of three lengths of the curves
-
-
-@pytest.mark.parametrize(
-    "when", [0.30, 0.40]
-)  # within a run that would be locked, and within one that would not
-def test_a_frame_that_jumps_within_a_run_is_followed_to_the_row(robot, when):
-    by = {"x": 8e-4, "y": -5e-4, "turn_y": 2e-3}
-    hidden = {f"effects.frame_jump.{name}": value for name, value in by.items()}
-    table = measured(robot, np.random.default_rng(7), hidden, fixed={jump.WHEN: when})
-    at = np.searchsorted(recording.session_part(table), when)
-    run = table.run[at]
-    assert table.run[at - 1] == run and locked_rows(robot, table)[at] == (when == 0.30)
-    result = diagnose(robot, table)
-    assert [a.ids for a in result.accepted] == [["frame_jump"]]
-    assert result.verdict.word == "identified"
-    found = dict(result.accepted[0].entry.candidate.shape)[jump.WHEN]
-    assert abs(np.searchsorted(recording.session_part(table), found) - at) <= 1
-    assert not result.locked[table.run == run].any() or when != 0.30
-    assert result.rms_mm["with_effects"] < 1.15 * result.rms_mm["noise_floor"]
-
-
-def test_rows_between_fitted_ones_may_hide_a_jump(robot):
-    table = session(robot, np.random.default_rng(0))
-    part = recording.session_part(table)
-    fitted = np.ones(len(table), bool)
-    fitted[10:15] = False
-    np.testing.assert_array_equal(
-        np.flatnonzero(jump.uncertain_rows(table, fitted, part[11] + 1e-6)), np.arange(10, 15)
-    )
-    assert not jump.uncertain_rows(table, fitted, 0.5 * (part[3] + part[4])).any()
 
 
 def test_what_is_locked_holds_poses(robot):

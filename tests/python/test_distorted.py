@@ -75,7 +75,7 @@ def test_runs_that_no_fit_saw_are_corrected_by_those_nearby(distorted_more):
     assert distorted_more.verdict.word == "identified"
     assert distorted.FOLLOWED in distorted_more.leftover.in_words
     rms = distorted_more.rms_mm
-    plain = distorted_more.accepted[0].rms_mm
+    plain = distorted_more.reached_mm(distorted_more.accepted[0])
     noise = rms["noise_floor"] ** 2
     assert plain**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
     jitter = 1e3 * np.sqrt(3) * distorted_more.with_effects.noise.position_jitter

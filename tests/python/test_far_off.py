@@ -1,10 +1,11 @@
 """Outliers strike a reading and not a place: what is off at a place is told from them, and they from it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr.diagnose.far_off import FEWEST, come_together
+from ctcr.diagnose.far_off import FEWEST, alone, come_together, in_words
 from ctcr.measurements import Measurements
 
 JITTER = 3e-5  # [m] per axis
@@ -64,3 +65,31 @@ def test_outliers_anywhere_are_no_place(table, share):
         errors = directions(random, len(rows), 1.0) * random.uniform(5e-4, 3e-3, (len(rows), 1))
         found += come_together(table, fit(random, dict(zip(rows, errors, strict=True)))).any()
     assert found <= 2
+
+
+def test_a_reading_of_a_run_that_no_fit_saw_may_be_off_alone(table):
+    locked = np.arange(len(VISITS)) // 24 % 4 == 2
+    for seed in range(50):
+        random = np.random.default_rng(seed)
+        glitch, (error,) = random.choice(np.flatnonzero(locked)), directions(random, 1, 2e-3)
+        off = fit(random, {glitch: error})
+        assert np.flatnonzero(alone(table, off, locked)).tolist() == [glitch]
+        assert not alone(table, off, ~locked).any()
+        (told,) = in_words(table, off, alone(table, off, locked))
+        size = 1e3 * np.linalg.norm(off.residual[glitch, :3])
+        assert told.startswith(f"Reading {glitch + 2} is {size:.2g} mm off")
+        beside = glitch + 1 if locked[glitch + 1] else glitch - 1  # the next in time
+        assert not alone(table, fit(random, {glitch: error, beside: error}), locked).any()
+
+
+def test_what_is_off_at_a_place_or_often_is_not_alone(table):
+    everywhere = np.ones(len(VISITS), bool)
+    random = np.random.default_rng(1)
+    error = np.full(3, 1e-3)
+    again = np.arange(len(VISITS)) % 120  # every place twice, long after one another
+    apart = replace(table, beta=table.beta[2 * again], alpha=table.alpha[2 * again])
+    assert alone(apart, fit(random, {30: error}), everywhere).sum() == 1
+    assert not alone(apart, fit(random, {30: error, 150: error}), everywhere).any()
+    few, many = np.arange(5, len(VISITS), 40), np.arange(5, len(VISITS), 20)
+    assert alone(table, fit(random, dict.fromkeys(few, error)), everywhere).sum() == len(few)
+    assert not alone(table, fit(random, dict.fromkeys(many, error)), everywhere).any()

@@ -9,7 +9,7 @@ import pytest
 from ctcr import effect_fit, identify, robot_file, simulation
 from ctcr.diagnose import decision, prediction
 from ctcr.diagnose import race as racing
-from ctcr.diagnose.candidates import Candidate, candidates, forms
+from ctcr.diagnose.candidates import Candidate, candidates, forms, other_strengths
 from ctcr.diagnose.engine import Engine, Gain
 from ctcr.effects import get
 
@@ -135,3 +135,33 @@ def test_what_predicts_the_typical_run_better_predicts_better(monkeypatch):
     assert prediction.predicts_better(engine, "before", "after")
     assert not prediction.predicts_better(engine, "before", "same")
     assert not prediction.predicts_better(engine, "after", "before")
+
+
+def test_forms_of_the_same_parameters_are_refitted_after_others():
+    gain = Gain(0.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
+    told = ["coefficient 1", "coefficient 2", "play 1", "torque 1", "torque 2"]
+    entries = [
+        racing.Entry(Candidate("any", (name,), (("form", float(form)),)), gain)
+        for name, form in (text.split() for text in told)
+    ]
+    order = [told[entries.index(entry)] for entry in racing._other_strengths_first(entries)]
+    assert order == ["coefficient 1", "play 1", "torque 1", "coefficient 2", "torque 2"]
+
+
+def test_an_effect_whose_law_is_open_has_other_strengths():
+    friction = get("friction", 3)
+    coefficient, torque = (tuple(friction.names(name)) for name in ("coefficient", "torque_per_length"))
+    shape = (("effects.friction.insertion", 0.0),)
+    assert other_strengths(friction, Candidate("friction", coefficient, shape)) == [
+        Candidate("friction", torque, shape)
+    ]
+    freed = Candidate("friction", (*torque, "effects.friction.slip_angle"))
+    assert [other.names for other in other_strengths(friction, freed)] == [coefficient]
+    for identity in ("tip_load", "precurvature_profile", "field_distortion"):
+        effect = get(identity, 3)
+        assert not other_strengths(effect, Candidate(identity, tuple(effect.amplitudes)))
+
+
+def test_what_was_picked_among_many_values_pays_for_it():
+    gain = Gain(12.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
+    assert racing.Entry(Candidate("frame_jump", (MASS,), (), 5.0), gain).linear == 7.0

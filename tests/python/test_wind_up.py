@@ -13,8 +13,10 @@ from ctcr import (
     simulation,
     user_effects,
 )
+from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
 from ctcr.diagnose.candidates import Candidate, forms
-from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.engine import FITS, Engine, Gain
+from ctcr.diagnose.race import Entry
 
 ROOT = Path(__file__).parents[2]
 FREE = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
@@ -110,3 +112,24 @@ def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
     plane, across = effect.names("bend_x"), effect.names("bend_y")
     flat, free = forms(effect, Candidate("straight_curvature", tuple(plane)))
     assert list(flat.names) == plane + effect.shapes and list(free.names) == plane + across + effect.shapes
+
+
+def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot, plan):
+    made = simulation.simulate(effect_fit.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=3)
+    noise = identify.noise_of_readings(robot, made)
+    engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
+    names = {
+        strength: tuple(effects.get("friction", 3).names(strength))
+        for strength in ("torque_per_length", "coefficient")
+    }
+    for given, fitted in names.items():
+        fit = engine.fit(fitted)
+        gain = Gain(0.0, *4 * [np.zeros(1)])
+        entry = Entry(Candidate("friction", fitted), gain, fit=fit)
+        one = Accepted(entry, ["friction"], 100.0, 50.0, 0.5)
+        after = with_shapes(engine, [one], one, fit, lambda _: None)
+        assert (np.max(fit.inflation) > WRONG) == (given == "torque_per_length")
+        assert set(names["coefficient"]) <= set(one.entry.candidate.names)
+        assert not set(names["torque_per_length"]) & set(one.entry.candidate.names)
+        assert np.max(after.inflation) < FITS
+        assert after.rms_mm() < 1.2 * identify.noise_floor(after, noise, engine.places)[0]

@@ -17,7 +17,7 @@ from ctcr import (
 )
 from ctcr.calibrate import parameters
 from ctcr.calibrate.checks import sentence
-from ctcr.diagnose import distorted, unsteady
+from ctcr.diagnose import distorted, far_off, unsteady
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
@@ -104,8 +104,7 @@ def add(
         now, nominal = stage.values(), stage.nominal(fitted)
         fit = stage(fitted, fitted, ~held, [now])
         progress.advance(1)
-        judged = held if held.any() else np.ones(len(readings), bool)
-        stages = [Stage("nominal", *_rms(nominal[judged])), _stage("calibrated", fit, judged)]
+        errors = {"nominal": nominal, "calibrated": fit.residual}
         for identity in ids:
             fitted.append(identity)
             begun = set(effects.get(identity, robot.n_tubes).names()) & {*fixed, *(start or {})}
@@ -117,7 +116,11 @@ def add(
             if stage.shapes(identity):
                 fit = stage(fitted, fitted, ~held, [*elsewhere, now])
             progress.advance(1)
-            stages.append(_stage(identity, fit, judged))
+            errors[identity] = fit.residual
+        glitches = far_off.alone(readings, fit, held)
+        judged = held & ~glitches if held.any() else np.ones(len(readings), bool)
+        stages = [Stage(name, *_rms(residual[judged])) for name, residual in errors.items()]
+        off = [sentence(text) for text in far_off.in_words(readings, fit, glitches)]
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
@@ -132,7 +135,7 @@ def add(
         fit,
         stages,
         _in_words(readings, held),
-        [*said, *_notices(robot, fit, ids), *varies],
+        [*said, *off, *_notices(robot, fit, ids), *varies],
     )
 
 
@@ -331,10 +334,6 @@ def _only(fit: identify.Fit, kept) -> identify.Fit:
     """Names, values and deviations of some parameters of a fit."""
     places = [i for i, name in enumerate(fit.names) if kept(name)]
     return replace(fit, names=[fit.names[i] for i in places], values=fit.values[places], sd=fit.sd[places])
-
-
-def _stage(name: str, fit: identify.Fit, rows: Mask) -> Stage:
-    return Stage(name, fit.rms_mm(rows), fit.rms_deg(rows))
 
 
 def _rms(residual: Array) -> tuple[float, float]:

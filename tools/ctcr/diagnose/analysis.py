@@ -13,12 +13,13 @@ from ctcr.diagnose import race as racing
 from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
 from ctcr.diagnose.candidates import Candidate, candidates
 from ctcr.diagnose.engine import FITS, Engine, values_of
-from ctcr.diagnose.far_off import far_off
+from ctcr.diagnose.far_off import alone, far_off, in_words
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import Verdict, judge
+from ctcr.fit import rms
 from ctcr.measurements import Measurements
 from ctcr.preparation import prepared
 from ctcr.robot import Robot
@@ -38,6 +39,7 @@ class Diagnosis:
     robot: Robot
     measurements: Measurements
     locked: NDArray[np.bool_]  # rows that no fit saw
+    glitches: NDArray[np.bool_]  # those of them that are off alone, and do not count
     unseen: dict[str, str]  # effects that these data cannot show, and why
     calibrated: identify.Fit  # without effects, for prediction
     with_effects: identify.Fit  # for prediction
@@ -72,26 +74,30 @@ class Diagnosis:
 
     @property
     def judged(self) -> NDArray[np.bool_]:
-        """Locked rows that hold a reading."""
-        return self.locked & identify.measured_rows(self.measurements)
+        """Locked rows that hold a reading, but for those that are off alone."""
+        return self.locked & ~self.glitches & identify.measured_rows(self.measurements)
 
     @property
     def rms_mm(self) -> dict[str, float]:
-        """Of the locked rows."""
+        """Of the rows judged."""
         return {
-            "nominal": self.calibrated.nominal_rms_mm(self.locked),
-            "calibrated": self.calibrated.rms_mm(self.locked),
-            "with_effects": self.with_effects.rms_mm(self.locked),
+            "nominal": self.calibrated.nominal_rms_mm(self.judged),
+            "calibrated": self.calibrated.rms_mm(self.judged),
+            "with_effects": self.with_effects.rms_mm(self.judged),
             "noise_floor": self.noise_floor_mm,
         }
 
     @property
     def expected_mm(self) -> float:
-        """RMS to be expected on the locked rows of a right model: noise, and what the parameters leave open.
+        """RMS to be expected on the rows judged, of a right model: noise, and what the parameters leave open.
 
         Far above the noise floor where these rows are unlike those that were fitted.
         """
-        return max(self.with_effects.floor_mm(self.locked), self.noise_floor_mm)
+        return max(self.with_effects.floor_mm(self.judged), self.noise_floor_mm)
+
+    def reached_mm(self, accepted: Accepted) -> float:
+        """RMS of the rows judged, once an accepted effect was in, with those accepted before."""
+        return 1e3 * rms(accepted.residual, self.judged)
 
     def rest(self) -> None:
         """Gives back the memory of what its fits can compute again."""
@@ -156,7 +162,7 @@ def diagnose(
             *notices,
             "taken to have been at rest at the first reading, not to have come from home: it fits better",
         ]
-    result.notices = notices
+    result.notices = [*result.notices, *notices]
     result.seconds = perf_counter() - began
     return result
 
@@ -243,17 +249,18 @@ def _diagnose(
     lags = [*told, unsteady.FOLLOWED] if told else []
     leftover = leftover_of(engine, calibrated, seen, lags)
     progress("prediction of other runs")
-    alone = after = predictive(engine, calibrated, {})
+    plain = after = predictive(engine, calibrated, {})
     if accepted:
         after = predictive(engine, fit, fixed)
         after = unsteady.followed(engine, after)[0] if lags else after
-    explained = other_runs.explained(engine, alone, after) if accepted else {}
+    explained = other_runs.explained(engine, plain, after) if accepted else {}
     varies = None
     if leftover.rejected and accepted and varying.may_outdo(engine, calibrated, after):
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated, leftover.sample)
     outdone = varies is not None and varies.outdoes(engine, calibrated, after)
-    verdict = judge(alone, after, accepted, leftover, locked, explained, outdone)
+    glitches = alone(engine.measurements, after, locked)
+    verdict = judge(plain, after, accepted, leftover, locked & ~glitches, explained, outdone)
     floor_noise = fit.noise
     # A smooth error explains many causes that are none of the field's: only for one that is found by itself.
     smooth = distorted.noise_of(engine, fit) if verdict.word == "identified" else None
@@ -268,9 +275,10 @@ def _diagnose(
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)
     return Diagnosis(
-        robot, engine.measurements, locked, unseen, alone, open_side.widened(after),
+        robot, engine.measurements, locked, glitches, unseen, plain, open_side.widened(after),
         unsteady.widened(engine, open_side.widened(fit)),
         identify.noise_floor(after, floor_noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
+        in_words(engine.measurements, after, glitches),
     )  # fmt: skip
 
 
@@ -311,7 +319,7 @@ def _grow(
         rejected = engine.rejects(fit)
         fit = _begun(engine, accepted, fit, progress)
         fit = with_shapes(engine, accepted, accepted[-1], fit, progress)
-        accepted[-1].rms_mm = fit.rms_mm(locked)
+        accepted[-1].residual = fit.residual[:, :3]
         if rejected and accepted[0].share < HARDLY:
             break  # no effect is stacked on one that hardly explains anything
     for a in accepted[:-1]:  # what the others hid of their forms shows now

@@ -38,6 +38,7 @@ class Candidate:
     id: str
     names: tuple[str, ...]
     shape: tuple[tuple[str, float], ...] = ()
+    price: float = 0.0  # log evidence that it costs to have picked such a value among many
 
     @property
     def told(self) -> str:
@@ -94,6 +95,15 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     free = [tuple(dict.fromkeys((*candidate.names, *names))) for names in more]
     unlike = list({frozenset(shape): shape for shape in shapes}.values())  # in whatever order it is told
     return [Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in unlike]
+
+
+def other_strengths(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
+    """The same of an effect that offers several laws, by strengths that are neither part of its own nor hold them."""
+    if not any(p.kind == "choice" for p in effect.parameters):
+        return []
+    strengths = [tuple(_names(effect, variant)) for variant in VARIANTS.get(effect.id, ())]
+    own = {name for names in strengths for name in names} & set(candidate.names)
+    return [Candidate(effect.id, names, candidate.shape) for names in strengths if own.isdisjoint(names)]
 
 
 def is_of_metal(name: str) -> bool:

@@ -24,7 +24,7 @@ def waterfall(figure, d: "Diagnosis") -> None:
     rms = d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
     for k, a in enumerate(d.accepted, start=1):
-        reached = rms["with_effects"] if k == len(d.accepted) else a.rms_mm
+        reached = rms["with_effects"] if k == len(d.accepted) else d.reached_mm(a)
         bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)

@@ -22,26 +22,30 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
     """
     measurements, best, gain = engine.measurements, None, 0.0
     part, last = recording.session_part(measurements), len(measurements)
+    fitted = np.flatnonzero(engine.fitted)  # rows that are not cannot tell
 
-    def jumped(row: int) -> NDArray:
-        return columns * (np.arange(last) >= row)[:, None, None]
+    def jumped(k: int) -> NDArray:
+        return columns * (np.arange(last) >= fitted[k])[:, None, None]
 
-    rows = np.flatnonzero(np.diff(measurements.run)) + 1
-    if len(rows) < 3:
-        rows = np.arange(1, last)
-    while len(rows):
-        rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST).astype(int))]
-        gains = [worth(jumped(row)) for row in rows]
+    places = np.flatnonzero(np.diff(measurements.run[fitted])) + 1  # among fitted rows
+    if len(places) < 3:
+        places = np.arange(1, len(fitted))
+    while len(places):
+        places = places[np.unique(np.linspace(0, len(places) - 1, MOST).astype(int))]
+        gains = [worth(jumped(place)) for place in places]
         if max(gains) <= gain:
             break
         k = int(np.argmax(gains))
-        best, gain = int(rows[k]), gains[k]
-        low, high = (rows[j] if 0 <= j < len(rows) else end for j, end in ((k - 1, 0), (k + 1, last)))
-        rows = np.setdiff1d(np.arange(low + 1, high), rows)
+        best, gain = int(places[k]), gains[k]
+        low, high = (
+            places[j] if 0 <= j < len(places) else end for j, end in ((k - 1, 0), (k + 1, len(fitted)))
+        )
+        places = np.setdiff1d(np.arange(low + 1, high), places)
     if best is None:
         return []
-    when = float(0.5 * (part[best - 1] + part[best]))
-    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),)), jumped(best))]
+    when = float(0.5 * (part[fitted[best - 1]] + part[fitted[best]]))
+    price = float(np.log(len(fitted) - 1))  # it could have been at any row but the first
+    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),), price), jumped(best))]
 
 
 def uncertain_rows(measurements: Measurements, fitted: NDArray[np.bool_], when: float) -> NDArray[np.bool_]:

@@ -42,7 +42,7 @@ class Entry:
 
     @property
     def linear(self) -> float:
-        return self.gain.log_evidence
+        return self.gain.log_evidence - self.candidate.price
 
     @property
     def score(self) -> float:
@@ -203,7 +203,7 @@ def race(
         return Round(before, [], {}, reason="no effect is left to try")
     worth = [entry for entry in screened if entry.linear > max(1.0, NEAR * screened[0].linear)]
     chosen: list[Entry] = []
-    for entry in worth:
+    for entry in _other_strengths_first(worth):
         same = [other for other in chosen if other.id == entry.id]
         if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
             chosen.append(entry)
@@ -222,6 +222,13 @@ def race(
         round_.accepted, round_.ids = None, []
     round_.shed()
     return round_
+
+
+def _other_strengths_first(entries: list[Entry]) -> list[Entry]:
+    """In their order, but forms of the same parameters of an effect last: once it is accepted, all forms are tried."""
+    seen: set[tuple[str, ...]] = set()
+    first = [e for e in entries if not (e.candidate.names in seen or seen.add(e.candidate.names))]
+    return [*first, *(entry for entry in entries if not any(entry is other for other in first))]
 
 
 def _stand_ins(engine: Engine, accepted: list[Entry]) -> set[str]:
@@ -355,7 +362,7 @@ def _refit(
     share = share_of(before, fit, len(candidate.names))
     return replace(
         entry,
-        refit=unsteady.evidence(engine, fit) - evidence,
+        refit=unsteady.evidence(engine, fit) - evidence - candidate.price,
         share=share,
         # A chi-square removed has a standard deviation of twice its root.
         spread=2 * np.sqrt(max(share, 0.0) / max(excess(before), 1.0)),

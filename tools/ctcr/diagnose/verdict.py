@@ -34,7 +34,7 @@ def judge(
     with_effects: identify.Fit,
     accepted: list[Accepted],
     leftover: Leftover,
-    locked: NDArray[np.bool_],
+    judged: NDArray[np.bool_],
     explained: dict[str, float],
     outdone: bool,
 ) -> Verdict:
@@ -43,7 +43,7 @@ def judge(
     that are not constant explain far more.
     """
     jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
-    before, after = (max(fit.rms_mm(locked) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
+    before, after = (max(fit.rms_mm(judged) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     if not accepted:
         if not leftover.structured:
             return Verdict(
