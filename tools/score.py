@@ -21,9 +21,12 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
-robot file and measurements alone. Thresholds were set on the tuning half. `jitter`: noise of single readings;
+robot file and measurements alone. %s `jitter`: noise of single readings;
 `realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which
 the unequal lags of single readings belong where a delay is hidden. Written by `tools/dev score --keep`."""
+TUNED = "Thresholds were set on the tuning half."
+UNSEEN = """Other seeds than those by which thresholds were set, scored once
+(`python tools/oracle/make_suite.py --shift K --out FOLDER`)."""
 VISIBLE = (
     30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 )
@@ -139,6 +142,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--seconds", type=int, default=300, help="longest time for one set")
     parser.add_argument("--keep", action="store_true", help="write the result to docs")
+    parser.add_argument("--unseen", action="store_true", help="say that nobody has looked at these seeds")
     options = parser.parse_args()
     if not (options.suite / "truth").is_dir():
         sys.exit(f"{options.suite} holds no suite: python tools/oracle/make_suite.py writes it")
@@ -162,8 +166,11 @@ def main() -> None:
     text = report(chosen, said, truths, groups)
     print(text)
     if options.keep:
-        title = f"Scores of `ctcr diagnose`: {len(chosen)} sets of the {options.half} half"
-        KEPT.write_text(f"# {title}\n\n{ABOUT}\n\n{text}\n", encoding="utf-8")
+        of = "unseen seeds" if options.unseen else f"the {options.half} half"
+        title = f"Scores of `ctcr diagnose`: {len(chosen)} sets of {of}"
+        about = ABOUT % (UNSEEN if options.unseen else TUNED)
+        target = KEPT.with_stem(f"{KEPT.stem}_unseen") if options.unseen else KEPT
+        target.write_text(f"# {title}\n\n{about}\n\n{text}\n", encoding="utf-8")
 
 
 def report(

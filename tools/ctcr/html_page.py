@@ -8,8 +8,8 @@ from typing import Any
 
 
 def short(value: float) -> str:
-    """An error as people say it: 1.36, 0.93, 0.19, 0.061."""
-    return f"{value:.3g}" if value >= 1 else f"{value:.2g}"
+    """An error as people say it: 1.36, 0.93, 0.10, 0.061."""
+    return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
 
 
 def page(

@@ -54,7 +54,7 @@ def with_shapes(
                 break  # it explains the readings: no other law can do more
         if min(np.max(there.inflation) for there, _, _ in ended) <= WRONG:
             break
-    fit_with, entry, freed = max(ended, key=lambda one: one[0].log_evidence)
+    fit_with, entry, freed = max(ended, key=lambda end: end[0].log_evidence)
     if fit_with is fit:
         return fit
     one.entry = replace(entry, fit=freed.without_readings())

@@ -232,7 +232,7 @@ def _diagnose(
         more = np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
         before = values_of(first)
-        first, settled = _grow(part, first, pool, accepted, rounds, locked, progress, more)
+        first, settled = _grow(part, first, pool, accepted, rounds, progress, more)
         start = values_of(first)
         engine.measurements = part.measurements
     calibrated = fit = racing.baseline(engine, [], before, progress)
@@ -240,7 +240,7 @@ def _diagnose(
         engine.robust = True
         fit = racing.baseline(engine, [a.entry for a in accepted], start, progress)
     if not settled:
-        fit, _ = _grow(engine, fit, pool, accepted, rounds, locked, progress)
+        fit, _ = _grow(engine, fit, pool, accepted, rounds, progress)
     if len(accepted) > 1:
         fit = _backward(engine, accepted, fit, progress)
     progress("what is left")
@@ -288,7 +288,6 @@ def _grow(
     pool: list[Candidate],
     accepted: list[Accepted],
     rounds: list[Round],
-    locked: NDArray[np.bool_],
     progress: Progress,
     more: float = 1.0,
 ) -> tuple[identify.Fit, bool]:

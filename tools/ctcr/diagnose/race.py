@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 SURE = 5.0  # log evidence beyond which candidates can surely be told apart
+CERTAIN = 200.0  # log evidence of a further effect that runs left out, by slopes alone, do not outweigh
 REFITS = 6  # effects that are refitted, the best by their slopes
 ITERATIONS = 5  # of a refit: kinks of an effect that is far behind need not be followed to the end
 CONTENDS = 0.5  # of the best gain: a candidate with more is followed to the end
@@ -217,7 +218,8 @@ def race(
     round_ = Round(before, entries, {})
     tried = len({c.id for c in candidates})
     decide(round_, tried, bool(accepted), engine.rejects(before), _stand_ins(engine, accepted))
-    if round_.accepted and accepted and not predicts_better(engine, before, round_.accepted.fit):
+    unsure = round_.accepted and accepted and round_.accepted.score < CERTAIN
+    if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"{round_.accepted.id} would not predict other runs better"
         round_.accepted, round_.ids = None, []
     round_.shed()
