@@ -165,3 +165,21 @@ def test_an_effect_whose_law_is_open_has_other_strengths():
 def test_what_was_picked_among_many_values_pays_for_it():
     gain = Gain(12.0, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, 1)))
     assert racing.Entry(Candidate("frame_jump", (MASS,), (), 5.0), gain).linear == 7.0
+
+
+@pytest.mark.parametrize(("offset", "accepted"), [(2e-3, True), (1.2e-4, False)])
+def test_a_prediction_by_slopes_does_not_outweigh_all_evidence(robot, plan, monkeypatch, offset, accepted):
+    hidden = {MASS: 0.01, "effects.sensor_offset.x": offset}
+    made = simulation.simulate(
+        effect_fit.with_values(robot, ["tip_load", "sensor_offset"], hidden), plan, "jitter", seed=5
+    )
+    engine = Engine(robot, made, identify.noise_of_readings(robot, made), np.ones(len(made), bool))
+    before = engine.fit([MASS])
+    first = racing.Entry(Candidate("tip_load", (MASS,)), Gain(0.0, *4 * [np.zeros(1)]), fit=before)
+    pool = [c for c in candidates(robot, made)[0] if c.id == "sensor_offset"]
+    monkeypatch.setattr(racing, "predicts_better", lambda *_: False)
+    monkeypatch.setattr(racing, "CERTAIN", 90.0)  # these are few rows
+    round_ = racing.race(engine, before, pool, [first], lambda _: None)
+    assert (round_.entries[0].score > racing.CERTAIN) == accepted and round_.entries[0].score > round_.needed
+    assert round_.ids == (["sensor_offset"] if accepted else [])
+    assert ("predict other runs" in round_.reason) != accepted
