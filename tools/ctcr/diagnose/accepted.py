@@ -36,12 +36,12 @@ def with_shapes(
 ) -> identify.Fit:
     """Frees what an accepted effect was not given in the race where that helps: its form may be another one.
 
-    Where all of them are hardly right, those of its other strengths are tried too.
+    Where all of them are hardly right, those of its other strengths are tried too, of the effect accepted last.
     """
     given = one.entry.candidate
     effect = effects.get(given.id, engine.robot.n_tubes)
-    ended = []
-    for strength in (given, *other_strengths(effect, given)):
+    others, ended = other_strengths(effect, given) if one is accepted[-1] else [], []
+    for strength in (given, *others):
         tried = [form for form in forms(effect, strength, one.aside) if form != given]
         freed = _freed(engine, accepted, one, fit, tried, progress)
         gain = max((there.log_evidence for _, there in freed), default=-np.inf) - fit.log_evidence
