@@ -146,3 +146,18 @@ def test_cpp_block(block, project):
     run(["cmake", "-G", "Ninja", "-B", "build"], project)  # without a build type: the shortest to compile
     run(["cmake", "--build", "build"], project)
     run([project / "build/reader"], project)
+
+
+def test_scores_told_are_those_kept():
+    """Of all noises together, as the page that the README names keeps them."""
+    page, told = (ROOT / "docs" / "diagnosis_scores_unseen.md").read_text(), (ROOT / "README.md").read_text()
+
+    def of(score):
+        counts = re.findall(rf"^\| {score} \| \w+ \| (\d+)/(\d+) =", page, re.MULTILINE)
+        assert counts
+        return [sum(int(count) for count in column) for column in zip(*counts, strict=True)]
+
+    right, sets = of("right class first")
+    assert f"right effect first in {right} of {sets}" in " ".join(told.split())
+    quiet, controls = of("controls: nothing named")
+    assert quiet == controls and f"none in {controls} that hide nothing" in " ".join(told.split())
