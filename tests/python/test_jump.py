@@ -1,6 +1,7 @@
 """The moment at which the tracker frame jumped is found to the row, whatever runs are locked."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -42,16 +43,21 @@ def test_a_frame_that_jumps_within_a_run_is_followed_to_the_row(robot, when):
     assert result.rms_mm["with_effects"] < 1.15 * result.rms_mm["noise_floor"]
 
 
-def test_the_moment_of_a_jump_is_found_whatever_rows_are_fitted(robot):
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_the_moment_of_a_jump_is_found_whatever_rows_are_fitted(robot, shuffled):
     """Rows that are not fitted cannot tell; the first stage looks at starts of runs alone."""
-    table = measured_session(robot)
+    table, random = measured_session(robot), np.random.default_rng(3)
+    if shuffled:
+        order = random.permutation(len(table))
+        names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+        table = replace(table, **{name: getattr(table, name)[order] for name in names})
     whole = Candidate("frame_jump", ("effects.frame_jump.x",))
-    columns, group = np.ones((len(table), 6, 1)), groups(table)
-    part, random = recording.session_part(table), np.random.default_rng(3)
+    columns, group, part = np.ones((len(table), 6, 1)), groups(table), recording.session_part(table)
+    np.testing.assert_allclose([part.min(), part.max()], [0, 1])
     for _ in range(60):
         fitted = ~np.isin(group, random.choice(np.unique(group)[1:-1], 3, replace=False))
-        at = random.choice(np.flatnonzero(fitted)[5:-5])
-        signal = (np.arange(len(table)) >= at) * fitted + 0.05 * random.standard_normal(len(table))
+        at = random.choice(np.sort(part[fitted])[5:-5])
+        signal = (part >= at) * fitted + 0.05 * random.standard_normal(len(table))
 
         def gain(slopes, fitted=fitted, signal=signal):
             a = np.column_stack([slopes[fitted, 0, 0], np.ones(fitted.sum())])
@@ -61,7 +67,7 @@ def test_the_moment_of_a_jump_is_found_whatever_rows_are_fitted(robot):
         engine = SimpleNamespace(measurements=table, fitted=fitted)
         [(found, slopes)] = jump.moment(engine, whole, columns, gain)
         when = dict(found.shape)[jump.WHEN]
-        np.testing.assert_array_equal(part[fitted] > when, np.flatnonzero(fitted) >= at)
+        np.testing.assert_array_equal(part[fitted] > when, part[fitted] >= at)
         np.testing.assert_array_equal(slopes[fitted, 0, 0], part[fitted] > when)
         assert found.price == pytest.approx(np.log(fitted.sum() - 1))
 

@@ -34,9 +34,9 @@ def values(robot: Robot) -> Array:
 
 
 def session_part(measurements: Measurements) -> Array:
-    """When each row was measured, from 0 (first) to 1 (last); by its number where times are missing."""
+    """When each row was measured, from 0 (first in time) to 1 (last); by its number where times are missing."""
     t = measurements.t if np.isfinite(measurements.t).all() else np.arange(len(measurements), dtype=float)
-    return (t - t[0]) / max(t[-1] - t[0], np.finfo(float).tiny)
+    return (t - t.min()) / max(np.ptp(t), np.finfo(float).tiny)
 
 
 def steps_for(

@@ -21,11 +21,11 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
     `columns` are the slopes of a frame displaced in all rows, `worth` says what slopes bring.
     """
     measurements, best, gain = engine.measurements, None, 0.0
-    part, last = recording.session_part(measurements), len(measurements)
-    fitted = np.flatnonzero(engine.fitted)  # rows that are not cannot tell
+    part, fitted = recording.session_part(measurements), np.flatnonzero(engine.fitted)  # others cannot tell
+    fitted = fitted[np.argsort(part[fitted], kind="stable")]  # rows need not be in the order of time
 
     def jumped(k: int) -> NDArray:
-        return columns * (np.arange(last) >= fitted[k])[:, None, None]
+        return columns * (part >= part[fitted[k]])[:, None, None]
 
     places = np.flatnonzero(np.diff(measurements.run[fitted])) + 1  # among fitted rows
     if len(places) < 3:
