@@ -24,6 +24,7 @@ from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import begin, likeliest, screen
 from ctcr.diagnose.split import locked_rows
 from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.fit import rms
 from ctcr.measurements import Measurements
 from ctcr.output import Progress
 from ctcr.preparation import prepared
@@ -119,7 +120,7 @@ def add(
             errors[identity] = fit.residual
         glitches = far_off.alone(readings, fit, held)
         judged = held & ~glitches if held.any() else np.ones(len(readings), bool)
-        stages = [Stage(name, *_rms(residual[judged])) for name, residual in errors.items()]
+        stages = [_stage(name, residual, judged) for name, residual in errors.items()]
         off = [sentence(text) for text in far_off.in_words(readings, fit, glitches)]
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
@@ -336,12 +337,8 @@ def _only(fit: identify.Fit, kept) -> identify.Fit:
     return replace(fit, names=[fit.names[i] for i in places], values=fit.values[places], sd=fit.sd[places])
 
 
-def _rms(residual: Array) -> tuple[float, float]:
-    parts = (residual[:, :3], residual[:, 3:])
-    sizes = [
-        np.sqrt(np.nanmean(np.sum(part**2, axis=1))) if np.isfinite(part).any() else np.nan for part in parts
-    ]
-    return 1e3 * float(sizes[0]), float(np.degrees(sizes[1]))
+def _stage(name: str, residual: Array, rows: Mask) -> Stage:
+    return Stage(name, 1e3 * rms(residual[:, :3], rows), float(np.degrees(rms(residual[:, 3:], rows))))
 
 
 def _notices(robot: Robot, fit: identify.Fit, ids: Sequence[str]) -> list[str]:

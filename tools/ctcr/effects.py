@@ -64,6 +64,11 @@ class Effect:
         """Shapes and details: what is fitted once the strengths are."""
         return [name for p in self.parameters if p.kind in ("detail", "shape") for name in p.full_names]
 
+    @property
+    def choices(self) -> list[str]:
+        """Which of several laws: none where it has one."""
+        return [name for p in self.parameters if p.kind == "choice" for name in p.full_names]
+
 
 @cache
 def catalogue(n_tubes: int) -> dict[str, Effect]:

@@ -14,6 +14,7 @@ inline constexpr EffectInfo info{
     .look_alikes = "sensor_offset softening field_distortion",
     .reference = "Gilbert & Webster 2016 (shape setting)",
 };
+
 /// The weight of a Legendre polynomial.
 consteval EffectParameter weight(std::string_view name, double sigma, std::string_view meaning,
                                  Role role = Role::amplitude) {

@@ -78,15 +78,14 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     """What an accepted candidate may become: under each law that the effect offers, its shape free, with the strengths
     by which it entered the race or with all that it may enter by. A piece of metal is among these where the race left
     its place, full names, `aside`."""
-    laws = {name for p in effect.parameters if p.kind == "choice" for name in p.full_names}
+    laws = set(effect.choices)
     rest = {name: value for name, value in candidate.shape if name not in laws}
     shapes = [candidate.shape]
     for form in ({}, *FORMS.get(effect.id, ())):
         full = {f"effects.{effect.id}.{name}": value for name, value in form.items()}
         law = full if laws & set(full) else {}  # with the shape from which it begins
         shapes.append(tuple((rest | law).items()))
-    strengths = [_names(effect, variant) for variant in VARIANTS.get(effect.id, ())]
-    wider = [name for names in strengths if set(candidate.names) <= set(names) for name in names]
+    wider = [name for names in _strengths(effect) if set(candidate.names) <= set(names) for name in names]
     has_metal = any(is_of_metal(name) for name in (*candidate.names, *aside))
     details = [name for name in effect.shapes if has_metal or not is_of_metal(name)]
     more = [details, [*wider, *details]]
@@ -99,9 +98,7 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
 
 def other_strengths(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
     """The same of an effect that offers several laws, by strengths that are neither part of its own nor hold them."""
-    if not any(p.kind == "choice" for p in effect.parameters):
-        return []
-    strengths = [tuple(_names(effect, variant)) for variant in VARIANTS.get(effect.id, ())]
+    strengths = _strengths(effect) if effect.choices else []
     own = {name for names in strengths for name in names} & set(candidate.names)
     return [Candidate(effect.id, names, candidate.shape) for names in strengths if own.isdisjoint(names)]
 
@@ -109,6 +106,11 @@ def other_strengths(effect: effects.Effect, candidate: Candidate) -> list[Candid
 def is_of_metal(name: str) -> bool:
     """Whether a parameter, by full name, is one of a piece of metal."""
     return name.startswith("effects.field_distortion.") and name.split(".")[2] in METAL
+
+
+def _strengths(effect: effects.Effect) -> list[tuple[str, ...]]:
+    """By which it may enter the race, where it has several."""
+    return [tuple(_names(effect, variant)) for variant in VARIANTS.get(effect.id, ())]
 
 
 def _names(effect: effects.Effect, variant: tuple[str, ...] | None) -> Sequence[str]:

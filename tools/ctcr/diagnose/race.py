@@ -228,15 +228,14 @@ def race(
 
 def _other_strengths_first(entries: list[Entry]) -> list[Entry]:
     """In their order, but forms of the same parameters of an effect last: once it is accepted, all forms are tried."""
-    seen: set[tuple[str, ...]] = set()
-    first = [e for e in entries if not (e.candidate.names in seen or seen.add(e.candidate.names))]
-    return [*first, *(entry for entry in entries if not any(entry is other for other in first))]
+    first = {entry.candidate.names: entry for entry in reversed(entries)}
+    return sorted(entries, key=lambda entry: first[entry.candidate.names] is not entry)
 
 
 def _stand_ins(engine: Engine, accepted: list[Entry]) -> set[str]:
     """Look-alikes of accepted effects whose law is not known: it may be none of those that are offered."""
     known = (effects.get(entry.id, engine.robot.n_tubes) for entry in accepted)
-    unsure = (effect for effect in known if any(p.kind == "choice" for p in effect.parameters))
+    unsure = (effect for effect in known if effect.choices)
     return {identity for effect in unsure for identity in effect.look_alikes}
 
 
