@@ -1,8 +1,8 @@
 // Calibration from your own program: where the tracker sees the robot, and at which angle a motor holds its tube.
 #include <cmath>
 #include <cstdio>
-#include <ctcr/calibration/registration.hpp>
-#include <ctcr/calibration/rotation_offset.hpp>
+#include <ctcr/calibration/procedures/registration.hpp>
+#include <ctcr/calibration/procedures/rotation_offset.hpp>
 #include <ctcr/ctcr.hpp>
 #include <numbers>
 #include <random>

@@ -22,7 +22,7 @@ LAYERS = {
 }
 # Devices know the robot, not how it is solved: they see the layers below this one, and themselves.
 HIGHEST_SEEN = {"actuation": 2, "sensing": 2}
-INCLUDE = re.compile(r'\s*#\s*include\s*[<"](?:\.\./)*(?:ctcr/)?(\w+)/\w+\.hpp[>"]')
+INCLUDE = re.compile(r'\s*#\s*include\s*[<"](?:\.\./)*(?:ctcr/)?(\w+)/(?:\w+/)*\w+\.hpp[>"]')
 
 
 def may_include(own: str, other: str) -> bool:
@@ -33,8 +33,8 @@ def problems(include: Path) -> list[str]:
     """What is wrong under the folder `include`, as `file:line: sentence`."""
     found = []
     for header in sorted((include / "ctcr").rglob("*.hpp")):
-        own = header.parent.name
-        if own == "ctcr":
+        own, *rest = header.relative_to(include / "ctcr").parts
+        if not rest:
             continue
         if own not in LAYERS:
             found.append(f"{header}:1: folder '{own}' is not a layer")

@@ -1,4 +1,4 @@
-#include "ctcr/calibration/cantilever.hpp"
+#include "ctcr/calibration/procedures/cantilever.hpp"
 
 #include <gtest/gtest.h>
 

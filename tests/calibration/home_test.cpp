@@ -1,4 +1,4 @@
-#include "ctcr/calibration/home.hpp"
+#include "ctcr/calibration/procedures/home.hpp"
 
 #include <gtest/gtest.h>
 

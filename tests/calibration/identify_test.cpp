@@ -1,9 +1,9 @@
-#include "ctcr/calibration/identify.hpp"
+#include "ctcr/calibration/identification/identify.hpp"
 
 #include <gtest/gtest.h>
 
 #include "calibration/toy.hpp"
-#include "ctcr/calibration/row_report.hpp"
+#include "ctcr/calibration/identification/row_report.hpp"
 
 namespace identify_test {
 

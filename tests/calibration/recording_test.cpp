@@ -1,10 +1,10 @@
-#include "ctcr/calibration/recording.hpp"
+#include "ctcr/calibration/identification/recording.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "ctcr/calibration/identify_readings.hpp"
+#include "ctcr/calibration/identification/identify_with_exclusions.hpp"
 #include "support/catalogue_cases.hpp"
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
@@ -227,7 +227,7 @@ TEST(IdentifyReadings, FindsTheRobotThatWasMeasured) {
     Recording<2> readings(nominal, table.rows, table.measured, free.index, pool);
     std::vector<int> excluded;
     const Identification fit =
-        identify_readings(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
+        identify_with_exclusions(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
     ASSERT_TRUE(fit.converged) << fit.status;
     EXPECT_TRUE(excluded.empty());
     // The truth was drawn from 0.7 of the prior, so it lies a little nearer than the posterior allows.
@@ -260,7 +260,7 @@ TEST(IdentifyReadings, NamesTheGaugesOfARobot) {
   for (int i = 0; i < 3; ++i) yaw[at(Parameter::tracker_rotation, i)] = -axis[i];
   options.known.push_back({"yaw", yaw});
   std::vector<int> excluded;
-  const Identification fit = identify_readings(readings, free.parameters, noise, places(table), options, excluded);
+  const Identification fit = identify_with_exclusions(readings, free.parameters, noise, places(table), options, excluded);
   ASSERT_FALSE(fit.directions.empty());
   EXPECT_EQ(fit.directions[0].text.substr(0, 4), "yaw ");
   EXPECT_NEAR(fit.directions[0].ratio, 1, 1e-3);
@@ -282,7 +282,7 @@ TEST(IdentifyReadings, LeavesOutRowsThatStandInTheWay) {
   Recording<2> readings(nominal, table.rows, table.measured, homes, pool);
   const Free free = free_parameters(readings.nominal(), homes);
   std::vector<int> excluded;
-  const Identification fit = identify_readings(readings, free.parameters, noise, places(table), {}, excluded);
+  const Identification fit = identify_with_exclusions(readings, free.parameters, noise, places(table), {}, excluded);
   EXPECT_TRUE(fit.converged) << fit.status;
   EXPECT_EQ(excluded, (std::vector<int>{7, 9}));
   EXPECT_NEAR(fit.values[1] - readings.nominal()[1], 1e-3, 4 * fit.sd[1]);
@@ -313,7 +313,7 @@ TEST(IdentifyReadings, RowsInTheWayOneBehindTheOtherDoNotHoldItUp) {
   const Free free = free_parameters(readings.nominal(), homes);
   std::vector<int> excluded;
   const Identification fit =
-      identify_readings(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
+      identify_with_exclusions(readings, free.parameters, noise, places(table), {.starts = 1}, excluded);
   EXPECT_TRUE(fit.converged) << fit.status;
   EXPECT_EQ(excluded, blocking);
   EXPECT_NEAR(fit.values[1] - readings.nominal()[1], 1e-3, 4 * fit.sd[1]);

@@ -1,4 +1,4 @@
-#include "ctcr/calibration/registration.hpp"
+#include "ctcr/calibration/procedures/registration.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "ctcr/calibration/rotation_offset.hpp"
+#include "ctcr/calibration/procedures/rotation_offset.hpp"
 
 #include <gtest/gtest.h>
 

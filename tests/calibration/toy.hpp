@@ -1,6 +1,6 @@
 #pragma once
 // A table of readings that depend on its parameters in a known way, for tests of identification.
-#include "ctcr/calibration/identify.hpp"
+#include "ctcr/calibration/identification/identify.hpp"
 #include "support/random_robots.hpp"
 
 namespace ctcr::test {

@@ -1,4 +1,4 @@
-#include "ctcr/calibration/tube_shape.hpp"
+#include "ctcr/calibration/procedures/tube_shape.hpp"
 
 #include <gtest/gtest.h>
 

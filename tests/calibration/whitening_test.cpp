@@ -1,8 +1,8 @@
-#include "ctcr/calibration/whitening.hpp"
+#include "ctcr/calibration/identification/whitening.hpp"
 
 #include <gtest/gtest.h>
 
-#include "ctcr/calibration/outliers.hpp"
+#include "ctcr/calibration/identification/outliers.hpp"
 #include "support/random_robots.hpp"
 
 namespace whitening_test {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "ctcr/calibration/recording.hpp"
+#include "ctcr/calibration/identification/recording.hpp"
 #include "support/walk.hpp"
 
 namespace ctcr {

@@ -1,6 +1,6 @@
 // Four points seen from a displaced tracker, registered through the installed headers.
 #include <cstdio>
-#include <ctcr/calibration/registration.hpp>
+#include <ctcr/calibration/procedures/registration.hpp>
 
 int main() {
   const ctcr::Vec3 displacement(0.3, -0.1, 0.2);

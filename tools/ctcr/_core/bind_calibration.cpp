@@ -7,11 +7,11 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
-#include <ctcr/calibration/cantilever.hpp>
-#include <ctcr/calibration/home.hpp>
-#include <ctcr/calibration/registration.hpp>
-#include <ctcr/calibration/rotation_offset.hpp>
-#include <ctcr/calibration/tube_shape.hpp>
+#include <ctcr/calibration/procedures/cantilever.hpp>
+#include <ctcr/calibration/procedures/home.hpp>
+#include <ctcr/calibration/procedures/registration.hpp>
+#include <ctcr/calibration/procedures/rotation_offset.hpp>
+#include <ctcr/calibration/procedures/tube_shape.hpp>
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -7,8 +7,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include <ctcr/calibration/identify_readings.hpp>
-#include <ctcr/calibration/row_report.hpp>
+#include <ctcr/calibration/identification/identify_with_exclusions.hpp>
+#include <ctcr/calibration/identification/row_report.hpp>
 #include <tuple>
 
 #include "any_recording.hpp"
@@ -73,7 +73,7 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
   if (nb::isinstance<BoundRecording>(predict)) {
     AnyRecording& recording = **nb::cast<BoundRecording*>(predict);
     const nb::gil_scoped_release released;
-    return identify_readings(recording, parameters, noise, places, options, excluded);
+    return identify_with_exclusions(recording, parameters, noise, places, options, excluded);
   }
   return identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, places, options);
 }

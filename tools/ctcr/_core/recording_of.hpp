@@ -1,7 +1,7 @@
 #pragma once
 // Recordings of a robot of N tubes behind AnyRecording. Each N is compiled in a file of its own.
 #include <algorithm>
-#include <ctcr/calibration/recording.hpp>
+#include <ctcr/calibration/identification/recording.hpp>
 #include <stdexcept>
 
 #include "all_effects.hpp"

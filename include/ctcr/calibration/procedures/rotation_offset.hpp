@@ -3,8 +3,8 @@
 #include <numbers>
 #include <span>
 
-#include "ctcr/calibration/circle_solution.hpp"
-#include "ctcr/calibration/significance.hpp"
+#include "ctcr/calibration/procedures/circle_solution.hpp"
+#include "ctcr/calibration/procedures/significance.hpp"
 #include "ctcr/math/functions.hpp"
 #include "ctcr/math/se3.hpp"
 

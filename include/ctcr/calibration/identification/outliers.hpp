@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ctcr/calibration/whitening.hpp"
+#include "ctcr/calibration/identification/whitening.hpp"
 
 namespace ctcr {
 

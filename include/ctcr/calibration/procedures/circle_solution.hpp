@@ -3,9 +3,9 @@
 #include <limits>
 #include <numbers>
 
-#include "ctcr/calibration/circle_fit.hpp"
-#include "ctcr/calibration/notice.hpp"
-#include "ctcr/calibration/propagation.hpp"
+#include "ctcr/calibration/procedures/circle_fit.hpp"
+#include "ctcr/calibration/procedures/notice.hpp"
+#include "ctcr/calibration/procedures/propagation.hpp"
 
 namespace ctcr {
 

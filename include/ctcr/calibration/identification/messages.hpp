@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ctcr/calibration/identification.hpp"
+#include "ctcr/calibration/identification/identification.hpp"
 
 namespace ctcr {
 namespace detail {

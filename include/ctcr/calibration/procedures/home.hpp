@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ctcr/calibration/notice.hpp"
+#include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/core/types.hpp"
 
 namespace ctcr {

@@ -1,7 +1,7 @@
 #pragma once
 // From a starting point down to the nearest minimum of minus the log of a posterior.
-#include "ctcr/calibration/bounds.hpp"
-#include "ctcr/calibration/identification.hpp"
+#include "ctcr/calibration/identification/bounds.hpp"
+#include "ctcr/calibration/identification/identification.hpp"
 
 namespace ctcr {
 namespace detail {

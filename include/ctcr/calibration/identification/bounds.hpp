@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "ctcr/calibration/posterior.hpp"
+#include "ctcr/calibration/identification/posterior.hpp"
 
 namespace ctcr {
 

@@ -3,8 +3,8 @@
 #include <functional>
 #include <optional>
 
-#include "ctcr/calibration/bounds.hpp"
-#include "ctcr/calibration/whitening.hpp"
+#include "ctcr/calibration/identification/bounds.hpp"
+#include "ctcr/calibration/identification/whitening.hpp"
 
 namespace ctcr {
 /// Residuals (6 rows) at parameters x: measured - predicted position [m] and rotation vector [rad] of each row,

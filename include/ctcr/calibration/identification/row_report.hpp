@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ctcr/calibration/identification.hpp"
+#include "ctcr/calibration/identification/identification.hpp"
 
 namespace ctcr {
 /// What a fit says of every row that its predictor answers, rows that were not fitted included.

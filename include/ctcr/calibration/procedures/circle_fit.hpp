@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "ctcr/calibration/ceres_problem.hpp"
+#include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/dense.hpp"
 #include "ctcr/core/types.hpp"
 

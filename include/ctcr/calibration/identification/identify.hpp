@@ -4,9 +4,9 @@
 #include <numbers>
 #include <random>
 
-#include "ctcr/calibration/descent.hpp"
-#include "ctcr/calibration/identification_words.hpp"
-#include "ctcr/calibration/outliers.hpp"
+#include "ctcr/calibration/identification/descent.hpp"
+#include "ctcr/calibration/identification/messages.hpp"
+#include "ctcr/calibration/identification/outliers.hpp"
 
 namespace ctcr {
 namespace detail {

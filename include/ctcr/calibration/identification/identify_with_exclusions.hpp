@@ -4,7 +4,7 @@
 #include <iterator>
 #include <vector>
 
-#include "ctcr/calibration/identify.hpp"
+#include "ctcr/calibration/identification/identify.hpp"
 
 namespace ctcr {
 
@@ -16,7 +16,7 @@ namespace ctcr {
 /// @param excluded  receives the rows left out
 /// @return and throws as identify(); on return the table's active rows are those that were fitted
 template <class Table>
-Identification identify_readings(Table& table, const std::vector<FreeParameter>& parameters, const Noise& noise,
+Identification identify_with_exclusions(Table& table, const std::vector<FreeParameter>& parameters, const Noise& noise,
                                  const Eigen::MatrixX3d& places, IdentifyOptions options, std::vector<int>& excluded) {
   constexpr int rounds = 4;
   const auto exclude = [&](const std::vector<int>& rows) {

@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "ctcr/calibration/elastica.hpp"
-#include "ctcr/calibration/notice.hpp"
-#include "ctcr/calibration/propagation.hpp"
-#include "ctcr/calibration/significance.hpp"
+#include "ctcr/calibration/procedures/elastica.hpp"
+#include "ctcr/calibration/procedures/notice.hpp"
+#include "ctcr/calibration/procedures/propagation.hpp"
+#include "ctcr/calibration/procedures/significance.hpp"
 #include "ctcr/robot/tube.hpp"
 
 namespace ctcr {

@@ -9,10 +9,10 @@
 #include <limits>
 #include <span>
 
-#include "ctcr/calibration/ceres_problem.hpp"
-#include "ctcr/calibration/notice.hpp"
-#include "ctcr/calibration/propagation.hpp"
-#include "ctcr/calibration/significance.hpp"
+#include "ctcr/calibration/procedures/ceres_problem.hpp"
+#include "ctcr/calibration/procedures/notice.hpp"
+#include "ctcr/calibration/procedures/propagation.hpp"
+#include "ctcr/calibration/procedures/significance.hpp"
 
 namespace ctcr {
 
