@@ -39,9 +39,7 @@ def main() -> int:
     try:
         compiler = run([str(arguments.driver), "--about"]).strip()
         counts = {case: per_step(arguments.driver, case) for case in CASES}
-        rivals = {
-            case: per_step(arguments.driver, rival) for case, rival in RIVALS.items() if arguments.rival
-        }
+        rivals = {case: per_step(arguments.driver, rival) for case, rival in RIVALS.items() if arguments.rival}
     except (OSError, RuntimeError) as error:
         print(f"count_instructions: {error}", file=sys.stderr)
         return 1
@@ -54,18 +52,14 @@ def main() -> int:
     recorded = baseline["instructions_per_step"] if comparable else {}
     print_table(counts, recorded, rivals)
     if not comparable:
-        print(
-            f"not compared: recorded with {baseline.get('compiler')}, this is {compiler}; --update records it"
-        )
+        print(f"not compared: recorded with {baseline.get('compiler')}, this is {compiler}; --update records it")
         return 0
     wrong = []
     for case, count in counts.items():
         if case not in recorded:
             wrong.append(f"{case}: {count} instructions, none recorded: --update records them")
         elif count > (1 + GROWTH) * recorded[case]:
-            wrong.append(
-                f"{case}: {count} instructions, {recorded[case]} recorded, grew by over {GROWTH:.0%}"
-            )
+            wrong.append(f"{case}: {count} instructions, {recorded[case]} recorded, grew by over {GROWTH:.0%}")
     print(*wrong, sep="\n")
     return 1 if wrong else 0
 

@@ -24,36 +24,44 @@ LONG = [("diagnose", 20_000)]
 
 def session(kind: str, rows: int):
     """The robot as described, and the readings of the true one."""
-    from ctcr import effect_fit, free_parameters, identify, measurements, robot_file, simulation
+    from ctcr.diagnose import add
+    from ctcr.model import parameters, simulation
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
 
     rng = np.random.default_rng(1)
     robot = robot_file.load(EXAMPLES / "robots" / "table2.yaml")
-    names = identify.expand("standard", robot)
-    mean, sd, *_ = free_parameters.priors(robot, names)
-    true = free_parameters.applied(robot, names, mean + 0.7 * sd * rng.standard_normal(len(names)))
+    names = parameters.expand("standard", robot)
+    mean, sd, *_ = parameters.priors(robot, names)
+    true = parameters.applied(robot, names, mean + 0.7 * sd * rng.standard_normal(len(names)))
     plan = measurements.load(EXAMPLES / "data" / "plan.csv", robot.n_tubes)
     stream = "stream" in kind
     if stream:
-        true = effect_fit.with_values(true, ["delay"], {"effects.delay.delay": 0.06})
+        true = add.with_values(true, ["delay"], {"effects.delay.delay": 0.06})
     runs = [np.flatnonzero(plan.run == run) for run in np.unique(plan.run)]
     made: list[dict] = []
     while sum(len(run["t"]) for run in made) < rows:
         chosen = runs[rng.integers(len(runs))]
         at = np.linspace(0, len(chosen) - 1, 8 * len(chosen)) if stream else np.arange(len(chosen))
         joints = {
-            name: np.column_stack([
-                np.interp(at, np.arange(len(chosen)), column)
-                for column in (getattr(plan, name)[chosen] + rng.uniform(-reach, reach, robot.n_tubes)).T
-            ])
+            name: np.column_stack(
+                [
+                    np.interp(at, np.arange(len(chosen)), column)
+                    for column in (getattr(plan, name)[chosen] + rng.uniform(-reach, reach, robot.n_tubes)).T
+                ]
+            )
             for name, reach in (("beta", 2e-3), ("alpha", np.pi))
-        }  # fmt: skip
+        }
         start = made[-1]["t"][-1] + 10 if made else 0.0
         step = 0.125 if stream else 2.0
         made.append(
             joints
-            | {"t": start + step * np.arange(len(at)), "run": np.full(len(at), len(made)),
-               "force": np.repeat(plan.force[chosen[:1]], len(at), axis=0)}
-        )  # fmt: skip
+            | {
+                "t": start + step * np.arange(len(at)),
+                "run": np.full(len(at), len(made)),
+                "force": np.repeat(plan.force[chosen[:1]], len(at), axis=0),
+            }
+        )
     columns = {name: np.concatenate([run[name] for run in made])[:rows] for name in made[0]}
     table = replace(plan, **columns, position=None, quaternion=None, row=np.arange(rows) + 2)
     return robot, simulation.simulate(true, table, "jitter", steps=2)
@@ -61,13 +69,13 @@ def session(kind: str, rows: int):
 
 def measured(kind: str, rows: int) -> dict:
     """Seconds and megabytes of one case, the making of the readings not counted as time."""
-    from ctcr import identify
     from ctcr.diagnose.analysis import diagnose
+    from ctcr.fit import joint
 
     robot, readings = session(kind, rows)
     began = perf_counter()
     if kind == "fit":
-        fit = identify.fit(robot, readings)
+        fit = joint.fit(robot, readings)
         said = f"{len(fit.names)} parameters, {fit.status}, chi-square {fit.reduced_chi_square:.3f}"
     else:
         result = diagnose(robot, readings)

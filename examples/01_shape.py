@@ -22,8 +22,6 @@ print("tip quaternion    " + "".join(f"{component:8.4f}" for component in tip.qu
 # The centreline at uniform places and every breakpoint, and how strongly it is bent there.
 shape = model.shape(beta, alpha, weight, points=5)
 print("\n s [mm]    x [mm]    y [mm]    z [mm]  curvature of tube 1 [1/m]")
-for s, (x, y, z), curvature in zip(
-    shape.arc_length, 1e3 * shape.position, shape.tube_curvature[0], strict=True
-):
+for s, (x, y, z), curvature in zip(shape.arc_length, 1e3 * shape.position, shape.tube_curvature[0], strict=True):
     bending = (curvature[0] ** 2 + curvature[1] ** 2) ** 0.5
     print(f"{1e3 * s:7.1f} {x:9.2f} {y:9.2f} {z:9.2f} {bending:10.2f}")

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from ctcr import robot_file
+from ctcr.robot import robot_file
 from ctcr.track import scenario
 from ctcr.track.runs import run_once, system_values
 

@@ -16,9 +16,7 @@ class RotationPickup(Effect):
     measure = "Push one tube in small steps without turning any."
     look_alikes = ("delay",)
     parameters = [
-        Parameter(
-            "gain", unit="rad/m", sigma=1.0, bounds=(-5, 5), per_tube=True, meaning="turn per insertion"
-        ),
+        Parameter("gain", unit="rad/m", sigma=1.0, bounds=(-5, 5), per_tube=True, meaning="turn per insertion")
     ]
 
     def joints(self, rows, values):
@@ -27,16 +25,19 @@ class RotationPickup(Effect):
 
 
 def main() -> None:
-    from ctcr import effect_fit, measurements, robot_file, simulation
+    from ctcr.diagnose import add
+    from ctcr.model import simulation
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
 
     examples = Path(__file__).parent
     load(__file__)
     robot = robot_file.load(examples / "robots" / "table2.yaml")
     plan = measurements.load(examples / "data" / "plan.csv", robot.n_tubes)
 
-    truth = effect_fit.with_values(robot, ["rotation_pickup"], {"effects.rotation_pickup.gain.1": 2.0})
+    truth = add.with_values(robot, ["rotation_pickup"], {"effects.rotation_pickup.gain.1": 2.0})
     readings = simulation.simulate(truth, plan, noise="jitter", seed=5)
-    added = effect_fit.add(robot, readings, ["rotation_pickup"])
+    added = add.add(robot, readings, ["rotation_pickup"])
     for stage in added.stages:
         print(f"{stage.name:16} {stage.rms_mm:.3f} mm RMS on runs that the fit has not seen")
     for name, found in added.parameters().items():

@@ -84,9 +84,7 @@ def summary(pairs: list[tuple[Times, Times]]) -> list[str]:
         low, middle, high = statistics.quantiles([new / old for old, new in both], method="inclusive")
         verdict = "faster" if high < 1 else "slower" if low > 1 else ""
         old_ns, new_ns = (statistics.median(column) for column in zip(*both, strict=True))
-        lines.append(
-            f"{name:44} {old_ns:12.1f} {new_ns:12.1f}  {middle:6.3f}  [{low:.3f}, {high:.3f}]  {verdict}"
-        )
+        lines.append(f"{name:44} {old_ns:12.1f} {new_ns:12.1f}  {middle:6.3f}  [{low:.3f}, {high:.3f}]  {verdict}")
     return lines
 
 

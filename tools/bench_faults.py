@@ -20,10 +20,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from ctcr import robot_file
-from ctcr.devices import emergency_stop
-from ctcr.simulators import aurora, ethercat
-from ctcr.simulators.control import request
+from ctcr.bench.devices import emergency_stop
+from ctcr.bench.simulators import aurora, ethercat
+from ctcr.bench.simulators.control import request
+from ctcr.robot import robot_file
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "bench_faults.md"
@@ -80,14 +80,16 @@ class Wires:
 
     def start(self, command: list[str]) -> subprocess.Popen:
         return subprocess.Popen(
-            command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            command,
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
 
     def run(self, *arguments: object) -> None:
-        subprocess.run(
-            self.command(*arguments), cwd=self.folder, check=True, capture_output=True, timeout=120
-        )
+        subprocess.run(self.command(*arguments), cwd=self.folder, check=True, capture_output=True, timeout=120)
 
     def set(self, device: str, **faults: object) -> dict:
         return request(self.wires, device, {"faults": faults})
@@ -172,7 +174,7 @@ FAULTS = [
     Fault("5 % of the bus frames lost, 5 % late", on("ethercat", lost_frames=0.05, late_frames=0.05), True, ""),
     Fault("emergency stop during a move", lambda wires, _: wires.run("stop"), False, "ctcr stop was called"),
     Fault("disk full", fill_disk, False, "no space left on device", readings=3),
-]  # fmt: skip
+]
 
 
 @dataclass(frozen=True)
@@ -194,15 +196,11 @@ def strike(wires: Wires, fault: Fault) -> Outcome:
     if on_own_disk:  # a small file system of the recorder's own; what was written is copied out in the end
         disk = target.with_suffix(".disk")
         disk.mkdir()
-        script = (
-            f'mount -t tmpfs -o size={DISK} tmpfs "$0" && "$@"; code=$?; cp -r "$0" "{target}"; exit $code'
-        )
+        script = f'mount -t tmpfs -o size={DISK} tmpfs "$0" && "$@"; code=$?; cp -r "$0" "{target}"; exit $code'
         command = ["unshare", "-m", "sh", "-c", script, disk, *wires.recorder(str(disk), fault.readings)]
     table = target / "measurements.csv"
     process = wires.start(command)
-    seen = wait_for_rows(
-        process, Path(f"/proc/{process.pid}/root{disk}/measurements.csv") if on_own_disk else table
-    )
+    seen = wait_for_rows(process, Path(f"/proc/{process.pid}/root{disk}/measurements.csv") if on_own_disk else table)
     fault.strike(wires, process)
     if fault.lasts is not None:
         time.sleep(fault.lasts)
@@ -226,9 +224,14 @@ def strike(wires: Wires, fault: Fault) -> Outcome:
         wrong.append(f"it cannot go on: {error.strip()}")
     lost = 0 if final.startswith(kept) and kept.startswith(seen) else rows_of(seen)
     return Outcome(
-        fault.name, "went on by itself" if went_on else "stopped; the same command went on", message,
-        rows_of(seen), rows_of(kept), lost + wires.rows * fault.readings - rows_of(final), "; ".join(wrong),
-    )  # fmt: skip
+        fault.name,
+        "went on by itself" if went_on else "stopped; the same command went on",
+        message,
+        rows_of(seen),
+        rows_of(kept),
+        lost + wires.rows * fault.readings - rows_of(final),
+        "; ".join(wrong),
+    )
 
 
 def wait_for_rows(process: subprocess.Popen, table: Path, rows: int = STRUCK_AFTER) -> bytes:
@@ -289,9 +292,14 @@ def kill(wires: Wires, times: int) -> Outcome:
     wrong = ["the motors moved on"] * (not still) + [error] * bool(again.returncode)
     lost += 0 if final.startswith(kept) else before
     return Outcome(
-        f"recorder killed {times} times (SIGKILL)", "motors stopped; the same command went on", "none: it is dead",
-        before, before, lost + wires.rows - rows_of(final), "; ".join(wrong),
-    )  # fmt: skip
+        f"recorder killed {times} times (SIGKILL)",
+        "motors stopped; the same command went on",
+        "none: it is dead",
+        before,
+        before,
+        lost + wires.rows - rows_of(final),
+        "; ".join(wrong),
+    )
 
 
 HEAD = """# Faults on the bench
@@ -312,8 +320,7 @@ def written(outcomes: list[Outcome], folder: Path) -> str:
         return text.replace(str(folder) + "/", "").replace("|", "/")
 
     return HEAD + "".join(
-        f"| {o.fault} | {o.ended} | {cell(o.message)} | {o.before} | {o.after} | {o.lost} |\n"
-        for o in outcomes
+        f"| {o.fault} | {o.ended} | {cell(o.message)} | {o.before} | {o.after} | {o.lost} |\n" for o in outcomes
     )
 
 
@@ -347,10 +354,28 @@ def main() -> int:
         folder = Path(name)
         near_the_plate(folder / "robot.yaml", folder / "bench.yaml")
         command = [
-            sys.executable, "-m", "ctcr", "sim", "bench", folder / "robot.yaml", "--noise", "none",
-            "--folder", folder / "wires", "--", sys.executable, __file__, "--beside", folder,
-            "-o", given.output.resolve(), "--only", given.only, "--kills", str(given.kills),
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "ctcr",
+            "sim",
+            "bench",
+            folder / "robot.yaml",
+            "--noise",
+            "none",
+            "--folder",
+            folder / "wires",
+            "--",
+            sys.executable,
+            __file__,
+            "--beside",
+            folder,
+            "-o",
+            given.output.resolve(),
+            "--only",
+            given.only,
+            "--kills",
+            str(given.kills),
+        ]
         return subprocess.run(command).returncode
 
 

@@ -52,9 +52,7 @@ def rows(sitting: dict) -> list[tuple[str, str]]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument(
-        "--beside", default="Nothing else ran.", help="a sentence: what else ran on the computer"
-    )
+    parser.add_argument("--beside", default="Nothing else ran.", help="a sentence: what else ran on the computer")
     parser.add_argument("-o", "--output", type=Path, default=TARGET)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
@@ -62,9 +60,7 @@ def main() -> int:
         for file in ("robot.yaml", "bench.yaml", "cube.yaml"):
             text = (FILES / file).read_text(encoding="utf-8")
             rounds = max(1, round(60 * given.minutes / ROUND_S))
-            (folder / file).write_text(
-                text.replace("repetitions: 1", f"repetitions: {rounds}"), encoding="utf-8"
-            )
+            (folder / file).write_text(text.replace("repetitions: 1", f"repetitions: {rounds}"), encoding="utf-8")
         ctcr = f"{sys.executable} -m ctcr"
         script = (
             f"{ctcr} move robot.yaml --bench bench.yaml --at-home && "
@@ -74,14 +70,16 @@ def main() -> int:
         done = subprocess.run(
             [sys.executable, "-m", "ctcr", "sim", "bench", "robot.yaml", "--folder", "wires", "--", "sh", "-c", script],
             cwd=folder,
-        )  # fmt: skip
+        )
         load.append(os.getloadavg()[0])
         sitting = json.loads((folder / "run" / "session.json").read_text(encoding="utf-8"))["sittings"][-1]
     head = HEAD.format(
-        minutes=sitting["tracker"]["frames"] / 40 / 60, beside=given.beside, cores=os.cpu_count(),
+        minutes=sitting["tracker"]["frames"] / 40 / 60,
+        beside=given.beside,
+        cores=os.cpu_count(),
         load=" and ".join(f"{value:.1f}" for value in load),
         real_time="granted" if sitting["bus"]["real_time_priority"] else "not granted",
-    )  # fmt: skip
+    )
     given.output.write_text(head + "".join(f"| {a} | {b} |\n" for a, b in rows(sitting)), encoding="utf-8")
     print(given.output.read_text(encoding="utf-8"))
     return done.returncode

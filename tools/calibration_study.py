@@ -108,8 +108,9 @@ def _truth(answers: dict[str, Any], robot: Any) -> dict[str, float]:
 
 def judge(number: int) -> Answer:
     """Makes a set where it is missing, calibrates, and compares with the truth."""
-    from ctcr import measurements, robot_file
     from ctcr.calibrate import joint_fit
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
     from ruamel.yaml import YAML
 
     folder = make(number)
@@ -123,9 +124,7 @@ def judge(number: int) -> Answer:
         since = mean if name.startswith("actuation.") else 0.0
         pulls[name] = float((value - since - true[name]) / sd)
     held = found.held_out
-    return Answer(
-        answers["noise"], pulls, held.error.rms_mm, held.floor.rms_mm, float(fit.reduced_chi_square)
-    )
+    return Answer(answers["noise"], pulls, held.error.rms_mm, held.floor.rms_mm, float(fit.reduced_chi_square))
 
 
 def study(count: int, jobs: int = 2, tell=print) -> list[Answer]:
@@ -134,8 +133,10 @@ def study(count: int, jobs: int = 2, tell=print) -> list[Answer]:
     with ProcessPoolExecutor(jobs) as pool:
         for number, answer in enumerate(pool.map(judge, range(count))):
             within = np.mean(np.abs(list(answer.pulls.values())) <= WIDTH)
-            tell(f"{number:03d} {answer.noise}: {within:.0%} of {len(answer.pulls)} within {WIDTH:g} sd; held out "
-                 f"{answer.held_out_mm:.3f} mm, floor {answer.floor_mm:.3f} mm")  # fmt: skip
+            tell(
+                f"{number:03d} {answer.noise}: {within:.0%} of {len(answer.pulls)} within {WIDTH:g} sd; held out "
+                f"{answer.held_out_mm:.3f} mm, floor {answer.floor_mm:.3f} mm"
+            )
             answers.append(answer)
     return answers
 
@@ -150,8 +151,7 @@ def errors_mm(answers: list[Answer], noise: str) -> tuple[float, float]:
     """Held-out error and noise floor, RMS of all robots with this noise."""
     chosen = [a for a in answers if a.noise == noise]
     held, floor = (
-        float(np.sqrt(np.mean(np.square([getattr(a, n) for a in chosen]))))
-        for n in ("held_out_mm", "floor_mm")
+        float(np.sqrt(np.mean(np.square([getattr(a, n) for a in chosen])))) for n in ("held_out_mm", "floor_mm")
     )
     return held, floor
 
@@ -175,8 +175,10 @@ def summary(answers: list[Answer]) -> str:
         chosen = [a for a in answers if a.noise == noise]
         pulls = [p for a in chosen for p in a.pulls.values()]
         held, floor = errors_mm(answers, noise)
-        lines.append(f"| {noise} | {len(chosen)} | {wilson(*within(answers, noise))} | {np.mean(np.square(pulls)):.2f} "
-                     f"| {held:.3f} | {floor:.3f} | {held / floor:.2f} |")  # fmt: skip
+        lines.append(
+            f"| {noise} | {len(chosen)} | {wilson(*within(answers, noise))} | {np.mean(np.square(pulls)):.2f} "
+            f"| {held:.3f} | {floor:.3f} | {held / floor:.2f} |"
+        )
     lines += ["", "| parameters | noise | within | mean square error / variance |", "|---|---|---|---|"]
     kinds: dict[tuple[str, str], list[float]] = defaultdict(list)
     for a in answers:

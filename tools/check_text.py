@@ -19,9 +19,7 @@ def files(root: Path) -> list[Path]:
     inside = (path for folder in FOLDERS for path in (root / folder).rglob("*"))
     top = (path for path in root.iterdir() if path.name != ".git")
     return sorted(
-        path
-        for path in (*inside, *top)
-        if path.is_file() and path.suffix in TEXT and "__pycache__" not in path.parts
+        path for path in (*inside, *top) if path.is_file() and path.suffix in TEXT and "__pycache__" not in path.parts
     )
 
 

@@ -8,19 +8,15 @@ the calibration and with the effects that the diagnosis found drive it along the
 from pathlib import Path
 
 import numpy as np
-from ctcr import (
-    effect_fit,
-    effect_settings,
-    effects,
-    identify,
-    measurements,
-    robot_file,
-    simulation,
-)
-from ctcr.diagnose import diagnose
+from ctcr.diagnose import add, diagnose
+from ctcr.effects import catalogue, settings
+from ctcr.fit import joint
 from ctcr.frames import base_to_tracker, tracker_to_base
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr.model import simulation
+from ctcr.robot import robot_file
+from ctcr.robot.description import Robot
+from ctcr.table import measurements
+from ctcr.table.measurements import Measurements
 from ctcr.track import runs, scenario
 
 ROOT = Path(__file__).parents[1]
@@ -40,20 +36,20 @@ out. All robots begin at rest at the start of the path: friction remembers nothi
 
 
 def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot:
-    effect = effects.get(identity, robot.n_tubes)
+    effect = catalogue.get(identity, robot.n_tubes)
     strength, size = HIDDEN[identity]
     hidden = next(p for p in effect.parameters if p.name == strength)
     values = dict.fromkeys(hidden.full_names, hidden.neutral + size * hidden.sigma)
-    return effect_fit.with_values(simulation.as_built(robot, rng), [identity], values)
+    return add.with_values(simulation.as_built(robot, rng), [identity], values)
 
 
 def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], str]:
     """What the controller may know of the robot, and what the diagnosis said."""
-    known = {"robot file": robot, "calibrated": identify.fit(robot, session).apply(robot)}
+    known = {"robot file": robot, "calibrated": joint.fit(robot, session).apply(robot)}
     result = diagnose(robot, session)
     if result.accepted:
-        ids, fixed, start = effect_settings.found(result.as_json(), robot)
-        known["with the effects found"] = effect_fit.add(robot, session, ids, fixed=fixed, start=start).robot
+        ids, fixed, start = settings.found(result.as_json(), robot)
+        known["with the effects found"] = add.add(robot, session, ids, fixed=fixed, start=start).robot
     return known, f"{result.verdict.word}: {' + '.join(a.entry.id for a in result.accepted) or 'nothing'}"
 
 
@@ -93,11 +89,16 @@ def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.nd
     run = runs.run_once(own, values, values, 0.0)
     n, count, drive = plant.n_tubes, len(run.time), controller.actuation
     replay = Measurements(
-        t=run.time, run=np.zeros(count, int), beta=run.joints[:, :n] - drive.translation_correction,
+        t=run.time,
+        run=np.zeros(count, int),
+        beta=run.joints[:, :n] - drive.translation_correction,
         alpha=run.joints[:, n:] - drive.rotation_correction,
-        force=np.zeros((count, 3)), position=None, quaternion=None, row=np.arange(count) + 2,
+        force=np.zeros((count, 3)),
+        position=None,
+        quaternion=None,
+        row=np.arange(count) + 2,
         from_home=False,  # as the controller planned: at rest at the start of the path
-    )  # fmt: skip
+    )
     read = simulation.simulate(plant, replay, "none")
     return 1e3 * np.linalg.norm(read.position - in_tracker(controller, run.wanted), axis=1)[run.far]
 
@@ -128,9 +129,7 @@ def main() -> None:
         for name, controller in known.items():
             lines.append(row(name, open_loop(plan, controller, plant), closed_loop(plan, controller, plant)))
             print(identity, lines[-1], flush=True)
-    TARGET.write_text(
-        f"# Control with a missing effect\n\n{ABOUT}\n" + "\n".join(lines) + "\n", encoding="utf-8"
-    )
+    TARGET.write_text(f"# Control with a missing effect\n\n{ABOUT}\n" + "\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -11,8 +11,9 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
-from ctcr import measurements, robot_file
 from ctcr.diagnose import diagnose
+from ctcr.robot import robot_file
+from ctcr.table import measurements
 from ruamel.yaml import YAML
 from score import ROOT, wilson
 
@@ -26,9 +27,19 @@ TUBE = {
     "length": ("length_mm", 1e-3),
 }
 OUTSIDE = {
-    "backlash_rotation", "backlash_translation", "delay", "tip_load", "sensor_offset", "field_distortion",
-    "frame_drift", "frame_jump", "periodic_rotation", "periodic_translation", "entry_compliance", "contact",
-}  # fmt: skip
+    "backlash_rotation",
+    "backlash_translation",
+    "delay",
+    "tip_load",
+    "sensor_offset",
+    "field_distortion",
+    "frame_drift",
+    "frame_jump",
+    "periodic_rotation",
+    "periodic_translation",
+    "entry_compliance",
+    "contact",
+}
 EFFECTS = {  # id -> parameters without the id, and their true values
     "delay": lambda v: {"delay": v["delay_s"]},
     "sensor_offset": lambda v: dict(zip("xyz", v["offset_m"], strict=True)),
@@ -58,9 +69,7 @@ def errors(name: str) -> tuple[str, str, list[tuple[str, float]]] | None:
     robot = robot_file.load(SUITE / name / "robot.yaml")
     found = diagnose(robot, measurements.load(SUITE / name / "measurements.csv", robot.n_tubes), threads=1)
     named = [accepted.ids for accepted in found.accepted]
-    if len(named) != len(answers["classes"]) or not all(
-        any(c in ids for ids in named) for c in answers["classes"]
-    ):
+    if len(named) != len(answers["classes"]) or not all(any(c in ids for ids in named) for c in answers["classes"]):
         return None
     true, fit = truth_of(answers), found.final
     offset = {n: v for n, v in zip(fit.names, fit.prior_mean, strict=True) if n.startswith("actuation.")}
@@ -78,8 +87,7 @@ def sets(half: str, every: int) -> list[str]:
     chosen = [
         name
         for name, answers in known.items()
-        if answers["half"] == half
-        and all(cause["ids"] and set(cause["ids"]) <= OUTSIDE for cause in answers["causes"])
+        if answers["half"] == half and all(cause["ids"] and set(cause["ids"]) <= OUTSIDE for cause in answers["causes"])
     ]
     return chosen[::every]
 

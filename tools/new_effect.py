@@ -158,19 +158,14 @@ def main(arguments: list[str], root: Path) -> int:
         return 2
     name = arguments[0]
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name):
-        print(
-            f"new-effect: '{name}' is no id: use lower-case words joined by _, such as cable_pull",
-            file=sys.stderr,
-        )
+        print(f"new-effect: '{name}' is no id: use lower-case words joined by _, such as cable_pull", file=sys.stderr)
         return 2
     header = root / "include/ctcr/effects" / f"{name}.hpp"
     test = root / "tests/effects" / f"{name}_test.cpp"
     catalogue = root / "include/ctcr/effects/catalogue.hpp"
     taken = [path for path in (header, test) if path.exists()]
     if taken:
-        print(
-            f"new-effect: {taken[0].relative_to(root)} exists already; choose another name", file=sys.stderr
-        )
+        print(f"new-effect: {taken[0].relative_to(root)} exists already; choose another name", file=sys.stderr)
         return 1
     listed = with_effect(catalogue.read_text(encoding="utf-8"), name)
     header.write_text(written(HEADER, name), encoding="utf-8")

@@ -27,17 +27,10 @@ the unequal lags of single readings belong where a delay is hidden. Written by `
 TUNED = "Thresholds were set on the tuning half."
 UNSEEN = """Other seeds than those by which thresholds were set, scored once
 (`python tools/oracle/make_suite.py --shift K --out FOLDER`)."""
-VISIBLE = (
-    30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
-)
+VISIBLE = 30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 
 # Causes outside the catalogue that depend on one quantity: how the ids of such quantities begin.
-DEPENDS = {
-    "rotation_with_translation": "length",
-    "tooth_error": "alpha",
-    "temperature": "time",
-    "grip_slip": "time",
-}
+DEPENDS = {"rotation_with_translation": "length", "tooth_error": "alpha", "temperature": "time", "grip_slip": "time"}
 
 
 def wilson(hits: int, count: int) -> str:
@@ -54,16 +47,7 @@ def answer(folder: Path, answers: Path, seconds: int) -> dict | None:
     """What the command says of a set; None where it fails."""
     target = answers / f"{folder.name}.json"
     if not target.exists():
-        command = [
-            sys.executable,
-            "-m",
-            "ctcr",
-            "diagnose",
-            "robot.yaml",
-            "measurements.csv",
-            "--threads",
-            "1",
-        ]
+        command = [sys.executable, "-m", "ctcr", "diagnose", "robot.yaml", "measurements.csv", "--threads", "1"]
         try:
             done = subprocess.run(
                 [*command, "--json", str(target)], cwd=folder, capture_output=True, text=True, timeout=seconds
@@ -121,8 +105,7 @@ def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[
     for noise in sorted({truths[name]["noise"] for name in chosen}):
         sets = [n for n in chosen if said[n] and truths[n]["classes"] and truths[n]["noise"] == noise]
         ratios = {
-            key: [said[n]["rms_mm"][key] / floor_mm(truths[n]) for n in sets]
-            for key in ("calibrated", "with_effects")
+            key: [said[n]["rms_mm"][key] / floor_mm(truths[n]) for n in sets] for key in ("calibrated", "with_effects")
         }
         for key, values in ratios.items():
             if len(values) > 1:
@@ -133,9 +116,7 @@ def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--suite", type=lambda text: Path(text).resolve(), default=ROOT / "build" / "suite")
     parser.add_argument("--half", choices=("tuning", "reporting", "both"), default="reporting")
     parser.add_argument("--every", type=int, default=1, help="score every n-th set only")
@@ -147,19 +128,13 @@ def main() -> None:
     if not (options.suite / "truth").is_dir():
         sys.exit(f"{options.suite} holds no suite: python tools/oracle/make_suite.py writes it")
     yaml = YAML(typ="safe")
-    truths = {
-        path.stem: yaml.load(path.read_text()) for path in sorted((options.suite / "truth").glob("s*.yaml"))
-    }
+    truths = {path.stem: yaml.load(path.read_text()) for path in sorted((options.suite / "truth").glob("s*.yaml"))}
     chosen = [name for name, t in truths.items() if options.half in (t["half"], "both")][:: options.every]
     answers = options.suite / "answers"
     answers.mkdir(exist_ok=True)
     with ThreadPoolExecutor(options.jobs) as pool:
         said = dict(
-            zip(
-                chosen,
-                pool.map(lambda n: answer(options.suite / n, answers, options.seconds), chosen),
-                strict=True,
-            )
+            zip(chosen, pool.map(lambda n: answer(options.suite / n, answers, options.seconds), chosen), strict=True)
         )
     with (options.suite / "truth" / "index.csv").open(encoding="utf-8") as index:
         groups = {row["set"]: row["group"] for row in csv.DictReader(index)}
@@ -173,9 +148,7 @@ def main() -> None:
         target.write_text(f"# {title}\n\n{about}\n\n{text}\n", encoding="utf-8")
 
 
-def report(
-    chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict], groups: dict[str, str]
-) -> str:
+def report(chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict], groups: dict[str, str]) -> str:
     """Tables of the scores by noise, and of who was taken for whom."""
     hits, counts, confusion = Counter(), Counter(), Counter()
     for name in chosen:

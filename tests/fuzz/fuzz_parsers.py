@@ -15,8 +15,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from ctcr import measurements, number_table, robot_file
 from ctcr.errors import InputError
+from ctcr.robot import robot_file
+from ctcr.table import csv_table, measurements
 
 ROBOT = (Path(__file__).parents[2] / "examples" / "robots" / "table2.yaml").read_bytes()
 TABLE = b"""t_s,run,beta1_m,beta2_m,alpha1_rad,alpha2_rad,fx_N,fy_N,fz_N,x_m,y_m,z_m,qw,qx,qy,qz
@@ -25,71 +26,11 @@ TABLE = b"""t_s,run,beta1_m,beta2_m,alpha1_rad,alpha2_rad,fx_N,fy_N,fz_N,x_m,y_m
 ,1,-0.32,-0.21,1E-3,+2.75,0,0,0,-0.06,-0.11,0.06,0.5,-0.5,0.5,-0.5
 """
 TOKENS = [
-    *(
-        b"",
-        b" ",
-        b"\n",
-        b"\r\n",
-        b"\r",
-        b",",
-        b",,",
-        b";",
-        b"\t",
-        b"\0",
-        b'"',
-        b"'",
-        b"#",
-        b":",
-        b"- ",
-        b"? ",
-    ),
-    *(
-        b"nan",
-        b".nan",
-        b"inf",
-        b"-.inf",
-        b"1e999",
-        b"-1e-999",
-        b"1_000",
-        b"0x1f",
-        b"0o7",
-        b"1:30",
-        b"9" * 400,
-    ),
-    *(
-        b"null",
-        b"~",
-        b"true",
-        b"on",
-        b"2020-01-01",
-        b"[1, 2, 3]",
-        b"{a: 1}",
-        b"[[[[",
-        b"{{{",
-        b"!!python/none x",
-    ),
-    *(
-        b"&a [*a]",
-        b"*a",
-        b"<<: *a",
-        b"|\n  x",
-        b">-\n",
-        b"---\n",
-        b"...\n",
-        b"%YAML 1.1\n---\n",
-        b"!!binary x",
-    ),
-    *(
-        b"!!float x",
-        b"!!int 1.5",
-        b"!!timestamp 2020-99-99",
-        b"!!set {1}",
-        b"!!omap [a: 1]",
-        b"-",
-        b"+",
-        b"e",
-        b".",
-    ),
+    *(b"", b" ", b"\n", b"\r\n", b"\r", b",", b",,", b";", b"\t", b"\0", b'"', b"'", b"#", b":", b"- ", b"? "),
+    *(b"nan", b".nan", b"inf", b"-.inf", b"1e999", b"-1e-999", b"1_000", b"0x1f", b"0o7", b"1:30", b"9" * 400),
+    *(b"null", b"~", b"true", b"on", b"2020-01-01", b"[1, 2, 3]", b"{a: 1}", b"[[[[", b"{{{", b"!!python/none x"),
+    *(b"&a [*a]", b"*a", b"<<: *a", b"|\n  x", b">-\n", b"---\n", b"...\n", b"%YAML 1.1\n---\n", b"!!binary x"),
+    *(b"!!float x", b"!!int 1.5", b"!!timestamp 2020-99-99", b"!!set {1}", b"!!omap [a: 1]", b"-", b"+", b"e", b"."),
     *(
         b"\xff\xfe",
         b"\xef\xbb\xbf",
@@ -159,9 +100,7 @@ def read_table(content: bytes) -> None:
 PARSERS: list[tuple[Callable[[bytes], None], bytes]] = [(read_robot, ROBOT), (read_table, TABLE)]
 
 
-def fuzz(
-    parser: Callable[[bytes], None], seed_file: bytes, source: random.Random, seconds: float
-) -> tuple[int, int]:
+def fuzz(parser: Callable[[bytes], None], seed_file: bytes, source: random.Random, seconds: float) -> tuple[int, int]:
     """Runs for `seconds`; returns how many files were tried and refused. Raises AssertionError with the culprit."""
     tried = refused = 0
     stop = time.monotonic() + seconds
@@ -185,7 +124,7 @@ def main() -> int:
     arguments.add_argument("--seconds", type=float, default=10)
     arguments.add_argument("--seed", type=int, default=1)
     options = arguments.parse_args()
-    number_table.BLOCK_BYTES = 100  # so that small files have several blocks
+    csv_table.BLOCK_BYTES = 100  # so that small files have several blocks
     warnings.simplefilter("error")  # a stray warning on the user's screen is a fault too
     for parser, seed_file in PARSERS:
         source = random.Random(options.seed)

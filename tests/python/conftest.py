@@ -30,7 +30,7 @@ def recorded():
 
 def demonstration(runs: int, every: int):
     """Its first runs, and of these every n-th row."""
-    from ctcr import measurements
+    from ctcr.table import measurements
 
     table = measurements.load(DEMO, 3)
     kept = np.flatnonzero((table.run < runs) & (np.arange(len(table)) % every == 0))
@@ -41,13 +41,11 @@ def demonstration(runs: int, every: int):
 @pytest.fixture(scope="session")
 def hidden():
     """hidden(robot, friction__coefficient="0.01"): the robot with effects that a test hides in its readings."""
-    from ctcr import effect_fit
-    from ctcr.effect_settings import settings
+    from ctcr.diagnose import add
+    from ctcr.effects.settings import settings
 
     def with_them(robot, **given):
         values = settings([f"{name.replace('__', '.')}={value}" for name, value in given.items()], robot)
-        return effect_fit.with_values(
-            robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values
-        )
+        return add.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
 
     return with_them

@@ -6,24 +6,26 @@ costs nothing: the compiled core and numpy load with the first name that needs t
 
 from importlib import import_module
 
-_HOME = {
-    "Model": "ctcr.model",
-    "Prediction": "ctcr.model",
-    "Shape": "ctcr.model",
-    "InputError": "ctcr.errors",
+# Public names and the modules that define them.
+_NAMES = {"Model": "ctcr.model", "Prediction": "ctcr.model", "Shape": "ctcr.model", "InputError": "ctcr.errors"}
+_MODULES = {
+    "errors": "ctcr.errors",
+    "frames": "ctcr.frames",
+    "measurements": "ctcr.table.measurements",
+    "model": "ctcr.model",
+    "output": "ctcr.show.output",
+    "pictures": "ctcr.show.pictures",
+    "robot_file": "ctcr.robot.robot_file",
 }
-_SUBMODULES = ("errors", "frames", "measurements", "model", "output", "pictures", "robot_file")
 
-__all__ = [*_HOME, *_SUBMODULES]
+__all__ = [*_NAMES, *_MODULES]
 
 
 def __getattr__(name: str):
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
-    if name in _SUBMODULES:
-        return import_module(f"ctcr.{name}")
+    if name in _NAMES:
+        return getattr(import_module(_NAMES[name]), name)
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name == "__version__":
-        from importlib.metadata import version
-
-        return version("ctcr")
+        return import_module("importlib.metadata").version("ctcr")
     raise AttributeError(f"module 'ctcr' has no attribute {name!r}")

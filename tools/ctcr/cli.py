@@ -69,9 +69,7 @@ def _report(error: Exception) -> None:
         lines = str(error).splitlines()
         _say(lines[0] if len(lines) == 1 else "\n  ".join(["the input cannot be used:", *lines]))
     elif isinstance(error, ModuleNotFoundError) and error.name == "ctcr._core":
-        _say(
-            "the compiled part of ctcr is missing: install the package with `pip install .` or `tools/dev setup`"
-        )
+        _say("the compiled part of ctcr is missing: install the package with `pip install .` or `tools/dev setup`")
     elif isinstance(error, MemoryError):
         _say("not enough memory for this input: split the table")
     elif "CTCR_DEBUG" in os.environ:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 
 @dataclass(frozen=True)
@@ -36,8 +37,6 @@ class InputError(Exception):
 
 def did_you_mean(name: str, choices: Iterable[str]) -> str | None:
     """The choice nearest in spelling to `name`, if any is near."""
-    from difflib import get_close_matches
-
     near = get_close_matches(name.lower(), [choice.lower() for choice in choices], n=1, cutoff=0.6)
     return next((choice for choice in choices if near and choice.lower() == near[0]), None)
 

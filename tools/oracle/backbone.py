@@ -136,7 +136,5 @@ def tip_moment_stiffness(backbone: Backbone, moment: np.ndarray) -> tuple[np.nda
     columns = _columns(backbone.turn)
     full = columns.T @ (skew(moment) @ columns)  # entry (e, f) = A_e . (l x A_f) = l . (A_f x A_e)
     block = np.arange(full.shape[0]) // 2
-    stiffness = full * np.where(
-        block[:, None] > block[None, :], 1.0, 0.5 * (block[:, None] == block[None, :])
-    )
+    stiffness = full * np.where(block[:, None] > block[None, :], 1.0, 0.5 * (block[:, None] == block[None, :]))
     return stiffness, columns.T @ np.cross(backbone.rotation[-1, :, 2], moment)

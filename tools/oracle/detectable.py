@@ -17,8 +17,12 @@ from specimen import Specimen
 
 THINNED = 9
 STEP = 0.1  # of a standard deviation
-_TUBE_KEYS = {"length_mm": "length_mm", "curved_length_mm": "curved_length_mm",
-              "curvature_percent": "curvature_per_m", "youngs_modulus_percent": "youngs_modulus_GPa"}  # fmt: skip
+_TUBE_KEYS = {
+    "length_mm": "length_mm",
+    "curved_length_mm": "curved_length_mm",
+    "curvature_percent": "curvature_per_m",
+    "youngs_modulus_percent": "youngs_modulus_GPa",
+}
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,10 @@ def _left(
 
     def whitened(parts: tuple[np.ndarray, ...]) -> np.ndarray:
         """(6 R, ...) position and rotation in units of their noise, as if no reading had been left out."""
-        flat = [solve_triangular(factor, part.reshape(len(factor), -1), lower=True)
-                for factor, part in zip(factors, parts, strict=True)]  # fmt: skip
+        flat = [
+            solve_triangular(factor, part.reshape(len(factor), -1), lower=True)
+            for factor, part in zip(factors, parts, strict=True)
+        ]
         return np.sqrt(THINNED) * np.concatenate([part.reshape(3 * len(factors[0]), -1) for part in flat])
 
     seen, jacobian = whitened(cause)[:, 0], whitened(columns)

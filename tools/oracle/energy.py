@@ -39,9 +39,7 @@ class Load:
 class Energy:
     """Energy of one robot at one joint position (beta, alpha) on one grid."""
 
-    def __init__(
-        self, robot: Robot, grid: Grid, beta: np.ndarray, alpha: np.ndarray, force: np.ndarray
-    ) -> None:
+    def __init__(self, robot: Robot, grid: Grid, beta: np.ndarray, alpha: np.ndarray, force: np.ndarray) -> None:
         self.grid, self.alpha = grid, alpha
         torsion = np.array([tube.torsional_stiffness for tube in robot.tubes])
         self._base_stiffness = torsion / np.maximum(-beta, SHORTEST_TRANSMISSION)
@@ -91,9 +89,7 @@ class Energy:
     def value(self, x: np.ndarray) -> float:
         """Energy [J] up to a constant."""
         u = self.curvature(x)
-        energy = np.sum(
-            self.grid.h[:, None] * u * (0.5 * self.grid.stiffness[:, None] * u - self._precurvature(x)[0])
-        )
+        energy = np.sum(self.grid.h[:, None] * u * (0.5 * self.grid.stiffness[:, None] * u - self._precurvature(x)[0]))
         for i, alpha in enumerate(self.alpha):
             theta = self.theta(x, i)
             energy += 0.5 * np.sum(self._twist_stiffness[i] * np.diff(theta) ** 2)

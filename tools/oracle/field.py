@@ -19,9 +19,7 @@ def dipole_field(place: np.ndarray) -> np.ndarray:
 
 def coil_fields(place: np.ndarray) -> np.ndarray:
     """(3, 6) field at a place (3,) [m] of each coil of the tracker. Scale left out."""
-    return np.column_stack(
-        [dipole_field(place - coil) @ axis for coil, axis in zip(_COILS, _AXES, strict=True)]
-    )
+    return np.column_stack([dipole_field(place - coil) @ axis for coil, axis in zip(_COILS, _AXES, strict=True)])
 
 
 def induced_fields(place: np.ndarray, metal: np.ndarray, volume: float) -> np.ndarray:
@@ -36,9 +34,7 @@ def misread(place: np.ndarray, metal: np.ndarray, volume: float) -> tuple[np.nda
     The tracker takes the sum of the fields for that of its coils alone and looks for the pose that explains it best.
     """
     own, step = coil_fields(place), 1e-7
-    columns = [
-        (coil_fields(place + d) - coil_fields(place - d)).ravel() / (2 * step) for d in step * np.eye(3)
-    ]
+    columns = [(coil_fields(place + d) - coil_fields(place - d)).ravel() / (2 * step) for d in step * np.eye(3)]
     # A sensor turned by w reads the field turned by -w.
     columns += [-np.cross(axis, own, axisb=0, axisc=0).ravel() for axis in np.eye(3)]
     added = induced_fields(place, metal, volume)

@@ -31,23 +31,10 @@ class Contacts:
     """Joints between unknowns theta_a and theta_b of x; arrays have one entry per joint."""
 
     def __init__(
-        self,
-        a: np.ndarray,
-        b: np.ndarray,
-        limit: np.ndarray,
-        anchor: np.ndarray,
-        slid: np.ndarray,
-        stiffness: float,
+        self, a: np.ndarray, b: np.ndarray, limit: np.ndarray, anchor: np.ndarray, slid: np.ndarray, stiffness: float
     ) -> None:
         """Indices a, b (n,) into x; torque limit (n,) [N m]; anchor (n, 2) and slid (n,) [rad]; stiffness [N m/rad]."""
-        self._a, self._b, self._limit, self._anchor, self._slid, self._k = (
-            a,
-            b,
-            limit,
-            anchor,
-            slid,
-            stiffness,
-        )
+        self._a, self._b, self._limit, self._anchor, self._slid, self._k = (a, b, limit, anchor, slid, stiffness)
 
     def _stretch(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(n, 2) motion since the anchor, its norm, and the secant stiffness min(k, limit / norm)."""
@@ -104,9 +91,7 @@ Place = tuple[int, str, int]  # inner tube of the pair; "plate", "start" or "tip
 class FrictionalRobot:
     """A robot that remembers: `move_to` follows the straight line in joint space in small moves."""
 
-    def __init__(
-        self, robot: Robot, law: FrictionLaw, beta: np.ndarray, alpha: np.ndarray, element_length: float
-    ):
+    def __init__(self, robot: Robot, law: FrictionLaw, beta: np.ndarray, alpha: np.ndarray, element_length: float):
         """Starts at rest without friction torque at (beta, alpha)."""
         self._robot, self._law, self._element_length = robot, law, element_length
         self._beta, self._alpha = beta, alpha
@@ -134,9 +119,7 @@ class FrictionalRobot:
         places = self._places(energy, beta)
         slid = np.array([self._slid(place, beta) for place in places])
         inner = np.array([place[0] for place in places], dtype=int)
-        a, b = (
-            energy.offset[tube] + np.array(list(places.values()), dtype=int) for tube in (inner, inner + 1)
-        )
+        a, b = (energy.offset[tube] + np.array(list(places.values()), dtype=int) for tube in (inner, inner + 1))
         now = np.stack([x[a] - x[b], slid], axis=1)
         anchor = np.array([self._anchor.get(place, now[k]) for k, place in enumerate(places)]).reshape(-1, 2)
         limit = np.array([self._law.coefficient * self._jump.get(place, 0.0) for place in places])
@@ -167,14 +150,10 @@ class FrictionalRobot:
     def _moment_jumps(self, places: dict[Place, int], beta: np.ndarray) -> dict[Place, float]:
         """|Jump| of the bending moment carried by all tubes inside the contact [N m]."""
         energy, grid = self._energy, self._energy.grid
-        moments = np.zeros(
-            (len(self._robot.tubes), grid.n_elements + 2, 2)
-        )  # guide, elements, beyond the tip
+        moments = np.zeros((len(self._robot.tubes), grid.n_elements + 2, 2))  # guide, elements, beyond the tip
         for i, tube in enumerate(self._robot.tubes):
             moments[i, 1 : grid.tip_node[i] + 1] = energy.bending_moment(self._x, i, tube.bending_stiffness)
-            if (
-                tube.length + beta[i] - tube.curved_length < -COINCIDENT
-            ):  # precurved part held straight in the guide
+            if tube.length + beta[i] - tube.curved_length < -COINCIDENT:  # precurved part held straight in the guide
                 angle = energy.theta(self._x, i)[0]
                 precurvature_moment = tube.bending_stiffness * tube.curvature
                 moments[i, 0] = -precurvature_moment * np.array([np.cos(angle), np.sin(angle)])

@@ -31,12 +31,7 @@ def make_grid(robot: Robot, beta: np.ndarray, element_length: float, refinement:
     shrink by the same factor, which Richardson extrapolation needs.
     """
     tips = np.array([tube.length for tube in robot.tubes]) + beta
-    if (
-        np.any(np.diff(beta) < 0)
-        or beta[-1] > 0
-        or np.any(np.diff(tips) > COINCIDENT)
-        or tips[-1] < -COINCIDENT
-    ):
+    if np.any(np.diff(beta) < 0) or beta[-1] > 0 or np.any(np.diff(tips) > COINCIDENT) or tips[-1] < -COINCIDENT:
         raise ValueError(f"joints out of order: beta {beta}, tips {tips}")
     starts = np.maximum(tips - np.array([tube.curved_length for tube in robot.tubes]), 0.0)
     points = np.unique(np.concatenate([[0.0], starts, np.maximum(tips, 0.0)]))

@@ -41,9 +41,7 @@ def periodic_rotation(setup: Setup, size: float, rng: np.random.Generator) -> Tr
 @cause("periodic_translation")
 def periodic_translation(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
     pitch = 1e-3 * setup.bench.description["actuation"]["translation_mm_per_rev"]
-    return add_periodic(
-        setup, np.arange(n_tubes(setup)), pitch, 30e-6 * size * np.abs(signed(setup, rng)), rng
-    )
+    return add_periodic(setup, np.arange(n_tubes(setup)), pitch, 30e-6 * size * np.abs(signed(setup, rng)), rng)
 
 
 def add_periodic(

@@ -44,8 +44,12 @@ def tip_force(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
 def contact(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
     """A rounded obstacle that an eighth of the tips would reach, somewhere beside the robot."""
     specimen, plan = Specimen(setup.mechanics, 2 * ELEMENT_LENGTH), setup.plan
-    tips = np.array([specimen.settle(*np.split(setup.true_joints(q), 2), np.zeros(3)).position
-                     for q in plan.joints[:: max(1, len(plan.time) // 300)]])  # fmt: skip
+    tips = np.array(
+        [
+            specimen.settle(*np.split(setup.true_joints(q), 2), np.zeros(3)).position
+            for q in plan.joints[:: max(1, len(plan.time) // 300)]
+        ]
+    )
     side = rng.uniform(0, 2 * np.pi)
     direction = np.array([np.cos(side), np.sin(side), rng.uniform(-0.2, 0.4)])
     direction /= np.linalg.norm(direction)

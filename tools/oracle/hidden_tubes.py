@@ -29,9 +29,7 @@ def clearance(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
     return {"gap_rad": gap}
 
 
-def _over_curved_part(
-    tube: Tube, shape: Callable[[np.ndarray], np.ndarray]
-) -> Callable[[np.ndarray], np.ndarray]:
+def _over_curved_part(tube: Tube, shape: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
     """Precurvature (kappa f_x, kappa f_y, f_z) with f = shape(position in the curved part from 0 to 1) (n, 3)."""
     start = tube.length - tube.curved_length
 
@@ -49,16 +47,12 @@ def precurvature_profile(setup: Setup, size: float, rng: np.random.Generator) ->
     for tube in setup.mechanics.robot.tubes:
         knots = np.concatenate([np.zeros(4), np.sort(rng.uniform(0.1, 0.9, 6)), np.ones(4)])
         place = np.linspace(0, 1, 401)
-        tilt = rng.choice([-1.0, 1.0]) * (
-            2 * np.linspace(0, 1, 10) - 1
-        )  # a gradient, and what the shaping left
+        tilt = rng.choice([-1.0, 1.0]) * (2 * np.linspace(0, 1, 10) - 1)  # a gradient, and what the shaping left
         spline = BSpline(knots, tilt + rng.normal(0, 0.4, 10), 3)
         values = spline(place) - spline(place).mean()
         scale = 0.15 / np.sqrt(3) * size * rng.uniform(0.7, 1.3) / values.std()
 
-        def shape(
-            x: np.ndarray, values: np.ndarray = scale * values, place: np.ndarray = place
-        ) -> np.ndarray:
+        def shape(x: np.ndarray, values: np.ndarray = scale * values, place: np.ndarray = place) -> np.ndarray:
             along = 1 + np.interp(x, place, values)
             return np.stack([along, np.zeros_like(x), np.zeros_like(x)], axis=1)
 
@@ -116,10 +110,7 @@ def fibre_tangent(tube: Tube, yield_strain: float, ratio: float, bending: np.nda
 
 @cause("softening")
 def softening(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
-    bent, squared = (
-        8.0,
-        0.004 * size * rng.uniform(0.7, 1.3),
-    )  # as much as a smooth law that loses 10 % at 5 /m
+    bent, squared = (8.0, 0.004 * size * rng.uniform(0.7, 1.3))  # as much as a smooth law that loses 10 % at 5 /m
     loss = 1 - 1 / (1 + squared * bent**2)  # of the secant stiffness
     ratio, step = rng.uniform(0.2, 0.45), setup.mechanics.table_step
     bending = step * np.arange(161)
@@ -139,9 +130,7 @@ def softening(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
 @cause("anisotropy")
 def anisotropy(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
     relative, direction = 0.03 * size * np.abs(signed(setup, rng)), rng.uniform(0, np.pi, n_tubes(setup))
-    setup.mechanics.ellipticity = relative[:, None] * np.stack(
-        [np.cos(2 * direction), np.sin(2 * direction)], axis=1
-    )
+    setup.mechanics.ellipticity = relative[:, None] * np.stack([np.cos(2 * direction), np.sin(2 * direction)], axis=1)
     return {"relative": relative, "direction_rad": direction}
 
 

@@ -25,10 +25,7 @@ class _Problem(ctypes.Structure):
         ("table_step", ctypes.c_double),
         ("h", _DOUBLES),
         ("tip", _INTEGERS),
-        *(
-            (name, _DOUBLES)
-            for name in ("stiffness", "torsion", "precurvature", "tangent", "base", "joint", "force")
-        ),
+        *((name, _DOUBLES) for name in ("stiffness", "torsion", "precurvature", "tangent", "base", "joint", "force")),
         ("contact_node", _INTEGERS),
         *((name, _DOUBLES) for name in ("contact", "plastic", "plastic_anchor", "obstacle")),
     ]
@@ -42,9 +39,7 @@ class NoEquilibriumError(RuntimeError):
 def _library() -> ctypes.CDLL:
     command = [COMPILER, *FLAGS, str(SOURCE)]
     version = subprocess.run([COMPILER, "--version"], capture_output=True, check=True).stdout
-    key = hashlib.sha256(b"".join([SOURCE.read_bytes(), repr(command[:-1]).encode(), version])).hexdigest()[
-        :16
-    ]
+    key = hashlib.sha256(b"".join([SOURCE.read_bytes(), repr(command[:-1]).encode(), version])).hexdigest()[:16]
     target = BUILD / f"kernel-{key}.so"
     if not target.exists():
         BUILD.mkdir(parents=True, exist_ok=True)
@@ -59,12 +54,11 @@ def _library() -> ctypes.CDLL:
 class Problem:
     """One configuration for the kernel; the fields are those of `Problem` in kernel.cpp, absent ones empty."""
 
-    def __init__(
-        self, *, h: np.ndarray, tip: np.ndarray, table_step: float = 1.0, **arrays: np.ndarray
-    ) -> None:
+    def __init__(self, *, h: np.ndarray, tip: np.ndarray, table_step: float = 1.0, **arrays: np.ndarray) -> None:
         self.h, self.tip = np.ascontiguousarray(h, float), np.ascontiguousarray(tip, np.int32)
-        self._arrays = {name: np.ascontiguousarray(array, float) for name, array in arrays.items()
-                        if name != "contact_node"}  # fmt: skip
+        self._arrays = {
+            name: np.ascontiguousarray(array, float) for name, array in arrays.items() if name != "contact_node"
+        }
         self._contact_node = np.ascontiguousarray(arrays.get("contact_node", ()), np.int32)
         n_tubes = self.tip.size
         self.offset = 2 * self.h.size + np.concatenate([[0], np.cumsum(self.tip + 1)])

@@ -26,13 +26,17 @@ DRAG = np.deg2rad(0.3)  # a tube that turns alone lags this far behind its motor
 STEP = 20.0  # [deg] between the readings of a circle
 DEPLOYED = 0.09  # [m] of the tube on a circle
 POINTS = {  # [mm] in the base frame: holes of the base plate, and the tool's way as target
-    "A": (-60, -40, -20), "B": (60, -40, -20), "C": (60, 40, -20), "D": (-60, 40, -20), "E": (-60, -40, -180),
-    "F": (60, -40, -180), "G": (60, 40, -180), "H": (-60, 40, -180), "tool": (0, 0, 150),
-}  # fmt: skip
-READ_EACH, PLACEMENT = (
-    3,
-    0.1e-3,
-)  # probe readings of a point; how far the probe's tip sits from it, per axis [m]
+    "A": (-60, -40, -20),
+    "B": (60, -40, -20),
+    "C": (60, 40, -20),
+    "D": (-60, 40, -20),
+    "E": (-60, -40, -180),
+    "F": (60, -40, -180),
+    "G": (60, 40, -180),
+    "H": (-60, 40, -180),
+    "tool": (0, 0, 150),
+}
+READ_EACH, PLACEMENT = (3, 0.1e-3)  # probe readings of a point; how far the probe's tip sits from it, per axis [m]
 HAND, FLUSH = 0.6e-3, 0.15e-3  # [m] a ruler; a tip brought flush with the plate
 CANTILEVER_LENGTH, HUNG = 0.080, (5, 10, 20, 30, 40, 50)  # [m] of tube 1; [g]
 DIAL = 0.03e-3  # [m] of a deflection
@@ -48,15 +52,9 @@ def circles(bench: Bench, tracker: Tracker, ratio: float, rng: np.random.Generat
         side, height = (1 - np.cos(bend)) / tube.curvature, straight + np.sin(bend) / tube.curvature
         for direction, angles in ((1, forward), (-1, forward[::-1])):
             for angle in angles:
-                alpha = (
-                    ratio * np.deg2rad(angle)
-                    + bench.alpha_offset[number - 1]
-                    - DRAG * direction * np.sign(ratio)
-                )
+                alpha = ratio * np.deg2rad(angle) + bench.alpha_offset[number - 1] - DRAG * direction * np.sign(ratio)
                 turn = Rotation.from_euler("z", alpha)
-                pose = Pose(
-                    turn.apply([0, -side, height]), (turn * Rotation.from_euler("x", bend)).as_matrix()
-                )
+                pose = Pose(turn.apply([0, -side, height]), (turn * Rotation.from_euler("x", bend)).as_matrix())
                 yield [str(number), f"{angle:g}", str(direction), *_mm(tracker.read(pose)[0])]
 
 
@@ -107,9 +105,7 @@ def picture(bench: Bench, rng: np.random.Generator) -> Iterator[list[str]]:
         yield [f"{value:.1f}" for value in PIXELS * (askew @ place) + [1100, 300] + rng.normal(0, CLICK, 2)]
 
 
-def poses(
-    description: dict, bench: Bench, tracker: Tracker, rng: np.random.Generator
-) -> Iterator[list[float]]:
+def poses(description: dict, bench: Bench, tracker: Tracker, rng: np.random.Generator) -> Iterator[list[float]]:
     """Rows (t, run, joints, force, pose) of a session; joints as the data sheet's homes give them."""
     true, time, n = from_description(bench.description), 0.0, len(description["tubes"])
     joints = np.concatenate([1e-3 * np.array(description["actuation"]["home_translation_mm"]), np.zeros(n)])
@@ -117,9 +113,7 @@ def poses(
         for visit, target in enumerate(run.stops[::2]):
             time += DWELL if visit else approach_time(joints, target)
             beta, alpha = target[:n] + bench.beta_offset, target[n:] + bench.alpha_offset
-            pose = solve_pose(
-                true, beta, alpha, Load(run.mass * true.gravity, np.zeros(3)), refinements=(1, 2)
-            )
+            pose = solve_pose(true, beta, alpha, Load(run.mass * true.gravity, np.zeros(3)), refinements=(1, 2))
             yield [time, number, *target, *(run.mass * true.gravity), *pose_fields(*tracker.read(pose))]
             joints = target
 

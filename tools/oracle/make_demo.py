@@ -20,9 +20,7 @@ RUNS, STOPS = 14, 20
 MASSES = (0.0, 0.010, 0.020)  # [kg]
 ELEMENT_LENGTH = 4e-3  # [m], one grid: tip error of micrometres, far below the jitter
 LARGEST_RETRACTION = np.array([0.060, 0.045, 0.045])  # [m] from the home position
-MARGIN = (
-    5e-3  # [m] kept between the bases and between the tips, more than the true lengths and offsets can be off
-)
+MARGIN = 5e-3  # [m] kept between the bases and between the tips, more than the true lengths and offsets can be off
 
 
 def draw_runs(description: dict, rng: np.random.Generator) -> list[Run]:
@@ -53,10 +51,12 @@ def measure(description: dict) -> Iterator[list[float]]:
     runs, bench = draw_runs(description, rng), draw_bench(description, rng)
     tracker = Tracker(description, bench, rng)
     offset = np.concatenate([bench.beta_offset, bench.alpha_offset])
-    joints = np.concatenate([
-        1e-3 * np.array(description["actuation"]["home_translation_mm"]),
-        np.deg2rad(description["actuation"]["home_rotation_deg"]),
-    ])  # fmt: skip
+    joints = np.concatenate(
+        [
+            1e-3 * np.array(description["actuation"]["home_translation_mm"]),
+            np.deg2rad(description["actuation"]["home_rotation_deg"]),
+        ]
+    )
     true = from_description(bench.description)
     robot = FrictionalRobot(true, LAW, *np.split(joints + offset, 2), ELEMENT_LENGTH)
     time = 0.0

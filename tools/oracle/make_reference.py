@@ -21,23 +21,52 @@ DESIGNS = {
     "two_tubes": [(0.6, 0.9, 300.0, 60.0, 12.0), (1.0, 1.3, 180.0, 180.0, 6.0)],
     "table2": [(1.3, 1.52, 463.0, 50.0, 10.0), (1.62, 1.8, 330.5, 50.0, 5.0), (2.03, 2.35, 199.0, 50.0, 7.0)],
     "straight_sheath": [(0.8, 1.0, 400.0, 50.0, 14.0), (1.1, 1.5, 280.0, 60.0, 7.0), (1.6, 2.4, 150.0, 0.0, 0.0)],
-    "four_tubes": [(0.7, 0.9, 420.0, 40.0, 12.0), (1.0, 1.25, 320.0, 50.0, 6.0), (1.35, 1.7, 230.0, 45.0, 5.0),
-                   (1.8, 2.3, 140.0, 60.0, 0.0)],
-}  # fmt: skip
+    "four_tubes": [
+        (0.7, 0.9, 420.0, 40.0, 12.0),
+        (1.0, 1.25, 320.0, 50.0, 6.0),
+        (1.35, 1.7, 230.0, 45.0, 5.0),
+        (1.8, 2.3, 140.0, 60.0, 0.0),
+    ],
+}
 # how many rows with (no tip load, force, force and moment), without and with weight
 ROWS = {False: (26, 8, 8), True: (4, 3, 3)}
 LARGEST_TURN = 0.5  # [rad] tip loads bend a straight robot of that length by at most about this
-JOINT_CASES = ("any", "any", "flush tips", "shared breakpoint", "flush with the plate",
-               "curved start at the plate", "grasped in the plate")  # fmt: skip
+JOINT_CASES = (
+    "any",
+    "any",
+    "flush tips",
+    "shared breakpoint",
+    "flush with the plate",
+    "curved start at the plate",
+    "grasped in the plate",
+)
 
 
 # A pose in the base frame needs none of these, but the file format wants them: drives and tracker are perfect.
 ACTUATION = {"translation_mm_per_rev": 1.0, "rotation_rev_per_rev": 1.0}
-TRACKER = {"sensor_on_tube": 1, "rate_Hz": None, "jitter_mm": 0.0, "jitter_deg": 0.0, "accuracy_95_mm": 0.0,
-           "accuracy_95_deg": 0.0, "position_mm": [0.0] * 3, "rotation_vector_rad": [0.0] * 3}  # fmt: skip
+TRACKER = {
+    "sensor_on_tube": 1,
+    "rate_Hz": None,
+    "jitter_mm": 0.0,
+    "jitter_deg": 0.0,
+    "accuracy_95_mm": 0.0,
+    "accuracy_95_deg": 0.0,
+    "position_mm": [0.0] * 3,
+    "rotation_vector_rad": [0.0] * 3,
+}
 UNCERTAINTY = dict.fromkeys(
-    ("tracker_frame_mm", "tracker_frame_deg", "rotation_offset_deg", "translation_offset_mm", "length_mm",
-     "curved_length_mm", "curvature_percent", "youngs_modulus_percent"), 0.0)  # fmt: skip
+    (
+        "tracker_frame_mm",
+        "tracker_frame_deg",
+        "rotation_offset_deg",
+        "translation_offset_mm",
+        "length_mm",
+        "curved_length_mm",
+        "curvature_percent",
+        "youngs_modulus_percent",
+    ),
+    0.0,
+)
 
 
 def describe(name: str, gravity: list[float]) -> dict:
@@ -89,9 +118,7 @@ def draw_load(robot: Robot, beta: np.ndarray, kind: int, rng: np.random.Generato
     return Load(force.round(6) * (kind > 0), moment.round(8) * (kind > 1))
 
 
-def is_unique(
-    robot: Robot, beta: np.ndarray, alpha: np.ndarray, load: Load, rng: np.random.Generator
-) -> bool:
+def is_unique(robot: Robot, beta: np.ndarray, alpha: np.ndarray, load: Load, rng: np.random.Generator) -> bool:
     """Whether searches from scattered starts end in one equilibrium: a bistable robot has no single right pose."""
     energy = Energy(robot, make_grid(robot, beta, 5e-3), beta, alpha, load.force)
     tips = []
@@ -104,9 +131,7 @@ def is_unique(
     return bool(np.ptp(tips, axis=0).max() < 1e-7)
 
 
-def make_rows(
-    robot: Robot, kind: int, count: int, rng: np.random.Generator
-) -> tuple[list[list[float]], float]:
+def make_rows(robot: Robot, kind: int, count: int, rng: np.random.Generator) -> tuple[list[list[float]], float]:
     """Rows (joints, force, moment, pose), and the largest distance between the two finest extrapolations [m]."""
     rows, worst = [], 0.0
     while len(rows) < count:
@@ -134,17 +159,11 @@ def main() -> None:
             description = describe(name, WEIGHT if weight else [0.0, 0.0, 0.0])
             robot, rng = from_description(description), np.random.default_rng([len(design), weight])
             n_tubes = len(robot.tubes)
-            rows, worst = zip(
-                *(make_rows(robot, kind, n, rng) for kind, n in enumerate(ROWS[weight])), strict=True
-            )
+            rows, worst = zip(*(make_rows(robot, kind, n, rng) for kind, n in enumerate(ROWS[weight])), strict=True)
             write_robot(OUTPUT / name / "robot.yaml", description)
-            write_table(
-                OUTPUT / name / "poses.csv", without_moment(rows[0] + rows[1], n_tubes), n_tubes, ("force",)
-            )
+            write_table(OUTPUT / name / "poses.csv", without_moment(rows[0] + rows[1], n_tubes), n_tubes, ("force",))
             write_table(OUTPUT / name / "moment_poses.csv", rows[2], n_tubes, ("force", "moment"))
-            print(
-                f"{name}: {sum(ROWS[weight])} poses, extrapolations within {1e6 * max(worst):.4f} micrometres"
-            )
+            print(f"{name}: {sum(ROWS[weight])} poses, extrapolations within {1e6 * max(worst):.4f} micrometres")
 
 
 if __name__ == "__main__":

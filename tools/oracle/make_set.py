@@ -65,9 +65,7 @@ class Session:
         leading = zip(self.plan.time, self.plan.run, self.plan.joints, force, strict=True)
         return [
             [time, run, *joints, *load, *pose_fields(place, turn)]
-            for (time, run, joints, load), place, turn in zip(
-                leading, position, rotation.as_matrix(), strict=True
-            )
+            for (time, run, joints, load), place, turn in zip(leading, position, rotation.as_matrix(), strict=True)
         ]
 
 
@@ -85,9 +83,7 @@ def measure(order: Order, *, even: bool = False) -> Session:
     promised["uncertainty"]["youngs_modulus_percent"] *= order.modulus_scatter
     bench = draw_bench(promised, bench_rng)
     setup = Setup(bench, plan, Mechanics(from_description(bench.description)))
-    truths = [
-        hide(setup, name, size, rng) for (name, size), rng in zip(order.effects, hidden_rng, strict=True)
-    ]
+    truths = [hide(setup, name, size, rng) for (name, size), rng in zip(order.effects, hidden_rng, strict=True)]
     if even:
         setup.lag_noise = Setup.lag_noise
     poses = list(run_session(setup))
@@ -99,9 +95,7 @@ def measure(order: Order, *, even: bool = False) -> Session:
 def answer(order: Order, session: Session) -> dict:
     """The content of the truth file."""
     few = thinned(session.plan)
-    plain = list(
-        run_session(Setup(session.bench, few, Mechanics(from_description(session.bench.description))))
-    )
+    plain = list(run_session(Setup(session.bench, few, Mechanics(from_description(session.bench.description)))))
     moved = session.position[::THINNED] - np.array([position for position, _ in plain])
     turned = session.rotation[::THINNED] * Rotation.concatenate([rotation for _, rotation in plain]).inv()
     inliers = ~session.noise.outlier
@@ -173,15 +167,9 @@ def write_set(order: Order, folder: Path, truth: Path) -> dict:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "--effect", action="append", default=[], choices=sorted(CAUSES), help="may be repeated"
-    )
-    parser.add_argument(
-        "--size", action="append", default=[], type=float, help="one for each effect; 1 if left out"
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--effect", action="append", default=[], choices=sorted(CAUSES), help="may be repeated")
+    parser.add_argument("--size", action="append", default=[], type=float, help="one for each effect; 1 if left out")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", choices=NOISES, default="jitter")
     parser.add_argument("--robot", choices=ROBOTS, default="table2")
@@ -193,13 +181,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sizes = given.size or [1.0] * len(given.effect)
     if len(sizes) != len(given.effect):
         parser.error(f"{len(given.effect)} effects but {len(sizes)} sizes")
-    order = Order(tuple(zip(given.effect, sizes, strict=True)), given.seed, given.noise, given.robot, given.loads,
-                  given.stream)  # fmt: skip
+    order = Order(
+        tuple(zip(given.effect, sizes, strict=True)), given.seed, given.noise, given.robot, given.loads, given.stream
+    )
     truth = given.truth or given.out.parent / "truth" / f"{given.out.name}.yaml"
     content = write_set(order, given.out, truth)
-    print(
-        f"{given.out}: {content['rows']} rows; effect {content['rms_mm']['effect']:.3f} mm RMS; answer in {truth}"
-    )
+    print(f"{given.out}: {content['rows']} rows; effect {content['rms_mm']['effect']:.3f} mm RMS; answer in {truth}")
 
 
 if __name__ == "__main__":

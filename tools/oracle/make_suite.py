@@ -28,32 +28,66 @@ from make_set import Order, write_set  # noqa: E402
 SUITE = Path(__file__).resolve().parents[2] / "build" / "suite"
 SIZES = (0.5, 1.0, 2.0)
 EFFECTS = (
-    "friction", "backlash_rotation", "backlash_translation", "delay", "tip_load", "precurvature_profile", "softening",
-    "anisotropy", "straight_curvature", "clearance", "torsional_compliance", "sensor_offset", "field_distortion",
-    "frame_drift", "frame_jump", "periodic_rotation", "periodic_translation", "entry_compliance", "entry_clearance",
-    "helical_precurvature", "contact",
-)  # fmt: skip
+    "friction",
+    "backlash_rotation",
+    "backlash_translation",
+    "delay",
+    "tip_load",
+    "precurvature_profile",
+    "softening",
+    "anisotropy",
+    "straight_curvature",
+    "clearance",
+    "torsional_compliance",
+    "sensor_offset",
+    "field_distortion",
+    "frame_drift",
+    "frame_jump",
+    "periodic_rotation",
+    "periodic_translation",
+    "entry_compliance",
+    "entry_clearance",
+    "helical_precurvature",
+    "contact",
+)
 # The realistic noise contains a distorted field, so that a further one is no question there.
 REALISTIC_EFFECTS = tuple(name for name in EFFECTS if name != "field_distortion")
 SEPARABLE_PAIRS = (
-    ("friction", "tip_load"), ("delay", "clearance"), ("softening", "precurvature_profile"),
-    ("friction", "softening"), ("anisotropy", "sensor_offset"), ("entry_compliance", "frame_drift"),
-    ("backlash_rotation", "tip_load"), ("clearance", "sensor_offset"), ("straight_curvature", "backlash_rotation"),
-    ("frame_jump", "entry_clearance"), ("contact", "friction"), ("helical_precurvature", "periodic_rotation"),
-)  # fmt: skip
+    ("friction", "tip_load"),
+    ("delay", "clearance"),
+    ("softening", "precurvature_profile"),
+    ("friction", "softening"),
+    ("anisotropy", "sensor_offset"),
+    ("entry_compliance", "frame_drift"),
+    ("backlash_rotation", "tip_load"),
+    ("clearance", "sensor_offset"),
+    ("straight_curvature", "backlash_rotation"),
+    ("frame_jump", "entry_clearance"),
+    ("contact", "friction"),
+    ("helical_precurvature", "periodic_rotation"),
+)
 ALIASED_PAIRS = (
-    ("shear_stiffness", "drive_compliance"), ("tip_mass", "tip_force"), ("translation_ratio", "bending_plane"),
-    ("tracker_yaw", "bending_plane"), ("tip_load", "bending_plane"), ("drive_compliance", "translation_ratio"),
-)  # fmt: skip
+    ("shear_stiffness", "drive_compliance"),
+    ("tip_mass", "tip_force"),
+    ("translation_ratio", "bending_plane"),
+    ("tracker_yaw", "bending_plane"),
+    ("tip_load", "bending_plane"),
+    ("drive_compliance", "translation_ratio"),
+)
 # A cause and its look-alike, with the same bench, plan and noise: the same answer is right.
-LOOK_ALIKES = (
-    ("shear_stiffness", "drive_compliance"), ("tip_mass", "tip_force"), ("bending_plane", "tracker_yaw"),
-)  # fmt: skip
+LOOK_ALIKES = (("shear_stiffness", "drive_compliance"), ("tip_mass", "tip_force"), ("bending_plane", "tracker_yaw"))
 UNLOADED_LOOK_ALIKES = ("entry_compliance", "entry_clearance")
 STRANGE = (
-    "rotation_with_translation", "material_hysteresis", "cable_pull", "temperature", "plate_vibration",
-    "insertion_stick_slip", "tooth_error", "load_not_as_known", "grip_slip",
-)  # fmt: skip
+    "rotation_with_translation",
+    "material_hysteresis",
+    "cable_pull",
+    "temperature",
+    "plate_vibration",
+    "insertion_stick_slip",
+    "tooth_error",
+    "load_not_as_known",
+    "grip_slip",
+)
 ROBOTS = ("table2", "B", "table2", "two_tubes", "table2", "four_tubes", "table2", "B", "table2")  # in turn
 
 
@@ -70,9 +104,7 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
     """(group, order) of every set. New ones go to the end, so that the names of the others stay."""
     robots, seeds = cycle(ROBOTS), count(10000 * shift + 1000)
 
-    def order(
-        *effects: tuple[str, float], noise: str = "jitter", seed: int | None = None, **rest: object
-    ) -> Order:
+    def order(*effects: tuple[str, float], noise: str = "jitter", seed: int | None = None, **rest: object) -> Order:
         robot = str(rest.pop("robot", None) or next(robots))
         return Order(effects, next(seeds) if seed is None else seed, noise, robot, **rest)
 
@@ -83,10 +115,7 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
     for noise, n in (("jitter", 12), ("realistic", 12)):
         for k in range(n):
             scatter = 1.35 if k in (4, 5) else 1.0
-            yield (
-                "control",
-                order(noise=noise, modulus_scatter=scatter, loads=k not in (6, 7), stream=k == 11),
-            )
+            yield ("control", order(noise=noise, modulus_scatter=scatter, loads=k not in (6, 7), stream=k == 11))
     for k, name in enumerate(REALISTIC_EFFECTS):
         for n, size in enumerate(SIZES):
             seed = 10000 * shift + 3000 + 10 * k + 2 * n + (k + n) % 2
@@ -134,22 +163,30 @@ def write_index(folder: Path, suite: Sequence[Entry]) -> None:
     unfinished = path.with_suffix(".unfinished")
     with unfinished.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(
-            ("set", "group", "effects", "sizes", "noise", "robot", "seed", "half", "loads", "streamed")
-        )
+        writer.writerow(("set", "group", "effects", "sizes", "noise", "robot", "seed", "half", "loads", "streamed"))
         for entry in suite:
             order = entry.order
             names, sizes = zip(*order.effects, strict=True) if order.effects else ((), ())
             half = "reporting" if order.seed % 2 else "tuning"
-            writer.writerow((entry.name, entry.group, "+".join(names), "+".join(map(str, sizes)), order.noise,
-                             order.robot, order.seed, half, int(order.loads), int(order.streamed)))  # fmt: skip
+            writer.writerow(
+                (
+                    entry.name,
+                    entry.group,
+                    "+".join(names),
+                    "+".join(map(str, sizes)),
+                    order.noise,
+                    order.robot,
+                    order.seed,
+                    half,
+                    int(order.loads),
+                    int(order.streamed),
+                )
+            )
     os.replace(unfinished, path)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=SUITE)
     parser.add_argument("--only", action="append", help="a group; may be repeated")
     parser.add_argument("--jobs", type=int, default=2)
@@ -169,10 +206,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 failed.append(name)
                 print(f"\n{name}: {problem}")
             print(f"\r{done} of {len(wanted)} sets, {monotonic() - start:.0f} s", end="", flush=True)
-    print(
-        f"\n{len(wanted) - len(failed)} sets in {given.out}"
-        + (f"; failed: {' '.join(failed)}" if failed else "")
-    )
+    print(f"\n{len(wanted) - len(failed)} sets in {given.out}" + (f"; failed: {' '.join(failed)}" if failed else ""))
     if failed:
         raise SystemExit(1)
 

@@ -14,9 +14,7 @@ from grid import make_grid
 from kernel import Problem
 from robot import Robot, Tube
 
-Profile = Callable[
-    [np.ndarray], np.ndarray
-]  # distance from the grasped point (n,) [m] -> precurvature (n, 3) [1/m]
+Profile = Callable[[np.ndarray], np.ndarray]  # distance from the grasped point (n,) [m] -> precurvature (n, 3) [1/m]
 
 
 @dataclass(frozen=True)
@@ -43,9 +41,7 @@ class Mechanics:
 
     robot: Robot
     profile: list[Profile] = field(default_factory=list)
-    ellipticity: np.ndarray | None = (
-        None  # (N, 2) (k_x - k_y) / (k_x + k_y) times (cos, sin) of twice its direction
-    )
+    ellipticity: np.ndarray | None = None  # (N, 2) (k_x - k_y) / (k_x + k_y) times (cos, sin) of twice its direction
     tangent: np.ndarray | None = None  # (N, T) tangent over initial bending stiffness against bending
     table_step: float = 0.25  # [1/m] of `tangent`
     torsion_factor: np.ndarray | None = None  # (N,)
@@ -58,9 +54,7 @@ class Mechanics:
     obstacle: np.ndarray | None = None  # (O, 5) centre, radius [m], Hertz stiffness [N/m^2.5]
     friction: FrictionLaw | None = None
     yielding: Yielding | None = None
-    warming: Callable[[float], float] = lambda time: (
-        0.0
-    )  # relative change of stiffness and curvature at a time [s]
+    warming: Callable[[float], float] = lambda time: 0.0  # relative change of stiffness and curvature at a time [s]
 
     def __post_init__(self) -> None:
         self.profile = self.profile or [standard_profile(tube) for tube in self.robot.tubes]
@@ -120,9 +114,7 @@ def configure(
     distance = 0.5 * (s[1:] + s[:-1])[None, :] - np.asarray(beta)[:, None]
     stiffness = np.array([tube.bending_stiffness for tube in robot.tubes]) * (1 + warmth)
     ellipticity = np.zeros((stiffness.size, 2)) if mechanics.ellipticity is None else mechanics.ellipticity
-    section = stiffness[:, None] * np.stack(
-        [1 + ellipticity[:, 0], ellipticity[:, 1], 1 - ellipticity[:, 0]], axis=1
-    )
+    section = stiffness[:, None] * np.stack([1 + ellipticity[:, 0], ellipticity[:, 1], 1 - ellipticity[:, 0]], axis=1)
     joint = np.zeros((elements, 4))
     for k, node in enumerate(places):
         parts = joints[int(node)]
@@ -130,8 +122,7 @@ def configure(
     fields = {
         "stiffness": section,
         "torsion": _torsion(mechanics) * (1 + warmth),
-        "precurvature": np.stack([p(d) for p, d in zip(mechanics.profile, distance, strict=True)])
-        * (1 + warmth),
+        "precurvature": np.stack([p(d) for p, d in zip(mechanics.profile, distance, strict=True)]) * (1 + warmth),
         "base": np.stack([alpha, *_base(mechanics, beta, 1 + warmth)], axis=1),
         "joint": joint,
     }

@@ -45,17 +45,28 @@ class Robot:
     gravity: np.ndarray
 
 
-_SCALE = {"youngs_modulus_GPa": 1e9, "inner_diameter_mm": 1e-3, "outer_diameter_mm": 1e-3, "length_mm": 1e-3,
-          "curved_length_mm": 1e-3}  # fmt: skip
-_FILE_KEYS = ("youngs_modulus_GPa", "poisson_ratio", "density_kg_m3", "inner_diameter_mm", "outer_diameter_mm",
-              "length_mm", "curved_length_mm", "curvature_per_m")  # fmt: skip
+_SCALE = {
+    "youngs_modulus_GPa": 1e9,
+    "inner_diameter_mm": 1e-3,
+    "outer_diameter_mm": 1e-3,
+    "length_mm": 1e-3,
+    "curved_length_mm": 1e-3,
+}
+_FILE_KEYS = (
+    "youngs_modulus_GPa",
+    "poisson_ratio",
+    "density_kg_m3",
+    "inner_diameter_mm",
+    "outer_diameter_mm",
+    "length_mm",
+    "curved_length_mm",
+    "curvature_per_m",
+)
 
 
 def from_description(description: dict) -> Robot:
     """Robot from the content of a robot.yaml."""
-    tubes = tuple(
-        Tube(*(_SCALE.get(key, 1.0) * tube[key] for key in _FILE_KEYS)) for tube in description["tubes"]
-    )
+    tubes = tuple(Tube(*(_SCALE.get(key, 1.0) * tube[key] for key in _FILE_KEYS)) for tube in description["tubes"])
     return Robot(tubes, np.array(description.get("gravity") or (0.0, 0.0, 0.0), dtype=float))
 
 

@@ -48,9 +48,7 @@ class Served:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("robot", type=Path)
     parser.add_argument("--friction", type=float, default=0.0, help="coefficient")
     given = parser.parse_args()

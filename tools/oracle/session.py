@@ -51,9 +51,7 @@ class Plan:
         return np.vstack([between, self.at(end)])
 
 
-def draw_plan(
-    allowed: JointRange, rng: np.random.Generator, *, loads: bool = True, stream: bool = False
-) -> Plan:
+def draw_plan(allowed: JointRange, rng: np.random.Generator, *, loads: bool = True, stream: bool = False) -> Plan:
     """A plan at stops or streamed, with hung masses in turn or without."""
     rows, knots = [], [(0.0, np.concatenate([allowed.home, np.zeros(allowed.home.size)]))]
     time = 0.0
@@ -77,8 +75,10 @@ def draw_plan(
             knots += [(time - SETTLED, stop), (time, stop)]
             rows.append((time, run, stop, mass))
     knots = [knot for k, knot in enumerate(knots) if k == 0 or knot[0] > knots[k - 1][0]]
-    return Plan(*(np.array(column) for column in zip(*rows, strict=True)),
-                *(np.array(column) for column in zip(*knots, strict=True)))  # fmt: skip
+    return Plan(
+        *(np.array(column) for column in zip(*rows, strict=True)),
+        *(np.array(column) for column in zip(*knots, strict=True)),
+    )
 
 
 def _draw_line(allowed: JointRange, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -173,10 +173,7 @@ def draw_noise(tracker: dict, positions: np.ndarray, kind: str, rng: np.random.G
     direction = rng.normal(size=(n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     position += outlier[:, None] * rng.uniform(*OUTLIER_SIZE, (n, 1)) * direction
-    sigma = (
-        1e-3 * tracker["accuracy_95_mm"] / QUANTILE_95,
-        np.deg2rad(tracker["accuracy_95_deg"]) / QUANTILE_95,
-    )
+    sigma = (1e-3 * tracker["accuracy_95_mm"] / QUANTILE_95, np.deg2rad(tracker["accuracy_95_deg"]) / QUANTILE_95)
     fields = [s * _smooth_field(positions, rng) for s in sigma]
     return Noise(position, rotation, *fields, outlier)
 

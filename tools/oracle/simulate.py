@@ -74,9 +74,7 @@ def _field(sigma: float, rng: np.random.Generator, waves: int = 200) -> Callable
     """Three smooth random functions of position: normal, squared-exponential correlation over FIELD_LENGTH."""
     wave_vector = rng.normal(size=(3, waves, 3)) / FIELD_LENGTH
     phase = rng.uniform(0, 2 * np.pi, (3, waves))
-    return lambda position: (
-        sigma * np.sqrt(2 / waves) * np.sum(np.cos(wave_vector @ position + phase), axis=1)
-    )
+    return lambda position: sigma * np.sqrt(2 / waves) * np.sum(np.cos(wave_vector @ position + phase), axis=1)
 
 
 @dataclass(frozen=True)

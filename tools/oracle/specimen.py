@@ -98,23 +98,24 @@ class Specimen:
             unknowns = np.stack([offset[inner] + node, offset[inner + 1] + node], axis=1)
             anchors = [self._anchor.get(place, np.full(2, np.nan)) for place in places]
             limit = [law.coefficient * self._jump.get(place, 0.0) for place in places]
-            contact = np.column_stack([limit, np.full(len(places), law.contact_stiffness),
-                                       np.reshape(anchors, (-1, 2)), slid])  # fmt: skip
+            contact = np.column_stack(
+                [limit, np.full(len(places), law.contact_stiffness), np.reshape(anchors, (-1, 2)), slid]
+            )
             new = np.isnan(contact[:, 2])  # a contact that was not there starts with no limit, so no torque
             contact[new, 2:4] = 0.0
             contact[new, 0] = 0.0
             history |= {"contact_node": unknowns, "contact": contact}
         if self.mechanics.yielding:
             distance = here.middle[None, :] - beta[:, None]
-            history["plastic_anchor"] = np.stack([
-                np.stack([np.interp(d, FIBRE * np.arange(len(f)), f[:, axis]) for axis in range(2)], axis=1)
-                for d, f in zip(distance, self._fibres, strict=True)
-            ])  # fmt: skip
+            history["plastic_anchor"] = np.stack(
+                [
+                    np.stack([np.interp(d, FIBRE * np.arange(len(f)), f[:, axis]) for axis in range(2)], axis=1)
+                    for d, f in zip(distance, self._fibres, strict=True)
+                ]
+            )
         return history
 
-    def _remember(
-        self, here: Configuration, problem: Problem, x: np.ndarray, beta: np.ndarray, history: dict
-    ) -> None:
+    def _remember(self, here: Configuration, problem: Problem, x: np.ndarray, beta: np.ndarray, history: dict) -> None:
         self._last = here, problem, x
         moment, deviation = problem.sections(x)
         if self.mechanics.friction:
@@ -129,9 +130,7 @@ class Specimen:
         if self.mechanics.yielding:
             self._follow_fibres(here, deviation, beta, history["plastic_anchor"])
 
-    def _follow_fibres(
-        self, here: Configuration, deviation: np.ndarray, beta: np.ndarray, anchor: np.ndarray
-    ) -> None:
+    def _follow_fibres(self, here: Configuration, deviation: np.ndarray, beta: np.ndarray, anchor: np.ndarray) -> None:
         stretch = deviation - anchor
         norm = np.linalg.norm(stretch, axis=2, keepdims=True)
         moved = stretch * (1 - np.minimum(1.0, self.mechanics.yielding.curvature / np.maximum(norm, 1e-300)))
@@ -160,9 +159,7 @@ class Specimen:
         for e in np.flatnonzero(here.h == 0):  # a joint carries what comes out of it
             padded[:, e + 1] = moment[:, e + 1] if e + 1 < here.h.size else 0.0
         for i, tube in enumerate(self.mechanics.robot.tubes):
-            if (
-                tube.length + beta[i] - tube.curved_length < -COINCIDENT
-            ):  # precurved part held straight in the guide
+            if tube.length + beta[i] - tube.curved_length < -COINCIDENT:  # precurved part held straight in the guide
                 angle, held = problem.theta(x, i)[0], tube.bending_stiffness * tube.curvature
                 padded[i, 0] = -held * np.array([np.cos(angle), np.sin(angle)])
         jumps = np.linalg.norm(np.diff(np.cumsum(padded, axis=0), axis=1), axis=2)

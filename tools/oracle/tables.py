@@ -17,11 +17,7 @@ def pose_fields(position: np.ndarray, rotation: np.ndarray) -> list[float]:
 
 
 def write_table(
-    path: Path,
-    rows: Iterable[Iterable[float]],
-    n_tubes: int,
-    loads: tuple[str, ...],
-    leading: tuple[str, ...] = (),
+    path: Path, rows: Iterable[Iterable[float]], n_tubes: int, loads: tuple[str, ...], leading: tuple[str, ...] = ()
 ) -> None:
     """Rows of (leading, beta, alpha, loads, pose) as CSV with 12 significant digits."""
     tubes = range(1, n_tubes + 1)

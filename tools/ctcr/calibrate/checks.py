@@ -5,12 +5,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.compare import wording
+from ctcr.compare.offsets import find_run_offsets
+from ctcr.compare.sample import take_sample
+from ctcr.compare.visits import find_revisits, find_stops
 from ctcr.errors import InputError, Problem
+from ctcr.fit.run_frames import error_with_frames
 from ctcr.frames import base_to_tracker
-from ctcr.measurements import Measurements
-from ctcr.output import listed
-from ctcr.robot import Robot
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.show import wording
+from ctcr.show.output import listed
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 OUTLIER_WEIGHT = 0.3  # below it a reading hardly counts
@@ -25,8 +30,6 @@ def start(robot: Robot, readings: Measurements) -> float:
 
     Raises InputError where nothing is measured or solved, and where the tracker frame is no start for a fit.
     """
-    from ctcr.model import Model
-
     if readings.position is None or not np.isfinite(readings.position).any():
         raise InputError(Problem("no position is measured: columns x_m, y_m, z_m are missing or empty"))
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
@@ -37,11 +40,13 @@ def start(robot: Robot, readings: Measurements) -> float:
     distance = np.linalg.norm(readings.position - tip, axis=1)
     usual, longest = float(np.nanmedian(distance)), robot.tubes[0].length
     if usual > longest:
-        raise InputError(Problem(
-            f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
-            f"tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
-            f"`ctcr calibrate registration`"
-        ))  # fmt: skip
+        raise InputError(
+            Problem(
+                f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
+                f"tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
+                f"`ctcr calibrate registration`"
+            )
+        )
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
 
 
@@ -56,9 +61,7 @@ def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
     if usable.all():
         return usable, []
     repeated = readings.row[~usable]
-    return usable, [
-        f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."
-    ]
+    return usable, [f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."]
 
 
 def outlier_rows(fit, readings: Measurements) -> list[int]:
@@ -76,9 +79,7 @@ def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> l
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
-        said.append(
-            f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted."
-        )
+        said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
     if not frame_per_run:
         said += _one_frame(after, readings, fit) or _run_frames(after, readings, fit)
     return said
@@ -92,8 +93,6 @@ def sentence(text: str) -> str:
 
 def _one_frame(robot: Robot, readings: Measurements, fit) -> list[str]:
     """A sentence where an error far beyond noise goes away with another frame for all."""
-    from ctcr.calibrate.run_frames import error_with_frames
-
     together = replace(readings, run=np.zeros_like(readings.run))
     before_mm, after_mm = error_with_frames(robot, together, fit.noise)
     if before_mm < FRAMES_BEYOND * fit.floor_mm() or after_mm > FRAMES_LEAVE * before_mm:
@@ -108,12 +107,6 @@ def _one_frame(robot: Robot, readings: Measurements, fit) -> list[str]:
 def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
     """A sentence where the runs do not share one frame: the same joints give other positions in other runs, or an error
     far beyond noise goes away with a frame for each."""
-    from ctcr.calibrate.run_frames import error_with_frames
-    from ctcr.compare.offsets import find_run_offsets
-    from ctcr.compare.sample import take_sample
-    from ctcr.compare.visits import find_revisits, find_stops
-    from ctcr.model import Model
-
     if len(np.unique(readings.run)) < 2:
         return []
     before_mm, after_mm = error_with_frames(robot, readings, fit.noise)

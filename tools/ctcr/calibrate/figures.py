@@ -1,12 +1,13 @@
 """The pictures of the calibration report. Colours mean what they mean in the comparison's."""
 
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
 from ctcr.calibrate.joint_fit import Calibration
-from ctcr.calibrate.parameters import SAYS_NOTHING
-from ctcr.compare.figures import ERROR, FAINT, INK, NOISE, OUT
-from ctcr.compare.wording import mm
+from ctcr.model.fields import SAYS_NOTHING
+from ctcr.show.style import ERROR, FAINT, INK, NOISE, OUT
+from ctcr.show.wording import mm
 
 GOOD = "#2e7d4f"
 MOST_NAMES = 60
@@ -28,16 +29,29 @@ def waterfall(figure, c: Calibration) -> None:
             axes.bar(place, previous - size, bottom=size, width=0.62, color=FAINT, alpha=0.45, zorder=1)
             axes.plot([place - 1 + 0.31, place + 0.31], [previous, previous], color=NOISE, lw=0.8)
             change = 100 * (size / previous - 1)
-            axes.annotate(f"{change:+.0f} %", (place, max(size, previous)), (0, 4), textcoords="offset points",
-                          ha="center", fontsize=9, color=NOISE)  # fmt: skip
+            axes.annotate(
+                f"{change:+.0f} %",
+                (place, max(size, previous)),
+                (0, 4),
+                textcoords="offset points",
+                ha="center",
+                fontsize=9,
+                color=NOISE,
+            )
         inside = size > 0.12 * steps[0][1]
-        axes.annotate(mm(size), (place, size), (0, -13 if inside else 3), textcoords="offset points",
-                      ha="center", color="white" if inside else INK, fontweight="bold", zorder=3)  # fmt: skip
+        axes.annotate(
+            mm(size),
+            (place, size),
+            (0, -13 if inside else 3),
+            textcoords="offset points",
+            ha="center",
+            color="white" if inside else INK,
+            fontweight="bold",
+            zorder=3,
+        )
     last = len(steps)
     axes.bar(last, floor, width=0.62, color=NOISE)
-    axes.annotate(
-        mm(floor), (last, floor), (0, 3), textcoords="offset points", ha="center", fontweight="bold"
-    )
+    axes.annotate(mm(floor), (last, floor), (0, 3), textcoords="offset points", ha="center", fontweight="bold")
     axes.axhline(floor, color=NOISE, ls="--", lw=1)
     labels = [_label(name, c) for name, _ in steps] + ["noise floor"]
     axes.set_xticks(range(last + 1), labels)
@@ -54,23 +68,13 @@ def _label(name: str, c: Calibration) -> str:
 def histogram(figure, c: Calibration) -> None:
     """Error sizes before and after, against what noise would give."""
     axes = figure.subplots()
-    before, after = (
-        _known(1e3 * np.linalg.norm(r[:, :3], axis=1)) for r in (c.fit.nominal_residual, c.fit.residual)
-    )
+    before, after = (_known(1e3 * np.linalg.norm(r[:, :3], axis=1)) for r in (c.fit.nominal_residual, c.fit.residual))
     axis_sd = c.floor.rms_mm / np.sqrt(3)
     low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
     edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
     for sizes, colour, label in ((before, ERROR, "robot file"), (after, GOOD, "calibrated")):
-        axes.hist(
-            sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label
-        )
-    axes.stairs(
-        100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)),
-        edges,
-        color=NOISE,
-        lw=1.5,
-        label="noise alone",
-    )
+        axes.hist(sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label)
+    axes.stairs(100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)), edges, color=NOISE, lw=1.5, label="noise alone")
     axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
     _plain_ticks(axes.xaxis)
     axes.legend(fontsize=9)
@@ -100,16 +104,24 @@ def shifts(figure, c: Calibration) -> None:
     axes = figure.subplots()
     for place, item in enumerate(items):
         colour = ERROR if item.implausible or item.moved_far else FAINT if item.says_nothing else OUT
-        axes.plot([item.shift - item.ratio, item.shift + item.ratio], [place, place], color=colour, lw=2.2,
-                  solid_capstyle="butt")  # fmt: skip
+        axes.plot(
+            [item.shift - item.ratio, item.shift + item.ratio],
+            [place, place],
+            color=colour,
+            lw=2.2,
+            solid_capstyle="butt",
+        )
         axes.plot(item.shift, place, "o", color=colour, ms=4.5)
     reach = max(3.0, 1.1 * max(abs(item.shift) + item.ratio for item in items))
     axes.axvspan(-2, 2, color="#eef2f5", lw=0, zorder=0)
     axes.axvspan(-1, 1, color="#dfe6eb", lw=0, zorder=0)
     axes.axvline(0, color=NOISE, lw=0.8)
     axes.set_yticks(range(len(items)), [item.name for item in items], fontsize=8)
-    axes.set(xlim=(-reach, reach), ylim=(-0.7, len(items) - 0.3),
-             xlabel="shift from the robot file, in standard deviations of what it says")  # fmt: skip
+    axes.set(
+        xlim=(-reach, reach),
+        ylim=(-0.7, len(items) - 0.3),
+        xlabel="shift from the robot file, in standard deviations of what it says",
+    )
     axes.grid(axis="y", visible=False)
 
 
@@ -146,45 +158,33 @@ def half_difference(figure, c: Calibration) -> bool | None:
     """Where the models of two halves of the data disagree, and whether noise would drive them that far apart."""
     if c.halves is None:
         return False
-    tip, size, noise = (
-        1e3 * c.halves.tip,
-        1e3 * np.linalg.norm(c.halves.difference, axis=1),
-        1e3 * c.halves.noise,
-    )
+    tip, size, noise = (1e3 * c.halves.tip, 1e3 * np.linalg.norm(c.halves.difference, axis=1), 1e3 * c.halves.noise)
     views = figure.subplots(1, 3, width_ratios=(1, 1, 1.1))
     top = max(np.percentile(size, 98), 1e-6)
     for axes, (x, y) in zip(views[:2], ((2, 0), (2, 1)), strict=True):
         order = np.argsort(size)
-        drawn = axes.scatter(
-            tip[order, x], tip[order, y], c=size[order], cmap="YlOrRd", vmin=0, vmax=top, s=16, lw=0
-        )
+        drawn = axes.scatter(tip[order, x], tip[order, y], c=size[order], cmap="YlOrRd", vmin=0, vmax=top, s=16, lw=0)
         axes.set(xlabel=f"{'xyz'[x]} (base), mm", ylabel=f"{'xyz'[y]} (base), mm", aspect="equal")
         axes.set_adjustable("datalim")
     label = "difference of the two models, mm"
     figure.colorbar(drawn, ax=views[:2], location="bottom", shrink=0.6, pad=0.02, label=label)
     axes = views[2]
     beyond = size > 2 * noise
-    for mask, colour, label in (
-        (~beyond, NOISE, "what noise can do"),
-        (beyond, ERROR, "beyond twice the noise"),
-    ):
+    for mask, colour, label in ((~beyond, NOISE, "what noise can do"), (beyond, ERROR, "beyond twice the noise")):
         if mask.any():
-            axes.plot(
-                noise[mask],
-                size[mask],
-                ".",
-                color=colour,
-                ms=5,
-                alpha=0.6,
-                label=f"{label} ({mask.mean():.0%})",
-            )
+            axes.plot(noise[mask], size[mask], ".", color=colour, ms=5, alpha=0.6, label=f"{label} ({mask.mean():.0%})")
     low, high = min(noise.min(), size.min()), max(noise.max(), size.max())
     low = max(low, 1e-3 * high)
     line = np.array([low, high])
     axes.plot(line, line, color=INK, lw=1)
     axes.plot(line, 2 * line, color=INK, lw=0.8, ls="--")
-    axes.set(xscale="log", yscale="log", xlabel="expected from noise, mm RMS", ylabel="difference, mm",
-             ylim=(low, 1.3 * high))  # fmt: skip
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="expected from noise, mm RMS",
+        ylabel="difference, mm",
+        ylim=(low, 1.3 * high),
+    )
     _plain_ticks(axes.xaxis)
     _plain_ticks(axes.yaxis)
     axes.legend(fontsize=8, loc="lower right")
@@ -196,8 +196,6 @@ def _known(values):
 
 
 def _plain_ticks(axis) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter(lambda value, _: f"{value:g}")
     axis.set_minor_formatter(NullFormatter())

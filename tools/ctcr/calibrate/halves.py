@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ctcr import effect_model
 from ctcr.frames import base_to_tracker
-from ctcr.measurements import Measurements
-from ctcr.model import Model
-from ctcr.robot import Robot
+from ctcr.model import effect_model
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 MOST_PLACES = 400
@@ -61,9 +61,7 @@ def compare_halves(robot: Robot, readings: Measurements, first, second, kind: st
     if not solved.any():
         return None
     base = (tips[0] - models[0].tracker.position) @ models[0].tracker.rotation
-    return Halves(
-        kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(squares[solved])
-    )
+    return Halves(kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(squares[solved]))
 
 
 def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Array:

@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import robot_update, sensor_roll
-from ctcr.calibrate import checks, parameters
+from ctcr.audit import sensor_roll
+from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
-from ctcr.calibrate.parameters import Fitted
-from ctcr.calibrate.splits import Split, parts_of, runs_left_out
-from ctcr.measurements import Measurements
-from ctcr.output import Progress
-from ctcr.robot import Robot
+from ctcr.fit import joint
+from ctcr.fit.folds import Split, parts_of, runs_left_out
+from ctcr.fit.run_frames import fit_with_frames
+from ctcr.model import fields
+from ctcr.model.fields import Fitted
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot import ledger
+from ctcr.robot.description import Robot
+from ctcr.show.output import Progress
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -68,9 +73,7 @@ class Calibration:
     def unexplained(self) -> Stage:
         """Scatter per axis beside the stated noise: what the model cannot explain."""
         jitter = np.array([1e3 * self.fit.noise.position_jitter, np.degrees(self.fit.noise.rotation_jitter)])
-        return Stage(
-            "unexplained", *map(float, jitter * np.sqrt(np.maximum(np.square(self.fit.inflation) - 1, 0)))
-        )
+        return Stage("unexplained", *map(float, jitter * np.sqrt(np.maximum(np.square(self.fit.inflation) - 1, 0))))
 
     @property
     def n_readings(self) -> int:
@@ -92,10 +95,7 @@ class Calibration:
             "chi_square": fit.chi_square,
             "observations": fit.observations,
             "effective_parameters": fit.effective_parameters,
-            "unexplained_scatter": {
-                "position_mm": self.unexplained.rms_mm,
-                "rotation_deg": self.unexplained.rms_deg,
-            },
+            "unexplained_scatter": {"position_mm": self.unexplained.rms_mm, "rotation_deg": self.unexplained.rms_deg},
             "correlations": [{"first": a, "second": b, "r": r} for a, b, r in fit.correlations],
             "undetermined": [{"text": d.text, "ratio": d.ratio} for d in fit.directions],
             "frames": self.frames and self.frames.as_dict(),
@@ -152,7 +152,7 @@ def calibrate(
     if hold_out or len(readings) > MOST_ROWS_FOLDED:
         judged = judged[1:2]
     both = parts_of(readings, lever, 2) if halves else None
-    engine = _engine(robot, readings, usable, frame_per_run, parameters.in_si(sd or {}, robot))
+    engine = _engine(robot, readings, usable, frame_per_run, fields.in_si(sd or {}, robot))
     with Progress("fitting", 3 + len(judged) + 2 * (both is not None)) as progress:
 
         def fitted(only: Sequence[str], **options):
@@ -175,64 +175,52 @@ def calibrate(
         after=after,
         readings=readings,
         fit=fit,
-        fitted=parameters.fitted(fit),
+        fitted=fields.fitted(fit),
         stages=stages,
         held_out=held_out,
         floor=Stage("noise floor", fit.floor_mm(usable), fit.floor_deg(usable)),
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
         frames=getattr(fit, "frames", None),
-        notices=[
-            *map(checks.sentence, notices),
-            *repeated,
-            *checks.notices(after, readings, fit, frame_per_run),
-        ],
+        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(after, readings, fit, frame_per_run)],
     )
 
 
-def write_robot(
-    c: Calibration, target: str | Path, measurements: str | Path, in_place: bool = False
-) -> Robot:
+def write_robot(c: Calibration, target: str | Path, measurements: str | Path, in_place: bool = False) -> Robot:
     """Writes the calibrated robot file with its entry in the ledger."""
     figures = {"rms_mm": rms(c, "rms_mm"), "reduced_chi_square": c.fit.reduced_chi_square}
     if np.isfinite(c.floor.rms_deg):
         figures["rms_deg"] = rms(c, "rms_deg")
-    entry = robot_update.Entry(
-        "ctcr calibrate fit", [measurements], figures, " ".join(parameters.doubts(c.fitted))
+    entry = ledger.Entry("ctcr calibrate fit", [measurements], figures, " ".join(fields.doubts(c.fitted)))
+    return ledger.write(
+        c.before,
+        target,
+        fields.changes(c.fit, c.before, c.after),
+        entry,
+        effects=c.after.effects if c.after.effects != c.before.effects else None,
+        in_place=in_place,
     )
-    return robot_update.write(
-        c.before, target, parameters.changes(c.fit, c.before, c.after), entry,
-        effects=c.after.effects if c.after.effects != c.before.effects else None, in_place=in_place,
-    )  # fmt: skip
 
 
-def _engine(
-    robot: Robot, readings: Measurements, usable: Array, frame_per_run: bool, sd: Mapping[str, float]
-):
+def _engine(robot: Robot, readings: Measurements, usable: Array, frame_per_run: bool, sd: Mapping[str, float]):
     """fit(names, rows=, ..): the plain fit, or that with a frame for every run."""
-    from ctcr import identify
-    from ctcr.calibrate.run_frames import fit_with_frames
 
     def fit(names: Sequence[str], rows: Array | None = None, **options):
         kept = usable if rows is None else usable & rows
         if frame_per_run:
             return fit_with_frames(robot, readings, names, kept, sd=sd, **options)
-        return identify.fit(robot, readings, free=list(names), rows=kept, sd=sd, **options)
+        return joint.fit(robot, readings, free=list(names), rows=kept, sd=sd, **options)
 
     return fit
 
 
 def _noises(robot: Robot, readings: Measurements, noise: str) -> list:
     """The noises to try, the smaller first."""
-    from ctcr import identify
-
-    jitter, field = (identify.noise_of_readings(robot, readings, field=wanted) for wanted in (False, True))
+    jitter, field = (noise_of_readings(robot, readings, field=wanted) for wanted in (False, True))
     smooth = field.position_field > 0 or field.rotation_field > 0
     return {"jitter": [jitter], "field": [field], "auto": [jitter, field] if smooth else [jitter]}[noise]
 
 
-def _chosen(
-    fitted, names: Sequence[str], noises: list, parts: Split | None, judged: Sequence[int], usable: Array
-):
+def _chosen(fitted, names: Sequence[str], noises: list, parts: Split | None, judged: Sequence[int], usable: Array):
     """The fit with the noise to use, and its error on the parts that are left out in turn."""
     tried = []
     for noise in noises:
@@ -245,9 +233,7 @@ def _chosen(
         return tried[-1], None
     held_out = []
     for fit in tried:
-        folds = [
-            (fitted(names, rows=parts.part != part, **_as_in(fit)), parts.part == part) for part in judged
-        ]
+        folds = [(fitted(names, rows=parts.part != part, **_as_in(fit)), parts.part == part) for part in judged]
         held_out.append(_held_out(folds, parts.kind, usable))
     best = min(range(len(tried)), key=lambda i: held_out[i].error.rms_mm)
     return tried[best], held_out[best]
@@ -277,10 +263,11 @@ def _held_out(folds: list, kind: str, usable: Array) -> HeldOut:
     seen = [(fit.residual[rows & usable], fit.expected_square[rows & usable]) for fit, rows in folds]
     residual, expected = (np.concatenate([pair[i] for pair in seen]) for i in range(2))
     known = np.isfinite(residual[:, [0, 3]])
-    floor = [
-        float(np.sqrt(np.mean(expected[known[:, i], i]))) if known[:, i].any() else nan for i in range(2)
-    ]
+    floor = [float(np.sqrt(np.mean(expected[known[:, i], i]))) if known[:, i].any() else nan for i in range(2)]
     return HeldOut(
-        kind, len(folds), int(known[:, 0].sum()), _stage("held out", residual),
+        kind,
+        len(folds),
+        int(known[:, 0].sum()),
+        _stage("held out", residual),
         Stage("noise floor", 1e3 * floor[0], float(np.degrees(floor[1]))),
-    )  # fmt: skip
+    )

@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr.bench.devices.bench_file import Bench
+from ctcr.bench.devices.motors import Motors
+from ctcr.bench.devices.person import Person
+from ctcr.bench.devices.sight import Sight
+from ctcr.bench.devices.tracker import Tracker
+from ctcr.bench.devices.transmission import turns_of_joints
+from ctcr.bench.record.row_file import RowFile
 from ctcr.calibrate.still_reading import StillReading, still_reading
 from ctcr.calibrate.tables import Table
-from ctcr.devices.bench_file import Bench
-from ctcr.devices.motors import Motors
-from ctcr.devices.person import Person
-from ctcr.devices.sight import Sight
-from ctcr.devices.tracker import Tracker
-from ctcr.devices.transmission import turns_of_joints
 from ctcr.errors import InputError, Problem
-from ctcr.record.row_file import RowFile
-from ctcr.robot import Robot
+from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
 
@@ -127,9 +127,7 @@ class _Turner:
         for tube in range(self._robot.n_tubes):
             if problem := self._limits.problem(self._alone(tube)):
                 text = f"tube {tube + 1} cannot stand out alone: {problem}; widen the limits, or take the tubes in the "
-                problems.append(
-                    Problem(f"{text}way out of the robot and make the table by hand", field="limits")
-                )
+                problems.append(Problem(f"{text}way out of the robot and make the table by hand", field="limits"))
         if problems:
             raise InputError(problems)
 
@@ -158,16 +156,12 @@ class _Turner:
         """Which tube has the sensor: the one that is out alone, or else its usual one."""
         tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
         out = np.flatnonzero(tips > FLUSH_M)
-        self._worn = (
-            int(out[0]) if len(out) == 1 else self._robot.tracker.sensor_on_tube - 1 if len(out) else None
-        )
+        self._worn = int(out[0]) if len(out) == 1 else self._robot.tracker.sensor_on_tube - 1 if len(out) else None
 
     def take_out(self, tube: int) -> None:
         """This tube alone out of the plate with the sensor on it. The sensor does not fit into another tube."""
         tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
-        ordered = (
-            tube == 0 or (np.delete(tips, tube) <= FLUSH_M).all()
-        )  # the straight way keeps to the limits
+        ordered = tube == 0 or (np.delete(tips, tube) <= FLUSH_M).all()  # the straight way keeps to the limits
         if self._worn != tube or not ordered:
             if self._worn is not None:
                 self._person.fasten(None)

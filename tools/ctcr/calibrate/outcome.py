@@ -1,13 +1,19 @@
 """What a calibration procedure found, and how it is given back: table, JSON, robot file."""
 
+import html
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite, nan
+from pathlib import Path
 from typing import Any
 
-from ctcr import output, robot_update
+from ctcr.calibrate.procedure_figures import WIDTH
 from ctcr.errors import InputError, Problem
-from ctcr.robot_update import Change, Entry
+from ctcr.robot import ledger
+from ctcr.robot.ledger import Change, Entry
+from ctcr.show import html_page, output
+from ctcr.show.html_page import bullets, figure, table
+from ctcr.show.output import atomic_writer
 
 
 @dataclass(frozen=True)
@@ -81,11 +87,9 @@ def deliver(
     """Writes what was asked for, the files first, and prints the table."""
     if target:
         entry = Entry(command, sources, outcome.figures, " ".join(outcome.notices))
-        robot_update.write(robot, target, outcome.changes, entry, in_place=in_place)
+        ledger.write(robot, target, outcome.changes, entry, in_place=in_place)
     if report:
-        from ctcr.calibrate import procedure_report
-
-        procedure_report.write(outcome, report, command, " and ".join(map(str, sources)), robot)
+        write_report(outcome, report, command, " and ".join(map(str, sources)), robot)
     if json_target:
         output.write_json(outcome.as_dict(), json_target)
     console = output.console(json_target)
@@ -106,10 +110,15 @@ def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
     with_old = any(isfinite(row.old) for row in outcome.rows)
     columns = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"]
     return columns, [
-        [row.name, row.unit, *([number(row.old, row.deviation)] if with_old else []),
-         number(row.value, row.deviation), deviation(row.deviation)]
+        [
+            row.name,
+            row.unit,
+            *([number(row.old, row.deviation)] if with_old else []),
+            number(row.value, row.deviation),
+            deviation(row.deviation),
+        ]
         for row in outcome.rows
-    ]  # fmt: skip
+    ]
 
 
 def number(value: float, deviation: float = nan) -> str:
@@ -129,3 +138,22 @@ def deviation(value: float) -> str:
 def digits(deviation: float) -> int:
     """Decimals that show a standard deviation to two digits."""
     return max(0, 1 - int(f"{deviation:.1e}".partition("e")[2]))
+
+
+def write_report(outcome: Outcome, target: str | Path, command: str, source: str, robot=None) -> None:
+    """Write the report; source says what was measured. Raises InputError when the file cannot be written."""
+    with atomic_writer(target) as file:
+        file.write(page(outcome, command, source, robot))
+
+
+def page(outcome: Outcome, command: str, source: str, robot=None) -> str:
+    """The whole HTML text."""
+    title = f"{outcome.title}: {robot.name}" if robot else outcome.title
+    sections = [f"<h1>{html.escape(title)}</h1>"]
+    if outcome.notices:
+        sections.append("<h2>To know</h2>" + bullets(outcome.notices))
+    if outcome.picture:
+        p = outcome.picture
+        sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))
+    sections.append(table("Found, with one standard deviation", *cells(outcome), 2))
+    return html_page.page(title, sections, source, command)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
 
 Array = NDArray[np.float64]
 
@@ -47,9 +47,7 @@ def circle_of(name: str, position: Array, angle: Array, forward: NDArray[np.bool
     if fit.in_base_frame:
         position = (position - robot.tracker.position) @ robot.tracker.rotation
     used = ~np.isin(np.arange(len(angle)), fit.outliers)
-    return Circle(
-        name, position, angle, forward, used, np.array(fit.centre), np.array(fit.normal), fit.radius
-    )
+    return Circle(name, position, angle, forward, used, np.array(fit.centre), np.array(fit.normal), fit.radius)
 
 
 def circles(figure, found: list[Circle]) -> None:
@@ -138,11 +136,7 @@ def outline(figure, found: tuple[Array, Array, Array, float, list[int]]) -> None
     across = np.array([-chord[1], chord[0]]) / length
     height = np.sqrt(max(radius**2 - (0.5 * length) ** 2, 0.0))
     # Of the four arcs of that radius through both ends, the one that the points follow.
-    arcs = [
-        _arc(junction, tip, junction + half + side * height * across, long)
-        for side in (1, -1)
-        for long in (0, 1)
-    ]
+    arcs = [_arc(junction, tip, junction + half + side * height * across, long) for side in (1, -1) for long in (0, 1)]
     arc = min(arcs, key=lambda a: np.sum(np.min(np.linalg.norm(a[:, None] - clicked, axis=2), axis=1) ** 2))
     straight = junction - arc[1]
     back = max(0.0, float(((junction - clicked) @ -straight / np.linalg.norm(straight)).max()))

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ctcr import html_page
 from ctcr.calibrate import figures, terminal
 from ctcr.calibrate.joint_fit import Calibration
-from ctcr.calibrate.parameters import doubts
 from ctcr.calibrate.view import view
-from ctcr.compare.wording import mm
-from ctcr.html_page import bullets, cards, figure, table
-from ctcr.output import atomic_writer
+from ctcr.model.fields import doubts
+from ctcr.show import html_page
+from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.output import atomic_writer
+from ctcr.show.wording import mm
 
 
 def write(c: Calibration, target: str | Path, source: str) -> None:
@@ -24,8 +24,16 @@ def write(c: Calibration, target: str | Path, source: str) -> None:
 def page(c: Calibration, source: str) -> str:
     """The whole HTML text."""
     title = f"Calibration: {c.before.name}"
-    sections = [_opening(c, title), _doubts(c), _waterfall(c), _parameters(c), _together(c), _halves(c), _residuals(c),
-                _numbers(c)]  # fmt: skip
+    sections = [
+        _opening(c, title),
+        _doubts(c),
+        _waterfall(c),
+        _parameters(c),
+        _together(c),
+        _halves(c),
+        _residuals(c),
+        _numbers(c),
+    ]
     return html_page.page(title, sections, source, "ctcr calibrate fit", view(c))
 
 
@@ -36,16 +44,10 @@ def _opening(c: Calibration, title: str) -> str:
         ("good", f"{c.stages[-1].rms_mm:.3g} mm", f"RMS error with {len(c.fitted)} parameters fitted"),
     ]
     if c.held_out:
-        numbers.append(
-            ("good", f"{error.rms_mm:.3g} mm", f"RMS error on {c.held_out.kind} that a fit has not seen")
-        )
+        numbers.append(("good", f"{error.rms_mm:.3g} mm", f"RMS error on {c.held_out.kind} that a fit has not seen"))
     smooth = " and smooth error" if c.fit.noise.position_field > 0 else ""
-    numbers.append(
-        ("noise", f"{floor.rms_mm:.2g} mm", f"noise floor: what the tracker's jitter{smooth} would give")
-    )
-    numbers.append(
-        ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all")
-    )
+    numbers.append(("noise", f"{floor.rms_mm:.2g} mm", f"noise floor: what the tracker's jitter{smooth} would give"))
+    numbers.append(("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"))
     return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(terminal.headline(c))}</p>{cards(numbers)}'
 
 
@@ -58,9 +60,7 @@ def _doubts(c: Calibration) -> str:
 
 
 def _waterfall(c: Calibration) -> str:
-    caption = (
-        "From the robot file's values to what noise leaves. What counts is the error of readings not seen."
-    )
+    caption = "From the robot file's values to what noise leaves. What counts is the error of readings not seen."
     return "<h2>What calibration brings</h2>" + figure(figures.waterfall, c, 10.4, 4.2, caption, wide=True)
 
 
@@ -82,11 +82,7 @@ def _together(c: Calibration) -> str:
     caption = "Dark red and dark blue: the data determine only the sum or the difference of the two."
     text = "<h2>What the data cannot tell apart</h2>"
     lines = terminal.undetermined(c)
-    return (
-        text
-        + (bullets(lines) if lines else "")
-        + figure(figures.correlations, c, 10.4, size, caption, wide=True)
-    )
+    return text + (bullets(lines) if lines else "") + figure(figures.correlations, c, 10.4, size, caption, wide=True)
 
 
 def _halves(c: Calibration) -> str:
@@ -104,10 +100,9 @@ def _halves(c: Calibration) -> str:
         f"Noise alone would make it {mm(h.noise_mm)}, {verdict}."
     )
     caption = "Left, middle: where the two disagree. Right: against what noise can do (line) and twice that (dashed)."
-    return (
-        f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>"
-        + figure(figures.half_difference, c, 10.4, 4.6, caption, wide=True)
-    )  # fmt: skip
+    return f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>" + figure(
+        figures.half_difference, c, 10.4, 4.6, caption, wide=True
+    )
 
 
 def _residuals(c: Calibration) -> str:
@@ -124,16 +119,16 @@ def _residuals(c: Calibration) -> str:
 def _numbers(c: Calibration) -> str:
     fit = c.fit
     rows = [
-        ["readings", str(c.n_readings)], ["numbers measured", str(fit.observations)],
+        ["readings", str(c.n_readings)],
+        ["numbers measured", str(fit.observations)],
         ["parameters in effect", f"{fit.effective_parameters:.1f} of {len(c.fitted)}"],
-        ["chi-square", f"{fit.chi_square:.5g}"], ["reduced chi-square", f"{c.fit.reduced_chi_square:.3g}"],
+        ["chi-square", f"{fit.chi_square:.5g}"],
+        ["reduced chi-square", f"{c.fit.reduced_chi_square:.3g}"],
         ["seconds of the last fit", f"{fit.seconds:.2g}"],
-    ]  # fmt: skip
+    ]
     frames = ""
     if c.frames:
-        frames = table(
-            "Frames of the runs against the typical one", list(c.frames.COLUMNS), c.frames.rows(), 0
-        )
+        frames = table("Frames of the runs against the typical one", list(c.frames.COLUMNS), c.frames.rows(), 0)
     return (
         "<h2>Numbers</h2>"
         + table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1)

@@ -4,13 +4,14 @@ from math import nan
 
 import numpy as np
 
+from ctcr import _core
 from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed
 from ctcr.calibrate.procedures import check_tube, left_out
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
-from ctcr.robot import Robot
-from ctcr.robot_update import Change
+from ctcr.robot.description import Robot
+from ctcr.robot.ledger import Change
 
 CANTILEVER = (
     Column("load", "load"),
@@ -31,50 +32,60 @@ def cantilever(
     fit_zero: bool,
 ) -> Outcome:
     """Young's modulus from the deflection of a tube that is clamped at one end and loaded across."""
-    from ctcr import _core
-
     described = _described_tube(robot, tube)
     inner = inner_mm if inner_mm is not None else getattr(described, "inner_diameter_mm", None)
     outer = outer_mm if outer_mm is not None else getattr(described, "outer_diameter_mm", None)
     if inner is None or outer is None:
-        raise InputError(
-            Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot and --tube")
-        )
+        raise InputError(Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot and --tube"))
     fit = computed(
-        _core.fit_cantilever, table.file, load=table["load"], deflection=table["deflection"],
-        free_length=table["free_length"], load_distance=table["load_distance"] if "load_distance" in table else None,
-        inner_diameter=1e-3 * inner, outer_diameter=1e-3 * outer, fit_zero=fit_zero,
+        _core.fit_cantilever,
+        table.file,
+        load=table["load"],
+        deflection=table["deflection"],
+        free_length=table["free_length"],
+        load_distance=table["load_distance"] if "load_distance" in table else None,
+        inner_diameter=1e-3 * inner,
+        outer_diameter=1e-3 * outer,
+        fit_zero=fit_zero,
         **{name: 1e-3 * sd for name, sd in sds_mm.items()},
-    )  # fmt: skip
+    )
     given_EI = described is not None and described.bending_stiffness_Nm2 is not None
     old = described.youngs_modulus_GPa if described is not None and not given_EI else None
     rows = [
-        Row("Young's modulus", "GPa", 1e-9 * fit.youngs_modulus, 1e-9 * fit.youngs_modulus_sd,
-            nan if old is None else old),
-        Row("bending stiffness EI", "N m^2", fit.bending_stiffness, fit.bending_stiffness_sd,
-            described.bending_stiffness if described else nan),
+        Row(
+            "Young's modulus",
+            "GPa",
+            1e-9 * fit.youngs_modulus,
+            1e-9 * fit.youngs_modulus_sd,
+            nan if old is None else old,
+        ),
+        Row(
+            "bending stiffness EI",
+            "N m^2",
+            fit.bending_stiffness,
+            fit.bending_stiffness_sd,
+            described.bending_stiffness if described else nan,
+        ),
         Row("distance from the readings, RMS", "mm", 1e3 * fit.rms),
-    ]  # fmt: skip
+    ]
     if fit_zero:
         rows.append(Row("zero of the readings", "mm", 1e3 * fit.zero, 1e3 * fit.zero_sd))
     changes = []
     if described is not None:
         path, unit, row = (
-            ("bending_stiffness_Nm2", "N m^2", rows[1])
-            if given_EI
-            else ("youngs_modulus_GPa", "GPa", rows[0])
+            ("bending_stiffness_Nm2", "N m^2", rows[1]) if given_EI else ("youngs_modulus_GPa", "GPa", rows[0])
         )
         changes.append(Change(("tubes", tube - 1, path), unit, row.value, row.deviation))
     details = {
-        "rows": [{"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
-                 for row, modulus, residual in zip(table.row, fit.row_modulus, fit.residuals, strict=True)],
+        "rows": [
+            {"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
+            for row, modulus, residual in zip(table.row, fit.row_modulus, fit.residuals, strict=True)
+        ],
         "largest_slope_deg": float(np.degrees(np.max(np.abs(fit.slope_angle)))),
-    }  # fmt: skip
+    }
     read = 1e3 * table["deflection"]
     caption = "What was read and what the fitted modulus gives; right, the difference."
-    picture = Picture(
-        figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption
-    )
+    picture = Picture(figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption)
     said = [notice.text for notice in fit.notices]
     return Outcome("Cantilever", rows, said, changes, {"deflection_rms_mm": 1e3 * fit.rms}, details, picture)
 
@@ -89,67 +100,63 @@ def curvature(
     point_sd: float,
 ) -> Outcome:
     """Curvature and curved length from points along the picture of a tube."""
-    from ctcr import _core
-
     described = _described_tube(robot, tube)
     unit = table.unit["x"]
     if table.unit["y"] != unit:
-        raise InputError(
-            Problem(f"x is in {unit} but y in {table.unit['y']}: give both in one unit", table.file)
-        )
+        raise InputError(Problem(f"x is in {unit} but y in {table.unit['y']}: give both in one unit", table.file))
     scale = {"scale": 1.0} if unit != "px" else {}
     if unit == "px":
         if (scale_mm is None) == (reference is None):
-            raise InputError(
-                Problem("points in px need their scale: give --mm-per-px, or --reference, not both")
-            )
+            raise InputError(Problem("points in px need their scale: give --mm-per-px, or --reference, not both"))
         if scale_mm is not None:
             scale = {"scale": 1e-3 * scale_mm}
         else:
-            scale = {
-                "reference": np.array(reference[:4]).reshape(2, 2),
-                "reference_length": 1e-3 * reference[4],
-            }
+            scale = {"reference": np.array(reference[:4]).reshape(2, 2), "reference_length": 1e-3 * reference[4]}
     elif scale_mm is not None or reference is not None:
         raise InputError(Problem(f"points in {unit} have their scale: leave out --mm-per-px and --reference"))
     fit = computed(
-        _core.fit_tube_shape, table.file, points=np.ascontiguousarray(table.stacked("x", "y")),
-        scale_sd=1e-2 * scale_sd_percent, point_sd=point_sd if unit == "px" else 1e-3 * point_sd, **scale,
-    )  # fmt: skip
+        _core.fit_tube_shape,
+        table.file,
+        points=np.ascontiguousarray(table.stacked("x", "y")),
+        scale_sd=1e-2 * scale_sd_percent,
+        point_sd=point_sd if unit == "px" else 1e-3 * point_sd,
+        **scale,
+    )
     sign = -1.0 if described is not None and described.curvature < 0 else 1.0  # a picture does not tell it
     rows = [
         Row("curvature", "1/m", sign * fit.curvature, fit.curvature_sd, described.curvature if described else nan),
-        Row("curved length", "mm", 1e3 * fit.curved_length, 1e3 * fit.curved_length_sd,
-            described.curved_length_mm if described else nan),
+        Row(
+            "curved length",
+            "mm",
+            1e3 * fit.curved_length,
+            1e3 * fit.curved_length_sd,
+            described.curved_length_mm if described else nan,
+        ),
         Row("radius", "mm", 1e3 * fit.radius),
         Row("straight length seen", "mm", 1e3 * fit.straight_length),
         Row("distance from the points, RMS", "mm", 1e3 * fit.rms),
-    ]  # fmt: skip
+    ]
     changes = []
     if described is not None:
         for key, row in (("curvature_per_m", rows[0]), ("curved_length_mm", rows[1])):
             changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.deviation))
-    notices = [notice.text for notice in fit.notices] + left_out(
-        "", [int(table.row[i]) for i in fit.outliers]
-    )
+    notices = [notice.text for notice in fit.notices] + left_out("", [int(table.row[i]) for i in fit.outliers])
     details = {"correlation": fit.correlation, "junction": fit.junction, "tip": fit.tip, "points_unit": unit}
     ends = (np.asarray(fit.junction), np.asarray(fit.tip))
     bend = fit.curved_length / abs(fit.radius)
     picture = Picture(
-        figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)),
-        "The points on the tube that was fitted to them; the mark is where its curve starts.", 5.0,
-    )  # fmt: skip
-    return Outcome(
-        "Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details, picture
+        figures_of.outline,
+        (table.stacked("x", "y"), *ends, bend, list(fit.outliers)),
+        "The points on the tube that was fitted to them; the mark is where its curve starts.",
+        5.0,
     )
+    return Outcome("Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details, picture)
 
 
 def _described_tube(robot: Robot | None, tube: int | None):
     if robot is None:
         return None
     if tube is None:
-        raise InputError(
-            Problem(f"give --tube, 1 to {robot.n_tubes} from the innermost: which tube was measured")
-        )
+        raise InputError(Problem(f"give --tube, 1 to {robot.n_tubes} from the innermost: which tube was measured"))
     check_tube(tube, robot, robot._source.file)
     return robot.tubes[tube - 1]

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.devices.fault import DeviceFault
-from ctcr.devices.sight import RATE_HZ, Sight
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.sight import RATE_HZ, Sight
 
 
 @dataclass(frozen=True)

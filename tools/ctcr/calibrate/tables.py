@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
-from ctcr.number_table import Faults
+from ctcr.table.csv_table import Faults
 
 Array = NDArray[np.float64]
 MAX_BYTES = 16 << 20
@@ -76,9 +76,7 @@ def read(path: str | Path, columns: Sequence[Column]) -> Table:
     file, header = str(path), [name.strip() for name in lines[0]]
     found = _find(header, columns, file)
     faults = Faults(file)
-    rows = [
-        (number, fields) for number, fields in enumerate(lines[1:], start=2) if any(map(str.strip, fields))
-    ]
+    rows = [(number, fields) for number, fields in enumerate(lines[1:], start=2) if any(map(str.strip, fields))]
     if not rows:
         raise InputError(Problem("has no rows below the header", file))
     for number, fields in rows:
@@ -121,9 +119,7 @@ def _lines(path: str | Path) -> list[list[str]]:
     rows = text.splitlines()
     if "," not in rows[0] and (";" in rows[0] or "\t" in rows[0]):
         raise InputError(
-            Problem(
-                "separates its columns by semicolons or tabs: use commas, and points for decimals", str(path)
-            )
+            Problem("separates its columns by semicolons or tabs: use commas, and points for decimals", str(path))
         )
     return list(csv.reader(rows))
 
@@ -139,20 +135,19 @@ def _find(header: list[str], columns: Sequence[Column], file: str) -> dict[Colum
             free = [other for other in columns if not any(name in header for name in other.headings)]
             near = did_you_mean(heading, [other.headings[0] for other in free])
             meant |= {other for other in free if other.headings[0] == near}
-            text = "unknown column" + (
-                f": did you mean {near}?" if near else f": those known are {_names(columns)}"
-            )
+            text = "unknown column" + (f": did you mean {near}?" if near else f": those known are {_names(columns)}")
             problems.append(Problem(text, file, 1, heading or "(no name)", line_name="row"))
         elif column in found:
-            problems.append(
-                Problem(f"this column is there twice, also as {found[column]}", file, 1, heading, "row")
-            )
+            problems.append(Problem(f"this column is there twice, also as {found[column]}", file, 1, heading, "row"))
         else:
             found[column] = heading
     for column in columns:
         if column.needed and column not in found and column not in meant:
-            text = f"this column is missing (or as {', '.join(column.headings[1:])})" if column.headings[1:] else (
-                "this column is missing")  # fmt: skip
+            text = (
+                f"this column is missing (or as {', '.join(column.headings[1:])})"
+                if column.headings[1:]
+                else ("this column is missing")
+            )
             problems.append(Problem(text, file, 1, column.headings[0], line_name="row"))
     if problems:
         raise InputError(problems)

@@ -4,9 +4,9 @@ from math import isfinite
 
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.calibrate.outcome import deviation, number
-from ctcr.calibrate.parameters import doubts
-from ctcr.compare.wording import mm
-from ctcr.output import table
+from ctcr.model.fields import doubts
+from ctcr.show.output import table
+from ctcr.show.wording import mm
 
 ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
 PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]
@@ -64,12 +64,16 @@ def parameter_rows(c: Calibration) -> list[list[str]]:
     """Each parameter before and after, in the unit of the robot file."""
     return [
         [
-            item.name, item.unit, _with_deviation(item.nominal, item.prior_sd), _with_deviation(item.value, item.sd),
+            item.name,
+            item.unit,
+            _with_deviation(item.nominal, item.prior_sd),
+            _with_deviation(item.value, item.sd),
             f"{item.shift:+.1f} sd" if isfinite(item.shift) else "-",
-            f"{100 * item.ratio:.0f} %" if isfinite(item.ratio) else "-", item.flag,
+            f"{100 * item.ratio:.0f} %" if isfinite(item.ratio) else "-",
+            item.flag,
         ]
         for item in c.fitted
-    ]  # fmt: skip
+    ]
 
 
 def undetermined(c: Calibration) -> list[str]:

@@ -18,8 +18,10 @@ def command(robot: str | None, json_target: str | None) -> None:
     The times hold for this machine at this moment: absolute times mean nothing across machines. The benchmark of
     the library itself, with instruction counts and the rival, is `tools/dev bench`.
     """
-    from ctcr import output, robot_file
-    from ctcr.model import Model
+    from ctcr.model.model import Model
+    from ctcr.robot import robot_file
+    from ctcr.robot.table_ii import table_ii
+    from ctcr.show import output
 
     loaded = robot_file.load(robot) if robot else table_ii()
     model = Model(loaded)
@@ -44,36 +46,8 @@ def command(robot: str | None, json_target: str | None) -> None:
     ]
     columns = ["load", "result", "threads", "configurations/s", "per thread", "solved %"]
     console = output.console(json_target)
-    console.print(
-        output.table(f"{loaded.name}: {ROWS} random configurations from a cold start", columns, rows, 2)
-    )
+    console.print(output.table(f"{loaded.name}: {ROWS} random configurations from a cold start", columns, rows, 2))
     console.print("Best of 5. Absolute times mean nothing across machines.")
-
-
-def table_ii():
-    """The robot of the paper's Table II."""
-    from ctcr.robot import Actuation, Robot, Tracker, Tube, Uncertainty
-
-    def tube(inner: float, outer: float, length: float, curvature: float) -> Tube:
-        return Tube(
-            youngs_modulus_GPa=58.0,
-            poisson_ratio=0.3,
-            density_kg_m3=6450.0,
-            inner_diameter_mm=inner,
-            outer_diameter_mm=outer,
-            length_mm=length,
-            curved_length_mm=50.0,
-            curvature_per_m=curvature,
-        )
-
-    return Robot(
-        name="Table II",
-        gravity=None,
-        tubes=[tube(1.3, 1.52, 463.0, 10.0), tube(1.62, 1.8, 330.5, 5.0), tube(2.03, 2.35, 199.0, 7.0)],
-        actuation=Actuation.model_construct(),
-        tracker=Tracker.model_construct(sensor_on_tube=1),
-        uncertainty=Uncertainty.model_construct(),
-    )
 
 
 def _timed(model, robot, load: str, derivatives: bool, threads: int) -> dict:

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.group(name="calibrate")
@@ -18,9 +18,7 @@ def command() -> None:
 def _outputs(function):
     """The options that all procedures share."""
     for option in (
-        click.option(
-            "--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output."
-        ),
+        click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output."),
         click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page."),
         click.option("--in-place", is_flag=True, help="Change the robot file itself."),
         click.option("-o", "--output", "target", metavar="NEW", help="Write the updated robot file."),
@@ -29,12 +27,8 @@ def _outputs(function):
     return function
 
 
-_robot = click.option(
-    "--robot", metavar="ROBOT", help="The robot file: what it states is used, and updated with -o."
-)
-_tube = click.option(
-    "--tube", type=click.IntRange(1, 9), help="The tube measured, innermost 1 (with --robot)."
-)
+_robot = click.option("--robot", metavar="ROBOT", help="The robot file: what it states is used, and updated with -o.")
+_tube = click.option("--tube", type=click.IntRange(1, 9), help="The tube measured, innermost 1 (with --robot).")
 
 
 def _live(function):
@@ -42,32 +36,24 @@ def _live(function):
     for option in (
         folder_option,
         click.option(
-            "--readings",
-            type=click.IntRange(2),
-            default=20,
-            show_default=True,
-            help="With --live, of each row.",
+            "--readings", type=click.IntRange(2), default=20, show_default=True, help="With --live, of each row."
         ),
         click.option("--bench", metavar="BENCH.yaml", help="With --live: the devices and their limits."),
-        click.option(
-            "--live", is_flag=True, help="Measure now; the table is written row by row, or gone on with."
-        ),
+        click.option("--live", is_flag=True, help="Measure now; the table is written row by row, or gone on with."),
     ):
         function = option(function)
     return function
 
 
 def _desk(bench, folder, console):
+    from ctcr.bench.devices import bench_file, person
+    from ctcr.bench.devices.private_folder import private_folder
     from ctcr.calibrate.live import Desk
-    from ctcr.devices import bench_file, person
-    from ctcr.devices.private_folder import private_folder
 
     if not bench:
         raise click.UsageError("--live needs --bench")
     devices, place = bench_file.load(bench), private_folder(folder)
-    return Desk(
-        devices, place, person.person_of(devices, place), lambda text: console.print(text, markup=False)
-    )
+    return Desk(devices, place, person.person_of(devices, place), lambda text: console.print(text, markup=False))
 
 
 def _length(name: str, default: float | None, text: str):
@@ -75,14 +61,12 @@ def _length(name: str, default: float | None, text: str):
     return click.option(name, type=click.FloatRange(min=0), default=default, show_default=shown, help=text)
 
 
-def _run(
-    name: str, room: str, procedure: str, table, robot, target, in_place, json_target, report, **options
-) -> None:
+def _run(name: str, room: str, procedure: str, table, robot, target, in_place, json_target, report, **options) -> None:
     """Runs a procedure of ctcr.calibrate.procedures or .specimens; its columns have its name in capitals."""
     from importlib import import_module
 
-    from ctcr import robot_file
     from ctcr.calibrate import outcome, tables
+    from ctcr.robot import robot_file
 
     room = import_module(f"ctcr.calibrate.{room}")
     loaded = robot_file.load(robot) if robot else None
@@ -98,21 +82,13 @@ def _run(
 @click.option("--ratio", type=float, help="Turns of a tube in one turn of its motor; else as in ROBOT.")
 @_live
 @click.option(
-    "--step-deg",
-    type=click.FloatRange(1, 90),
-    default=20.0,
-    show_default=True,
-    help="With --live: between rows.",
+    "--step-deg", type=click.FloatRange(1, 90), default=20.0, show_default=True, help="With --live: between rows."
 )
 @click.option(
-    "--deployed-mm",
-    type=click.FloatRange(min=1),
-    help="With --live: how far a tube stands out; else its curved part.",
+    "--deployed-mm", type=click.FloatRange(min=1), help="With --live: how far a tube stands out; else its curved part."
 )
 @_outputs
-def rotation_offset(
-    table: str, robot, ratio, live, bench, readings, folder, step_deg, deployed_mm, **outputs
-) -> None:
+def rotation_offset(table: str, robot, ratio, live, bench, readings, folder, step_deg, deployed_mm, **outputs) -> None:
     """Home rotations from circles: one tube alone is out of the plate and turns, both ways.
 
     TABLE: motor_angle_deg, x_mm, y_mm, z_mm of the tip (tracker frame); tube (default 1) and direction (1 or -1,
@@ -124,36 +100,27 @@ def rotation_offset(
     if live:
         import math
 
-        from ctcr import output, robot_file
         from ctcr.calibrate.live import Circles, rotation_table
+        from ctcr.robot import robot_file
+        from ctcr.show import output
 
         if not robot:
             raise click.UsageError("--live needs --robot")
         deployed = None if deployed_mm is None else 1e-3 * deployed_mm
         desk = _desk(bench, folder, output.console(outputs["json_target"]))
-        rotation_table(
-            table, robot_file.load(robot), desk, Circles(math.radians(step_deg), readings, deployed)
-        )
+        rotation_table(table, robot_file.load(robot), desk, Circles(math.radians(step_deg), readings, deployed))
     _run("rotation-offset", "procedures", "rotation_offsets", table, robot, ratio=ratio, **outputs)
 
 
 @command.command(name="registration")
 @click.argument("points")
 @_robot
-@_length(
-    "--placement-sd-mm", 0.0, "How far the probe may sit from a CAD point, per axis; 0: from the residuals."
-)
+@_length("--placement-sd-mm", 0.0, "How far the probe may sit from a CAD point, per axis; 0: from the residuals.")
 @_live
-@click.option(
-    "--cad", metavar="CAD.csv", help="With --live: names and places of the points, columns as POINTS."
-)
-@click.option(
-    "--rounds", type=click.IntRange(1), default=1, show_default=True, help="With --live: over all points."
-)
+@click.option("--cad", metavar="CAD.csv", help="With --live: names and places of the points, columns as POINTS.")
+@click.option("--rounds", type=click.IntRange(1), default=1, show_default=True, help="With --live: over all points.")
 @_outputs
-def registration(
-    points: str, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, **outputs
-) -> None:
+def registration(points: str, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, **outputs) -> None:
     """The tracker frame T_ref from named points on the robot, read with a probe.
 
     POINTS: point (its name), cad_x_mm, cad_y_mm, cad_z_mm (base frame), x_mm, y_mm, z_mm (reading, tracker frame);
@@ -163,32 +130,22 @@ def registration(
     With --live you are told which point of CAD.csv to touch; it is read when the probe is still, and POINTS is written.
     """
     if live:
-        from ctcr import output
         from ctcr.calibrate import tables
         from ctcr.calibrate.live import point_table
         from ctcr.calibrate.procedures import CAD_POINTS
+        from ctcr.show import output
 
         if not cad:
             raise click.UsageError("--live needs --cad")
         desk = _desk(bench, folder, output.console(outputs["json_target"]))
         point_table(points, tables.read(cad, CAD_POINTS), desk, readings, rounds)
-    _run(
-        "registration",
-        "procedures",
-        "registration",
-        points,
-        robot,
-        placement_sd_mm=placement_sd_mm,
-        **outputs,
-    )
+    _run("registration", "procedures", "registration", points, robot, placement_sd_mm=placement_sd_mm, **outputs)
 
 
 @command.command(name="home")
 @click.argument("table")
 @_robot
-@click.option(
-    "--pitch-mm", type=float, help="How far a tube moves in one turn of its motor; else as in ROBOT."
-)
+@click.option("--pitch-mm", type=float, help="How far a tube moves in one turn of its motor; else as in ROBOT.")
 @_length("--distance-sd-mm", 1.0, "Standard deviation of a distance measured by hand.")
 @_length("--flush-sd-mm", 0.2, "Standard deviation of bringing a tip flush with the plate.")
 @_length("--length-sd-mm", 1.0, "Standard deviation of a length measured by hand.")
@@ -216,43 +173,42 @@ def home(table: str, robot, pitch_mm, distance_sd_mm, flush_sd_mm, length_sd_mm,
 @click.option("--fit-zero", is_flag=True, help="The reading without load is not known: find it too.")
 @_outputs
 def cantilever(
-    table,
-    robot,
-    tube,
-    inner_mm,
-    outer_mm,
-    deflection_sd_mm,
-    free_length_sd_mm,
-    diameter_sd_mm,
-    fit_zero,
-    **outputs,
+    table, robot, tube, inner_mm, outer_mm, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, fit_zero, **outputs
 ) -> None:
     """Young's modulus from a straight piece of tube, clamped at one end and loaded across.
 
     TABLE: load_N (or load_g, a hung mass), deflection_mm (at the free end), free_length_mm (clamp to end);
     load_distance_mm (clamp to load, default: at the end) may be added. Large deflections are allowed.
     """
-    sds = {
-        "deflection_sd": deflection_sd_mm,
-        "free_length_sd": free_length_sd_mm,
-        "diameter_sd": diameter_sd_mm,
-    }
-    _run("cantilever", "specimens", "cantilever", table, robot, tube=tube, inner_mm=inner_mm, outer_mm=outer_mm,
-         sds_mm=sds, fit_zero=fit_zero, **outputs)  # fmt: skip
+    sds = {"deflection_sd": deflection_sd_mm, "free_length_sd": free_length_sd_mm, "diameter_sd": diameter_sd_mm}
+    _run(
+        "cantilever",
+        "specimens",
+        "cantilever",
+        table,
+        robot,
+        tube=tube,
+        inner_mm=inner_mm,
+        outer_mm=outer_mm,
+        sds_mm=sds,
+        fit_zero=fit_zero,
+        **outputs,
+    )
 
 
 @command.command(name="curvature")
 @click.argument("table")
 @_robot
 @_tube
-@click.option(
-    "--mm-per-px", "scale_mm", type=click.FloatRange(min=0, min_open=True), help="Scale of the picture."
-)
+@click.option("--mm-per-px", "scale_mm", type=click.FloatRange(min=0, min_open=True), help="Scale of the picture.")
 @_length("--scale-sd-percent", 0.0, "Standard deviation of the scale.")
 @click.option(
-    "--reference", type=(float, float, float, float, float), default=None, metavar="X1 Y1 X2 Y2 MM",
+    "--reference",
+    type=(float, float, float, float, float),
+    default=None,
+    metavar="X1 Y1 X2 Y2 MM",
     help="Two points of the picture (px) and their distance (mm) instead of the scale.",
-)  # fmt: skip
+)
 @_length("--point-sd", 0.0, "Standard deviation of a point, in its unit; 0: from the residuals.")
 @_outputs
 def curvature(table: str, robot, tube, scale_mm, scale_sd_percent, reference, point_sd, **outputs) -> None:
@@ -260,30 +216,52 @@ def curvature(table: str, robot, tube, scale_mm, scale_sd_percent, reference, po
 
     TABLE: x_px, y_px (or x_mm, y_mm) along the tube, in any order, over the curved part and some of the straight one.
     """
-    _run("curvature", "specimens", "curvature", table, robot, tube=tube, scale_mm=scale_mm,
-         scale_sd_percent=scale_sd_percent, reference=reference, point_sd=point_sd, **outputs)  # fmt: skip
+    _run(
+        "curvature",
+        "specimens",
+        "curvature",
+        table,
+        robot,
+        tube=tube,
+        scale_mm=scale_mm,
+        scale_sd_percent=scale_sd_percent,
+        reference=reference,
+        point_sd=point_sd,
+        **outputs,
+    )
 
 
 @command.command(name="fit")
 @click.argument("robot")
 @click.argument("measurements")
 @click.option(
-    "--free", default="standard", show_default=True, metavar="NAMES",
+    "--free",
+    default="standard",
+    show_default=True,
+    metavar="NAMES",
     help="What is fitted: names such as tubes.*.youngs_modulus,tracker.frame, or standard.",
-)  # fmt: skip
+)
 @click.option(
-    "--sd", "widths", multiple=True, metavar="NAME=SD",
+    "--sd",
+    "widths",
+    multiple=True,
+    metavar="NAME=SD",
     help="What is known of a parameter: a standard deviation in the unit of the robot file, or inf. May be repeated.",
-)  # fmt: skip
+)
 @click.option("--frame-per-run", is_flag=True, help="Fit a tracker frame for every run.")
 @click.option(
-    "--hold-out", type=click.IntRange(min=0), metavar="N",
+    "--hold-out",
+    type=click.IntRange(min=0),
+    metavar="N",
     help="Runs kept out of a second fit to judge it, evenly spread; 0: none; default: a quarter.",
-)  # fmt: skip
+)
 @click.option(
-    "--noise", type=click.Choice(["auto", "jitter", "field"]), default="auto", show_default=True,
+    "--noise",
+    type=click.Choice(["auto", "jitter", "field"]),
+    default="auto",
+    show_default=True,
     help="The tracker's jitter, or also the smooth error that its accuracy allows; auto: what the data call for.",
-)  # fmt: skip
+)
 @_outputs
 def fit(
     robot, measurements, free, widths, report, frame_per_run, hold_out, noise, target, in_place, json_target
@@ -293,9 +271,10 @@ def fit(
     What is known before, the robot file's `uncertainty`, counts as measurements do. Tells what the data determine and
     what not, the error on runs that a fit has not seen, and the noise floor that no fit can get below.
     """
-    from ctcr import measurements as table
-    from ctcr import output, robot_file
     from ctcr.calibrate import joint_fit, outcome, terminal
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements as table
 
     loaded = robot_file.load(robot)
     target = outcome.check_target(loaded, target, in_place)

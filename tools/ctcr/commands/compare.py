@@ -9,9 +9,7 @@ CHUNK_ROWS = 1 << 16
 @click.argument("robot")
 @click.argument("measurements")
 @click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
-@click.option(
-    "--json", "json_target", metavar="FILE", help="Write the numbers as JSON; - for standard output."
-)
+@click.option("--json", "json_target", metavar="FILE", help="Write the numbers as JSON; - for standard output.")
 @click.option(
     "--steps",
     type=click.IntRange(1, 1000),
@@ -19,23 +17,21 @@ CHUNK_ROWS = 1 << 16
     show_default=True,
     help="Integration steps per segment; more is finer and slower.",
 )
-@click.option(
-    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
-)
-def command(
-    robot: str, measurements: str, report: str | None, json_target: str | None, steps: int, own
-) -> None:
+@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has.")
+def command(robot: str, measurements: str, report: str | None, json_target: str | None, steps: int, own) -> None:
     """Compare the model of ROBOT with the poses in MEASUREMENTS.
 
     Shows the size of the error against noise, the difference between visits of the same joints from opposite
     directions, and what the error depends on.
     """
-    from ctcr import measurements as table
-    from ctcr import output, robot_file, spikes, unrecorded
+    from ctcr.audit import missing_motion, spikes
     from ctcr.compare import compare, terminal
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements as table
 
     if own:
-        from ctcr import user_effects
+        from ctcr.effects import user_effects
 
         user_effects.load_all(own)
     loaded = robot_file.load(robot)
@@ -43,10 +39,8 @@ def command(
     readings, spiked = spikes.left_out(loaded, readings)
     ways: list[str] = []
     if loaded.effects:  # they may remember what the table leaves out
-        readings, ways = unrecorded.completed(loaded, readings)
-    result = compare(
-        loaded, readings, _predict(loaded, readings, steps), [f"{said}." for said in (*spiked, *ways)]
-    )
+        readings, ways = missing_motion.completed(loaded, readings)
+    result = compare(loaded, readings, _predict(loaded, readings, steps), [f"{said}." for said in (*spiked, *ways)])
     if report:
         from ctcr.compare import report as page
 
@@ -70,11 +64,11 @@ def _predict(robot, readings, steps: int):
 
     import numpy as np
 
-    from ctcr.model import Model
-    from ctcr.output import Progress
+    from ctcr.model.model import Model
+    from ctcr.show.output import Progress
 
     if robot.effects:
-        from ctcr import effect_model
+        from ctcr.model import effect_model
 
         return effect_model.readings(robot, readings, steps)
     model, parts = Model(robot, steps=steps), []
@@ -84,6 +78,9 @@ def _predict(robot, readings, steps: int):
             rows = slice(start, start + CHUNK_ROWS)
             parts.append(model.predict(beta[rows], alpha[rows], readings.force[rows]))
             progress.advance(len(readings.run[rows]))
-    return SimpleNamespace(**{
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in ("position", "quaternion", "status")
-    })  # fmt: skip
+    return SimpleNamespace(
+        **{
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in ("position", "quaternion", "status")
+        }
+    )

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.group(name="demo")
@@ -12,9 +12,14 @@ def command() -> None:
 
 @command.command(name="bench")
 @click.option(
-    "-o", "--output", "target", default="build/bench_demo", show_default=True, metavar="FOLDER",
+    "-o",
+    "--output",
+    "target",
+    default="build/bench_demo",
+    show_default=True,
+    metavar="FOLDER",
     help="For all that is measured and found, and the report; what is there is removed.",
-)  # fmt: skip
+)
 @click.option("--short", is_flag=True, help="Leave out what only shows more.")
 @folder_option
 def bench(target, short, folder) -> int:
@@ -23,22 +28,22 @@ def bench(target, short, folder) -> int:
     Each step is a command, shown as you would type it, which meets the robot through the protocols of tracker and
     motors. Some minutes; writes report.html.
     """
-    from ctcr import robot_file
+    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.simulators import bench as simulated
+    from ctcr.bench.simulators.robot import SimulatedRobot
     from ctcr.demo import bench_story
     from ctcr.demo.hidden_robot import hidden_robot
-    from ctcr.devices.private_folder import private_folder
-    from ctcr.simulators import bench as simulated
-    from ctcr.simulators.robot import SimulatedRobot
+    from ctcr.robot import robot_file
 
     hidden = hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
     return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), private_folder(folder))
 
 
 def _tell(target, hidden, short) -> int:
-    from ctcr import output
     from ctcr.demo import bench_report, bench_story
     from ctcr.demo.story import Story, new_folder
     from ctcr.demo.terminal import Teller
+    from ctcr.show import output
 
     console, report = output.console(), f"{target}/report.html"
     story = Story(new_folder(target), Teller(console))

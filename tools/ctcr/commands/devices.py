@@ -2,21 +2,19 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.command(name="devices")
-@click.option(
-    "--bench", "bench_path", required=True, metavar="BENCH.yaml", help="Where the devices are connected."
-)
+@click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="Where the devices are connected.")
 @folder_option
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 def command(bench_path: str, folder: str | None, json_target: str | None) -> int:
     """Show which devices of a bench answer, their versions, and what is wrong with them. Nothing moves."""
-    from ctcr import output
-    from ctcr.devices import bench_file, emergency_stop
-    from ctcr.devices.health import health_of
-    from ctcr.devices.private_folder import private_folder
+    from ctcr.bench.devices import bench_file, emergency_stop
+    from ctcr.bench.devices.health import health_of
+    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.show import output
 
     place = private_folder(folder)
     found = health_of(bench_file.load(bench_path), place)

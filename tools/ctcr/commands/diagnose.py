@@ -7,32 +7,25 @@ import click
 @click.argument("robot")
 @click.argument("measurements")
 @click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
+@click.option("--json", "json_target", metavar="FILE", help="Write the verdict as JSON; - for standard output.")
 @click.option(
-    "--json", "json_target", metavar="FILE", help="Write the verdict as JSON; - for standard output."
-)
-@click.option(
-    "--effects",
-    "own",
-    multiple=True,
-    metavar="FILE.py",
-    help="File of your own effects that may be missing too.",
+    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that may be missing too."
 )
 @click.option("--threads", type=click.IntRange(0), default=0, help="Threads; 0: all cores.")
-def command(
-    robot: str, measurements: str, report: str | None, json_target: str | None, own, threads: int
-) -> None:
+def command(robot: str, measurements: str, report: str | None, json_target: str | None, own, threads: int) -> None:
     """Find out which physical effect the model of ROBOT lacks to explain MEASUREMENTS.
 
     Calibrates first, then fits every effect of the catalogue together with the calibration, accepts one at a time, and
     checks the result on runs that no fit saw. Says so when nothing is missing, when the data cannot tell effects apart,
     and when the cause is in no catalogue.
     """
-    from ctcr import measurements as table
-    from ctcr import output, robot_file
     from ctcr.diagnose import diagnose, terminal
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements as table
 
     if own:
-        from ctcr import user_effects
+        from ctcr.effects import user_effects
 
         user_effects.load_all(own)
     loaded = robot_file.load(robot)

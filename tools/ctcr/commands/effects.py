@@ -15,19 +15,16 @@ _NEEDS = {
 @click.argument("name", required=False)
 @click.option("--effects", "own", multiple=True, metavar="FILE.py", help="Show the effects of this file too.")
 @click.option(
-    "--tubes",
-    type=click.IntRange(1, 4),
-    default=3,
-    show_default=True,
-    help="Tubes of the robot, for full names.",
+    "--tubes", type=click.IntRange(1, 4), default=3, show_default=True, help="Tubes of the robot, for full names."
 )
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 def command(name: str | None, own: tuple[str, ...], tubes: int, json_target: str | None) -> None:
     """List the physical effects that can be added to a robot, or tell everything about the effect NAME."""
-    from ctcr import effects, output, user_effects
+    from ctcr.effects import catalogue, user_effects
+    from ctcr.show import output
 
     user_effects.load_all(own)
-    shown = [effects.get(name, tubes)] if name else list(effects.all_effects(tubes).values())
+    shown = [catalogue.get(name, tubes)] if name else list(catalogue.all_effects(tubes).values())
     if json_target:
         data = [_as_data(effect) for effect in shown]
         output.write_json(data[0] if name else {"effects": data}, json_target)
@@ -41,7 +38,7 @@ def command(name: str | None, own: tuple[str, ...], tubes: int, json_target: str
 
 
 def _list(console, shown) -> None:
-    from ctcr.output import table
+    from ctcr.show.output import table
 
     rows = [
         [
@@ -61,7 +58,7 @@ def _list(console, shown) -> None:
 def _tell(console, effect) -> None:
     from rich.table import Table
 
-    from ctcr.output import table
+    from ctcr.show.output import table
 
     needs = ", ".join(_NEEDS[need] for need in _NEEDS if need in effect.needs) or "nothing special"
     console.soft_wrap = False
@@ -69,18 +66,21 @@ def _tell(console, effect) -> None:
     facts = Table.grid(padding=(0, 2))
     facts.add_column(style="bold", no_wrap=True)
     for title, text in (
-        ("what happens", effect.physics), ("how it looks", effect.signature), ("what to measure", effect.measure),
-        ("the data need", needs), ("looks like", ", ".join(effect.look_alikes) or "no other"),
+        ("what happens", effect.physics),
+        ("how it looks", effect.signature),
+        ("what to measure", effect.measure),
+        ("the data need", needs),
+        ("looks like", ", ".join(effect.look_alikes) or "no other"),
         ("reference", effect.reference),
         *((name, p.meaning) for name, p in _families(effect)),
-    ):  # fmt: skip
+    ):
         if text:
             facts.add_row(title, text)
     console.print(facts)
     rows = [
         [name, p.unit or "-", p.kind, f"{p.neutral:.4g}", f"{p.sigma:.3g}", _interval(p.soft), _interval(p.hard)]
         for name, p in _families(effect)
-    ]  # fmt: skip
+    ]
     columns = ["parameter (SI)", "unit", "kind", "neutral", "sd", "usual", "possible"]
     console.print()
     console.print(table("", columns, rows, text=(0, 1, 2, 5, 6)))

@@ -11,8 +11,8 @@ def command(folder, target) -> None:
 
     Joints, measurements and, of a controlled robot, references are channels of JSON messages, a message a row.
     """
-    from ctcr import output
-    from ctcr.record.mcap_file import write_mcap
+    from ctcr.show import output
+    from ctcr.track.mcap_file import write_mcap
 
     counts = write_mcap(folder, target)
     rows = [[channel, str(count)] for channel, count in counts.items()]

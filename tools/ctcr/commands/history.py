@@ -5,14 +5,14 @@ import click
 
 @click.command(name="history")
 @click.argument("robot")
-@click.option(
-    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that it has."
-)
+@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that it has.")
 @click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 def command(robot: str, own: tuple[str, ...], report: str | None, json_target: str | None) -> None:
     """Show the ledger of ROBOT: what was calibrated and added, and how the error fell on data that no fit had seen."""
-    from ctcr import history, output, robot_file, user_effects
+    from ctcr.effects import user_effects
+    from ctcr.robot import history, robot_file
+    from ctcr.show import output
 
     user_effects.load_all(own)
     loaded = robot_file.load(robot)

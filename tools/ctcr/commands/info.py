@@ -10,7 +10,8 @@ import click
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 def command(robot: str, json_target: str | None) -> None:
     """Show what the file ROBOT says, the stiffnesses that follow, and what looks wrong."""
-    from ctcr import output, robot_file
+    from ctcr.robot import robot_file
+    from ctcr.show import output
 
     loaded = robot_file.load(robot)
     doubts = robot_file.warnings(loaded)
@@ -96,7 +97,5 @@ def _as_data(robot, doubts) -> dict:
             }
             for tube in robot.tubes
         ],
-        "looks_wrong": [
-            {"field": doubt.field, "line": doubt.line, "message": doubt.message} for doubt in doubts
-        ],
+        "looks_wrong": [{"field": doubt.field, "line": doubt.line, "message": doubt.message} for doubt in doubts],
     }

@@ -13,8 +13,11 @@ def command(robot, tables, target) -> None:
     For recordings between which the joints stayed where they were, such as a first one and the one that ctcr next
     proposed. Runs are numbered on; times go on by what the recordings' session.json say.
     """
-    from ctcr import measurements, output, robot_file, simulation
-    from ctcr.record.joined import joined, start_of
+    from ctcr.bench.record.joined import joined, start_of
+    from ctcr.model import simulation
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements
 
     n = robot_file.load(robot).n_tubes
     whole = joined([measurements.load(table, n) for table in tables], [start_of(table) for table in tables])

@@ -2,25 +2,17 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.command(name="move")
 @click.argument("robot")
-@click.option(
-    "--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits."
-)
+@click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits.")
 @click.option("--beta", metavar="MM,MM,...", help="Grasped points, innermost tube first [mm].")
 @click.option("--alpha", metavar="DEG,DEG,...", help="Base angles, innermost tube first [deg].")
-@click.option(
-    "--home", is_flag=True, help="Find where the joints are, by retracting each tube until it is flush."
-)
-@click.option(
-    "--at-home", is_flag=True, help="Take where the joints stand now, set to their marks by hand, for home."
-)
-@click.option(
-    "--speed", type=click.FloatRange(0.01, 1.0), default=0.5, show_default=True, help="Share of the highest."
-)
+@click.option("--home", is_flag=True, help="Find where the joints are, by retracting each tube until it is flush.")
+@click.option("--at-home", is_flag=True, help="Take where the joints stand now, set to their marks by hand, for home.")
+@click.option("--speed", type=click.FloatRange(0.01, 1.0), default=0.5, show_default=True, help="Share of the highest.")
 @folder_option
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
     """Move the joints of ROBOT in a straight line of joint space; those not given stay.
@@ -29,10 +21,11 @@ def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> Non
     """
     import numpy as np
 
-    from ctcr import output, robot_file
-    from ctcr.devices import bench_file, homing, person
-    from ctcr.devices.motors import Motors
-    from ctcr.devices.private_folder import private_folder
+    from ctcr.bench.devices import bench_file, homing, person
+    from ctcr.bench.devices.motors import Motors
+    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.robot import robot_file
+    from ctcr.show import output
 
     loaded, place = robot_file.load(robot), private_folder(folder)
     bench, console, n = bench_file.load(bench_path), output.console(), loaded.n_tubes
@@ -51,9 +44,7 @@ def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> Non
             motors.move(target, speed)
             motors.wait()
         state, joints = motors.state, motors.joints
-        rows = [
-            [f"tube {i + 1}", f"{1e3 * joints[i]:.3f}", f"{np.rad2deg(joints[n + i]):.3f}"] for i in range(n)
-        ]
+        rows = [[f"tube {i + 1}", f"{1e3 * joints[i]:.3f}", f"{np.rad2deg(joints[n + i]):.3f}"] for i in range(n)]
         title = "Joints" if state["homed"] else "Joints since power on: home first (ctcr move --home)"
         console.print(output.table(title, ["", "beta [mm]", "alpha [deg]"], rows))
 

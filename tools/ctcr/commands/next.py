@@ -8,15 +8,9 @@ import click
 @click.argument("measurements")
 @click.option("--runs", type=click.IntRange(1, 100), default=4, show_default=True, help="Runs to propose.")
 @click.option(
-    "--masses",
-    default="0,10,20",
-    show_default=True,
-    metavar="GRAMS",
-    help="Masses that can be hung at the tip.",
+    "--masses", default="0,10,20", show_default=True, metavar="GRAMS", help="Masses that can be hung at the tip."
 )
-@click.option(
-    "-o", "--output", "target", metavar="PLAN", help="Write the runs as a table that the robot can run."
-)
+@click.option("-o", "--output", "target", metavar="PLAN", help="Write the runs as a table that the robot can run.")
 @click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
 @click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects.")
 @click.option("--threads", type=click.IntRange(0), default=0, help="Threads; 0: all cores.")
@@ -26,9 +20,13 @@ def command(robot, measurements, runs, masses, target, json_target, own, threads
     Diagnoses first. Each run goes out and back through the same stops under one load, within the joints measured so
     far. Says so when nothing is open, and when no run can decide.
     """
-    from ctcr import measurements as table
-    from ctcr import output, plan, robot_file, simulation, user_effects
+    from ctcr import plan
     from ctcr.diagnose import diagnose, terminal
+    from ctcr.effects import user_effects
+    from ctcr.model import simulation
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements as table
 
     user_effects.load_all(own)
     grams = _masses(masses)
@@ -64,15 +62,13 @@ def _masses(text: str) -> list[float]:
     except ValueError:
         grams = [-1.0]
     if not all(0 <= gram < 1000 for gram in grams):
-        raise InputError(
-            Problem(f"--masses {text}: give grams from 0 to 1000, separated by commas, as 0,10,20")
-        )
+        raise InputError(Problem(f"--masses {text}: give grams from 0 to 1000, separated by commas, as 0,10,20"))
     return grams
 
 
 def _show(console, n_tubes: int, verdict: str, proposal) -> None:
-    from ctcr import output
     from ctcr.plan.proposal import instead
+    from ctcr.show import output
 
     if len(proposal.rivals) < 2:
         console.print(f"Nothing is open between effects: the verdict on these measurements is {verdict}.")

@@ -29,32 +29,26 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
     show_default=True,
     help="Integration steps per segment; more is finer and slower.",
 )
-@click.option(
-    "--json", "json_target", metavar="FILE", help="Write the summary as JSON; - for standard output."
-)
-@click.option(
-    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
-)
-def command(
-    robot: str, table: str, target: str, frame: str, steps: int, json_target: str | None, own
-) -> None:
+@click.option("--json", "json_target", metavar="FILE", help="Write the summary as JSON; - for standard output.")
+@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has.")
+def command(robot: str, table: str, target: str, frame: str, steps: int, json_target: str | None, own) -> None:
     """Add the pose that the model of ROBOT predicts to each row of TABLE.
 
     The new columns are pred_x_m .. pred_z_m and the quaternion pred_qw .. pred_qz of the tube that carries the
     sensor, with the effects that ROBOT has. Rows that cannot be solved stay empty and are listed.
     """
-    from ctcr import measurements, output, robot_file
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements
 
     if own:
-        from ctcr import user_effects
+        from ctcr.effects import user_effects
 
         user_effects.load_all(own)
     loaded = robot_file.load(robot)
     readings = measurements.load(table, loaded.n_tubes)
     with output.atomic_writer(target, binary=True) as file:
-        unsolved = _write(
-            file, Path(table), readings, _predictor(loaded, readings, steps), loaded.tracker, frame
-        )
+        unsolved = _write(file, Path(table), readings, _predictor(loaded, readings, steps), loaded.tracker, frame)
     summary = {
         "rows": len(readings),
         "solved": len(readings) - len(unsolved),
@@ -72,11 +66,11 @@ def _predictor(robot, readings, steps: int):
     from types import SimpleNamespace
 
     if robot.effects:
-        from ctcr import effect_model
+        from ctcr.model import effect_model
 
         found = effect_model.readings(robot, readings, steps)
         return lambda rows: SimpleNamespace(**{name: values[rows] for name, values in vars(found).items()})
-    from ctcr.model import Model
+    from ctcr.model.model import Model
 
     model = Model(robot, steps=steps)
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
@@ -85,7 +79,7 @@ def _predictor(robot, readings, steps: int):
 
 def _write(file, table: Path, readings, predict, tracker, frame: str) -> list[tuple[int, str]]:
     """Copies the table with the predictions beside it; returns (row, why) of those not solved."""
-    from ctcr.output import Progress
+    from ctcr.show.output import Progress
 
     unsolved = []
     with open(table, "rb") as source, Progress("predicting", len(readings)) as progress:
@@ -105,7 +99,7 @@ def _fields(answer, tracker, frame: str) -> tuple[list[str], list[str]]:
     import numpy as np
 
     from ctcr import frames
-    from ctcr.model import status_text
+    from ctcr.model.model import status_text
 
     position, quaternion = answer.position, answer.quaternion
     if frame == "tracker":

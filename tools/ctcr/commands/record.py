@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.command(name="record")
@@ -11,43 +11,43 @@ from ctcr.bench_options import folder_option
 @click.option(
     "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; goes on with one there."
 )
+@click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits.")
+@click.option("--dwell", type=click.FloatRange(0), default=0.5, show_default=True, help="Rest before reading [s].")
+@click.option("--readings", type=click.IntRange(1), default=1, show_default=True, help="Of each row of the plan.")
+@click.option("--speed", type=click.FloatRange(0.01, 1), default=1.0, show_default=True, help="Share of the highest.")
 @click.option(
-    "--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits."
-)
-@click.option(
-    "--dwell", type=click.FloatRange(0), default=0.5, show_default=True, help="Rest before reading [s]."
-)
-@click.option(
-    "--readings", type=click.IntRange(1), default=1, show_default=True, help="Of each row of the plan."
-)
-@click.option(
-    "--speed", type=click.FloatRange(0.01, 1), default=1.0, show_default=True, help="Share of the highest."
-)
-@click.option(
-    "--approach", type=click.Choice(["planned", "forward", "backward"]), default="planned", show_default=True,
+    "--approach",
+    type=click.Choice(["planned", "forward", "backward"]),
+    default="planned",
+    show_default=True,
     help="Come to each row as planned, or always with all joints moving up (forward) or down (backward).",
-)  # fmt: skip
+)
 @click.option("--approach-mm", type=click.FloatRange(0), default=2.0, show_default=True, help="Its length.")
 @click.option("--approach-deg", type=click.FloatRange(0), default=5.0, show_default=True, help="Its length.")
 @click.option(
-    "--patience",
-    type=click.FloatRange(0.1),
-    default=30.0,
-    show_default=True,
-    help="With an unseen sensor [s].",
+    "--patience", type=click.FloatRange(0.1), default=30.0, show_default=True, help="With an unseen sensor [s]."
 )
-@click.option(
-    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has."
-)
-@click.option(
-    "--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew."
-)
+@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has.")
+@click.option("--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew.")
 @folder_option
 @click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
 def command(
-    robot, plan, target, bench_path, dwell, readings, speed, approach, approach_mm, approach_deg, patience, own,
-    page, folder, json_target,
-) -> None:  # fmt: skip
+    robot,
+    plan,
+    target,
+    bench_path,
+    dwell,
+    readings,
+    speed,
+    approach,
+    approach_mm,
+    approach_deg,
+    patience,
+    own,
+    page,
+    folder,
+    json_target,
+) -> None:
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
     Every row is on the disk as soon as it is measured; the same command goes on where a recording was interrupted.
@@ -59,19 +59,22 @@ def command(
 
     import numpy as np
 
-    from ctcr import measurements, output, robot_file, user_effects
-    from ctcr.devices import bench_file, person
-    from ctcr.devices.motors import Motors
-    from ctcr.devices.private_folder import private_folder
-    from ctcr.devices.real_time import CONTROLLER, real_time
-    from ctcr.devices.sight import Sight
-    from ctcr.devices.tracker import Tracker
+    from ctcr.bench.devices import bench_file, person
+    from ctcr.bench.devices.motors import Motors
+    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.devices.real_time import CONTROLLER, real_time
+    from ctcr.bench.devices.sight import Sight
+    from ctcr.bench.devices.tracker import Tracker
+    from ctcr.bench.record.display import Display
+    from ctcr.bench.record.folder import TABLE, Folder
+    from ctcr.bench.record.live_page import LivePage
+    from ctcr.bench.record.plan import Approach, steps_of
+    from ctcr.bench.record.session import Options, Session
+    from ctcr.effects import user_effects
     from ctcr.errors import InputError
-    from ctcr.record.display import Display
-    from ctcr.record.folder import TABLE, Folder
-    from ctcr.record.live_page import LivePage
-    from ctcr.record.plan import Approach, steps_of
-    from ctcr.record.session import Options, Session
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements
 
     user_effects.load_all(own)
     loaded, place, bench = robot_file.load(robot), private_folder(folder), bench_file.load(bench_path)
@@ -93,10 +96,7 @@ def command(
         before = recording.rows.groups
         if before:
             console.print(f"going on after {before} of {len(steps)} rows", markup=False)
-        with (
-            Display() as display,
-            LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live,
-        ):
+        with Display() as display, LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live:
 
             def shown(progress):
                 display.show(progress)
@@ -116,8 +116,7 @@ def command(
             recording.note(motors, tracker, sight.lateness, "finished")
     path = recording.path / TABLE
     console.print(
-        f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}",
-        markup=False,
+        f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}", markup=False
     )
     if json_target:
         output.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)}, json_target)

@@ -5,20 +5,16 @@ import click
 
 @click.command(name="reproduce")
 @click.option("--quick", is_flag=True, help="Fewer designs, configurations and repetitions: under a minute.")
-@click.option(
-    "--report", metavar="FILE.html", default="reproduction.html", show_default=True, help="The page."
-)
-@click.option(
-    "--json", "json_target", metavar="FILE", help="Write the values as JSON; - for standard output."
-)
+@click.option("--report", metavar="FILE.html", default="reproduction.html", show_default=True, help="The page.")
+@click.option("--json", "json_target", metavar="FILE", help="Write the values as JSON; - for standard output.")
 def command(quick: bool, report: str, json_target: str | None) -> None:
     """Compute Tables I and II, Figures 2 to 6 and the claims of Boyer et al. 2024, and write them as one page."""
     import time
 
-    from ctcr import output
     from ctcr.reproduce import control, influence, model
     from ctcr.reproduce import report as page
     from ctcr.reproduce.claim import COLUMNS
+    from ctcr.show import output
 
     designs, configurations, repetitions = (20, 50, 1) if quick else (1000, 1000, 10)
     samples, points = (2000, 3) if quick else (1_000_000, 11)

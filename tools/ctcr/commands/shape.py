@@ -26,17 +26,10 @@ class Numbers(click.ParamType):
 @click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("-o", "--output", "picture", metavar="FILE.png", help="Draw the robot.")
 @click.option(
-    "--steps",
-    type=click.IntRange(1, 1000),
-    default=4,
-    show_default=True,
-    help="Integration steps per segment.",
+    "--steps", type=click.IntRange(1, 1000), default=4, show_default=True, help="Integration steps per segment."
 )
 @click.option(
-    "--json",
-    "json_target",
-    metavar="FILE",
-    help="Write it, with the samples, as JSON; - for standard output.",
+    "--json", "json_target", metavar="FILE", help="Write it, with the samples, as JSON; - for standard output."
 )
 def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_target) -> None:
     """Solve ROBOT at one set of joints: --beta and --alpha, one value a tube.
@@ -45,9 +38,10 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_
     """
     import numpy as np
 
-    from ctcr import output, robot_file
     from ctcr.errors import InputError, Problem
-    from ctcr.model import Model, status_text
+    from ctcr.model.model import Model, status_text
+    from ctcr.robot import robot_file
+    from ctcr.show import output
 
     loaded = robot_file.load(robot)
     beta = _joints("beta", beta, "beta-mm", beta_mm, 1e-3, loaded.n_tubes)
@@ -63,7 +57,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
     if picture:
         from ctcr.frames import matrix_from_quaternion
-        from ctcr.pictures import draw_robot
+        from ctcr.show.pictures import draw_robot
 
         draw_robot(
             picture,
@@ -86,7 +80,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_
 
 def _without_path(robot):
     """The robot without the effects that depend on how its joints were reached, and their names."""
-    from ctcr import effect_model
+    from ctcr.model import effect_model
 
     left_out = effect_model.of_the_path(robot)
     kept = {name: given for name, given in robot.effects.items() if name not in left_out}
@@ -94,14 +88,12 @@ def _without_path(robot):
 
 
 def _tell_effects(console, tip, robot, left_out: list[str]) -> None:
-    from ctcr.effect_model import OF_THE_TRACKER
+    from ctcr.model.effect_model import OF_THE_TRACKER
 
     acting = [name for name in robot.effects if name not in OF_THE_TRACKER]
     if acting:
         place = ", ".join(f"{1e3 * x:.3f}" for x in tip)
-        text = (
-            f"With {', '.join(acting)} the sensor is at {place} mm; the shape is that of the standard model."
-        )
+        text = f"With {', '.join(acting)} the sensor is at {place} mm; the shape is that of the standard model."
         console.print(text, markup=False)
     if left_out:
         text = f"Left out, as it depends on how the joints were reached: {', '.join(left_out)}"
@@ -113,12 +105,10 @@ def _joints(name: str, values, other: str, other_values, factor: float, n_tubes:
     import numpy as np
 
     from ctcr.errors import InputError, Problem
-    from ctcr.measurements import QUANTITIES
+    from ctcr.table.measurements import QUANTITIES
 
     if (values is None) == (other_values is None):
-        raise InputError(
-            Problem(f"give either --{name} or --{other}: {n_tubes} numbers, innermost tube first")
-        )
+        raise InputError(Problem(f"give either --{name} or --{other}: {n_tubes} numbers, innermost tube first"))
     used = f"--{name}" if other_values is None else f"--{other}"
     joints = _finite(used.lstrip("-"), np.array(values if other_values is None else other_values), n_tubes)
     joints = joints if other_values is None else factor * joints
@@ -169,23 +159,17 @@ def _as_data(robot, shape, tip, ends) -> dict:
 
 
 def _report(console, robot, data: dict, picture: str | None) -> None:
-    from ctcr.output import table
+    from ctcr.show.output import table
 
     rows = [
-        [
-            f"tube {i + 1}",
-            f"{1e3 * tube['tip_arc_length_m']:.2f}",
-            *(f"{1e3 * x:.3f}" for x in tube["tip_position_m"]),
-        ]
+        [f"tube {i + 1}", f"{1e3 * tube['tip_arc_length_m']:.2f}", *(f"{1e3 * x:.3f}" for x in tube["tip_position_m"])]
         for i, tube in enumerate(data["tubes"])
     ]
     console.print(f"[bold]{robot.name}[/bold], base frame")
     console.print(table("Where the tubes end", ["", "out [mm]", "x [mm]", "y [mm]", "z [mm]"], rows))
     tip = data["tip"]
     console.print("tip direction  " + ", ".join(f"{x:.5f}" for x in tip["direction"]))
-    console.print(
-        "tip quaternion " + ", ".join(f"{x:.5f}" for x in tip["quaternion_wxyz"]) + "  (w, x, y, z)"
-    )
+    console.print("tip quaternion " + ", ".join(f"{x:.5f}" for x in tip["quaternion_wxyz"]) + "  (w, x, y, z)")
     if data["stability"] == data["stability"]:  # not known with effects
         console.print(f"stability      {data['stability']:.3g}  (0: about to snap)")
     if picture:

@@ -2,23 +2,25 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 NOISES = ["none", "jitter", "realistic"]
 
 scenario_option = click.option(
-    "--scenario",
-    metavar="FILE.yaml",
-    help="Faults at set times: a list of `at_s` with the faults that change.",
+    "--scenario", metavar="FILE.yaml", help="Faults at set times: a list of `at_s` with the faults that change."
 )
 hide_option = click.option(
-    "--hide", "hidden", multiple=True, metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
+    "--hide",
+    "hidden",
+    multiple=True,
+    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
     help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
-)  # fmt: skip
+)
 oracle_option = click.option(
-    "--oracle", metavar="COMMAND",
+    "--oracle",
+    metavar="COMMAND",
     help="A program that knows where the tip is, instead of the model; gets ROBOT as its last argument.",
-)  # fmt: skip
+)
 noise_option = click.option(
     "--noise", type=click.Choice(NOISES), default="jitter", show_default=True, help="As in ctcr simulate."
 )
@@ -46,7 +48,7 @@ def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
 
     The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
     """
-    from ctcr.simulators.aurora import AuroraSimulator
+    from ctcr.bench.simulators.aurora import AuroraSimulator
 
     simulator = AuroraSimulator(_robot(robot, hidden, oracle, noise, seed), _folder(folder), scenario, seed)
     _serve(simulator, f"tracker: {simulator.line.link}")
@@ -56,9 +58,12 @@ def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
 @click.option("--interface", metavar="NAME", help="Answer on this one, instead of making a virtual pair.")
 @click.option("--motors", type=click.IntRange(1, 8), default=6, show_default=True)
 @click.option(
-    "--variant", type=click.Choice(["EL7041", "EL7031"]), default="EL7041", show_default=True,
+    "--variant",
+    type=click.Choice(["EL7041", "EL7031"]),
+    default="EL7041",
+    show_default=True,
     help="Type of the terminals.",
-)  # fmt: skip
+)
 @folder_option
 @seed_option
 @scenario_option
@@ -67,8 +72,8 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
     Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
     """
-    from ctcr.simulators import network
-    from ctcr.simulators.ethercat import EthercatSimulator
+    from ctcr.bench.simulators import network
+    from ctcr.bench.simulators.ethercat import EthercatSimulator
 
     place = _folder(folder)
     if not interface:
@@ -92,12 +97,10 @@ def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario,
 
     Needs no rights: bus and COMMAND get a network of their own.
     """
-    from ctcr.simulators import bench as simulated
+    from ctcr.bench.simulators import bench as simulated
 
     robots = _robot(robot, hidden, oracle, noise, seed)
-    return simulated.run(
-        lambda: _run(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed
-    )
+    return simulated.run(lambda: _run(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed)
 
 
 @command.command(name="set")
@@ -108,8 +111,9 @@ def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario,
 @folder_option
 def set_(device, settings, force, line_break, folder) -> None:
     """Switch faults of a running simulator on and off; without any, show them."""
-    from ctcr import output, yaml_document
-    from ctcr.simulators.control import request
+    from ctcr.bench.simulators.control import request
+    from ctcr.robot import yaml_document
+    from ctcr.show import output
 
     pairs = [text.partition("=")[::2] for text in settings]
     message = {"faults": {name: yaml_document.parse(value, name).data for name, value in pairs}}
@@ -152,10 +156,11 @@ def _serve(simulator, text) -> None:
 def _robot(robot, hidden, oracle, noise, seed):
     import shlex
 
-    from ctcr import effect_fit, robot_file
-    from ctcr.effect_settings import settings
-    from ctcr.simulators.oracle import Oracle
-    from ctcr.simulators.robot import SimulatedRobot
+    from ctcr.bench.simulators.oracle import Oracle
+    from ctcr.bench.simulators.robot import SimulatedRobot
+    from ctcr.diagnose import add
+    from ctcr.effects.settings import settings
+    from ctcr.robot import robot_file
 
     if oracle and hidden:
         raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
@@ -163,10 +168,10 @@ def _robot(robot, hidden, oracle, noise, seed):
     values = settings(hidden, loaded)
     names = list(dict.fromkeys(name.split(".")[1] for name in values))
     known = Oracle([*shlex.split(oracle), robot], loaded) if oracle else None
-    return SimulatedRobot(effect_fit.with_values(loaded, names, values), noise, seed, known)
+    return SimulatedRobot(add.with_values(loaded, names, values), noise, seed, known)
 
 
 def _folder(folder):
-    from ctcr.devices.private_folder import private_folder
+    from ctcr.bench.devices.private_folder import private_folder
 
     return private_folder(folder)

@@ -7,16 +7,20 @@ import click
 @click.argument("robot")
 @click.argument("plan")
 @click.option(
-    "--hide", "hidden", multiple=True, metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
+    "--hide",
+    "hidden",
+    multiple=True,
+    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
     help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
-)  # fmt: skip
-@click.option(
-    "--noise", type=click.Choice(["none", "jitter", "realistic"]), default="jitter", show_default=True,
-    help="jitter: of the robot file; realistic: with the smooth error of the tracker's field and outliers too.",
-)  # fmt: skip
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Another one: other noise."
 )
+@click.option(
+    "--noise",
+    type=click.Choice(["none", "jitter", "realistic"]),
+    default="jitter",
+    show_default=True,
+    help="jitter: of the robot file; realistic: with the smooth error of the tracker's field and outliers too.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Another one: other noise.")
 @click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects.")
 @click.option("-o", "--output", "target", required=True, metavar="MEASUREMENTS", help="The table to write.")
 def command(robot, plan, hidden, noise, seed, own, target) -> None:
@@ -27,15 +31,20 @@ def command(robot, plan, hidden, noise, seed, own, target) -> None:
     """
     import numpy as np
 
-    from ctcr import effect_fit, measurements, output, robot_file, simulation, user_effects
-    from ctcr.effect_settings import settings
+    from ctcr.diagnose import add
+    from ctcr.effects import user_effects
+    from ctcr.effects.settings import settings
+    from ctcr.model import simulation
+    from ctcr.robot import robot_file
+    from ctcr.show import output
+    from ctcr.table import measurements
 
     user_effects.load_all(own)
     loaded = robot_file.load(robot)
     values = settings(hidden, loaded)
     names = list(dict.fromkeys(name.split(".")[1] for name in values))
     table = measurements.load(plan, loaded.n_tubes)
-    made = simulation.simulate(effect_fit.with_values(loaded, names, values), table, noise, seed)
+    made = simulation.simulate(add.with_values(loaded, names, values), table, noise, seed)
     simulation.write(made, target, loaded.n_tubes)
     console = output.console()
     unsolved = int(np.isnan(made.position).any(axis=1).sum())

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.command(name="stop")
@@ -13,8 +13,8 @@ def command(release: bool, folder: str | None) -> None:
 
     This stops by software. The switch that cuts the motors' power is the emergency stop of the bench.
     """
-    from ctcr.devices import emergency_stop
-    from ctcr.devices.private_folder import private_folder
+    from ctcr.bench.devices import emergency_stop
+    from ctcr.bench.devices.private_folder import private_folder
 
     place = private_folder(folder)
     if not release:

@@ -2,34 +2,29 @@
 
 import click
 
-from ctcr.bench_options import folder_option
+from ctcr.commands.options import folder_option
 
 
 @click.command(name="track")
 @click.argument("robot")
 @click.argument("scenario")
-@click.option(
-    "--plant", metavar="ROBOT2", help="What is controlled, where it differs from what the controller knows."
-)
+@click.option("--plant", metavar="ROBOT2", help="What is controlled, where it differs from what the controller knows.")
 @click.option("--live", is_flag=True, help="On the bench instead of a simulated robot; needs --bench and -o.")
 @click.option("--bench", "bench_path", metavar="BENCH.yaml", help="The devices and their limits.")
 @click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; goes on with one there.")
 @click.option(
-    "--patience",
-    type=click.FloatRange(0.1),
-    default=2.0,
-    show_default=True,
-    help="With an unseen sensor [s].",
+    "--patience", type=click.FloatRange(0.1), default=2.0, show_default=True, help="With an unseen sensor [s]."
 )
 @click.option(
-    "--most-error-mm", type=click.FloatRange(1), default=20.0, show_default=True,
+    "--most-error-mm",
+    type=click.FloatRange(1),
+    default=20.0,
+    show_default=True,
     help="Stop where the tip is farther from its reference.",
-)  # fmt: skip
+)
 @folder_option
 @click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
-@click.option(
-    "--json", "json_target", metavar="FILE", help="Write the numbers as JSON; - for standard output."
-)
+@click.option("--json", "json_target", metavar="FILE", help="Write the numbers as JSON; - for standard output.")
 def command(
     robot, scenario, plant, live, bench_path, target, patience, most_error_mm, folder, report, json_target
 ) -> None:
@@ -39,7 +34,8 @@ def command(
     pace is that of the tracker, where a weight differs from that before you are asked to hang it, and every reading is
     in FOLDER at once; the same command goes on behind the last whole run.
     """
-    from ctcr import output, robot_file
+    from ctcr.robot import robot_file
+    from ctcr.show import output
     from ctcr.track import scenario as scenario_file
     from ctcr.track.runs import run_all
     from ctcr.track.summary import COLUMNS, rows, summary
@@ -53,9 +49,15 @@ def command(
         from ctcr.track.live import track
 
         runs, wanted = track(
-            target, robot, scenario, bench_path, place=folder, patience_s=patience, most_error_mm=most_error_mm,
+            target,
+            robot,
+            scenario,
+            bench_path,
+            place=folder,
+            patience_s=patience,
+            most_error_mm=most_error_mm,
             said=lambda text: console.print(text, markup=False),
-        )  # fmt: skip
+        )
         on = f" on the bench, into {target}"
     else:
         real = robot_file.load(plant) if plant else loaded

@@ -11,15 +11,7 @@ from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.crossvalidation import make_folds
 from ctcr.compare.dependence import TRIALS, Dependence, Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
-from ctcr.compare.offsets import (
-    FrameTurn,
-    RunOffsets,
-    Shift,
-    find_run_offsets,
-    find_shift,
-    find_turn,
-    rigid_motion,
-)
+from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.errors import InputError, Problem
@@ -86,8 +78,19 @@ class Comparison:
 
     def as_dict(self) -> dict:
         """The numbers for JSON, without the readings themselves."""
-        names = ("robot", "position_mm", "percent_of_length", "angle_deg", "angle_kind", "runs", "noise",
-                 "direction", "shift", "turn", "run_offsets")  # fmt: skip
+        names = (
+            "robot",
+            "position_mm",
+            "percent_of_length",
+            "angle_deg",
+            "angle_kind",
+            "runs",
+            "noise",
+            "direction",
+            "shift",
+            "turn",
+            "run_offsets",
+        )
         data = {name: _plain(getattr(self, name)) for name in names}
         data["rows"] = {
             "compared": self.position_mm.count,
@@ -111,24 +114,24 @@ class Comparison:
 def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Comparison:
     """Compare measured with predicted tip poses; `notices` say what became of the table before.
 
-    robot, measurements and prediction as `ctcr.robot_file.load`, `ctcr.measurements.load` and
+    robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
     """
     sample = take_sample(robot, measurements, prediction)
     if len(sample.row) == 0:
-        raise InputError(Problem(
-            f"no row can be compared: {len(sample.not_measured)} rows without a measured position, "
-            f"{len(sample.not_solved)} rows that the model does not solve"
-        ))  # fmt: skip
+        raise InputError(
+            Problem(
+                f"no row can be compared: {len(sample.not_measured)} rows without a measured position, "
+                f"{len(sample.not_solved)} rows that the model does not solve"
+            )
+        )
     tracker = robot.tracker
     shift, turn = _constant_errors(sample)
     headline, sample = sample, _aligned(sample) if turn and turn.gross else sample
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
-    step, velocity = (
-        motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity)
-    )
+    step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
     run_offsets = find_run_offsets(sample, revisits, LEVEL)
     error = _about_means(sample.base_error, sample.run if run_offsets.found else np.zeros_like(sample.run))
@@ -166,9 +169,12 @@ def spread(values: Array) -> Spread:
     """Mean, RMS, 95th percentile and maximum of what is finite in values (K,)."""
     known = values[np.isfinite(values)]
     return Spread(
-        len(known), float(known.mean()), float(np.sqrt(np.mean(known**2))), float(np.percentile(known, 95)),
+        len(known),
+        float(known.mean()),
+        float(np.sqrt(np.mean(known**2))),
+        float(np.percentile(known, 95)),
         float(known.max()),
-    )  # fmt: skip
+    )
 
 
 def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
@@ -176,8 +182,7 @@ def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
     folds = make_folds(label, TRIALS)
     if folds.count < FEWEST_RUNS:
         return None, None
-    return (find_shift(sample.error[rows], folds),
-            find_turn(sample.predicted[rows], sample.measured[rows], folds))  # fmt: skip
+    return (find_shift(sample.error[rows], folds), find_turn(sample.predicted[rows], sample.measured[rows], folds))
 
 
 def _aligned(sample: Sample) -> Sample:
@@ -218,9 +223,14 @@ def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:
 
 def _dependence(item: Dependence) -> dict:
     return {
-        "name": item.name, "label": item.label, "frame": item.form.frame, "share": item.share,
-        "p_value": item.p_value, "size_mm": item.size_mm, "indistinct": list(item.indistinct),
-    }  # fmt: skip
+        "name": item.name,
+        "label": item.label,
+        "frame": item.form.frame,
+        "share": item.share,
+        "p_value": item.p_value,
+        "size_mm": item.size_mm,
+        "indistinct": list(item.indistinct),
+    }
 
 
 def _plain(value):

@@ -41,9 +41,7 @@ class Covariate:
         unit = np.nan_to_num((self.value - low) / (high - low), nan=0.5)[:, None]
         levels = len(np.unique(self.value[:: max(1, len(self.value) // 5000)]))
         line = 2 * unit - 1
-        return [line, np.cos(np.pi * unit * np.arange(1, min(WAVES, levels - 1) + 1))][
-            : 1 if levels < 3 else 2
-        ]
+        return [line, np.cos(np.pi * unit * np.arange(1, min(WAVES, levels - 1) + 1))][: 1 if levels < 3 else 2]
 
     def _harmonics(self, count: int) -> Array:
         turns = self.value[:, None] * np.arange(1, count + 1)
@@ -79,8 +77,9 @@ def _all(sample: Sample, pitch: float | None) -> Iterator[Covariate]:
     if pitch:
         for i, beta in enumerate(sample.beta.T, 1):
             phase = 2 * np.pi * beta / pitch
-            yield Covariate(f"screw_phase{i}", f"phase of drive screw {i}", f"screw {i}", "deg", 180 / np.pi,
-                            "angle", phase, i)  # fmt: skip
+            yield Covariate(
+                f"screw_phase{i}", f"phase of drive screw {i}", f"screw {i}", "deg", 180 / np.pi, "angle", phase, i
+            )
     yield Covariate("time", "time since the start", "t", "s", 1.0, "number", sample.t)
     yield Covariate("order", "order of measuring", "row", "", 1.0, "number", sample.row.astype(float))
 
@@ -100,17 +99,33 @@ def _differences(sample: Sample) -> Iterator[Covariate]:
     for i in range(count):
         for j in range(i + 1, count):
             pair = f"{i + 1}{j + 1}"
-            yield _angle(f"alpha{pair}", f"joint difference α{i + 1} − α{j + 1}", f"α{i + 1}−α{j + 1}",
-                         sample.alpha[:, i] - sample.alpha[:, j])  # fmt: skip
-            yield _length(f"length{pair}", f"length of tube {i + 1} beyond tube {j + 1}", f"ℓ{i + 1}−ℓ{j + 1}",
-                          deployed[:, i] - deployed[:, j])  # fmt: skip
+            yield _angle(
+                f"alpha{pair}",
+                f"joint difference α{i + 1} − α{j + 1}",
+                f"α{i + 1}−α{j + 1}",
+                sample.alpha[:, i] - sample.alpha[:, j],
+            )
+            yield _length(
+                f"length{pair}",
+                f"length of tube {i + 1} beyond tube {j + 1}",
+                f"ℓ{i + 1}−ℓ{j + 1}",
+                deployed[:, i] - deployed[:, j],
+            )
 
 
 def _directions(sample: Sample) -> Iterator[Covariate]:
     for name, symbol, column, tube in _joint_columns(sample):
         sign = sample.motion.direction[:, column].astype(float)
-        yield Covariate(f"direction_{name}", f"direction of the last motion of {symbol}", f"sign of d{symbol}",
-                        "", 1.0, "direction", sign, tube)  # fmt: skip
+        yield Covariate(
+            f"direction_{name}",
+            f"direction of the last motion of {symbol}",
+            f"sign of d{symbol}",
+            "",
+            1.0,
+            "direction",
+            sign,
+            tube,
+        )
 
 
 def _speeds(sample: Sample) -> Iterator[Covariate]:
@@ -118,8 +133,16 @@ def _speeds(sample: Sample) -> Iterator[Covariate]:
         return
     for name, symbol, column, tube in _joint_columns(sample):
         turns = name.startswith("alpha")
-        yield Covariate(f"speed_{name}", f"speed of {symbol}", f"d{symbol}/dt", "deg/s" if turns else "mm/s",
-                        180 / np.pi if turns else 1e3, "number", sample.motion.rate[:, column], tube)  # fmt: skip
+        yield Covariate(
+            f"speed_{name}",
+            f"speed of {symbol}",
+            f"d{symbol}/dt",
+            "deg/s" if turns else "mm/s",
+            180 / np.pi if turns else 1e3,
+            "number",
+            sample.motion.rate[:, column],
+            tube,
+        )
     speed = np.linalg.norm(sample.tip_velocity, axis=1)
     yield Covariate("tip_speed", "speed of the tip", "tip speed", "mm/s", 1e3, "number", speed)
 
@@ -143,9 +166,7 @@ def _place(sample: Sample) -> Iterator[Covariate]:
         yield _length(f"place_{axis}", f"tip position {axis} in the base frame", axis, values)
     x, y = sample.base_position[:, 0], sample.base_position[:, 1]
     yield _length("place_radius", "distance of the tip from the insertion axis", "r", np.hypot(x, y))
-    yield _angle(
-        "place_azimuth", "direction of the tip around the insertion axis", "azimuth", np.arctan2(y, x)
-    )
+    yield _angle("place_azimuth", "direction of the tip around the insertion axis", "azimuth", np.arctan2(y, x))
 
 
 def _joint_columns(sample: Sample) -> Iterator[tuple[str, str, int, int]]:

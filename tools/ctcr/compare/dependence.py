@@ -82,16 +82,12 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
     frames = local_frames(sample, rows)
     items = covariates(sample, pitch_m)
     forms = all_forms(sample, rows, items)
-    total = (
-        float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if folds.count >= FEWEST_RUNS else 0.0
-    )
+    total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if folds.count >= FEWEST_RUNS else 0.0
     if total == 0:
         return Ranking([], [], np.nan, 0.0, error, rows, folds.count, kind, frames)
     alone, by_chance = _judge(forms, error, frames, folds, total)
     chosen, left, best = [], error, alone
-    while (
-        len(chosen) < MOST_FINDINGS and best and best[0].p_value <= alpha and best[0].share >= SMALLEST_SHARE
-    ):
+    while len(chosen) < MOST_FINDINGS and best and best[0].p_value <= alpha and best[0].share >= SMALLEST_SHARE:
         chosen.append(_with_rivals(best[:1], best, left, frames)[0])
         left = left - _predicted(best[0].form, left, frames, folds)
         names = {item.name for item in chosen}
@@ -123,8 +119,7 @@ def _judge(forms: list[Form], error: Array, frames: dict[str, Array], folds: Fol
         if form.name not in gains or gain[0] > gains[form.name][1]:
             gains[form.name] = (form, gain[0])
     found = [
-        Dependence(form, gain / total, chance(gain, best), *_size(form, error, local))
-        for form, gain in gains.values()
+        Dependence(form, gain / total, chance(gain, best), *_size(form, error, local)) for form, gain in gains.values()
     ]
     return sorted(found, key=lambda item: -item.share), best
 
@@ -168,10 +163,16 @@ def _with_rivals(items: list[Dependence], others: list[Dependence], error: Array
 
     alike = directions(items) @ directions(others).T
     return [
-        replace(item, indistinct=tuple(other.label for other, cosine in zip(others, row, strict=True)
-                                       if cosine >= SAME_FIELD and other.name != item.name))
+        replace(
+            item,
+            indistinct=tuple(
+                other.label
+                for other, cosine in zip(others, row, strict=True)
+                if cosine >= SAME_FIELD and other.name != item.name
+            ),
+        )
         for item, row in zip(items, alike, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def _field(form: Form, error: Array, frames: dict[str, Array]) -> Array:

@@ -1,6 +1,5 @@
 """The pictures of the report, as SVG text. One colour means one thing in all of them."""
 
-import io
 from collections.abc import Iterable
 
 import numpy as np
@@ -14,39 +13,15 @@ from ctcr.compare.dependence import Dependence
 from ctcr.compare.forms import FRAME_NAMES
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
+from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
 
 Array = NDArray[np.float64]
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 
-ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
-AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
-INK = "#1c2733"
 MOST_POINTS = 4000
 BARS = 12
 PANELS = 6
 BINS = 18
-
-STYLE = {
-    "font.family": "sans-serif", "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"], "font.size": 10,
-    "axes.edgecolor": "#8794a0", "axes.labelcolor": INK, "text.color": INK, "xtick.color": INK,
-    "ytick.color": INK, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 10.5,
-    "axes.titleweight": "bold", "axes.titlelocation": "left", "legend.frameon": False, "savefig.dpi": 150,
-    "axes.grid": True, "grid.color": "#e7ebef", "axes.axisbelow": True, "svg.hashsalt": "ctcr",
-}  # fmt: skip
-
-
-def draw(plot, c: Comparison, width: float, height: float) -> str | None:
-    """SVG text of a picture, or None when there is nothing to draw."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        if plot(figure, c) is False:
-            return None
-        target = io.StringIO()
-        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
-    text = target.getvalue()
-    return text[text.index("<svg") :]
 
 
 def histogram(figure: Figure, c: Comparison) -> None:
@@ -56,17 +31,13 @@ def histogram(figure: Figure, c: Comparison) -> None:
     noise = c.noise.axis_mm if c.noise.axis_mm > 0 else np.nan
     low = np.nanmin([np.percentile(size, 0.5), noise * 0.4, size.max() / 3])
     edges = np.geomspace(max(low, 1e-4), size.max() * 1.05, 45)
-    axes.hist(
-        size, edges, weights=np.full(len(size), 100 / len(size)), color=ERROR, alpha=0.85, label="error"
-    )
+    axes.hist(size, edges, weights=np.full(len(size), 100 / len(size)), color=ERROR, alpha=0.85, label="error")
     if np.isfinite(noise):
         share = 100 * np.diff(stats.maxwell.cdf(edges, scale=noise))
         axes.stairs(share, edges, fill=True, color=NOISE, alpha=0.55, label="noise alone")
         label = f"noise {c.noise.rms_mm:.2g} mm RMS"
         axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=label)
-    axes.axvline(
-        c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS"
-    )
+    axes.axvline(c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS")
     axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
     _log_ticks(axes)
     axes.legend(loc="best", fontsize=9)
@@ -94,8 +65,15 @@ def course(figure: Figure, c: Comparison) -> None:
             axes.axvspan(x[start], x[stop - 1], color="#f2f4f7", lw=0)
         axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
         if len(starts) > 1 and number % sparse == 0:
-            axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), transform=axes.get_xaxis_transform(),
-                      ha="center", fontsize=8, color=NOISE)  # fmt: skip
+            axes.text(
+                (x[start] + x[stop - 1]) / 2,
+                1.01,
+                str(run[start]),
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                fontsize=8,
+                color=NOISE,
+            )
     if len(starts) > 1:
         axes.text(-0.01, 1.01, "run", transform=axes.transAxes, ha="right", fontsize=8, color=NOISE)
     if np.isfinite(c.noise.rms_mm):
@@ -119,13 +97,20 @@ def out_and_return(figure: Figure, c: Comparison) -> bool | None:
     edges = np.geomspace(low, high, 32)
     for values, colour, label in zip(apart, (BACK, OUT), ("opposite", "same"), strict=True):
         if len(values):
-            left.hist(values, edges, weights=np.full(len(values), 100 / len(values)), color=colour, alpha=0.7,
-                      label=f"{label} direction ({len(values)})")  # fmt: skip
+            left.hist(
+                values,
+                edges,
+                weights=np.full(len(values), 100 / len(values)),
+                color=colour,
+                alpha=0.7,
+                label=f"{label} direction ({len(values)})",
+            )
     if c.noise.axis_mm > 0:
         share = 100 * np.diff(stats.maxwell.cdf(edges, scale=c.noise.axis_mm * np.sqrt(2)))
         left.stairs(share, edges, color=NOISE, lw=1.4, label="noise alone")
-    left.set(xscale="log", xlabel="distance between two visits, mm", ylabel="% of pairs",
-             title="Same joints, visited twice")  # fmt: skip
+    left.set(
+        xscale="log", xlabel="distance between two visits, mm", ylabel="% of pairs", title="Same joints, visited twice"
+    )
     _log_ticks(left)
     left.legend(fontsize=8, loc="best")
     left.margins(y=0.3)
@@ -149,8 +134,11 @@ def _both_ways(axes, c: Comparison, pairs) -> None:
     axes.fill_between(path, earlier[order], later[order], color=FAINT, alpha=0.6, lw=0)
     axes.plot(path, earlier[order], color=OUT, lw=1.3, marker=".", ms=3, label="first pass")
     axes.plot(path, later[order], color=BACK, lw=1.3, marker=".", ms=3, label="opposite pass")
-    axes.set(xlabel=f"place along the path of run {run}", ylabel=f"error along {'xyz'[component]} (tracker), mm",
-             title="The error out and on return")  # fmt: skip
+    axes.set(
+        xlabel=f"place along the path of run {run}",
+        ylabel=f"error along {'xyz'[component]} (tracker), mm",
+        title="The error out and on return",
+    )
     axes.legend(fontsize=8)
 
 
@@ -165,27 +153,17 @@ def ranking(figure: Figure, c: Comparison) -> bool | None:
     shares = [100 * max(item.share, 0) for item in items]
     axes.barh(range(len(items)), shares, color=colours, height=0.72)
     for place, (item, share) in enumerate(zip(items, shares, strict=True)):
-        axes.text(
-            share + 0.4,
-            place,
-            f"{100 * item.share:.0f} %  ({item.size_mm:.2g} mm)",
-            va="center",
-            fontsize=8.5,
-        )
+        axes.text(share + 0.4, place, f"{100 * item.share:.0f} %  ({item.size_mm:.2g} mm)", va="center", fontsize=8.5)
     axes.set_yticks(range(len(items)), [item.label for item in items], fontsize=9)
     level = 100 * c.ranking.chance_share
     if level > 0:
         axes.axvline(level, color=NOISE, ls="--", lw=1.2)
-        axes.text(
-            level,
-            len(items) - 0.4,
-            " chance rarely gets beyond this line",
-            fontsize=8,
-            color=NOISE,
-            va="bottom",
-        )
-    axes.set(xlabel="share of the squared error predicted on data left out, %", ylim=(-0.6, len(items) + 0.1),
-             xlim=(0, max([*shares, level]) * 1.25 + 1))  # fmt: skip
+        axes.text(level, len(items) - 0.4, " chance rarely gets beyond this line", fontsize=8, color=NOISE, va="bottom")
+    axes.set(
+        xlabel="share of the squared error predicted on data left out, %",
+        ylim=(-0.6, len(items) + 0.1),
+        xlim=(0, max([*shares, level]) * 1.25 + 1),
+    )
     axes.grid(axis="y", visible=False)
     return None
 
@@ -239,11 +217,7 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
     label_of = FRAME_NAMES[frame]
     levels = np.unique(x)
     bins = levels if len(levels) <= 6 else np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
-    cell = (
-        np.searchsorted(levels, x)
-        if len(levels) <= 6
-        else np.clip(np.searchsorted(bins, x) - 1, 0, len(bins) - 2)
-    )
+    cell = np.searchsorted(levels, x) if len(levels) <= 6 else np.clip(np.searchsorted(bins, x) - 1, 0, len(bins) - 2)
     for axis in range(3):
         axes.scatter(x[shown], local[shown, axis], s=3, color=AXES[axis], alpha=0.15, lw=0, rasterized=True)
         used = np.unique(cell)

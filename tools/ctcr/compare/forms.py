@@ -52,9 +52,7 @@ def all_forms(sample: Sample, rows: NDArray, items: list[Covariate]) -> list[For
     ]
     velocity = np.nan_to_num(sample.tip_velocity[rows])
     if has_speed(sample) and np.any(velocity):
-        forms.append(
-            Form("lag", "velocity of the tip (a delay)", "base", velocity.reshape(-1, 1), constant=False)
-        )
+        forms.append(Form("lag", "velocity of the tip (a delay)", "base", velocity.reshape(-1, 1), constant=False))
     for item in items:
         for columns in replace(item, value=item.value[rows]).bases():
             columns = np.nan_to_num(columns)

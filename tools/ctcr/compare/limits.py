@@ -6,7 +6,7 @@ import numpy as np
 
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import is_noise
-from ctcr.compare.wording import join, mm
+from ctcr.show.wording import join, mm
 
 
 def limits(c: Comparison) -> list[str]:

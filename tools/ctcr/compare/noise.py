@@ -41,9 +41,7 @@ class DirectionDifference:
     outliers: int  # pairs that differ more than noise of the tracker's scatter does once in 10^5
     floor_mm: float  # half the RMS: no model without history can be better
     p_against_same: float  # that they differ no more than same-direction visits; NaN with too few of those
-    p_against_quiet: (
-        float  # that they differ no more than NOTABLE times the stated jitter or the scatter at rest
-    )
+    p_against_quiet: float  # that they differ no more than NOTABLE times the stated jitter or the scatter at rest
     quiet_rms_mm: float  # difference of two visits that this jitter or scatter gives
     same_rms_mm: float  # difference of same-direction visits, NaN without
     miss_mm: float  # usual joint distance between the matched visits
@@ -70,8 +68,16 @@ def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloo
         source, axis, uncertainty = "rest", rest_axis, rest_axis / np.sqrt(6 * freedom)
     else:
         source, axis, uncertainty = "stated", stated_mm * 1e-3, np.nan
-    return NoiseFloor(source, axis * 1e3, float(uncertainty) * 1e3, axis * np.sqrt(3) * 1e3, len(pairs),
-                      int(resting.sum()), rest_axis * 1e3, float(stated_mm))  # fmt: skip
+    return NoiseFloor(
+        source,
+        axis * 1e3,
+        float(uncertainty) * 1e3,
+        axis * np.sqrt(3) * 1e3,
+        len(pairs),
+        int(resting.sum()),
+        rest_axis * 1e3,
+        float(stated_mm),
+    )
 
 
 def direction_difference(
@@ -99,9 +105,7 @@ def direction_difference(
     p_same = np.nan
     if len(same) >= FEWEST_PAIRS:
         p_same = stats.mannwhitneyu(scaled, reference, alternative="greater").pvalue
-    p_quiet = (
-        _beyond(square / opposite.noise_factor, NOTABLE * quiet, blocks) if np.isfinite(quiet) else np.nan
-    )
+    p_quiet = _beyond(square / opposite.noise_factor, NOTABLE * quiet, blocks) if np.isfinite(quiet) else np.nan
     rms = float(np.sqrt(square.mean()))
     motion = tip_step[opposite.later]
     length = np.linalg.norm(motion, axis=1)
@@ -150,8 +154,12 @@ def _delay(opposite: Revisits, blocks: NDArray, velocity: Array) -> tuple[float,
     left = difference + delay * contrast
     score = np.bincount(blocks[known], np.sum(contrast * left, axis=1))
     length = np.linalg.norm(left, axis=1) * 1e3
-    return (float(delay), float(np.sqrt(np.sum(score**2)) / energy), float(np.sqrt(np.mean(length**2))),
-            float(length.max()))  # fmt: skip
+    return (
+        float(delay),
+        float(np.sqrt(np.sum(score**2)) / energy),
+        float(np.sqrt(np.mean(length**2))),
+        float(length.max()),
+    )
 
 
 def blocks_of(run: NDArray) -> NDArray:

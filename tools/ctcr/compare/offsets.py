@@ -17,9 +17,7 @@ Array = NDArray[np.float64]
 GROSS_TURN_DEG = 10.0  # a frame wrong by more is fitted before anything else is looked at
 GROSS_SHARE = 0.3  # of the squared error left after the shift that such a turn must explain
 OUTLYING = 5.0  # a run may be off beyond this many robust standard deviations ...
-BEYOND_MOTION = (
-    2.0  # ... and is, if its error differs from that of near joints by this many times their distance
-)
+BEYOND_MOTION = 2.0  # ... and is, if its error differs from that of near joints by this many times their distance
 
 
 @dataclass(frozen=True)
@@ -72,9 +70,7 @@ def find_shift(error: Array, folds: Folds) -> Shift:
     gains = float(np.sum(error**2)) - unexplained(np.ones((len(error), 1)), error, folds)
     mean = error.mean(axis=0) * 1e3
     total = max(float(np.sum(error**2)), 1e-300)
-    return Shift(
-        tuple(mean), float(np.linalg.norm(mean)), float(gains[0]) / total, chance(gains[0], gains[1:])
-    )
+    return Shift(tuple(mean), float(np.linalg.norm(mean)), float(gains[0]) / total, chance(gains[0], gains[1:]))
 
 
 def rigid_motion(source: Array, target: Array) -> tuple[Array, Array]:
@@ -103,8 +99,9 @@ def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:
     angle = np.degrees(np.arctan2(sine, (np.trace(turn) - 1) / 2))
     axis = spin / sine if sine > 0 else np.array([0.0, 0.0, 1.0])
     count = len(predicted)
-    return FrameTurn(float(angle), tuple(axis), float(np.sqrt(before / count)) * 1e3,
-                     float(np.sqrt(after / count)) * 1e3)  # fmt: skip
+    return FrameTurn(
+        float(angle), tuple(axis), float(np.sqrt(before / count)) * 1e3, float(np.sqrt(after / count)) * 1e3
+    )
 
 
 def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOffsets:
@@ -124,10 +121,16 @@ def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOff
     distance = np.linalg.norm(means - np.median(means, axis=0), axis=1)
     far = _far_runs(sample, label, distance) if len(names) >= FEWEST_RUNS else np.zeros(len(names), bool)
     return RunOffsets(
-        len(between), len(within), _rms_mm(between), _rms_mm(within), p_value, float(share),
-        tuple(int(name) for name in names[far]), float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
+        len(between),
+        len(within),
+        _rms_mm(between),
+        _rms_mm(within),
+        p_value,
+        float(share),
+        tuple(int(name) for name in names[far]),
+        float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
         bool(p_value <= level or far.any()),
-    )  # fmt: skip
+    )
 
 
 def _far_runs(sample: Sample, label: NDArray, distance: Array) -> NDArray[np.bool_]:

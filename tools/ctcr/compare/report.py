@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ctcr import html_page
 from ctcr.compare import figures, terminal
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.limits import limits
 from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
 from ctcr.compare.summary import findings, headline, quiet
-from ctcr.html_page import bullets, cards, figure, table
-from ctcr.output import atomic_writer, listed
+from ctcr.show import html_page
+from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.output import atomic_writer, listed
 
 
 def write(c: Comparison, target: str | Path, source: str) -> None:
@@ -24,15 +24,7 @@ def write(c: Comparison, target: str | Path, source: str) -> None:
 def page(c: Comparison, source: str) -> str:
     """The whole HTML text."""
     title = f"Model and measurement: {c.robot}"
-    sections = [
-        _opening(c, title),
-        _findings(c),
-        _view(c),
-        _sizes(c),
-        _directions(c),
-        _dependences(c),
-        _tables(c),
-    ]
+    sections = [_opening(c, title), _findings(c), _view(c), _sizes(c), _directions(c), _dependences(c), _tables(c)]
     return html_page.page(title, sections, source, "ctcr compare", scene(c))
 
 
@@ -49,9 +41,7 @@ def _opening(c: Comparison, title: str) -> str:
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
         numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
     if d:
-        numbers.append(
-            ("back", f"{d.rms_mm:.3g} mm", f"out against return, RMS over {d.pairs} pairs of visits")
-        )
+        numbers.append(("back", f"{d.rms_mm:.3g} mm", f"out against return, RMS over {d.pairs} pairs of visits"))
     return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
 
 
@@ -63,8 +53,10 @@ def _findings(c: Comparison) -> str:
     )
     found = (
         f'<ol class="findings">{items}</ol><p class="soft">A bar is the share of the squared error that the finding '
-        f"concerns; shares overlap.</p>" if items else "<p>No finding beyond noise.</p>"
-    )  # fmt: skip
+        f"concerns; shares overlap.</p>"
+        if items
+        else "<p>No finding beyond noise.</p>"
+    )
     text = f"<h2>What was found</h2>{found}"
     for title, lines in (
         ("", quiet(c)),
@@ -90,36 +82,46 @@ def _view(c: Comparison) -> str:
 
 
 def _sizes(c: Comparison) -> str:
-    left = figure(
-        figures.histogram, c, 5.2, 3.4, "How large the errors are, against noise alone (logarithmic axis)."
-    )
+    left = figure(figures.histogram, c, 5.2, 3.4, "How large the errors are, against noise alone (logarithmic axis).")
     right = figure(figures.course, c, 5.2, 3.4, "The error in the order measured.")
     return f'<h2>How large, and when</h2><div class="pair">{left}{right}</div>'
 
 
 def _directions(c: Comparison) -> str:
     drawn = figure(
-        figures.out_and_return, c, 10.4, 3.6,
+        figures.out_and_return,
+        c,
+        10.4,
+        3.6,
         "Visits of the same joints. The errors of two visits are compared, so that small differences of the joints "
-        "do not count.", wide=True,
-    )  # fmt: skip
+        "do not count.",
+        wide=True,
+    )
     return f"<h2>Out and return</h2>{drawn}" if drawn else ""
 
 
 def _dependences(c: Comparison) -> str:
     bars = figure(
-        figures.ranking, c, 10.4, 4.6,
+        figures.ranking,
+        c,
+        10.4,
+        4.6,
         f"How much of the squared error (its constant part removed) each quantity predicts on "
         f"{c.ranking.block_kind} that were left out. Red: findings, the later ones in what the stronger ones left. "
-        f"The best of all quantities gets beyond the dashed line by chance in 1 of 80 tables.", wide=True,
-    )  # fmt: skip
+        f"The best of all quantities gets beyond the dashed line by chance in 1 of 80 tables.",
+        wide=True,
+    )
     if not bars:
         return ""
     panels = figure(
-        figures.strongest, c, 10.4, 6.4,
+        figures.strongest,
+        c,
+        10.4,
+        6.4,
         "The error against the strongest quantities, in the frame where each predicts best: readings (points) and "
-        "means of equal groups (lines). An asterisk marks a finding.", wide=True,
-    )  # fmt: skip
+        "means of equal groups (lines). An asterisk marks a finding.",
+        wide=True,
+    )
     return f"<h2>Where the error comes from</h2>{bars}{panels}"
 
 
@@ -129,8 +131,9 @@ def _tables(c: Comparison) -> str:
         table("Repeatability, mm", terminal.REPEAT_COLUMNS, terminal.repeat_rows(c), 1),
         table("By run, mm; mean error vector in the tracker frame", terminal.RUN_COLUMNS, terminal.run_rows(c), 0),
         table(terminal.ranking_title(c), terminal.RANKING_COLUMNS, terminal.ranking_rows(c), 2)
-        if c.ranking.alone else "",
-    ]  # fmt: skip
+        if c.ranking.alone
+        else "",
+    ]
     for what, rows in (("not measured", c.sample.not_measured), ("not solved", c.sample.not_solved)):
         if len(rows):
             parts.append(f"<p>{len(rows)} rows {what}: {listed(rows, 200)}</p>")

@@ -37,8 +37,10 @@ def scene(c: Comparison) -> str:
     error = measured - predicted
     size = np.linalg.norm(error, axis=1)
     top = float(max(np.percentile(size, 98), 1e-6))
-    hover = [f"row {row}, run {run}: {value:.2f} mm" for row, run, value in
-             zip(c.headline.row[rows], c.headline.run[rows], size, strict=True)]  # fmt: skip
+    hover = [
+        f"row {row}, run {run}: {value:.2f} mm"
+        for row, run, value in zip(c.headline.row[rows], c.headline.run[rows], size, strict=True)
+    ]
     head = predicted + factor * error
     shafts = np.full((3 * len(rows), 3), np.nan)
     shafts[0::3], shafts[1::3] = predicted, head
@@ -47,28 +49,55 @@ def scene(c: Comparison) -> str:
         _points(predicted, "predicted", PREDICTED, 1.8, hover),
         _points(measured, "measured", MEASURED, 2.2, hover),
         {
-            "type": "scatter3d", "mode": "lines", "name": f"error × {factor:g}", "hoverinfo": "skip",
-            **_xyz(shafts), "connectgaps": False,
+            "type": "scatter3d",
+            "mode": "lines",
+            "name": f"error × {factor:g}",
+            "hoverinfo": "skip",
+            **_xyz(shafts),
+            "connectgaps": False,
             "line": {"width": 4, "color": _numbers(paint), "colorscale": SCALE, "cmin": 0, "cmax": top},
         },
         {
-            "type": "cone", "name": "arrow heads", "anchor": "tip", "sizemode": "absolute", "hoverinfo": "skip",
-            "sizeref": _head_size(measured), **_xyz(head), **_unit(error), "showscale": False,
+            "type": "cone",
+            "name": "arrow heads",
+            "anchor": "tip",
+            "sizemode": "absolute",
+            "hoverinfo": "skip",
+            "sizeref": _head_size(measured),
+            **_xyz(head),
+            **_unit(error),
+            "showscale": False,
             "colorscale": [[0, "#b3361e"], [1, "#b3361e"]],
         },
         {
-            "type": "scatter3d", "mode": "markers", "name": "front plate (robot file)", "hoverinfo": "name",
-            **_xyz(c.plate_mm[None, :]), "marker": {"size": 6, "symbol": "diamond", "color": PLATE},
+            "type": "scatter3d",
+            "mode": "markers",
+            "name": "front plate (robot file)",
+            "hoverinfo": "name",
+            **_xyz(c.plate_mm[None, :]),
+            "marker": {"size": 6, "symbol": "diamond", "color": PLATE},
         },
         {
-            "type": "scatter3d", "mode": "markers", "showlegend": False, "hoverinfo": "skip", **_xyz(predicted[:1]),
-            "marker": {"size": 0.01, "color": [0], "colorscale": SCALE, "cmin": 0, "cmax": top, "showscale": True,
-                       "colorbar": {"title": {"text": "error, mm"}, "len": 0.6, "thickness": 12}},
+            "type": "scatter3d",
+            "mode": "markers",
+            "showlegend": False,
+            "hoverinfo": "skip",
+            **_xyz(predicted[:1]),
+            "marker": {
+                "size": 0.01,
+                "color": [0],
+                "colorscale": SCALE,
+                "cmin": 0,
+                "cmax": top,
+                "showscale": True,
+                "colorbar": {"title": {"text": "error, mm"}, "len": 0.6, "thickness": 12},
+            },
         },
-    ]  # fmt: skip
+    ]
     axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
     layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "paper_bgcolor": "#ffffff",
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "paper_bgcolor": "#ffffff",
         "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
         "legend": {"orientation": "h", "y": 0, "x": 0, "itemsizing": "constant"},
         "scene": {
@@ -76,13 +105,20 @@ def scene(c: Comparison) -> str:
             "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 0.8}},
             **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
         },
-    }  # fmt: skip
+    }
     return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
 
 
 def _points(points: Array, name: str, colour: str, size: float, hover: list[str]) -> dict:
-    return {"type": "scatter3d", "mode": "markers", "name": name, "text": hover, "hoverinfo": "text+name",
-            **_xyz(points), "marker": {"size": size, "color": colour, "opacity": 0.85}}  # fmt: skip
+    return {
+        "type": "scatter3d",
+        "mode": "markers",
+        "name": name,
+        "text": hover,
+        "hoverinfo": "text+name",
+        **_xyz(points),
+        "marker": {"size": size, "color": colour, "opacity": 0.85},
+    }
 
 
 def _xyz(points: Array) -> dict:

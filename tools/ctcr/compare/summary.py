@@ -11,7 +11,7 @@ import numpy as np
 from ctcr.compare.analysis import LEVEL, Comparison
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.noise import NOTABLE, DirectionDifference
-from ctcr.compare.wording import join, mm, most, percent, probability
+from ctcr.show.wording import join, mm, most, percent, probability
 
 MOST = 6
 CLEAR_DELAY = 0.2  # share of the squared out/return difference that a delay must explain to be mentioned
@@ -206,9 +206,7 @@ def _dependence_text(item: Dependence, c: Comparison) -> str:
     if item.indistinct:
         names = [name.removeprefix("a ") for name in item.indistinct[:3]]
         text += f"These data cannot tell it from the {join(names)}. "
-    key = next(
-        (name for name in (item.name, *LOOKS_LIKE) if item.name.startswith(name) and name in LOOKS_LIKE), ""
-    )
+    key = next((name for name in (item.name, *LOOKS_LIKE) if item.name.startswith(name) and name in LOOKS_LIKE), "")
     return (text + LOOKS_LIKE.get(key, "")).strip()
 
 

@@ -3,7 +3,7 @@
 from ctcr.compare.analysis import Comparison, Spread
 from ctcr.compare.limits import limits
 from ctcr.compare.summary import findings, headline, quiet
-from ctcr.output import listed, table
+from ctcr.show.output import listed, table
 
 SHOWN_RUNS = 15
 SHOWN_FORMS = 10
@@ -14,15 +14,11 @@ def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
     console.print(f"[bold]{c.robot}[/bold]", highlight=False)
     console.print(headline(c), markup=False)
-    console.print(
-        table("Error, measured minus predicted", ["", "unit", *COLUMNS], error_rows(c), text_columns=2)
-    )
+    console.print(table("Error, measured minus predicted", ["", "unit", *COLUMNS], error_rows(c), text_columns=2))
     if len(c.runs) > 1:
         console.print(table("By run, mm", RUN_COLUMNS, run_rows(c)[:SHOWN_RUNS], text_columns=1))
         if len(c.runs) > SHOWN_RUNS:
-            console.print(
-                f"  and {len(c.runs) - SHOWN_RUNS} more runs (all of them: --json FILE or --report FILE)"
-            )
+            console.print(f"  and {len(c.runs) - SHOWN_RUNS} more runs (all of them: --json FILE or --report FILE)")
     console.print(table("Repeatability, mm", REPEAT_COLUMNS, repeat_rows(c), text_columns=1))
     if c.ranking.alone:
         console.print(table(ranking_title(c), RANKING_COLUMNS, ranking_rows(c)[:SHOWN_FORMS], text_columns=2))
@@ -61,10 +57,7 @@ def run_rows(c: Comparison) -> list[list[str]]:
     """Errors of each run, mm, with the mean error vector in the tracker frame."""
     return [
         [str(r.run), str(r.position_mm.count)]
-        + [
-            f"{v:.2f}"
-            for v in (r.position_mm.mean, r.position_mm.rms, r.position_mm.p95, r.position_mm.maximum)
-        ]
+        + [f"{v:.2f}" for v in (r.position_mm.mean, r.position_mm.rms, r.position_mm.p95, r.position_mm.maximum)]
         + [f"{v:+.2f}" for v in r.mean_error_mm]
         for r in c.runs
     ]
@@ -79,12 +72,16 @@ def repeat_rows(c: Comparison) -> list[list[str]]:
 
     rows = []
     if n.source == "revisits":
-        rows.append(["noise of a reading, from revisits", f"{n.rms_mm:.3f}",
-                     f"{n.axis_mm:.3f} ± {number(n.uncertainty_mm)}", str(n.pairs)])  # fmt: skip
-    if n.dwells:
         rows.append(
-            ["scatter at rest", f"{n.rest_axis_mm * root3:.3f}", f"{n.rest_axis_mm:.3f}", str(n.dwells)]
+            [
+                "noise of a reading, from revisits",
+                f"{n.rms_mm:.3f}",
+                f"{n.axis_mm:.3f} ± {number(n.uncertainty_mm)}",
+                str(n.pairs),
+            ]
         )
+    if n.dwells:
+        rows.append(["scatter at rest", f"{n.rest_axis_mm * root3:.3f}", f"{n.rest_axis_mm:.3f}", str(n.dwells)])
     rows.append(["jitter stated", number(n.stated_axis_mm * root3), number(n.stated_axis_mm), ""])
     if d:
         rows.append(["out against return", f"{d.rms_mm:.3f} ± {number(d.uncertainty_mm)}", "", str(d.pairs)])
@@ -101,7 +98,12 @@ def ranking_rows(c: Comparison) -> list[list[str]]:
     """Dependences, strongest first; * marks the ones found one after another."""
     found = {item.name for item in c.ranking.chosen}
     return [
-        [("* " if item.name in found else "  ") + item.label, item.form.frame, f"{100 * item.share:.1f} %",
-         f"{item.size_mm:.2f}", f"{item.p_value:.3f}"]
+        [
+            ("* " if item.name in found else "  ") + item.label,
+            item.form.frame,
+            f"{100 * item.share:.1f} %",
+            f"{item.size_mm:.2f}",
+            f"{item.p_value:.3f}",
+        ]
         for item in c.ranking.distinct()
-    ]  # fmt: skip
+    ]

@@ -55,8 +55,16 @@ class Revisits:
 
     def select(self, mask: NDArray) -> "Revisits":
         """Some of the pairs."""
-        arrays = (self.later, self.earlier, self.weight, self.kind, self.between_runs, self.difference,
-                  self.miss, self.noise_factor)  # fmt: skip
+        arrays = (
+            self.later,
+            self.earlier,
+            self.weight,
+            self.kind,
+            self.between_runs,
+            self.difference,
+            self.miss,
+            self.noise_factor,
+        )
         return Revisits(*(array[mask] for array in arrays), self.tolerance, self.complete)
 
     def __len__(self) -> int:
@@ -83,8 +91,9 @@ def find_stops(sample: Sample) -> Stops:
         variance = (square - mean**2).mean(axis=1) * size / (size - 1)
     variance[size < 3] = np.nan
     last = start + size - 1
-    return Stops(start, size, run[start], _segment_mean(scaled, start, size), sample.motion.direction[last],
-                 mean, variance)  # fmt: skip
+    return Stops(
+        start, size, run[start], _segment_mean(scaled, start, size), sample.motion.direction[last], mean, variance
+    )
 
 
 def _segment_mean(values: Array, start: NDArray, size: NDArray) -> Array:
@@ -108,9 +117,7 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
     order = np.lexsort((vertex, later))
     later, vertex = later[order], vertex[order]
     opens = np.ones(len(later), bool)
-    opens[1:] = (
-        (np.diff(later) != 0) | (np.diff(vertex) > 1) | (stops.run[vertex[1:]] != stops.run[vertex[:-1]])
-    )
+    opens[1:] = (np.diff(later) != 0) | (np.diff(vertex) > 1) | (stops.run[vertex[1:]] != stops.run[vertex[:-1]])
     which_pass = np.cumsum(opens) - 1
     own = np.zeros(len(opens) and which_pass[-1] + 1, bool)
     own[which_pass[vertex == later]] = True
@@ -139,9 +146,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray, bool]:
     return np.repeat(queries, sizes), flat, stride == 1
 
 
-def _nearest_point(
-    scaled: Array, link: Array, length: Array, usable: NDArray, later: NDArray, vertex: NDArray
-):
+def _nearest_point(scaled: Array, link: Array, length: Array, usable: NDArray, later: NDArray, vertex: NDArray):
     """Nearest point to each later visit on the steps that meet in the neighbouring vertex: miss, start, weight."""
     best_miss = np.linalg.norm(scaled[later] - scaled[vertex], axis=1)
     best_start, best_weight = vertex.copy(), np.zeros(len(vertex))
@@ -168,5 +173,6 @@ def _pairs(stops: Stops, later, start, weight, miss, tolerance: float, complete:
     w = weight[:, None]
     difference = stops.error[later] - (1 - w) * stops.error[start] - w * stops.error[end]
     factor = 1 / stops.size[later] + (1 - weight) ** 2 / stops.size[start] + weight**2 / stops.size[end]
-    return Revisits(later, start, weight, kind, stops.run[later] != stops.run[start], difference, miss,
-                    factor, tolerance, complete)  # fmt: skip
+    return Revisits(
+        later, start, weight, kind, stops.run[later] != stops.run[start], difference, miss, factor, tolerance, complete
+    )

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from numpy.typing import NDArray
 
-from ctcr import simulation
-from ctcr.compare.figures import BACK, ERROR, FAINT, INK, NOISE, OUT
 from ctcr.diagnose.figures import GOOD
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr.model import simulation
+from ctcr.robot.description import Robot
+from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -25,9 +25,13 @@ BOXES = {  # name: (x, y, width, what it says)
     "robot": (10.6, 0.5, 2.0, "robot\nwith hidden friction"),
 }
 WIRES = (
-    ("commands", "reader", ""), ("commands", "owner", ""), ("reader", "aurora", "serial line\nBX, CRC"),
-    ("owner", "terminals", "EtherCAT\nframes"), ("aurora", "robot", ""), ("terminals", "robot", ""),
-)  # fmt: skip
+    ("commands", "reader", ""),
+    ("commands", "owner", ""),
+    ("reader", "aurora", "serial line\nBX, CRC"),
+    ("owner", "terminals", "EtherCAT\nframes"),
+    ("aurora", "robot", ""),
+    ("terminals", "robot", ""),
+)
 SIMULATED = ("aurora", "terminals", "robot")
 HEIGHT = 0.9
 
@@ -39,16 +43,19 @@ def bench(figure: Figure, _) -> None:
     axes.axis("off")
     for start, end, text in WIRES:
         (x, y, width, _), (to_x, to_y, _, _) = BOXES[start], BOXES[end]
-        axes.plot(
-            [x + width, to_x], [y + HEIGHT / 2 - 0.2, to_y + HEIGHT / 2 - 0.2], color=INK, lw=1.2, zorder=0
-        )
+        axes.plot([x + width, to_x], [y + HEIGHT / 2 - 0.2, to_y + HEIGHT / 2 - 0.2], color=INK, lw=1.2, zorder=0)
         axes.text((x + width + to_x) / 2, y + 0.3, text, ha="center", va="bottom", fontsize=8.5, color=OUT)
     for name, (x, y, width, text) in BOXES.items():
         colour = "#f6ead9" if name in SIMULATED else "#e2eef4"
         box = FancyBboxPatch(
-            (x, y - 0.2), width, HEIGHT, boxstyle="round,pad=0,rounding_size=0.12",
-            facecolor=colour, edgecolor=INK, lw=0.8,
-        )  # fmt: skip
+            (x, y - 0.2),
+            width,
+            HEIGHT,
+            boxstyle="round,pad=0,rounding_size=0.12",
+            facecolor=colour,
+            edgecolor=INK,
+            lw=0.8,
+        )
         axes.add_patch(box)
         title, below = text.split("\n")
         axes.text(x + width / 2, y + HEIGHT / 2 - 0.04, title, ha="center", weight="bold", fontsize=9)
@@ -110,19 +117,10 @@ def tracking(figure: Figure, drives: dict[str, Driven]) -> None:
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.4))
     for (name, driven), colour in zip(drives.items(), (ERROR, GOOD), strict=True):
         corner = np.arange(len(driven.blind)) + 1
-        left.plot(
-            corner,
-            driven.blind,
-            color=colour,
-            marker="o",
-            ms=4,
-            label=f"{name}: {driven.blind.mean():.2f} mm",
-        )
+        left.plot(corner, driven.blind, color=colour, marker="o", ms=4, label=f"{name}: {driven.blind.mean():.2f} mm")
         label = f"{name}: {driven.controlled.mean():.2f} mm"
         right.plot(driven.path, driven.controlled, color=colour, lw=1.1, label=label)
-    left.set(
-        title="blind: the model alone", xlabel="corners of the tour", ylabel="distance from the cube, mm"
-    )
+    left.set(title="blind: the model alone", xlabel="corners of the tour", ylabel="distance from the cube, mm")
     right.set(title="controlled: the tracker corrects at 40 Hz", xlabel="time along the tour, s")
     for axes in (left, right):
         axes.set_ylim(0, 1.35 * axes.get_ylim()[1])
@@ -137,17 +135,27 @@ def scene(drives: dict[str, Driven]) -> str:
         data.append(_line(driven.tips, name, colour, "solid", 5))
     axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
     layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "paper_bgcolor": "#ffffff",
-        "font": {"family": "system-ui, sans-serif", "color": INK}, "legend": {"orientation": "h", "y": 0, "x": 0},
-        "scene": {"aspectmode": "data", "camera": {"eye": {"x": 1.3, "y": -1.4, "z": 0.9}},
-                  **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"}},
-    }  # fmt: skip
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "paper_bgcolor": "#ffffff",
+        "font": {"family": "system-ui, sans-serif", "color": INK},
+        "legend": {"orientation": "h", "y": 0, "x": 0},
+        "scene": {
+            "aspectmode": "data",
+            "camera": {"eye": {"x": 1.3, "y": -1.4, "z": 0.9}},
+            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
+        },
+    }
     return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
 
 
 def _line(points: Array, name: str, colour: str, dash: str, width: float) -> dict:
     columns = {axis: np.round(points[:, k], 3).tolist() for k, axis in enumerate("xyz")}
     return {
-        "type": "scatter3d", "mode": "lines+markers", "name": name, "hoverinfo": "name", **columns,
-        "line": {"color": colour, "dash": dash, "width": width}, "marker": {"color": colour, "size": 3},
-    }  # fmt: skip
+        "type": "scatter3d",
+        "mode": "lines+markers",
+        "name": name,
+        "hoverinfo": "name",
+        **columns,
+        "line": {"color": colour, "dash": dash, "width": width},
+        "marker": {"color": colour, "size": 3},
+    }

@@ -10,18 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import history, html_page, measurements, robot_file
+from ctcr.bench.devices import bench_file
+from ctcr.bench.record.folder import ABOUT, TABLE
 from ctcr.demo import bench_figures
 from ctcr.demo.bench_figures import Driven
 from ctcr.demo.bench_story import ROBOTS, cube
 from ctcr.demo.hidden_robot import EFFECT, VALUE
 from ctcr.demo.story import Story
-from ctcr.devices import bench_file
 from ctcr.frames import tracker_to_base
-from ctcr.html_page import cards, figure, table
-from ctcr.output import atomic_writer
-from ctcr.record.folder import ABOUT, TABLE
-from ctcr.robot import Robot
+from ctcr.model import parameters as free_parameters
+from ctcr.robot import history, robot_file
+from ctcr.robot.description import Robot
+from ctcr.show import html_page
+from ctcr.show.html_page import cards, figure, table
+from ctcr.show.output import atomic_writer
+from ctcr.table import measurements
 from ctcr.track import scenario
 from ctcr.track.recording import runs_of
 
@@ -114,9 +117,7 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
             ("driven blindly", without.blind, with_it.blind),
             ("tracked at 40 Hz", without.controlled, with_it.controlled),
         ):
-            numbers.append(
-                ("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}")
-            )
+            numbers.append(("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}"))
     return (
         f"<h1>{TITLE}</h1>"
         f'<p class="lead">A robot stands on a simulated bench. It is off its file in {len(_calibrated(found))} '
@@ -126,8 +127,6 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
 
 
 def _calibrated(robot: Robot) -> list[str]:
-    from ctcr import free_parameters
-
     return free_parameters.expand("standard", robot)
 
 
@@ -221,11 +220,28 @@ def _wires(story: Story) -> str:
     for path in sorted(story.folder.glob("*/session.json"), key=lambda path: path.stat().st_mtime):
         about = json.loads(path.read_text(encoding="utf-8"))["sittings"][-1]
         bus, tracker = about["bus"], about["tracker"]
-        rows.append([
-            path.parent.name, str(tracker["frames"]), str(tracker["missed"]), f"{about['frames_late']['p99_ms']:.2f}",
-            str(bus["cycles"]), str(bus["bad_cycles"]), f"{bus['p99_late_ms']:.2f}", f"{bus['worst_late_ms']:.2f}",
-            "yes" if bus["real_time_priority"] else "no",
-        ])  # fmt: skip
-    columns = ["recording", "frames", "missed", "99 % late, ms", "bus cycles", "bad", "99 % late, ms", "worst, ms",
-               "real-time"]  # fmt: skip
+        rows.append(
+            [
+                path.parent.name,
+                str(tracker["frames"]),
+                str(tracker["missed"]),
+                f"{about['frames_late']['p99_ms']:.2f}",
+                str(bus["cycles"]),
+                str(bus["bad_cycles"]),
+                f"{bus['p99_late_ms']:.2f}",
+                f"{bus['worst_late_ms']:.2f}",
+                "yes" if bus["real_time_priority"] else "no",
+            ]
+        )
+    columns = [
+        "recording",
+        "frames",
+        "missed",
+        "99 % late, ms",
+        "bus cycles",
+        "bad",
+        "99 % late, ms",
+        "worst, ms",
+        "real-time",
+    ]
     return "<h2>How steady the loops were</h2>" + table("", columns, rows, 1)

@@ -6,10 +6,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import measurements, robot_file, simulation
+from ctcr.bench.record.folder import TABLE
 from ctcr.demo import blind_drive
 from ctcr.demo.story import Story
-from ctcr.record.folder import TABLE
+from ctcr.model import simulation
+from ctcr.robot import robot_file
+from ctcr.table import measurements
 from ctcr.track import scenario
 
 Array = NDArray[np.float64]
@@ -35,25 +37,25 @@ def _find_the_joints(story: Story, short: bool) -> None:
     if not short:
         story.do("See which devices answer", f"devices {BENCH}", _devices, "devices")
     home = "--at-home" if short else "--home"
-    found = (
-        "taken from their marks"
-        if short
-        else "each tube flush with the plate in turn: its length says where it is"
-    )
+    found = "taken from their marks" if short else "each tube flush with the plate in turn: its length says where it is"
     story.do("Find the joints", f"move robot.yaml {BENCH} {home}", lambda _: found)
     story.do(
         "Touch six points with the probe: where the tracker stands",
         f"calibrate registration points.csv --live --cad cad.csv {BENCH} --readings 5 --robot robot.yaml "
-        "-o registered.yaml", _registered, "registration",
-    )  # fmt: skip
+        "-o registered.yaml",
+        _registered,
+        "registration",
+    )
     if short:
         shutil.copy(story.folder / "registered.yaml", story.folder / KNOWN)
         return
     story.do(
         "Turn one tube after the other, alone: how they stand at home",
         f"calibrate rotation-offset circles.csv --live {BENCH} --readings 2 --step-deg 60 --robot registered.yaml "
-        f"-o {KNOWN}", _turned, "circles",
-    )  # fmt: skip
+        f"-o {KNOWN}",
+        _turned,
+        "circles",
+    )
 
 
 def _find_the_effect(story: Story, short: bool) -> None:
@@ -61,13 +63,13 @@ def _find_the_effect(story: Story, short: bool) -> None:
     story.do("Measure: all tubes turn by 40 degrees and back", record.format("first"), _recorded, "first")
     if not short:
         story.do("How wrong is the model?", f"compare {KNOWN} first/measurements.csv", _compared, "compared")
-    story.do(
-        "Which effect is missing?", f"diagnose {KNOWN} first/measurements.csv", _diagnosed, "first_diagnosis"
-    )  # fmt: skip
+    story.do("Which effect is missing?", f"diagnose {KNOWN} first/measurements.csv", _diagnosed, "first_diagnosis")
     story.do(
         "Ask for the runs that decide",
-        f"next {KNOWN} first/measurements.csv --runs 2 -o second.csv", _proposed, "proposal",
-    )  # fmt: skip
+        f"next {KNOWN} first/measurements.csv --runs 2 -o second.csv",
+        _proposed,
+        "proposal",
+    )
     if not story.answers["proposal"]["runs"]:  # the first recording has decided
         shutil.copy(story.folder / "first" / TABLE, story.folder / "both.csv")
         shutil.copy(story.folder / "first_diagnosis.json", story.folder / "diagnosis.json")
@@ -75,33 +77,29 @@ def _find_the_effect(story: Story, short: bool) -> None:
     story.do("Measure them", record.format("second"), _recorded, "second")
     story.do(
         "Put both recordings together",
-        f"join {KNOWN} first/measurements.csv second/measurements.csv -o both.csv", lambda _: "both.csv",
-    )  # fmt: skip
+        f"join {KNOWN} first/measurements.csv second/measurements.csv -o both.csv",
+        lambda _: "both.csv",
+    )
     story.do("Which effect is missing?", f"diagnose {KNOWN} both.csv", _diagnosed, "diagnosis")
 
 
 def _add_the_effect(story: Story, short: bool) -> None:
     table = "both.csv"
     if not short:
-        story.do(
-            "Measure all over the workspace",
-            _record(KNOWN).format("workspace"),
-            _recorded,
-            "workspace",
-        )
+        story.do("Measure all over the workspace", _record(KNOWN).format("workspace"), _recorded, "workspace")
         table = "all.csv"
         story.do(
-            "Put it to the others",
-            f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", lambda _: table,
-        )  # fmt: skip
+            "Put it to the others", f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", lambda _: table
+        )
     story.do(
-        "Calibrate alone, to compare",
-        f"calibrate fit {KNOWN} {table} -o calibrated.yaml", _calibrated, "calibrated",
-    )  # fmt: skip
+        "Calibrate alone, to compare", f"calibrate fit {KNOWN} {table} -o calibrated.yaml", _calibrated, "calibrated"
+    )
     story.do(
         "Add what was found",
-        f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml", _added, "added",
-    )  # fmt: skip
+        f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml",
+        _added,
+        "added",
+    )
 
 
 def _track(story: Story) -> None:
@@ -113,14 +111,18 @@ def _track(story: Story) -> None:
         plan = blind_drive.drive(loaded, start(story.folder), places)
         simulation.write(plan, story.folder / f"{blind}.csv", loaded.n_tubes)
         story.do(
-            f"Drive along a cube blindly, by the model {name}", _record(f"{robot}.yaml").format(blind),
-            lambda _, blind=blind: f"{blind_errors(story.folder, blind).mean():.2f} mm off the cube", blind,
-        )  # fmt: skip
+            f"Drive along a cube blindly, by the model {name}",
+            _record(f"{robot}.yaml").format(blind),
+            lambda _, blind=blind: f"{blind_errors(story.folder, blind).mean():.2f} mm off the cube",
+            blind,
+        )
     for robot, name in ROBOTS.items():
         story.do(
             f"Track the cube at 40 Hz, by the model {name}",
-            f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}", _tracked, f"track_{robot}",
-        )  # fmt: skip
+            f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}",
+            _tracked,
+            f"track_{robot}",
+        )
 
 
 def _record(robot: str, dwell: float = 0.2) -> str:
@@ -166,9 +168,7 @@ def _registered(told) -> str:
 
 def _turned(told) -> str:
     offsets = [value for value in told["values"] if value["name"].endswith("rotation offset")]
-    return (
-        ", ".join(f"{value['value']:.1f} ± {value['sd']:.1f}" for value in offsets) + " deg from their marks"
-    )
+    return ", ".join(f"{value['value']:.1f} ± {value['sd']:.1f}" for value in offsets) + " deg from their marks"
 
 
 def _compared(told) -> str:

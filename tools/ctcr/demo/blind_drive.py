@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import simulation
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
-from ctcr.measurements import Measurements
-from ctcr.model import Model
-from ctcr.robot import Robot
+from ctcr.model import simulation
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -37,9 +37,7 @@ def drive(robot: Robot, start: ArrayLike, places: ArrayLike) -> Measurements:
         rows.append(rows[-1])
         for _ in range(MOST_STEPS):
             table = _table(np.array(rows))
-            error = robot.tracker.rotation.T @ (
-                place - simulation.simulate(robot, table, "none").position[-1]
-            )
+            error = robot.tracker.rotation.T @ (place - simulation.simulate(robot, table, "none").position[-1])
             if np.linalg.norm(error) < CLOSE:
                 break
             rows[-1] = rows[-1] + _step(robot, table, error)
@@ -62,6 +60,12 @@ def _step(robot: Robot, table: Measurements, error: Array) -> Array:
 def _table(joints: Array) -> Measurements:
     rows, n = len(joints), joints.shape[1] // 2
     return Measurements(
-        t=np.arange(rows, dtype=float), run=np.zeros(rows, np.int64), beta=joints[:, :n], alpha=joints[:, n:],
-        force=np.zeros((rows, 3)), position=None, quaternion=None, row=np.arange(rows) + 2,
-    )  # fmt: skip
+        t=np.arange(rows, dtype=float),
+        run=np.zeros(rows, np.int64),
+        beta=joints[:, :n],
+        alpha=joints[:, n:],
+        force=np.zeros((rows, 3)),
+        position=None,
+        quaternion=None,
+        row=np.arange(rows) + 2,
+    )

@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from ctcr import effect_fit, simulation
-from ctcr.robot import Robot
+from ctcr.diagnose import add
+from ctcr.model import simulation
+from ctcr.robot.description import Robot
 
 EFFECT, VALUE = "friction", 0.02  # coefficient of every tube
 SEED = 4
-SHIFT_MM, TURN_DEG = (
-    (9.0, -6.0, 7.0),
-    (3.0, -2.5, 2.0),
-)  # of the tracker, and of the tubes at home, if misplaced
+SHIFT_MM, TURN_DEG = ((9.0, -6.0, 7.0), (3.0, -2.5, 2.0))  # of the tracker, and of the tubes at home, if misplaced
 
 
 def hidden_robot(known: Robot, misplaced: bool) -> Robot:
@@ -20,4 +18,4 @@ def hidden_robot(known: Robot, misplaced: bool) -> Robot:
         built.tracker.position_mm = list(np.add(built.tracker.position_mm, SHIFT_MM))
         built.actuation.home_rotation_deg = list(np.add(built.actuation.home_rotation_deg, TURN_DEG))
     values = {f"effects.{EFFECT}.coefficient.{i + 1}": VALUE for i in range(known.n_tubes)}
-    return effect_fit.with_values(built, [EFFECT], values)
+    return add.with_values(built, [EFFECT], values)

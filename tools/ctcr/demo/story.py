@@ -30,9 +30,7 @@ def new_folder(path: str | Path) -> Path:
     """An empty folder for a story; what an earlier one left there is removed. Raises InputError for anything else."""
     folder = Path(path)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / LOG).exists():
-        raise InputError(
-            Problem("is not empty and holds no demonstration: choose another folder", str(folder))
-        )
+        raise InputError(Problem("is not empty and holds no demonstration: choose another folder", str(folder)))
     try:
         if folder.exists():
             shutil.rmtree(folder)
@@ -78,9 +76,13 @@ class Story:
             log.write(f"$ ctcr {command}\n")
             log.flush()
             done = subprocess.run(
-                [sys.executable, "-m", "ctcr", *arguments], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log,
-                stderr=None if shown else subprocess.PIPE, text=True,
-            )  # fmt: skip
+                [sys.executable, "-m", "ctcr", *arguments],
+                cwd=self.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=None if shown else subprocess.PIPE,
+                text=True,
+            )
             log.write(f"{done.stderr or ''}\n")
         if done.returncode:
             said = (done.stderr or "").strip().removeprefix("Error: ")

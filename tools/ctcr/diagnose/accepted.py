@@ -5,12 +5,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify
 from ctcr.diagnose import decision
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.candidates import Candidate, forms, other_strengths
 from ctcr.diagnose.engine import FITS, Engine, values_of
 from ctcr.diagnose.race import Entry, Progress
+from ctcr.effects import catalogue
+from ctcr.fit import joint
 
 Array = NDArray[np.float64]
 
@@ -32,14 +33,14 @@ class Accepted:
 
 
 def with_shapes(
-    engine: Engine, accepted: list[Accepted], one: Accepted, fit: identify.Fit, progress: Progress
-) -> identify.Fit:
+    engine: Engine, accepted: list[Accepted], one: Accepted, fit: joint.Fit, progress: Progress
+) -> joint.Fit:
     """Frees what an accepted effect was not given in the race where that helps: its form may be another one.
 
     Where all of them are hardly right, those of its other strengths are tried too, of the effect accepted last.
     """
     given = one.entry.candidate
-    effect = effects.get(given.id, engine.robot.n_tubes)
+    effect = catalogue.get(given.id, engine.robot.n_tubes)
     others, ended = other_strengths(effect, given) if one is accepted[-1] else [], []
     for strength in (given, *others):
         tried = [form for form in forms(effect, strength, one.aside) if form != given]
@@ -63,13 +64,8 @@ def with_shapes(
 
 
 def _freed(
-    engine: Engine,
-    accepted: list[Accepted],
-    one: Accepted,
-    fit: identify.Fit,
-    tried: list[Candidate],
-    progress: Progress,
-) -> list[tuple[Entry, identify.Fit]]:
+    engine: Engine, accepted: list[Accepted], one: Accepted, fit: joint.Fit, tried: list[Candidate], progress: Progress
+) -> list[tuple[Entry, joint.Fit]]:
     """Forms of an accepted effect, each fitted in the noise of the fit with the given form."""
     found = []
     for form in tried:
@@ -82,9 +78,7 @@ def _freed(
     return found
 
 
-def _open_laws(
-    tried: list[tuple[Entry, identify.Fit]], fit: identify.Fit
-) -> list[tuple[Entry, identify.Fit]]:
+def _open_laws(tried: list[tuple[Entry, joint.Fit]], fit: joint.Fit) -> list[tuple[Entry, joint.Fit]]:
     """The best form; or that of each law, the best first, where the noise of the fit before is what a wrong law asks
     for: in it laws can hardly be told apart, but for those that are far worse than what is given."""
     tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, open_side
+from ctcr.audit.preparation import prepared
 from ctcr.diagnose import decision, distorted, jump, other_runs, unsteady, varying
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
@@ -19,10 +19,12 @@ from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import Progress, Round
 from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import Verdict, judge
-from ctcr.fit import rms
-from ctcr.measurements import Measurements
-from ctcr.preparation import prepared
-from ctcr.robot import Robot
+from ctcr.effects import catalogue
+from ctcr.fit import joint, one_sided
+from ctcr.fit.result import rms
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -41,9 +43,9 @@ class Diagnosis:
     locked: NDArray[np.bool_]  # rows that no fit saw
     glitches: NDArray[np.bool_]  # those of them that are off alone, and do not count
     unseen: dict[str, str]  # effects that these data cannot show, and why
-    calibrated: identify.Fit  # without effects, for prediction
-    with_effects: identify.Fit  # for prediction
-    final: identify.Fit  # with effects, under the noise of the most evidence: its values are those to quote
+    calibrated: joint.Fit  # without effects, for prediction
+    with_effects: joint.Fit  # for prediction
+    final: joint.Fit  # with effects, under the noise of the most evidence: its values are those to quote
     noise_floor_mm: float  # RMS that the tracker's noise leaves of a right model
     rounds: list[Round]
     accepted: list[Accepted]
@@ -75,7 +77,7 @@ class Diagnosis:
     @property
     def judged(self) -> NDArray[np.bool_]:
         """Locked rows that hold a reading, but for those that are off alone."""
-        return self.locked & ~self.glitches & identify.measured_rows(self.measurements)
+        return self.locked & ~self.glitches & joint.measured_rows(self.measurements)
 
     @property
     def rms_mm(self) -> dict[str, float]:
@@ -121,11 +123,7 @@ class Diagnosis:
         return {
             "verdict": self.verdict.word,
             "effects": [
-                {
-                    "class": a.ids,
-                    "parameters": self.parameters(a),
-                    "delta_log_evidence": round(a.log_evidence, 3),
-                }
+                {"class": a.ids, "parameters": self.parameters(a), "delta_log_evidence": round(a.log_evidence, 3)}
                 for a in self.accepted
             ],
             "leftover": {"structured": self.leftover.structured, "depends_on": self.depends_on},
@@ -180,9 +178,7 @@ def _of_these(
     other = _diagnose(robot, measurements, locked, progress, threads, robust=False)
     if together:
         there = np.isin(measurements.row, together)
-        return min(
-            result, other, key=lambda r: (np.sum(far_off(r.with_effects)), r.with_effects.rms_mm(there))
-        )
+        return min(result, other, key=lambda r: (np.sum(far_off(r.with_effects)), r.with_effects.rms_mm(there)))
     return max(result, other, key=lambda r: r.final.log_evidence)
 
 
@@ -191,11 +187,9 @@ def _beyond_judging(result: Diagnosis) -> set[int]:
     fit, group = result.with_effects, groups(result.measurements)
     expected = fit.expected_square[:, 0]
     usual = np.nanmean(expected[~result.locked])
-    beyond = {
-        k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual
-    }
+    beyond = {k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
     for a in result.accepted:
-        if "order" in effects.get(a.entry.id, result.robot.n_tubes).needs and result.locked[group == 0].any():
+        if "order" in catalogue.get(a.entry.id, result.robot.n_tubes).needs and result.locked[group == 0].any():
             beyond.add(0)  # how the robot came to its first row is not recorded
         if a.entry.id == "frame_jump":  # before or after it?
             when = dict(a.entry.candidate.shape)[jump.WHEN]
@@ -210,14 +204,9 @@ def _surprises(result: Diagnosis) -> bool:
 
 
 def _diagnose(
-    robot: Robot,
-    measurements: Measurements,
-    locked: NDArray[np.bool_],
-    progress: Progress,
-    threads: int,
-    robust: bool,
+    robot: Robot, measurements: Measurements, locked: NDArray[np.bool_], progress: Progress, threads: int, robust: bool
 ) -> Diagnosis:
-    noise = identify.noise_of_readings(robot, measurements)
+    noise = noise_of_readings(robot, measurements)
     engine = Engine(robot, measurements, noise, ~locked, robust, threads=threads)
     pool, unseen = candidates(robot, measurements)
     pool = [c for c in pool if c.id not in robot.effects]
@@ -225,10 +214,10 @@ def _diagnose(
     rounds: list[Round] = []
     accepted: list[Accepted] = []
     before, start, settled = {}, {}, False
-    few = identify.few_of(engine.fitted)
+    few = joint.few_of(engine.fitted)
     if few is not None:
         progress("a part of the readings first")
-        part = replace(engine, rows=few, tolerance=identify.COARSE)
+        part = replace(engine, rows=few, tolerance=joint.COARSE)
         more = np.sum(engine.fitted) / np.sum(few)
         first = racing.baseline(part, [], {}, progress)
         before = values_of(first)
@@ -275,22 +264,33 @@ def _diagnose(
         progress("parameters that are not constant")
         varies = varying.found(engine, calibrated if verdict.names_no_cause else fit, leftover.sample)
     return Diagnosis(
-        robot, engine.measurements, locked, glitches, unseen, plain, open_side.widened(after),
-        unsteady.widened(engine, open_side.widened(fit)),
-        identify.noise_floor(after, floor_noise, engine.places)[0], rounds, accepted, leftover, varies, verdict,
+        robot,
+        engine.measurements,
+        locked,
+        glitches,
+        unseen,
+        plain,
+        one_sided.widened(after),
+        unsteady.widened(engine, one_sided.widened(fit)),
+        joint.noise_floor(after, floor_noise, engine.places)[0],
+        rounds,
+        accepted,
+        leftover,
+        varies,
+        verdict,
         in_words(engine.measurements, after, glitches),
-    )  # fmt: skip
+    )
 
 
 def _grow(
     engine: Engine,
-    fit: identify.Fit,
+    fit: joint.Fit,
     pool: list[Candidate],
     accepted: list[Accepted],
     rounds: list[Round],
     progress: Progress,
     more: float = 1.0,
-) -> tuple[identify.Fit, bool]:
+) -> tuple[joint.Fit, bool]:
     """Accepts one effect after the other; the fit with them, and whether nothing is left to look for.
 
     more: how many times as many readings there are in all. Where these could change the outcome of a round, it is left
@@ -326,9 +326,9 @@ def _grow(
     return fit, True
 
 
-def _begun(engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress: Progress) -> identify.Fit:
+def _begun(engine: Engine, accepted: list[Accepted], fit: joint.Fit, progress: Progress) -> joint.Fit:
     """Where the effect accepted last remembers: the fit with the way to the first row that the readings ask for."""
-    if "order" not in effects.get(accepted[-1].entry.id, engine.robot.n_tubes).needs:
+    if "order" not in catalogue.get(accepted[-1].entry.id, engine.robot.n_tubes).needs:
         return fit
     entries = [a.entry for a in accepted]
     if not engine.begins_otherwise(fit, *racing.parameters(entries)):
@@ -336,9 +336,7 @@ def _begun(engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress
     return racing.baseline(engine, entries, values_of(fit), progress)
 
 
-def _backward(
-    engine: Engine, accepted: list[Accepted], fit: identify.Fit, progress: Progress
-) -> identify.Fit:
+def _backward(engine: Engine, accepted: list[Accepted], fit: joint.Fit, progress: Progress) -> joint.Fit:
     """Drops accepted effects that the others have made superfluous."""
     for a in list(accepted[:-1]):
         rest = [b for b in accepted if b is not a]
@@ -347,7 +345,7 @@ def _backward(
         start = values_of(fit)
         for iterations in (racing.ITERATIONS, racing.END):  # what is far behind need not be followed there
             without = engine.fit_like(
-                fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=identify.COARSE
+                fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=joint.COARSE
             )
             a.log_evidence = unsteady.evidence(engine, fit) - unsteady.evidence(engine, without)
             if a.log_evidence > SAFE:

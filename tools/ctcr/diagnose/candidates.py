@@ -8,20 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctcr import effects
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr.effects import catalogue
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 METAL = ("metal_volume", "metal_x", "metal_y", "metal_z", "coils_x", "coils_y", "coils_z")
 VARIANTS = {
     "friction": (("coefficient",), ("torque_per_length",)),
     "tip_load": (("mass",), ("force_x", "force_y", "force_z")),
-    "precurvature_profile": (
-        ("linear",),
-        ("quadratic",),
-        ("linear", "quadratic"),
-        ("linear", "quadratic", "cubic"),
-    ),
+    "precurvature_profile": (("linear",), ("quadratic",), ("linear", "quadratic"), ("linear", "quadratic", "cubic")),
     "straight_curvature": (("bend_x",), ("bend_x", "bend_y")),
     "sensor_offset": (("x", "y", "z"), ("x", "y", "z", "turn_x", "turn_y", "turn_z")),
     "field_distortion": (("scale",), None, METAL, ()),
@@ -56,7 +51,7 @@ class Candidate:
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
     """Those that these data can show, and why not for the others."""
     found, left_out = [], {}
-    for effect in effects.all_effects(robot.n_tubes).values():
+    for effect in catalogue.all_effects(robot.n_tubes).values():
         reason = _unseen(effect, robot, measurements)
         if reason:
             left_out[effect.id] = reason
@@ -74,7 +69,7 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
     return found, left_out
 
 
-def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] = ()) -> list[Candidate]:
+def forms(effect: catalogue.Effect, candidate: Candidate, aside: Collection[str] = ()) -> list[Candidate]:
     """What an accepted candidate may become: under each law that the effect offers, its shape free, with the strengths
     by which it entered the race or with all that it may enter by. A piece of metal is among these where the race left
     its place, full names, `aside`."""
@@ -96,7 +91,7 @@ def forms(effect: effects.Effect, candidate: Candidate, aside: Collection[str] =
     return [Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in unlike]
 
 
-def other_strengths(effect: effects.Effect, candidate: Candidate) -> list[Candidate]:
+def other_strengths(effect: catalogue.Effect, candidate: Candidate) -> list[Candidate]:
     """The same of an effect that offers several laws, by strengths that are neither part of its own nor hold them."""
     strengths = _strengths(effect) if effect.choices else []
     own = {name for names in strengths for name in names} & set(candidate.names)
@@ -108,18 +103,18 @@ def is_of_metal(name: str) -> bool:
     return name.startswith("effects.field_distortion.") and name.split(".")[2] in METAL
 
 
-def _strengths(effect: effects.Effect) -> list[tuple[str, ...]]:
+def _strengths(effect: catalogue.Effect) -> list[tuple[str, ...]]:
     """By which it may enter the race, where it has several."""
     return [tuple(_names(effect, variant)) for variant in VARIANTS.get(effect.id, ())]
 
 
-def _names(effect: effects.Effect, variant: tuple[str, ...] | None) -> Sequence[str]:
+def _names(effect: catalogue.Effect, variant: tuple[str, ...] | None) -> Sequence[str]:
     if variant is None:
         return effect.amplitudes
     return effect.names(*variant) if variant else [name for name in effect.names() if not is_of_metal(name)]
 
 
-def _unseen(effect: effects.Effect, robot: Robot, measurements: Measurements) -> str | None:
+def _unseen(effect: catalogue.Effect, robot: Robot, measurements: Measurements) -> str | None:
     if "time" in effect.needs and not np.isfinite(measurements.t).all():
         return "times are missing"
     if "order" in effect.needs and np.isfinite(measurements.t).all() and (np.diff(measurements.t) < 0).any():

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects
 from ctcr.diagnose.candidates import Candidate
+from ctcr.effects import catalogue
 
 FORCE = ["effects.tip_load.force_x", "effects.tip_load.force_y", "effects.tip_load.force_z"]
 STEM = "effects.contact."
@@ -17,8 +17,8 @@ def planes(engine, candidate: Candidate, by_force: NDArray, part: float) -> list
     are those of a force at the tip [1/N]."""
     tracker = engine.robot.tracker
     tips = (engine.places - tracker.position) @ tracker.rotation
-    sigma = effects.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
-    shapes = effects.get("contact", engine.robot.n_tubes).shapes
+    sigma = catalogue.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
+    shapes = catalogue.get("contact", engine.robot.n_tubes).shapes
     neutral = dict(zip(shapes, map(float, engine.priors(shapes)[0]), strict=True))
     options = []
     for elevation in np.deg2rad((-60, -30, 0, 30, 60, 90)):

@@ -5,9 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import free_parameters, identify, user_effects
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr.fit import joint
+from ctcr.model import parameters, user_recording
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -16,7 +18,7 @@ class Coverage:
     """Of groups of rows, `group` (M,) numbered from 0."""
 
     def __init__(self, robot: Robot, measurements: Measurements, group: NDArray[np.int64]) -> None:
-        rows = identify.measured_rows(measurements)
+        rows = joint.measured_rows(measurements)
         self._worlds = [_informations(slopes, group) for slopes in _slopes(robot, measurements, rows)]
 
     def left_open(self, locked: Iterable[int]) -> Array:
@@ -44,12 +46,12 @@ def _informations(slopes: Array, group: NDArray[np.int64]) -> tuple[Array, Array
 def _slopes(robot: Robot, measurements: Measurements, rows: NDArray[np.bool_]) -> Iterable[Array]:
     """Of poses (M, 6, k) by the calibration parameters, in units of jitter and prior; with curves as stated, longer and
     shorter: where a curve starts near the plate, that decides which readings know its length."""
-    names = free_parameters.expand("standard", robot)
-    mean, sd, low, high = free_parameters.priors(robot, names)
-    noise = identify.noise_of_readings(robot, measurements, field=False)
+    names = parameters.expand("standard", robot)
+    mean, sd, low, high = parameters.priors(robot, names)
+    noise = noise_of_readings(robot, measurements, field=False)
     jitter = np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
-    table = user_effects.recording_of(robot, measurements, names)
-    few = identify.few_of(rows)
+    table = user_recording.recording_of(robot, measurements, names)
+    few = joint.few_of(rows)
     table.activate((rows if few is None else few).tolist())
     curves = np.array([name.endswith(".curved_length") for name in names])
     for way in (0.0, 1.0, -1.0):

@@ -1,12 +1,10 @@
 """What comes of a round of the race: an effect is accepted, with those the data cannot tell from it, or none is."""
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from ctcr.diagnose.race import Entry, Round
+from ctcr.diagnose.round import Entry, Round
 
 EVIDENCE = 5.0  # of the best candidate over none, beyond the price of having looked at many: log(number of candidates)
 UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains what is left, and
@@ -19,9 +17,7 @@ ALIKE = 0.5  # ... and of forms of one effect the plainest is taken
 SAME = 0.95  # share of a signal that another candidate can imitate, both ways: the same to these data
 
 
-def decide(
-    round_: "Round", tried: int, is_further: bool, is_rejected: bool, stand_ins: Collection[str] = ()
-) -> None:
+def decide(round_: Round, tried: int, is_further: bool, is_rejected: bool, stand_ins: Collection[str] = ()) -> None:
     """Accepts the best entry, with all that the data cannot tell from it, or says why not.
 
     tried: number of effects that were looked at; is_further: whether others are in the model already; is_rejected:
@@ -43,9 +39,7 @@ def decide(
     alike = [entry for entry in fitted if entry.id == best.id and best.score - entry.score < ALIKE]
     best = min(alike, key=lambda entry: len(entry.candidate.shape))
     if best.score < threshold:
-        round_.reason = (
-            f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
-        )
+        round_.reason = f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence: below {threshold:.1f}"
         return
     needed = SHARE if is_further else FIRST_SHARE
     if best.id in stand_ins:
@@ -66,7 +60,7 @@ def decide(
     round_.margin = best.score - max(others, default=-np.inf)
 
 
-def imitated(entry: "Entry", by: "Entry") -> float:
+def imitated(entry: Entry, by: Entry) -> float:
     """Share of an entry's signal that another one can imitate together with the calibration."""
     signal = entry.gain.signal
     q, r = np.linalg.qr(by.gain.columns)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctcr import _core
 from ctcr.diagnose.engine import Engine
-from ctcr.identify import Fit, with_field
+from ctcr.fit.joint import Fit, with_field
 
 EFFECT = "effects.field_distortion."
 LENGTHS = (0.025, 0.04, 0.07)  # over which what is left may change [m]
@@ -34,9 +34,12 @@ def noise_of(engine: Engine, fit: Fit) -> Any:
         for size in SIZES:
             for turned in {0.0, ratio}:
                 noise = _core.Noise(
-                    position_jitter=stated.position_jitter, rotation_jitter=stated.rotation_jitter,
-                    position_field=size, rotation_field=turned * size, correlation_length=length,
-                )  # fmt: skip
+                    position_jitter=stated.position_jitter,
+                    rotation_jitter=stated.rotation_jitter,
+                    position_field=size,
+                    rotation_field=turned * size,
+                    correlation_length=length,
+                )
                 tried = engine.linear_fit(at, noise=noise, weights=at.weights)
                 best = max(best, tried, key=lambda one: one.log_evidence)
     return best.noise if best.log_evidence > least else None
@@ -47,9 +50,13 @@ def taken_off(engine: Engine, fit: Fit, noise: Any) -> Fit:
     near to them tell it."""
     there = engine.linear_fit(fit, noise=noise, weights=fit.weights, inflation=fit.inflation)
     return engine.linear_fit(
-        there, more=-np.nan_to_num(there.field), noise=with_field(noise, 0.0), weights=there.weights,
-        inflation=there.inflation, max_iterations=0,
-    )  # fmt: skip
+        there,
+        more=-np.nan_to_num(there.field),
+        noise=with_field(noise, 0.0),
+        weights=there.weights,
+        inflation=there.inflation,
+        max_iterations=0,
+    )
 
 
 def in_words(noise: Any) -> str:

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 
-from ctcr import _core, effects, free_parameters, identify, recording, user_effects
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr import _core
+from ctcr.effects import catalogue
+from ctcr.fit import joint
+from ctcr.model import parameters, recording, user_recording
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -88,9 +91,9 @@ class Engine:
     _wound: _core.Recording | None = field(init=False, default=None)  # of the last fit in which tubes rub
 
     def __post_init__(self) -> None:
-        self.places = identify.places_of(self.robot, self.measurements)
-        self.base = free_parameters.expand(list(self.free), self.robot)
-        self.measured = identify.measured_rows(self.measurements)
+        self.places = joint.places_of(self.robot, self.measurements)
+        self.base = parameters.expand(list(self.free), self.robot)
+        self.measured = joint.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
     @property
@@ -100,21 +103,21 @@ class Engine:
 
     def noise_with(self, part: float) -> Any:
         """The tracker's noise with a part of its stated field error."""
-        return identify.with_field(self.noise, part)
+        return joint.with_field(self.noise, part)
 
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of parameters of the robot and of effects."""
         found: dict[str, tuple[float, ...]] = {}
         own = [name for name in names if not name.startswith("effects.")]
         added = [name for name in names if name.startswith("effects.")]
-        for source, some in ((free_parameters, own), (effects, added)):
+        for source, some in ((parameters, own), (catalogue, added)):
             if some:
                 found |= zip(some, zip(*source.priors(self.robot, some), strict=True), strict=True)
         mean, sd, low, high = np.array([found[name] for name in names]).reshape(-1, 4).T
         return mean, sd, low, high
 
     def recording(self, names: Sequence[str], fixed: dict[str, float] | None = None) -> Any:
-        return user_effects.recording_of(
+        return user_recording.recording_of(
             self.robot, self.measurements, names, fixed=fixed, steps=self.steps, threads=self.threads
         )
 
@@ -130,7 +133,7 @@ class Engine:
         max_iterations: int = 50,
         tolerance: float | None = None,
         near: bool = False,
-    ) -> identify.Fit:
+    ) -> joint.Fit:
         """Calibration and `added` parameters of effects together. `near`: the start is where a like fit ended, so that
         a fit of few of many rows would teach nothing.
 
@@ -145,32 +148,40 @@ class Engine:
         _wind_as(table, self._wound)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
-        fitted = identify.identify_rows(
-            table, self.fitted, names, mean, sd, low, high, noise or self.noise, self.places,
-            robust=weights is None, weights=weights, admit_model_error=inflation is None, inflation=inflation,
-            start=at, max_iterations=max_iterations, tolerance=tolerance or self.tolerance, few_first=not near,
-            known=free_parameters.known_directions(self.robot, names),
-            within=free_parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
-        )  # fmt: skip
+        fitted = joint.identify_rows(
+            table,
+            self.fitted,
+            names,
+            mean,
+            sd,
+            low,
+            high,
+            noise or self.noise,
+            self.places,
+            robust=weights is None,
+            weights=weights,
+            admit_model_error=inflation is None,
+            inflation=inflation,
+            start=at,
+            max_iterations=max_iterations,
+            tolerance=tolerance or self.tolerance,
+            few_first=not near,
+            known=parameters.known_directions(self.robot, names),
+            within=parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
+        )
         if isinstance(table, _core.Recording) and table.is_wound:
             self._wound = table
         return fitted
 
-    def fit_like(self, other: identify.Fit, added: Iterable[str] = (), **options: Any) -> identify.Fit:
+    def fit_like(self, other: joint.Fit, added: Iterable[str] = (), **options: Any) -> joint.Fit:
         """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
         return self.fit(added, noise=other.noise, weights=other.weights, inflation=other.inflation, **options)
 
-    def begins_otherwise(
-        self, fit: identify.Fit, added: Iterable[str], fixed: dict[str, float] | None = None
-    ) -> bool:
+    def begins_otherwise(self, fit: joint.Fit, added: Iterable[str], fixed: dict[str, float] | None = None) -> bool:
         """Whether the robot came to its first row the other way than a fit has it, straight from home or at rest there:
         where the readings say so, that is taken for all fits to come."""
-        other = replace(
-            self, measurements=replace(self.measurements, from_home=not self.measurements.from_home)
-        )
-        there = other.fit_like(
-            fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=identify.COARSE
-        )
+        other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
+        there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=joint.COARSE)
         if there.log_evidence - fit.log_evidence < SAID:
             return False
         self.measurements = other.measurements
@@ -178,49 +189,57 @@ class Engine:
 
     def linear_fit(
         self,
-        at: identify.Fit,
+        at: joint.Fit,
         *,
         noise: Any = None,
         weights: Array | None = None,
         inflation: Array | None = None,
         max_iterations: int = 50,
         more: Array | float = 0.0,
-    ) -> identify.Fit:
+    ) -> joint.Fit:
         """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap,
         and so is `more` (M, 6) residual."""
         _, _, low, high = self.priors(at.names)
-        return identify.linear_fit(
-            at, low, high, self.places, noise=noise, rows=self.rows, weights=weights, inflation=inflation,
-            max_iterations=max_iterations, more=more,
-        )  # fmt: skip
+        return joint.linear_fit(
+            at,
+            low,
+            high,
+            self.places,
+            noise=noise,
+            rows=self.rows,
+            weights=weights,
+            inflation=inflation,
+            max_iterations=max_iterations,
+            more=more,
+        )
 
-    def likeliest_noise(self, fit: identify.Fit) -> Any:
+    def likeliest_noise(self, fit: joint.Fit) -> Any:
         """The noise of a fit with the part of the field error that its readings ask for."""
         _, _, low, high = self.priors(fit.names)
-        return identify.likeliest_field(fit, low, high, self.places)
+        return joint.likeliest_field(fit, low, high, self.places)
 
-    def thinned(self, fit: identify.Fit, least: int = SLOPES) -> tuple["Engine", identify.Fit]:
+    def thinned(self, fit: joint.Fit, least: int = SLOPES) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
-        few = identify.few_of(self.fitted, least)
+        few = joint.few_of(self.fitted, least)
         if few is None:
             return self, fit
         weights = fit.weights * few[:, None] * (np.sum(self.fitted) / np.sum(few))
         thin = self.linear_fit(fit, weights=weights, inflation=fit.inflation, max_iterations=0)
         return replace(self, rows=few), thin
 
-    def as_stated(self, fit: identify.Fit) -> identify.Fit:
+    def as_stated(self, fit: joint.Fit) -> joint.Fit:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
-    def rejects(self, fit: identify.Fit) -> bool:
+    def rejects(self, fit: joint.Fit) -> bool:
         """Whether noise alone, as stated, does not explain what is left."""
         return bool(np.max(fit.inflation) > FITS or self.as_stated(fit).p_value < SIGNIFICANCE)
 
-    def linear(self, fit: identify.Fit) -> Linear:
+    def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)
 
-    def slopes(self, fit: identify.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
+    def slopes(self, fit: joint.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
         """Raw slopes (M, 6, k) of the residual by parameters, fitted or neutral, in units of their prior sd.
 
         0 in rows that are not fitted.
@@ -245,5 +264,5 @@ def _wind_as(table: Any, other: Any) -> None:
         table.begin_at(other)
 
 
-def values_of(fit: identify.Fit) -> dict[str, float]:
+def values_of(fit: joint.Fit) -> dict[str, float]:
     return dict(zip(fit.names, map(float, fit.values), strict=True))

@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 from scipy.stats import binom
 
 from ctcr.diagnose.engine import OUTLIER
-from ctcr.joint_space import loaded_places
-from ctcr.measurements import Measurements
+from ctcr.table.joint_space import loaded_places
+from ctcr.table.measurements import Measurements
 
 Mask = NDArray[np.bool_]
 
@@ -76,9 +76,7 @@ def come_together(measurements: Measurements, fit: Any) -> Mask:
     noise = SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])
     equal = both & (np.linalg.norm(error[read] - error[neighbour], axis=1) < noise)
     by_chance = np.mean((noise[far[read]] / size[far[read]]) ** 3)  # share of a ball's volume
-    if (
-        equal.any() and _doubt((np.sum(equal) + 1) // 2, far, by_chance * share) < DOUBT
-    ):  # two may be one pair
+    if equal.any() and _doubt((np.sum(equal) + 1) // 2, far, by_chance * share) < DOUBT:  # two may be one pair
         together[read] |= equal
     return together
 

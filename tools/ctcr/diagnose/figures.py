@@ -4,13 +4,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr.compare.figures import ERROR, FAINT, INK, NOISE, drawable
+from ctcr.compare.figures import drawable
 from ctcr.diagnose.decision import imitated
-from ctcr.html_page import short
+from ctcr.show.html_page import short
+from ctcr.show.style import ERROR, FAINT, INK, NOISE
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
-    from ctcr.fit import Fit
+    from ctcr.fit.result import Fit
 
 GOOD = "#4b8b3b"
 CANDIDATES = 10
@@ -29,14 +30,17 @@ def waterfall(figure, d: "Diagnosis") -> None:
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
         axes.text(
-            i, 1.04 * value, f"{short(value)} mm", ha="center", va="bottom", weight="bold",
+            i,
+            1.04 * value,
+            f"{short(value)} mm",
+            ha="center",
+            va="bottom",
+            weight="bold",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
-        )  # fmt: skip
+        )
     axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
     last = len(bars) - 0.6
-    axes.text(
-        last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom"
-    )
+    axes.text(last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom")
     axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
     axes.set_ylabel("RMS error on locked runs, mm")
@@ -56,9 +60,13 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
             value = entry.linear if entry.refit is None else entry.refit
             accepted = entry.id in round_.ids
             axes.barh(
-                i, max(value, 0.3), color=GOOD if accepted else FAINT, edgecolor=INK if accepted else "none",
-                linewidth=1.5, alpha=PALE if entry.refit is None else 1,
-            )  # fmt: skip
+                i,
+                max(value, 0.3),
+                color=GOOD if accepted else FAINT,
+                edgecolor=INK if accepted else "none",
+                linewidth=1.5,
+                alpha=PALE if entry.refit is None else 1,
+            )
             axes.text(max(value, 0.3), i, f" {value:.1f}", va="center", fontsize=9)
         axes.set_yticks(range(len(shown)), [entry.id.replace("_", " ") for entry in shown])
         axes.invert_yaxis()
@@ -122,9 +130,7 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
     axes.grid(False)
     picture = axes.imshow(share, vmin=0, vmax=1, cmap="Blues")
     for i, j in np.ndindex(share.shape):
-        axes.text(
-            j, i, f"{share[i, j]:.2f}", ha="center", va="center", color="w" if share[i, j] > 0.6 else INK
-        )
+        axes.text(j, i, f"{share[i, j]:.2f}", ha="center", va="center", color="w" if share[i, j] > 0.6 else INK)
     names = [entry.id.replace("_", " ") for entry in best]
     axes.set_xticks(range(len(best)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(best)), names)

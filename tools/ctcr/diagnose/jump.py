@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import recording
 from ctcr.diagnose.candidates import Candidate
-from ctcr.measurements import Measurements
+from ctcr.model import recording
+from ctcr.table.measurements import Measurements
 
 WHEN = "effects.frame_jump.when"
 MOST = 40  # moments that are tried at a time
@@ -37,9 +37,7 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
             break
         k = int(np.argmax(gains))
         best, gain = int(places[k]), gains[k]
-        low, high = (
-            places[j] if 0 <= j < len(places) else end for j, end in ((k - 1, 0), (k + 1, len(fitted)))
-        )
+        low, high = (places[j] if 0 <= j < len(places) else end for j, end in ((k - 1, 0), (k + 1, len(fitted))))
         places = np.setdiff1d(np.arange(low + 1, high), places)
     if best is None:
         return []

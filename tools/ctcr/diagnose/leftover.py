@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effect_model, identify
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.far_off import come_together
-from ctcr.output import listed
+from ctcr.fit import joint
+from ctcr.model import effect_model
+from ctcr.show.output import listed
 
 LEVEL = 0.01  # chance that a dependence is named where there is none
 SHOWN = 6
@@ -54,17 +55,15 @@ class Leftover:
         return rejected + self.allowed + self.at_places
 
 
-def leftover_of(engine: Engine, before: identify.Fit, fit: identify.Fit, allowed: list[str]) -> Leftover:
-    sample = take_sample(
-        engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements)
-    )
+def leftover_of(engine: Engine, before: joint.Fit, fit: joint.Fit, allowed: list[str]) -> Leftover:
+    sample = take_sample(engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements))
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     places = engine.measurements.row[come_together(engine.measurements, fit)].tolist()
     return Leftover(engine.rejects(fit), places, ranked, after, sample, allowed)
 
 
-def _rank(engine: Engine, sample: Sample, fit: identify.Fit) -> Ranking:
+def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
     """What the position residual depends on, field error and outliers taken off."""
     rows = np.searchsorted(engine.measurements.row, sample.row)
     left = (fit.residual - fit.field)[rows, :3]

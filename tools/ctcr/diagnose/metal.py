@@ -39,11 +39,13 @@ def piece(engine, candidate: Candidate, worth: Callable[[NDArray], float]) -> li
         size = np.repeat([0.2 * radius, 0.5 * float(sd[4])], 3)
         found = [
             minimize(
-                cost, tried[k], method="Nelder-Mead",
+                cost,
+                tried[k],
+                method="Nelder-Mead",
                 options={"maxfev": STEPS, "initial_simplex": tried[k] + np.vstack([np.zeros(6), np.diag(size)])},
             )
             for k in np.argsort(costs)[:BEST]
-        ]  # fmt: skip
+        ]
         best = min(found, key=lambda result: result.fun).x
     shape = tuple(zip(candidate.names[1:], map(float, best), strict=True))
     return [(Candidate(candidate.id, candidate.names, shape), slopes(best))]

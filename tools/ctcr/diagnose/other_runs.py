@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from ctcr.diagnose import split
 from ctcr.diagnose.engine import Engine
-from ctcr.identify import Fit
+from ctcr.fit.joint import Fit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def excess_of(
-    engine: Engine, fit: Fit, rows: Mask, *, positions_alone: bool = False
-) -> Callable[[Array], float]:
+def excess_of(engine: Engine, fit: Fit, rows: Mask, *, positions_alone: bool = False) -> Callable[[Array], float]:
     """What a residual (M, 6) holds in some rows (M,) beyond noise: chi-square, less that of noise. Readings that are
     outliers of the fit, the better the model, count for little."""
     there = replace(engine, rows=rows)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import identify
 from ctcr.diagnose import split
 from ctcr.diagnose.engine import OUTLIER, Engine, values_of
+from ctcr.fit import joint
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ MUCH_BETTER = 0.9  # where the model explains the readings as it is
 SOUND = 1.05  # inflation of the noise up to which it does
 
 
-def held_out(engine: Engine, fit: identify.Fit, noise: Any = None) -> Array:
+def held_out(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
     """Mean square position errors [mm^2] of runs, each left out with a few others, of the model linearised at a fit."""
     group = split.groups(engine.measurements)
     plain, squares = fit.weights[:, 0] > OUTLIER, []
@@ -38,12 +38,12 @@ def typical(squares: Array) -> float:
     return float(np.exp(np.log(squares).mean()))
 
 
-def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
+def noise_for_prediction(engine: Engine, fit: joint.Fit) -> Any:
     """The noise of a fit, or that with the part of the field error that predicts other runs better.
 
     A field error that is not there lets calibration stay wrong; one that is there and left out bends it.
     """
-    tried = {part: engine.noise_with(part) for part in identify.FIELDS}
+    tried = {part: engine.noise_with(part) for part in joint.FIELDS}
     errors = {part: typical(held_out(engine, fit, noise)) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
     usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
@@ -51,21 +51,18 @@ def noise_for_prediction(engine: Engine, fit: identify.Fit) -> Any:
     return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
 
 
-def predictive(
-    engine: Engine, fit: identify.Fit, fixed: dict[str, float], tolerance: float = identify.COARSE
-) -> identify.Fit:
+def predictive(engine: Engine, fit: joint.Fit, fixed: dict[str, float], tolerance: float = joint.COARSE) -> joint.Fit:
     """The same parameters fitted under that noise; `fixed` are values of effects that are held."""
     noise = noise_for_prediction(engine, fit)
     if noise is fit.noise:
         return fit
     added = [name for name in fit.names if name.startswith("effects.")]
     return engine.fit(
-        added, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, near=True,
-        tolerance=tolerance,
-    )  # fmt: skip
+        added, start=values_of(fit), fixed=fixed, noise=noise, weights=fit.weights, near=True, tolerance=tolerance
+    )
 
 
-def predicts_better(engine: Engine, before: identify.Fit, after: identify.Fit) -> bool:
+def predicts_better(engine: Engine, before: joint.Fit, after: joint.Fit) -> bool:
     """Whether a further effect makes errors of runs left out smaller by its share of what noise does not explain."""
     jitter = 3e6 * engine.noise.position_jitter**2
     old, new = typical(held_out(engine, before)), typical(held_out(engine, after))

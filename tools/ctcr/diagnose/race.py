@@ -1,18 +1,20 @@
 """The race: every candidate judged after a joint refit with the calibration, one accepted at a time."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, open_side
 from ctcr.diagnose import contact, jump, metal, unsteady
 from ctcr.diagnose.candidates import Candidate, is_of_metal
 from ctcr.diagnose.decision import decide
-from ctcr.diagnose.engine import OUTLIER, Engine, Gain, values_of
+from ctcr.diagnose.engine import OUTLIER, Engine, values_of
 from ctcr.diagnose.prediction import predicts_better
+from ctcr.diagnose.round import Entry, Round
+from ctcr.effects import catalogue
 from ctcr.errors import InputError
+from ctcr.fit import joint, one_sided
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -29,99 +31,30 @@ MAX_EFFECTS = 4
 MOST_OUTLIERS = 0.01  # share of readings: where more are far off, the model may be wrong and not they
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A candidate in one round of the race."""
-
-    candidate: Candidate
-    gain: Gain  # over none, by slopes
-    refit: float | None = None  # log evidence after a joint refit; None: too far behind to be refitted
-    share: float = 0.0  # of the excess chi-square that it removes
-    spread: float = np.inf  # standard deviation of that share
-    fit: identify.Fit | None = None
-    implausible: tuple[str, ...] = ()  # what its values, or those of the calibration, would have to be
-
-    @property
-    def linear(self) -> float:
-        return self.gain.log_evidence - self.candidate.price
-
-    @property
-    def score(self) -> float:
-        return -np.inf if self.refit is None else self.refit
-
-    @property
-    def id(self) -> str:
-        return self.candidate.id
-
-
-@dataclass
-class Round:
-    """One round: the fit before, all entries, best first, and what came of it."""
-
-    before: identify.Fit
-    entries: list[Entry]
-    overlaps: dict[
-        str, float
-    ]  # by id: share of the winner's signal that it imitates, or the other way round: the less
-    accepted: Entry | None = None
-    ids: list[str] = field(default_factory=list)  # the accepted effect and those the data cannot tell from it
-    margin: float = np.inf  # log evidence over the best candidate outside these
-    reason: str = ""  # why nothing was accepted
-    needed: float = np.inf  # log evidence below which nothing is accepted in any case
-    is_stand_in: bool = False  # whether the best candidate surely removes too little of the excess
-
-    @property
-    def why_not(self) -> str:
-        """A sentence, or nothing where an effect was accepted."""
-        return f"Nothing accepted: {self.reason}." if self.reason else ""
-
-    @property
-    def best(self) -> list[Entry]:
-        """Of each effect the accepted form, or the best one; those that were refitted come first."""
-        found = {entry.id: entry for entry in reversed(self.entries)}
-        if self.accepted:
-            found[self.accepted.id] = self.accepted
-        return sorted(found.values(), key=lambda entry: (-entry.score, -entry.linear))
-
-    def shed(self) -> None:
-        """Gives back the memory of what was fitted: of many rows, a round would keep as much as all else."""
-        self.before = self.before.without_readings()
-        for place, entry in enumerate(self.entries):
-            if entry.fit is not None:
-                self.entries[place] = replace(entry, fit=entry.fit.without_readings())
-            if entry is self.accepted:
-                self.accepted = self.entries[place]
-
-    def is_hopeless(self, more: float) -> bool:
-        """Whether nothing would be accepted even with `more` times the readings."""
-        best = max((entry.score for entry in self.entries), default=-np.inf)
-        return self.accepted is None and (self.is_stand_in or more * best < self.needed)
-
-
-def misfit(fit: identify.Fit) -> float:
+def misfit(fit: joint.Fit) -> float:
     """Chi-square of residual and prior, in units of the fit's inflated noise."""
     return fit.admitted_chi_square + fit.shift_square
 
 
-def explained(fit: identify.Fit) -> float:
+def explained(fit: joint.Fit) -> float:
     """Chi-square that the noise as stated explains, in the units of misfit()."""
     position, rotation = fit.inflation
     used = (fit.weights > 0).sum(axis=0)
     return float(3 * (used[0] / position**2 + used[1] / rotation**2))
 
 
-def excess(fit: identify.Fit) -> float:
+def excess(fit: joint.Fit) -> float:
     """Chi-square beyond what the noise as stated explains, at least its usual scatter."""
     return max(misfit(fit) - explained(fit), np.sqrt(2 * fit.observations))
 
 
-def share_of(before: identify.Fit, after: identify.Fit, added: int) -> float:
+def share_of(before: joint.Fit, after: joint.Fit, added: int) -> float:
     """Part of the excess that `added` parameters remove, at the same weights and noise."""
     removed = misfit(before) - misfit(after) - added
     return float(removed / max(excess(before), removed, 1.0))
 
 
-def outliers(fit: identify.Fit) -> float:
+def outliers(fit: joint.Fit) -> float:
     """Share of the fitted readings that are taken for outliers."""
     used = fit.weights[:, 0] > 0
     return float(np.mean(fit.weights[used, 0] < OUTLIER)) if used.any() else 0.0
@@ -144,30 +77,24 @@ def aside(round_: Round) -> dict[str, float]:
     return found
 
 
-def baseline(
-    engine: Engine, accepted: list[Entry], start: dict[str, float], progress: Progress
-) -> identify.Fit:
+def baseline(engine: Engine, accepted: list[Entry], start: dict[str, float], progress: Progress) -> joint.Fit:
     """Calibration and the accepted effects, outliers weighted; the part of the field error that the data ask for."""
     progress("calibration")
     names, fixed = parameters(accepted)
     return likeliest(engine, names, start, fixed)
 
 
-def likeliest(
-    engine: Engine, names: Sequence[str], start: dict[str, float], fixed: dict[str, float]
-) -> identify.Fit:
+def likeliest(engine: Engine, names: Sequence[str], start: dict[str, float], fixed: dict[str, float]) -> joint.Fit:
     """Calibration and these parameters of effects, fitted with the part of the field error that the data ask for."""
 
-    def again(values: Array, like: identify.Fit | None) -> identify.Fit:
+    def again(values: Array, like: joint.Fit | None) -> joint.Fit:
         from_there = dict(zip(full.names, map(float, values), strict=True))
         if like is None:
             return engine.fit(names, start=from_there, fixed=fixed, near=True)
-        return engine.fit_like(
-            like, names, start=from_there, fixed=fixed, near=True, tolerance=identify.COARSE
-        )
+        return engine.fit_like(like, names, start=from_there, fixed=fixed, near=True, tolerance=joint.COARSE)
 
     full = engine.fit(names, start=start, fixed=fixed, near=bool(start))
-    full = open_side.crossed(full, again)
+    full = one_sided.crossed(full, again)
     noise = engine.likeliest_noise(full)
     # From the full model's place: what effects do far from there, slopes do not tell.
     if noise is full.noise:
@@ -175,7 +102,7 @@ def likeliest(
     return engine.fit(names, start=values_of(full), fixed=fixed, noise=noise, near=True)
 
 
-def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> identify.Fit:
+def arrived(engine: Engine, before: joint.Fit, accepted: list[Entry]) -> joint.Fit:
     """Where the refit of the last accepted effect leads in the end, at the weights of the fit before."""
     fit = accepted[-1].fit
     if fit.converged:
@@ -185,19 +112,13 @@ def arrived(engine: Engine, before: identify.Fit, accepted: list[Entry]) -> iden
 
 
 def race(
-    engine: Engine,
-    before: identify.Fit,
-    candidates: list[Candidate],
-    accepted: list[Entry],
-    progress: Progress,
+    engine: Engine, before: joint.Fit, candidates: list[Candidate], accepted: list[Entry], progress: Progress
 ) -> Round:
     """One round: screens all candidates by their slopes, refits the best, and decides."""
     progress("screening all candidates")
     names, fixed = parameters(accepted)
     if accepted:  # what a refit without a further effect finds too is no gain of one
-        again = engine.fit_like(
-            before, names, start=values_of(before), fixed=fixed, near=True, tolerance=identify.COARSE
-        )
+        again = engine.fit_like(before, names, start=values_of(before), fixed=fixed, near=True, tolerance=joint.COARSE)
         before = max(before, again, key=lambda fit: fit.log_evidence)
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
@@ -234,14 +155,12 @@ def _other_strengths_first(entries: list[Entry]) -> list[Entry]:
 
 def _stand_ins(engine: Engine, accepted: list[Entry]) -> set[str]:
     """Look-alikes of accepted effects whose law is not known: it may be none of those that are offered."""
-    known = (effects.get(entry.id, engine.robot.n_tubes) for entry in accepted)
+    known = (catalogue.get(entry.id, engine.robot.n_tubes) for entry in accepted)
     unsure = (effect for effect in known if effect.choices)
     return {identity for effect in unsure for identity in effect.look_alikes}
 
 
-def screen(
-    engine: Engine, before: identify.Fit, candidates: list[Candidate], fixed: dict[str, float]
-) -> list[Entry]:
+def screen(engine: Engine, before: joint.Fit, candidates: list[Candidate], fixed: dict[str, float]) -> list[Entry]:
     """All candidates with their gain by slopes, best first."""
     linear = unsteady.linear(engine, before)
     candidates = [c for c in candidates if not set(c.names) & set(before.names)]
@@ -274,10 +193,10 @@ def screen(
 
 
 def _in_reach(
-    engine: Engine, before: identify.Fit, chosen: list[Entry], fixed: dict[str, float], progress: Progress
+    engine: Engine, before: joint.Fit, chosen: list[Entry], fixed: dict[str, float], progress: Progress
 ) -> list[Entry]:
     """Those that a refit to a few of many rows does not leave far behind the best, with where that ended."""
-    few = identify.few_of(engine.fitted)
+    few = joint.few_of(engine.fitted)
     if few is None or len(chosen) < 2:
         return chosen
     small = replace(engine, rows=few)
@@ -286,15 +205,11 @@ def _in_reach(
     tried = refitted(small, base, chosen, fixed, progress)
     best = max(entry.score for entry in tried)
     reach = min(best, IN_REACH * best)  # the best itself always is
-    return [
-        replace(entry, fit=there.fit)
-        for entry, there in zip(chosen, tried, strict=True)
-        if there.score >= reach
-    ]
+    return [replace(entry, fit=there.fit) for entry, there in zip(chosen, tried, strict=True) if there.score >= reach]
 
 
 def refitted(
-    engine: Engine, before: identify.Fit, entries: list[Entry], fixed: dict[str, float], progress: Progress
+    engine: Engine, before: joint.Fit, entries: list[Entry], fixed: dict[str, float], progress: Progress
 ) -> list[Entry]:
     """The entries after a joint fit with calibration and what was accepted before, at the same weights and noise."""
     evidence = unsteady.evidence(engine, before)
@@ -309,27 +224,21 @@ def refitted(
 
 
 def _without_candidate(
-    engine: Engine, before: identify.Fit, entries: list[Entry], names: list[str], fixed: dict[str, float]
-) -> tuple[identify.Fit, list[Entry]]:
+    engine: Engine, before: joint.Fit, entries: list[Entry], names: list[str], fixed: dict[str, float]
+) -> tuple[joint.Fit, list[Entry]]:
     """The fit before and the entries, after a fit without the best candidate from where it led: what that finds too, as
     another place of the effects accepted before, is no gain of it."""
     best = max((entry for entry in entries if entry.fit), key=lambda entry: entry.score, default=None)
     if best is None:
         return before, entries
-    there = engine.fit_like(
-        before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=identify.COARSE
-    )
+    there = engine.fit_like(before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=joint.COARSE)
     found = there.log_evidence - before.log_evidence
     if found <= 0:
         return before, entries
     entries = [
         entry
         if entry.fit is None
-        else replace(
-            entry,
-            refit=entry.refit - found,
-            share=share_of(there, entry.fit, len(entry.candidate.names)),
-        )
+        else replace(entry, refit=entry.refit - found, share=share_of(there, entry.fit, len(entry.candidate.names)))
         for entry in entries
     ]
     return there, entries
@@ -337,7 +246,7 @@ def _without_candidate(
 
 def _refit(
     engine: Engine,
-    before: identify.Fit,
+    before: joint.Fit,
     evidence: float,
     entry: Entry,
     fixed: dict[str, float],
@@ -352,9 +261,14 @@ def _refit(
     for start in (first, values_of(before)):
         try:
             fit = engine.fit_like(
-                before, [*added, *candidate.names], start=start, fixed=fixed | dict(candidate.shape),
-                max_iterations=iterations, tolerance=identify.COARSE, near=entry.fit is not None,
-            )  # fmt: skip
+                before,
+                [*added, *candidate.names],
+                start=start,
+                fixed=fixed | dict(candidate.shape),
+                max_iterations=iterations,
+                tolerance=joint.COARSE,
+                near=entry.fit is not None,
+            )
             break
         except InputError:
             continue  # the model has no solution there
@@ -372,7 +286,7 @@ def _refit(
     )
 
 
-def begin(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float]:
+def begin(engine: Engine, before: joint.Fit, entry: Entry) -> dict[str, float]:
     """Where the slopes say that the refit will end."""
     fitted = entry.candidate.names[: len(entry.gain.values)]  # the shapes of a contact come after
     neutral, sd, _, _ = engine.priors(fitted)
@@ -381,9 +295,9 @@ def begin(engine: Engine, before: identify.Fit, entry: Entry) -> dict[str, float
     return dict(zip(before.names, map(float, moved), strict=True)) | dict(entry.candidate.shape) | own
 
 
-def implausible(engine: Engine, fit: identify.Fit, candidate: Candidate) -> list[str]:
+def implausible(engine: Engine, fit: joint.Fit, candidate: Candidate) -> list[str]:
     """Values beyond the soft bounds of their effect, by more than two standard deviations."""
-    known = effects.parameter_of(engine.robot.n_tubes)
+    known = catalogue.parameter_of(engine.robot.n_tubes)
     found = []
     for name, value, sd in zip(fit.names, fit.values, fit.sd, strict=True):
         if name not in candidate.names or name not in known:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ctcr import effects, free_parameters, html_page
 from ctcr.diagnose import figures
-from ctcr.html_page import cards, figure, short, table
-from ctcr.output import atomic_writer
+from ctcr.effects import catalogue
+from ctcr.model import parameters
+from ctcr.show import html_page
+from ctcr.show.html_page import cards, figure, short, table
+from ctcr.show.output import atomic_writer
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -67,7 +69,7 @@ def _found(d: "Diagnosis") -> str:
     items = []
     for a in d.accepted:
         for identity in a.ids:
-            e = effects.get(identity, d.robot.n_tubes)
+            e = catalogue.get(identity, d.robot.n_tubes)
             items.append(f"<li><b>{html.escape(e.title)}</b> ({identity}). {html.escape(e.physics)}</li>")
     heading = "What takes the place of the cause" if d.verdict.names_no_cause else "What is missing"
     return f"<h2>{heading}</h2><ul>{''.join(items)}</ul>"
@@ -94,9 +96,13 @@ def _varying(d: "Diagnosis") -> str:
         return ""
     items = "".join(f"<li>{html.escape(v.in_words)}</li>" for v in d.varying.variations)
     drawn = figure(
-        figures.varying, d, 10.4, 3.4,
-        "How each parameter would have to change over the readings, beside its calibrated value.", True,
-    )  # fmt: skip
+        figures.varying,
+        d,
+        10.4,
+        3.4,
+        "How each parameter would have to change over the readings, beside its calibrated value.",
+        True,
+    )
     return (
         f"<h2>What does not stay constant</h2><p>{html.escape(d.varying.lead)}:</p><ul>{items}</ul>{drawn}"
         f"<p>{html.escape(d.varying.advice)}</p>"
@@ -113,15 +119,22 @@ def _view(d: "Diagnosis") -> str:
 
 def _candidates(d: "Diagnosis") -> str:
     drawn = figure(
-        figures.candidates, d, 10.4, 4.4,
+        figures.candidates,
+        d,
+        10.4,
+        4.4,
         "Every candidate was judged together with the calibration; pale: by slopes alone, too far behind to be fitted. "
-        "Boxed: accepted, with all that these data cannot tell from it.", True,
-    )  # fmt: skip
+        "Boxed: accepted, with all that these data cannot tell from it.",
+        True,
+    )
     apart = figure(
-        figures.overlap, d, 5.2, 4.2,
+        figures.overlap,
+        d,
+        5.2,
+        4.2,
         "How much of one candidate's signal another one can imitate together with calibration: near 1 both ways, these "
         "data cannot tell the two apart.",
-    )  # fmt: skip
+    )
     why = next((r.why_not for r in reversed(d.rounds) if r.why_not), "")
     below = f'<div class="pair">{apart}<div><p>{html.escape(why)}</p></div></div>'
     return f"<h2>All candidates</h2>{drawn}{below}" if drawn else ""
@@ -131,7 +144,7 @@ def _next(d: "Diagnosis") -> str:
     """What to measure to be surer."""
     named = [] if d.verdict.names_no_cause else d.accepted
     ids = list(dict.fromkeys(identity for a in named for identity in a.ids))
-    advice = [f"<li><b>{i}</b>: {html.escape(effects.get(i, d.robot.n_tubes).measure)}</li>" for i in ids]
+    advice = [f"<li><b>{i}</b>: {html.escape(catalogue.get(i, d.robot.n_tubes).measure)}</li>" for i in ids]
     advice += [f"<li>{html.escape(text)}</li>" for text in (d.varying.measure if d.varying else [])]
     if not advice:
         return ""
@@ -140,8 +153,8 @@ def _next(d: "Diagnosis") -> str:
 
 
 def _parameters(d: "Diagnosis") -> str:
-    known, rows = effects.parameter_of(d.robot.n_tubes), []
-    units = free_parameters.units_with_effects(d.robot)
+    known, rows = catalogue.parameter_of(d.robot.n_tubes), []
+    units = parameters.units_with_effects(d.robot)
     for name, value, sd, shift in zip(d.final.names, d.final.values, d.final.sd, d.final.shift, strict=True):
         p = known.get(name)
         unit, meaning = (p.unit, p.meaning) if p else (units[name], "")
@@ -177,12 +190,16 @@ def scene(d: "Diagnosis") -> str:
         data.append(_trace(lines, f"error, {name}, × {factor:g}", style))
     axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
     layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0}, "paper_bgcolor": "#ffffff",
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "paper_bgcolor": "#ffffff",
         "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
         "legend": {"orientation": "h", "y": 0, "x": 0, "itemsizing": "constant"},
-        "scene": {"aspectmode": "data", "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 0.8}},
-                  **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"}},
-    }  # fmt: skip
+        "scene": {
+            "aspectmode": "data",
+            "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 0.8}},
+            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
+        },
+    }
     return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
 
 

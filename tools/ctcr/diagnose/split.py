@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.diagnose.coverage import Coverage
-from ctcr.identify import measured_rows
-from ctcr.measurements import Measurements
-from ctcr.robot import Robot
+from ctcr.fit.joint import measured_rows
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
 
 FEWEST_RUNS = 4
 BLOCKS = 12  # of a single run, in time

@@ -5,7 +5,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from ctcr import fitted_effects, output
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from ctcr.diagnose import fitted_effects
+from ctcr.show import output
 
 if TYPE_CHECKING:
     from ctcr.diagnose.analysis import Diagnosis
@@ -19,9 +23,6 @@ def progress() -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         yield lambda _: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     columns = (BarColumn(20), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)  # how many rounds there will be, nobody knows
@@ -40,9 +41,7 @@ def show(console: Any, result: "Diagnosis") -> None:
             console.print(_candidates(number, round_))
         if round_.why_not:
             console.print(round_.why_not, markup=False)
-    console.print(
-        "  slopes, fit: gain in log evidence, by slopes alone and in the fit; removed: of the excess error"
-    )
+    console.print("  slopes, fit: gain in log evidence, by slopes alone and in the fit; removed: of the excess error")
     if result.accepted:
         fit = result.final
         fitted_effects.show(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
@@ -78,14 +77,16 @@ def _candidates(number: int, round_: Any) -> Any:
     rows = []
     for entry in round_.best[:SHOWN]:
         refitted = entry.refit is not None
-        rows.append([
-            entry.id,
-            entry.candidate.told,
-            f"{entry.linear:.1f}",
-            f"{entry.refit:.1f}" if refitted else "",
-            f"{entry.share:.0%}" if refitted else "",
-            _remark(entry, round_),
-        ])  # fmt: skip
+        rows.append(
+            [
+                entry.id,
+                entry.candidate.told,
+                f"{entry.linear:.1f}",
+                f"{entry.refit:.1f}" if refitted else "",
+                f"{entry.share:.0%}" if refitted else "",
+                _remark(entry, round_),
+            ]
+        )
     title = f"Round {number}: effects, each fitted together with the calibration"
     return output.table(title, ["effect", "parameters", "slopes", "fit", "removed", ""], rows, text=(0, 1, 5))
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ctcr.diagnose import split
 from ctcr.diagnose.engine import Engine, Gain, Linear, laplace
-from ctcr.identify import Fit
+from ctcr.fit.joint import Fit
 
 Array = NDArray[np.float64]
 
@@ -21,11 +21,7 @@ FEWEST = 12  # readings in each of more than these
 MOST = 96  # stretches: of more runs several share one, as each is a column of all readings
 AT_ONCE = 16  # of these columns are made at a time
 SPREAD = 0.2  # standard deviation of a stretch's lag, over the delay
-MEMORIES = (
-    0.0,
-    1 / 16,
-    1 / 4,
-)  # times, over that of all readings, for which lags stay alike: the likeliest of these
+MEMORIES = (0.0, 1 / 16, 1 / 4)  # times, over that of all readings, for which lags stay alike: the likeliest of these
 SURE = 5.0  # log evidence from which lags are followed, and told
 LEFT = 0.5  # share that they may leave of what noise does not explain
 ONE_FRAME = 0.3  # by how much lags may differ by more or less than a frame of the tracker, over it

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import free_parameters
 from ctcr.compare.covariates import HARMONICS, Covariate, covariates
 from ctcr.compare.sample import Sample
 from ctcr.diagnose import other_runs
 from ctcr.diagnose.engine import Engine, Linear, laplace
-from ctcr.identify import Fit
+from ctcr.fit.joint import Fit
+from ctcr.model import parameters
 
 Array = NDArray[np.float64]
 
@@ -70,9 +70,7 @@ class Variation:
 
     @property
     def in_words(self) -> str:
-        return (
-            f"{self.label}: by {np.ptp(self.change):.2g} {self.unit} in all, with the {self.covariate.label}"
-        )
+        return f"{self.label}: by {np.ptp(self.change):.2g} {self.unit} in all, with the {self.covariate.label}"
 
 
 @dataclass(frozen=True)
@@ -136,9 +134,7 @@ class _Trials:
             places = np.array([trials[k].places for k in which])
             parts = 1 + places.size * columns.shape[1] // AT_ONCE
             gathered = (columns[some] for some in np.array_split(places, parts))
-            self._alike.append(
-                (which, places, np.concatenate([own @ own.transpose(0, 2, 1) for own in gathered]))
-            )
+            self._alike.append((which, places, np.concatenate([own @ own.transpose(0, 2, 1) for own in gathered])))
 
     def log_evidences(self, linear: Linear) -> Array:
         """Linear.gain() of each, in far less time."""
@@ -172,9 +168,7 @@ def found(engine: Engine, fit: Fit, sample: Sample) -> Varying | None:
     chosen: list[_Trial] = []
     reached = [(excess(at.residual), moved)]
     while len(chosen) < MOST and is_open.any():
-        gains = np.where(
-            is_open, trials.log_evidences(Linear(residual + whitened @ moved, whitened)), -np.inf
-        )
+        gains = np.where(is_open, trials.log_evidences(Linear(residual + whitened @ moved, whitened)), -np.inf)
         best = int(np.argmax(gains))
         if gains[best] < EVIDENCE + np.log(np.sum(is_open)):
             break
@@ -252,7 +246,7 @@ def _variations(
 ) -> list[Variation]:
     """What `moved`, of all columns of the pairs in units of prior sd, says of each parameter."""
     rows = np.searchsorted(engine.measurements.row, sample.row)
-    units, found, begin = free_parameters.units_with_effects(engine.robot), [], 0
+    units, found, begin = parameters.units_with_effects(engine.robot), [], 0
     for p, covariate, columns in pairs:
         end = begin + columns.shape[1]
         unit, scale = SHOWN_UNITS.get(units[fit.names[p]], (units[fit.names[p]], 1.0))

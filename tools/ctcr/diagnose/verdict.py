@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import identify
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.accepted import Accepted
 from ctcr.diagnose.leftover import Leftover
-from ctcr.output import listed
+from ctcr.fit import joint
+from ctcr.show.output import listed
 
 # Share of what noise does not explain of locked runs that effects must explain to be no stand-ins, and
 EXPLAINED = 0.75
@@ -30,8 +30,8 @@ class Verdict:
 
 
 def judge(
-    calibrated: identify.Fit,
-    with_effects: identify.Fit,
+    calibrated: joint.Fit,
+    with_effects: joint.Fit,
     accepted: list[Accepted],
     leftover: Leftover,
     judged: NDArray[np.bool_],
@@ -46,27 +46,19 @@ def judge(
     before, after = (max(fit.rms_mm(judged) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
     if not accepted:
         if not leftover.structured:
-            return Verdict(
-                "nothing_missing", ["Calibration and the tracker's noise explain these measurements."]
-            )
+            return Verdict("nothing_missing", ["Calibration and the tracker's noise explain these measurements."])
         missing = "Something is missing that no effect of the catalogue explains."
         return Verdict("not_in_catalogue", [missing, *leftover.at_places])
     first = accepted[0]
     share = float(np.median([*explained.values()])) if explained else first.share
     if leftover.rejected and share < EXPLAINED:
-        return Verdict(
-            "stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."]
-        )
+        return Verdict("stand_in", [f"Adding {first.entry.id} removes part of the error, but much of it stays."])
     if outdone:
-        return Verdict(
-            "stand_in", [f"Calibration that is not constant explains far more than {first.entry.id} does."]
-        )
+        return Verdict("stand_in", [f"Calibration that is not constant explains far more than {first.entry.id} does."])
     if after > max(MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.entry.id} the runs that no fit saw are predicted worse."])
     if any(a.entry.implausible for a in accepted):
-        return Verdict(
-            "stand_in", ["The data want values that are hardly possible.", *first.entry.implausible]
-        )
+        return Verdict("stand_in", ["The data want values that are hardly possible.", *first.entry.implausible])
     if any(len(a.ids) > 1 for a in accepted):
         return Verdict("ambiguous", ["These data cannot tell some effects apart."])
     if any(a.margin < racing.SURE for a in accepted):
@@ -78,7 +70,10 @@ def judge(
         stays = [f"Much of the error in {listed(odd, SHOWN)} stays."] if odd else []
         return Verdict(
             "probable",
-            [f"Of what noise does not explain of a run that no fit saw, {names} {verb} {share:.0%} (median).", *stays,
-             "More than noise is left: the law may be another one, or something else acts too."],
-        )  # fmt: skip
+            [
+                f"Of what noise does not explain of a run that no fit saw, {names} {verb} {share:.0%} (median).",
+                *stays,
+                "More than noise is left: the law may be another one, or something else acts too.",
+            ],
+        )
     return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import effects, identify, user_effects
 from ctcr.diagnose.analysis import Diagnosis
 from ctcr.diagnose.race import SURE, Entry
-from ctcr.measurements import Measurements
+from ctcr.effects import catalogue
+from ctcr.fit import joint
+from ctcr.model import user_recording
 from ctcr.plan.runs import Run, random_runs, table
+from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
@@ -28,7 +30,7 @@ class Rival:
     """An explanation that the measurements leave open."""
 
     id: str
-    fit: identify.Fit
+    fit: joint.Fit
     fixed: dict[str, float]  # values of parameters of effects that are not fitted
 
 
@@ -56,9 +58,7 @@ def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
                 entries.setdefault(entry.id, entry)
         if len(entries) > 1:
             shapes = dict(pair for entry in before for pair in entry.candidate.shape)
-            return [
-                Rival(entry.id, entry.fit, shapes | dict(entry.candidate.shape)) for entry in entries.values()
-            ]
+            return [Rival(entry.id, entry.fit, shapes | dict(entry.candidate.shape)) for entry in entries.values()]
         before.append(accepted.entry)
     return []
 
@@ -98,7 +98,7 @@ def _margin(rivals: list[Rival]) -> float:
 
 def instead(proposal: Proposal, n_tubes: int) -> dict[str, str]:
     """By effect: what else can be measured to see it."""
-    return {rival.id: effects.get(rival.id, n_tubes).measure for rival in proposal.rivals}
+    return {rival.id: catalogue.get(rival.id, n_tubes).measure for rival in proposal.rivals}
 
 
 class Contest:
@@ -130,7 +130,7 @@ class Contest:
 def _contest(diagnosis: Diagnosis, truth: Rival, other: Rival, plan: Measurements) -> Contest:
     position, quaternion = _readings(diagnosis, truth, plan)
     seen = replace(plan, position=position, quaternion=quaternion)
-    recorded = user_effects.recording_of(diagnosis.robot, seen, other.fit.names, fixed=other.fixed)
+    recorded = user_recording.recording_of(diagnosis.robot, seen, other.fit.names, fixed=other.fixed)
     residual, jacobian, _ = recorded.residual(other.fit.values, True)
     # The field error is the same for both, so that jitter remains, as much as the fit had to admit.
     noise = other.fit.noise
@@ -144,6 +144,6 @@ def _contest(diagnosis: Diagnosis, truth: Rival, other: Rival, plan: Measurement
 
 def _readings(diagnosis: Diagnosis, rival: Rival, plan: Measurements) -> tuple[Array, Array]:
     """What the tracker would read, (rows, 3) [m] and (rows, 4), NaN where the model has no solution."""
-    recorded: Any = user_effects.recording_of(diagnosis.robot, plan, rival.fit.names, fixed=rival.fixed)
+    recorded: Any = user_recording.recording_of(diagnosis.robot, plan, rival.fit.names, fixed=rival.fixed)
     recorded.residual(rival.fit.values)
     return recorded.predicted()

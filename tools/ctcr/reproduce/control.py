@@ -53,23 +53,57 @@ def tracking_claims(s: Scenarios) -> list[Claim]:
     return [
         Claim("IV.D", "S1: runs that fail", 100, failed("S1", [0.0]), "%"),
         Claim("IV.D", "S2: runs that fail", 0, failed("S2", [0.0]), "%"),
-        Claim("IV.D", "S3 and S4 up to 20 g: runs that fail", 0,
-              failed("S3", [0.0, 5, 10, 15, 20]) + failed("S4", [0.0, 5, 10, 15, 20]), "%"),
-        Claim("IV.D", "S3 and S4 above 20 g: runs that fail", 100,
-              0.5 * (failed("S3", [25.0, 30]) + failed("S4", [25.0, 30])), "%",
-              "all are held at a limit; a run counts as failed above 1 mm, and the least of the largest errors at 25 g "
-              f"unknown is {1e3 * nearly:.2f} mm, by its noise"),
-        Claim("IV.D", "S5 (beyond the paper) at 25 and 27 g: runs that fail", 100, failed("S5", [25.0, 27]), "%",
-              "force estimated, other joints take over from one at its limit, tubes turned against the weight"),
-        Claim("IV.D", "S5 at 30 g: runs that fail", 100, failed("S5", [30.0]), "%",
-              f"no posture within the limits brings the tip nearer than {1e3 * s.reach[30.0]:.1f} mm to one corner of "
-              f"the cube (25 g: {1e3 * s.reach[25.0]:.1f} mm, 27 g: {1e3 * s.reach[27.0]:.1f} mm)"),
-        Claim("IV.D", "20 g unknown: increase of the mean error", 0.01,
-              of[added[1], added[0]]["mean_mm"] - free["mean_mm"], "mm", feedback),
-        Claim("IV.D", "20 g unknown: increase of the largest error", 0.3,
-              of[added[1], added[0]]["max_mm"] - free["max_mm"], "mm", PLACES),
+        Claim(
+            "IV.D",
+            "S3 and S4 up to 20 g: runs that fail",
+            0,
+            failed("S3", [0.0, 5, 10, 15, 20]) + failed("S4", [0.0, 5, 10, 15, 20]),
+            "%",
+        ),
+        Claim(
+            "IV.D",
+            "S3 and S4 above 20 g: runs that fail",
+            100,
+            0.5 * (failed("S3", [25.0, 30]) + failed("S4", [25.0, 30])),
+            "%",
+            "all are held at a limit; a run counts as failed above 1 mm, and the least of the largest errors at 25 g "
+            f"unknown is {1e3 * nearly:.2f} mm, by its noise",
+        ),
+        Claim(
+            "IV.D",
+            "S5 (beyond the paper) at 25 and 27 g: runs that fail",
+            100,
+            failed("S5", [25.0, 27]),
+            "%",
+            "force estimated, other joints take over from one at its limit, tubes turned against the weight",
+        ),
+        Claim(
+            "IV.D",
+            "S5 at 30 g: runs that fail",
+            100,
+            failed("S5", [30.0]),
+            "%",
+            f"no posture within the limits brings the tip nearer than {1e3 * s.reach[30.0]:.1f} mm to one corner of "
+            f"the cube (25 g: {1e3 * s.reach[25.0]:.1f} mm, 27 g: {1e3 * s.reach[27.0]:.1f} mm)",
+        ),
+        Claim(
+            "IV.D",
+            "20 g unknown: increase of the mean error",
+            0.01,
+            of[added[1], added[0]]["mean_mm"] - free["mean_mm"],
+            "mm",
+            feedback,
+        ),
+        Claim(
+            "IV.D",
+            "20 g unknown: increase of the largest error",
+            0.3,
+            of[added[1], added[0]]["max_mm"] - free["max_mm"],
+            "mm",
+            PLACES,
+        ),
         Claim("Fig. 6", "largest error of all", 1.22, errors.max(), "mm", simulated),
         Claim("Fig. 6", "errors below 1 mm", 99.8, 100 * (errors < 1).mean(), "%", simulated),
         Claim("Fig. 6", "errors below 0.88 mm", 99.2, 100 * (errors < 0.88).mean(), "%", simulated),
         Claim("VI", "mean error under unknown loads", 0.29, errors_mm(s.runs["S3", 20.0]).mean(), "mm", simulated),
-    ]  # fmt: skip
+    ]

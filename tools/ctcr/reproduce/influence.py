@@ -67,9 +67,7 @@ def claims(s: Influence) -> list[Claim]:
         return 1e3 * sum(getattr(curve, of) for curve in study.curves if curve.varied.kind in kinds)
 
     own = shipped("S2").tasks.feedback_per_s
-    gain = (
-        f"sum of the three tubes with a feedback of {SLOW_FEEDBACK:g} 1/s; the paper does not state its own"
-    )
+    gain = f"sum of the three tubes with a feedback of {SLOW_FEEDBACK:g} 1/s; the paper does not state its own"
     ours = f"with the feedback of our scenarios, {own:g} 1/s: the faster it is, the less a wrong Jacobian matters"
     last = [kind for kind in KINDS if kind != "rotation offset"]
     largest = max(one.maximum for one in s.opened.influences)
@@ -77,15 +75,27 @@ def claims(s: Influence) -> list[Claim]:
     simple = "translation offset and length (1 mm), T_ref (0.5 mm, 0.3 deg)"
     increase = "increase of the largest error"
     return [
-        *(Claim("Fig. 4, V.A", f"{kind}: {increase}", paper, total(s.slow, [kind]), "um", gain)
-          for kind, paper in KINDS.items()),
+        *(
+            Claim("Fig. 4, V.A", f"{kind}: {increase}", paper, total(s.slow, [kind]), "um", gain)
+            for kind, paper in KINDS.items()
+        ),
         Claim("V.A", f"Poisson's ratio: {increase}", 0, total(s.slow, ["Poisson's ratio"]), "um", gain),
-        *(Claim("V.A", f"{listed}: increase of the {error} error", paper, total(loop, last, of), "um", why)
-          for error, of, paper in (("largest", "worst_maximum", 867), ("mean", "worst_mean", 304))
-          for loop, why in ((s.slow, gain), (s.fast, ours))),
-        *(Claim("V.A", f"worst case of {simple}: {increase}", 15, 1e3 * loop.cumulated_maximum, "um", why)
-          for loop, why in ((s.measured_slow, f"{gain}; 15 um lie between 10 and 15 1/s"), (s.measured_fast, ours))),
+        *(
+            Claim("V.A", f"{listed}: increase of the {error} error", paper, total(loop, last, of), "um", why)
+            for error, of, paper in (("largest", "worst_maximum", 867), ("mean", "worst_mean", 304))
+            for loop, why in ((s.slow, gain), (s.fast, ours))
+        ),
+        *(
+            Claim("V.A", f"worst case of {simple}: {increase}", 15, 1e3 * loop.cumulated_maximum, "um", why)
+            for loop, why in ((s.measured_slow, f"{gain}; 15 um lie between 10 and 15 1/s"), (s.measured_fast, ours))
+        ),
         Claim("V.A", "open loop: largest change of a predicted tip", 30, largest, "mm", "the paper: a few centimetres"),
-        Claim("V.A", "open loop against closed loop", 100, largest / max(c.worst_maximum for c in s.slow.curves), "",
-              "the paper: around a hundred times; with a feedback of 7 1/s"),
-    ]  # fmt: skip
+        Claim(
+            "V.A",
+            "open loop against closed loop",
+            100,
+            largest / max(c.worst_maximum for c in s.slow.curves),
+            "",
+            "the paper: around a hundred times; with a feedback of 7 1/s",
+        ),
+    ]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.model import Model
+from ctcr.model.model import Model
 from ctcr.reproduce.claim import Claim
 from ctcr.reproduce.robot import paper_robot, random_design, random_rows
 
@@ -63,9 +63,7 @@ def integration_errors(
     return {name: np.concatenate(parts) for name, parts in errors.items()}, others, seconds
 
 
-def integration_claims(
-    errors: dict[str, Array], others: dict[str, int], seconds: dict[str, float]
-) -> list[Claim]:
+def integration_claims(errors: dict[str, Array], others: dict[str, int], seconds: dict[str, float]) -> list[Claim]:
     designs = (
         "the paper does not list the ranges of its designs: ours end at the curvature (10 1/m) and curved length (50 "
         "mm) of its own robot; with 2 to 12 1/m and 20 to 80 mm the mean is 12 times as large"
@@ -82,8 +80,14 @@ def integration_claims(
         Claim("Fig. 2", "RK3, largest error, of the length", 1.0, 100 * errors["RK3"].max(), "%", worst("RK3")),
         Claim("Fig. 2", "RK4, largest error", 0.1, 100 * errors["RK4"].max(), "%", worst("RK4")),
         Claim("Fig. 2", "RK4, mean error", 0.003, 100 * errors["RK4"].mean(), "%", designs),
-        Claim("Fig. 2", "ours (Magnus, 4th order), mean error", 0.003, 100 * errors["ours"].mean(), "%",
-              "against the paper's RK4"),
+        Claim(
+            "Fig. 2",
+            "ours (Magnus, 4th order), mean error",
+            0.003,
+            100 * errors["ours"].mean(),
+            "%",
+            "against the paper's RK4",
+        ),
         Claim("III.B.2", "RK3 is faster than RK8 by", 3.5, seconds["RK8"] / seconds["RK3"], "", "whole solves"),
         Claim("III.B.2", "RK4 is faster than RK8 by", 2.9, seconds["RK8"] / seconds["RK4"], "", "whole solves"),
-    ]  # fmt: skip
+    ]

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ctcr.compare.figures import AXES, ERROR, INK
 from ctcr.reproduce.control import Scenarios
+from ctcr.show.style import AXES, ERROR, INK
 from ctcr.track.summary import errors_mm
 
 
@@ -12,9 +12,13 @@ def integration(figure: Figure, errors: dict[str, np.ndarray]) -> None:
     """Fig. 2: errors of one step a segment."""
     axes = figure.subplots()
     axes.boxplot(
-        [100 * np.maximum(error, 1e-13) for error in errors.values()], tick_labels=list(errors), whis=(0, 100),
-        patch_artist=True, boxprops={"facecolor": "#cfe3ee"}, medianprops={"color": INK},
-    )  # fmt: skip
+        [100 * np.maximum(error, 1e-13) for error in errors.values()],
+        tick_labels=list(errors),
+        whis=(0, 100),
+        patch_artist=True,
+        boxprops={"facecolor": "#cfe3ee"},
+        medianprops={"color": INK},
+    )
     axes.set(yscale="log", ylabel="tip error, % of the length")
 
 
@@ -23,10 +27,14 @@ def forces(figure: Figure, s: Scenarios) -> None:
     axes = figure.subplots()
     groups = [("S2", 0.0), *((name, mass) for name in ("S3", "S4") for mass in (5.0, 10.0, 15.0, 20.0))]
     boxes = axes.boxplot(
-        [errors_mm(s.runs[group]) for group in groups], tick_labels=[f"{name}\n{mass:g} g" for name, mass in groups],
-        whis=(0, 100), showmeans=True, patch_artist=True, medianprops={"color": INK},
+        [errors_mm(s.runs[group]) for group in groups],
+        tick_labels=[f"{name}\n{mass:g} g" for name, mass in groups],
+        whis=(0, 100),
+        showmeans=True,
+        patch_artist=True,
+        medianprops={"color": INK},
         meanprops={"marker": "D", "markersize": 4},
-    )  # fmt: skip
+    )
     colour = {"S2": "#e3e7ea", "S3": "#f6dcc0", "S4": "#cfe3ee"}
     for box, (name, _) in zip(boxes["boxes"], groups, strict=True):
         box.set(facecolor=colour[name])
@@ -45,9 +53,7 @@ def beyond(figure: Figure, s: Scenarios) -> None:
         largest = [errors_mm(s.runs[scenario, mass]).max() for mass in masses]
         axes.plot(masses, largest, "o-", color=colour, label=label)
     least = {mass: 1e3 * away for mass, away in s.reach.items() if away > 0}
-    axes.plot(
-        list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits"
-    )
+    axes.plot(list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits")
     axes.axhline(1, color="#8794a0", lw=1, ls="--")
     axes.set(yscale="log", xlabel="weight at the tip, g", ylabel="largest error, mm")
     axes.yaxis.set_major_formatter("{x:g}")

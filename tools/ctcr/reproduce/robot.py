@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ctcr.commands.bench import table_ii
-from ctcr.robot import Actuation, Robot, Tracker
+from ctcr.robot.description import Actuation, Robot, Tracker
+from ctcr.robot.table_ii import table_ii
 
 
 def paper_robot() -> Robot:
@@ -13,15 +13,23 @@ def paper_robot() -> Robot:
     return table_ii().model_copy(
         update={
             "actuation": Actuation(
-                translation_mm_per_rev=2.0, rotation_rev_per_rev=-1.0,
-                home_translation_mm=[-298.0, -220.5, -145.0], home_rotation_deg=[3.55, -0.22, 2.71],
+                translation_mm_per_rev=2.0,
+                rotation_rev_per_rev=-1.0,
+                home_translation_mm=[-298.0, -220.5, -145.0],
+                home_rotation_deg=[3.55, -0.22, 2.71],
             ),
             "tracker": Tracker(
-                sensor_on_tube=1, rate_Hz=40.0, jitter_mm=0.035, jitter_deg=None, accuracy_95_mm=0.88,
-                accuracy_95_deg=0.48, position_mm=[-48.25, -7.25, 5.61], rotation_vector_rad=turn.tolist(),
+                sensor_on_tube=1,
+                rate_Hz=40.0,
+                jitter_mm=0.035,
+                jitter_deg=None,
+                accuracy_95_mm=0.88,
+                accuracy_95_deg=0.48,
+                position_mm=[-48.25, -7.25, 5.61],
+                rotation_vector_rad=turn.tolist(),
             ),
         }
-    )  # fmt: skip
+    )
 
 
 def random_design(random: np.random.Generator) -> Robot:

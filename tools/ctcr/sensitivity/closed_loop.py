@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core, effects, free_parameters
+from ctcr import _core
+from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
-from ctcr.robot import Robot
+from ctcr.model import parameters as free_parameters
+from ctcr.robot.description import Robot
 from ctcr.sensitivity.progress_file import ProgressFile
 from ctcr.sensitivity.ranges import Varied
 from ctcr.sensitivity.work import workers
@@ -71,9 +73,7 @@ def work(job: Job) -> tuple[float, float]:
     def values(parameters: Array) -> _core.SystemValues:
         return _core.SystemValues(parameters=parameters, effects=job.effects)
 
-    runs = [
-        run_once(scenario, values(job.controller), values(job.plant), mass) for mass in scenario.load.mass_g
-    ]
+    runs = [run_once(scenario, values(job.controller), values(job.plant), mass) for mass in scenario.load.mass_g]
     if any(not run.started or run.status != "ok" for run in runs):
         return np.nan, np.nan
     error = 1e3 * np.concatenate([run.counted for run in runs])
@@ -95,7 +95,7 @@ def study(
     fractions = np.linspace(-1, 1, points)
     nominal = free_parameters.values(robot)
     cases = [nominal] + [one.at(fraction) for one in varied for fraction in fractions]
-    text, own = scenario.model_dump_json(), effects.values(robot)
+    text, own = scenario.model_dump_json(), catalogue.values(robot)
     jobs = [Job(text, case, nominal, own) for case in cases]
     settings = {"study": "closed loop", "scenario": text, "cases": [case.tolist() for case in cases]}
     kept = ProgressFile(keep, settings)
@@ -109,13 +109,9 @@ def study(
             advance(1)
     kept.save(found)
     if not np.isfinite(found[0]).all():
-        raise InputError(
-            Problem("even the controller that knows the robot fails in this scenario: `ctcr track` tells")
-        )
+        raise InputError(Problem("even the controller that knows the robot fails in this scenario: `ctcr track` tells"))
     mean, maximum = (np.array([one[k] for one in found[1:]]).reshape(len(varied), points) for k in (0, 1))
-    curves = [
-        Curve(one, fractions, mean[k] - found[0][0], maximum[k] - found[0][1]) for k, one in enumerate(varied)
-    ]  # fmt: skip
+    curves = [Curve(one, fractions, mean[k] - found[0][0], maximum[k] - found[0][1]) for k, one in enumerate(varied)]
     return ClosedLoop(found[0][0], found[0][1], curves)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ctcr.compare.figures import AXES, ERROR, FAINT
 from ctcr.sensitivity.closed_loop import ClosedLoop
 from ctcr.sensitivity.open_loop import OpenLoop
+from ctcr.show.style import AXES, ERROR, FAINT
 
 
 def bars(figure: Figure, study: OpenLoop) -> None:
@@ -13,14 +13,7 @@ def bars(figure: Figure, study: OpenLoop) -> None:
     axes = figure.subplots()
     order = [study.together, *sorted(study.influences, key=lambda one: one.p95)]
     place = np.arange(len(order))
-    axes.barh(
-        place,
-        [max(one.p95, 1e-4) for one in order],
-        color=ERROR,
-        alpha=0.8,
-        height=0.65,
-        label="95 % are below",
-    )
+    axes.barh(place, [max(one.p95, 1e-4) for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
     axes.plot([max(one.mean, 1e-4) for one in order], place, "D", color="#1c2733", ms=3.5, label="mean")
     axes.plot([max(one.maximum, 1e-4) for one in order], place, "|", color="#1c2733", ms=8, label="largest")
     axes.set_yticks(place, [one.name for one in order])
@@ -35,8 +28,14 @@ def curves(figure: Figure, study: ClosedLoop) -> None:
     for panel, kind in zip(panels, kinds, strict=False):
         for curve in (one for one in study.curves if one.varied.kind == kind):
             change = [curve.varied.change(fraction) for fraction in curve.fraction]
-            panel.plot(change, 1e3 * curve.maximum, "o-", ms=3, color=AXES[(curve.varied.tube - 1) % 3],
-                       label=f"tube {curve.varied.tube}")  # fmt: skip
+            panel.plot(
+                change,
+                1e3 * curve.maximum,
+                "o-",
+                ms=3,
+                color=AXES[(curve.varied.tube - 1) % 3],
+                label=f"tube {curve.varied.tube}",
+            )
         unit = next(one.varied.unit for one in study.curves if one.varied.kind == kind)
         panel.axhline(0, color=FAINT, lw=1)
         panel.set_title(kind, fontsize=9.5)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core, free_parameters
-from ctcr.robot import Robot
+from ctcr import _core
+from ctcr.model import parameters
+from ctcr.robot.description import Robot
 from ctcr.sensitivity.progress_file import ProgressFile
 from ctcr.sensitivity.ranges import Varied, together
 from ctcr.sensitivity.work import workers
@@ -51,10 +52,7 @@ class Totals:
         self.jobs += 1
 
     def as_state(self) -> dict[str, Any]:
-        return {
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in vars(self).items()
-        }
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(self).items()}
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> "Totals":
@@ -108,9 +106,16 @@ def work(job: Job) -> dict[str, Any]:
     result = _core.sensitivity(
         job.tubes,
         nominal=_core.SystemValues(parameters=job.nominal, effects=np.empty(0)),
-        varied=job.varied, low=job.low, high=job.high, most_force=job.most_force, seed=job.seed,
-        first_block=job.first_block, blocks=job.blocks, configurations=job.configurations, threads=job.threads,
-    )  # fmt: skip
+        varied=job.varied,
+        low=job.low,
+        high=job.high,
+        most_force=job.most_force,
+        seed=job.seed,
+        first_block=job.first_block,
+        blocks=job.blocks,
+        configurations=job.configurations,
+        threads=job.threads,
+    )
     names = ("count", "unsolved", "sum", "sum_of_squares", "maximum", "histogram", "evaluations")
     return {name: getattr(result, name) for name in names} | {"seconds": clock() - start}
 
@@ -134,13 +139,17 @@ def study(
     ends = np.array([one.at(fraction) for one in varied for fraction in (-1.0, 1.0)])
     low, high = together(robot, varied)
     jobs = [
-        Job(robot.n_tubes, free_parameters.values(robot), ends, low, high, most_force, seed, first, blocks, size, 1)
+        Job(robot.n_tubes, parameters.values(robot), ends, low, high, most_force, seed, first, blocks, size, 1)
         for first, blocks, size in _pieces(configurations)
-    ]  # fmt: skip
+    ]
     settings = {
-        "study": "open loop", "nominal": jobs[0].nominal.tolist(), "ends": ends.tolist(),
-        "configurations": configurations, "most_force": most_force, "seed": seed,
-    }  # fmt: skip
+        "study": "open loop",
+        "nominal": jobs[0].nominal.tolist(),
+        "ends": ends.tolist(),
+        "configurations": configurations,
+        "most_force": most_force,
+        "seed": seed,
+    }
     kept = ProgressFile(keep, settings)
     state = kept.load()
     totals = Totals.from_state(state) if state else Totals.empty(len(ends) + 1)
@@ -171,9 +180,12 @@ def _told(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:
         place = int(np.searchsorted(np.cumsum(histogram), 0.95 * count))
         p95 = min(EDGES_MM[place + 1], 1e3 * t.maximum[columns].max())
         return Influence(
-            name, 1e3 * t.sum[columns].sum() / count, p95, 1e3 * t.maximum[columns].max(),
+            name,
+            1e3 * t.sum[columns].sum() / count,
+            p95,
+            1e3 * t.maximum[columns].max(),
             int(t.unsolved[columns].sum()),
-        )  # fmt: skip
+        )
 
     each = [influence(one.name, slice(2 * k, 2 * k + 2)) for k, one in enumerate(varied)]
     all_at_once = influence("all together", slice(2 * len(varied), None))

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ctcr.errors import InputError, Problem, file_fault
-from ctcr.output import atomic_writer
+from ctcr.show.output import atomic_writer
 
 
 class ProgressFile:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ctcr import free_parameters
-from ctcr.robot import Robot
+from ctcr.model import parameters
+from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
 
@@ -34,13 +34,11 @@ class Varied:
 
 def all_varied(robot: Robot) -> list[Varied]:
     """The parameters of a robot: of each tube, then those of the tracker frame T_ref."""
-    names, nominal = free_parameters.names_of(robot.n_tubes), free_parameters.values(robot)
+    names, nominal = parameters.names_of(robot.n_tubes), parameters.values(robot)
     place = {name: i for i, name in enumerate(names)}
     found: list[Varied] = []
 
-    def add(
-        kind: str, tube: int | None, unit: str, low: float, high: float, changed: dict[str, Callable]
-    ) -> None:
+    def add(kind: str, tube: int | None, unit: str, low: float, high: float, changed: dict[str, Callable]) -> None:
         """`changed` {name: value at a change}."""
 
         def values(fraction: float) -> list[tuple[int, float]]:
@@ -72,9 +70,7 @@ def all_varied(robot: Robot) -> list[Varied]:
         if tube.bending_stiffness_Nm2 is None:
             add("Young's modulus", i, "GPa", -15, 15, shift(f"tubes.{i}.youngs_modulus", 1e9))
             inner, outer = tube.inner_diameter, tube.outer_diameter
-            wall = {
-                f"tubes.{i}.inner_diameter": lambda change, d=inner, o=outer: o - (o - d) * (1 + change / 100)
-            }
+            wall = {f"tubes.{i}.inner_diameter": lambda change, d=inner, o=outer: o - (o - d) * (1 + change / 100)}
             add("wall thickness", i, "%", -15, 15, wall)
         else:
             add("bending stiffness", i, "%", -25, 25, percent(f"tubes.{i}.bending_stiffness"))
@@ -98,15 +94,21 @@ def _turned(nominal: Array, places: list[int], k: int, axis: str) -> Varied:
         return x
 
     return Varied(
-        f"tracker rotation {axis}", f"tracker rotation {axis}", None, "deg", -3, 3, at,
+        f"tracker rotation {axis}",
+        f"tracker rotation {axis}",
+        None,
+        "deg",
+        -3,
+        3,
+        at,
         lambda fraction: [(places[k], fraction * limit)],
-    )  # fmt: skip
+    )
 
 
 def together(robot: Robot, varied: list[Varied]) -> tuple[Array, Array]:
     """Lowest and highest value of every parameter when all vary; the turn of the tracker frame counts from it."""
-    low = free_parameters.values(robot)
-    for i, name in enumerate(free_parameters.names_of(robot.n_tubes)):
+    low = parameters.values(robot)
+    for i, name in enumerate(parameters.names_of(robot.n_tubes)):
         if name.startswith("tracker.rotation."):
             low[i] = 0.0
     high = low.copy()

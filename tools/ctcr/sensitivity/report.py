@@ -3,15 +3,13 @@
 from pathlib import Path
 from typing import Any
 
-from ctcr import html_page
-from ctcr.html_page import bullets, figure, table
-from ctcr.output import atomic_writer
 from ctcr.sensitivity import figures, terminal
+from ctcr.show import html_page
+from ctcr.show.html_page import bullets, figure, table
+from ctcr.show.output import atomic_writer
 
 
-def write(
-    found: dict[str, Any], accuracy: float, target: str | Path, robot: str, scenario: str | None
-) -> None:
+def write(found: dict[str, Any], accuracy: float, target: str | Path, robot: str, scenario: str | None) -> None:
     """Writes the page. Raises InputError where the file cannot be written."""
     sections = ["<h1>Which parameters matter</h1>", bullets(terminal.closing(found, accuracy))]
     if "open_loop" in found:

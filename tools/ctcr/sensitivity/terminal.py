@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from ctcr import output
 from ctcr.sensitivity.advice import Advice, advise
 from ctcr.sensitivity.closed_loop import ClosedLoop
 from ctcr.sensitivity.open_loop import OpenLoop
+from ctcr.show import output
 
 OPEN_COLUMNS = ["mean, mm", "95 %, mm", "max, mm"]
 CLOSED_COLUMNS = ["range", "mean +um", "max +um"]
@@ -34,16 +34,15 @@ def open_rows(study: OpenLoop) -> list[list[str]]:
 def closed_rows(study: ClosedLoop) -> list[list[str]]:
     order = sorted(study.curves, key=lambda curve: -curve.worst_maximum)
     rows = [
-        [curve.varied.name, f"{curve.varied.low:+g} to {curve.varied.high:+g} {curve.varied.unit}".strip(),
-         f"{1e3 * curve.worst_mean:.1f}", f"{1e3 * curve.worst_maximum:.1f}"]
+        [
+            curve.varied.name,
+            f"{curve.varied.low:+g} to {curve.varied.high:+g} {curve.varied.unit}".strip(),
+            f"{1e3 * curve.worst_mean:.1f}",
+            f"{1e3 * curve.worst_maximum:.1f}",
+        ]
         for curve in order
-    ]  # fmt: skip
-    total = [
-        "all of them, worst case",
-        "",
-        f"{1e3 * study.cumulated_mean:.1f}",
-        f"{1e3 * study.cumulated_maximum:.1f}",
     ]
+    total = ["all of them, worst case", "", f"{1e3 * study.cumulated_mean:.1f}", f"{1e3 * study.cumulated_maximum:.1f}"]
     return [*rows, total]
 
 
@@ -83,26 +82,32 @@ def as_data(robot: str, found: dict[str, Any], accuracy: float) -> dict[str, Any
         study = found["open_loop"]
         rows = [*study.influences, study.together]
         data["open_loop"] = {
-            "configurations": study.configurations, "tips": study.solved, "evaluations": study.evaluations,
+            "configurations": study.configurations,
+            "tips": study.solved,
+            "evaluations": study.evaluations,
             "processor_s": study.seconds,
             "influence": {
                 one.name: {"mean_mm": one.mean, "p95_mm": one.p95, "max_mm": one.maximum, "unsolved": one.unsolved}
                 for one in rows
             },
-        }  # fmt: skip
+        }
     if "closed_loop" in found:
         loop = found["closed_loop"]
         data["closed_loop"] = {
-            "nominal_mean_mm": loop.nominal_mean, "nominal_max_mm": loop.nominal_maximum,
-            "cumulated_mean_mm": loop.cumulated_mean, "cumulated_max_mm": loop.cumulated_maximum,
+            "nominal_mean_mm": loop.nominal_mean,
+            "nominal_max_mm": loop.nominal_maximum,
+            "cumulated_mean_mm": loop.cumulated_mean,
+            "cumulated_max_mm": loop.cumulated_maximum,
             "influence": {
                 curve.varied.name: {
-                    "unit": curve.varied.unit, "change": [curve.varied.change(f) for f in curve.fraction],
-                    "mean_increase_mm": curve.mean, "max_increase_mm": curve.maximum,
+                    "unit": curve.varied.unit,
+                    "change": [curve.varied.change(f) for f in curve.fraction],
+                    "mean_increase_mm": curve.mean,
+                    "max_increase_mm": curve.maximum,
                 }
                 for curve in loop.curves
             },
-        }  # fmt: skip
+        }
     for kind, advice in advices(found, accuracy).items():
         data[kind]["calibrate"] = advice.calibrate
         data[kind]["error_mm"] = advice.error

@@ -22,9 +22,7 @@ def workers(address: str | None, threads: int | None = None) -> Iterator[Map]:
         count = threads or os.cpu_count() or 1
         with ThreadPoolExecutor(count) as pool:
             try:
-                yield lambda function, jobs: _in_order(
-                    pool.submit, function, jobs, 2 * count, lambda f: f.result()
-                )
+                yield lambda function, jobs: _in_order(pool.submit, function, jobs, 2 * count, lambda f: f.result())
             finally:
                 pool.shutdown(cancel_futures=True)  # an interruption does not wait for what has not begun
         return

@@ -7,13 +7,13 @@ from math import tau
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.devices.fault import DeviceFault
-from ctcr.devices.motors import Motors
-from ctcr.devices.sight import Sight, pose_of
-from ctcr.devices.transmission import turns_of_joints
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.motors import Motors
+from ctcr.bench.devices.sight import Sight, pose_of
+from ctcr.bench.devices.transmission import turns_of_joints
+from ctcr.bench.record.row_file import RowFile
 from ctcr.frames import matrix_from_quaternion
-from ctcr.record.row_file import RowFile
-from ctcr.robot import Robot
+from ctcr.robot.description import Robot
 from ctcr.track.recording import control_row
 
 Array = NDArray[np.float64]
@@ -46,9 +46,7 @@ class BenchRobot:
         if state["stopped"]:
             self.motors.wait()  # says why
         if state["limited"]:
-            raise DeviceFault(
-                "joints", "a limit of the bench file ended the motion", "change the path or the start"
-            )
+            raise DeviceFault("joints", "a limit of the bench file ended the motion", "change the path or the start")
         joints, pose = self.motors.joints, pose_of(frame)
         self._t = self.clock(frame.t)
         self.measurements.append([[self._t, self.run, *joints, *self.force, *pose]])

@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from ctcr.compare.figures import AXES, ERROR, FAINT
-from ctcr.robot import Robot
+from ctcr.robot.description import Robot
+from ctcr.show.style import AXES, ERROR, FAINT
 from ctcr.track.runs import Run
 from ctcr.track.scenario import TASKS, Scenario
 from ctcr.track.summary import by_mass, errors_mm
@@ -19,9 +19,14 @@ def boxes(figure: Figure, runs: list[Run]) -> bool | None:
     axes = figure.subplots()
     failed = [any(run.failed for run in group) for mass, group in by_mass(runs).items() if mass in groups]
     drawn = axes.boxplot(
-        list(groups.values()), tick_labels=[f"{mass:g} g" for mass in groups], whis=(0, 100), showmeans=True,
-        patch_artist=True, medianprops={"color": "#1c2733"}, meanprops={"marker": "D", "markersize": 4},
-    )  # fmt: skip
+        list(groups.values()),
+        tick_labels=[f"{mass:g} g" for mass in groups],
+        whis=(0, 100),
+        showmeans=True,
+        patch_artist=True,
+        medianprops={"color": "#1c2733"},
+        meanprops={"marker": "D", "markersize": 4},
+    )
     for box, bad in zip(drawn["boxes"], failed, strict=True):
         box.set(facecolor="#f2cdc6" if bad else "#cfe3ee")
     largest = [error.max() for error in groups.values()]
@@ -67,8 +72,6 @@ def tasks(figure: Figure, subject: tuple[Run, Scenario]) -> None:
     for place, k in enumerate(rows):
         gave = np.where(run.shortfall[:, k] > 1, place, np.nan)
         bottom.plot(run.time, gave, color=ERROR, lw=6, solid_capstyle="butt")
-    bottom.plot(
-        run.time, np.where(run.at_limit, len(rows), np.nan), color="#1c2733", lw=6, solid_capstyle="butt"
-    )
+    bottom.plot(run.time, np.where(run.at_limit, len(rows), np.nan), color="#1c2733", lw=6, solid_capstyle="butt")
     bottom.set(xlabel="time, s", ylim=(-0.6, len(rows) + 0.6))
     bottom.set_yticks(range(len(rows) + 1), [*(TASKS[k] for k in rows), "held at a limit"])

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ctcr import robot_file
-from ctcr.devices import bench_file
-from ctcr.devices.bench_file import Bench
-from ctcr.devices.motors import Motors
-from ctcr.devices.person import Person, person_of
-from ctcr.devices.private_folder import private_folder
-from ctcr.devices.real_time import CONTROLLER, real_time
-from ctcr.devices.sight import RATE_HZ, Sight
-from ctcr.devices.tracker import Tracker
+from ctcr.bench.devices import bench_file
+from ctcr.bench.devices.bench_file import Bench
+from ctcr.bench.devices.motors import Motors
+from ctcr.bench.devices.person import Person, person_of
+from ctcr.bench.devices.private_folder import private_folder
+from ctcr.bench.devices.real_time import CONTROLLER, real_time
+from ctcr.bench.devices.sight import RATE_HZ, Sight
+from ctcr.bench.devices.tracker import Tracker
+from ctcr.bench.record.folder import Folder
+from ctcr.bench.record.row_file import RowFile
 from ctcr.errors import InputError, Problem
-from ctcr.output import Progress
-from ctcr.record.folder import Folder
-from ctcr.record.row_file import RowFile
-from ctcr.robot import Robot
+from ctcr.robot import robot_file
+from ctcr.robot.description import Robot
+from ctcr.show.output import Progress
 from ctcr.track import scenario as scenario_file
 from ctcr.track.bench_robot import BenchRobot
 from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of, tips_at
@@ -29,9 +29,7 @@ from ctcr.track.scenario import Scenario
 
 PATIENCE_S = 2.0
 MOST_ERROR_MM = 20.0
-MOST_FEEDBACK = (
-    0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
-)
+MOST_FEEDBACK = 0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
 
 
 def track(
@@ -60,9 +58,7 @@ def track(
         tracker.connect()
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
         age = 1e-3 * devices.tracker.reading_age_ms
-        tracking = _Tracking(
-            loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm, age
-        )
+        tracking = _Tracking(loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm, age)
         try:
             with real_time(CONTROLLER):
                 tracking.run(person_of(devices, place), said)
@@ -95,12 +91,8 @@ def within(scenario: Scenario, bench: Bench, robot: Robot) -> Scenario:
         "tip_gap_mm": max(limits.tip_gap_mm, 2e3 * braking),
         "translation_mm_s": min(limits.translation_mm_s, 1e3 * float(axes.speeds[0])),
         "rotation_deg_s": min(limits.rotation_deg_s, float(np.rad2deg(axes.speeds[n]))),
-        "beta_low_mm": np.maximum(
-            low, -np.inf if limits.beta_low_mm is None else limits.beta_low_mm
-        ).tolist(),
-        "beta_high_mm": np.minimum(
-            high, np.inf if limits.beta_high_mm is None else limits.beta_high_mm
-        ).tolist(),
+        "beta_low_mm": np.maximum(low, -np.inf if limits.beta_low_mm is None else limits.beta_low_mm).tolist(),
+        "beta_high_mm": np.minimum(high, np.inf if limits.beta_high_mm is None else limits.beta_high_mm).tolist(),
     }
     changes = {
         "limits": limits.model_copy(update=tighter),
@@ -152,9 +144,17 @@ class _Tracking:
         self.sight.forget()
         with Progress(f"{mass:g} g, run {repetition}", 1.0) as progress:
             device = BenchRobot(
-                self._robot, motors, self.sight, self._folder.clock, self._folder.rows, self._control, entry["run"],
-                self._scenario.force(mass), self._most_error, progress.advance,
-            )  # fmt: skip
+                self._robot,
+                motors,
+                self.sight,
+                self._folder.clock,
+                self._folder.rows,
+                self._control,
+                entry["run"],
+                self._scenario.force(mass),
+                self._most_error,
+                progress.advance,
+            )
             run = run_once(self._scenario, values, device, mass, repetition, self._reading_age)
         if len(run.time):
             run = replace(run, tip=tips_at(run.time, run.time + self._reading_age, run.tip))

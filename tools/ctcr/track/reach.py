@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
-from ctcr.model import Model
-from ctcr.robot import Robot
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
 from ctcr.track.scenario import Limits, Scenario
 
 Array = NDArray[np.float64]
@@ -24,9 +24,7 @@ def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int 
     model, force = Model(robot), scenario.force(mass_g)[None]
     room = Room.of(robot, scenario.limits)
     corners = np.unique(scenario.trajectory.points, axis=0)
-    return max(
-        _nearest(model, force, room, corner, starts, np.random.default_rng(seed)) for corner in corners
-    )
+    return max(_nearest(model, force, room, corner, starts, np.random.default_rng(seed)) for corner in corners)
 
 
 @dataclass(frozen=True)
@@ -80,9 +78,7 @@ class Room:
         )
 
 
-def _nearest(
-    model: Model, force: Array, room: Room, target: Array, starts: int, random: np.random.Generator
-) -> float:
+def _nearest(model: Model, force: Array, room: Room, target: Array, starts: int, random: np.random.Generator) -> float:
     n, best = len(room.low), np.inf
 
     def squared_mm(x: Array) -> tuple[float, Array]:
@@ -94,8 +90,15 @@ def _nearest(
 
     for _ in range(starts):
         start = np.append(room.drawn(random), random.uniform(-np.pi, np.pi, n))
-        found = minimize(squared_mm, start, jac=True, method="SLSQP", bounds=room.bounds, constraints=room.constraint,
-                         options={"maxiter": 200, "ftol": 1e-9})  # fmt: skip
+        found = minimize(
+            squared_mm,
+            start,
+            jac=True,
+            method="SLSQP",
+            bounds=room.bounds,
+            constraints=room.constraint,
+            options={"maxiter": 200, "ftol": 1e-9},
+        )
         if room.holds(found.x):
             best = min(best, 1e-3 * np.sqrt(found.fun))
         if best < REACHED:

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import measurements
+from ctcr.bench.record.folder import TABLE, Folder
 from ctcr.frames import tracker_to_base
-from ctcr.number_table import read_columns
-from ctcr.record.folder import TABLE, Folder
-from ctcr.robot import Robot
+from ctcr.robot.description import Robot
+from ctcr.table import measurements
+from ctcr.table.csv_table import read_columns
 from ctcr.track.runs import Run, beside_obstacle
 from ctcr.track.scenario import TASKS, Scenario
 
@@ -15,25 +15,29 @@ Array = NDArray[np.float64]
 
 CONTROL = "control.csv"
 COLUMNS = (
-    "t_s", "run", "path_s", "wanted_x_m", "wanted_y_m", "wanted_z_m",
+    "t_s",
+    "run",
+    "path_s",
+    "wanted_x_m",
+    "wanted_y_m",
+    "wanted_z_m",
     *(f"shortfall_{task.replace(' ', '_')}" for task in TASKS),
-    "held_base_gaps", "held_tip_gaps", "held_travel", "held_speed",
-    "model_fx_N", "model_fy_N", "model_fz_N", "stability",
-)  # fmt: skip
+    "held_base_gaps",
+    "held_tip_gaps",
+    "held_travel",
+    "held_speed",
+    "model_fx_N",
+    "model_fy_N",
+    "model_fz_N",
+    "stability",
+)
 
 
 def control_row(t: float, run: int, result, row: int) -> list[float | str]:
     """A row of COLUMNS: row `row` of a LoopResult, whose reading came at `t` [s]."""
     wanted = map(repr, result.wanted[row].tolist())  # exact: whether a row counts must not hang on rounding
     columns = (result.shortfall, result.held, result.force)
-    return [
-        t,
-        run,
-        result.time[row],
-        *wanted,
-        *(v for column in columns for v in column[row]),
-        result.stability[row],
-    ]
+    return [t, run, result.time[row], *wanted, *(v for column in columns for v in column[row]), result.stability[row]]
 
 
 def finished(folder: Folder) -> list[dict]:
@@ -69,9 +73,20 @@ def tips_at(t: Array, when: Array, tip: Array) -> Array:
 def _run(entry: dict, scenario: Scenario, joints, tip, control) -> Run:
     path, wanted, shortfall, held, force, stability = np.split(control[:, 2:], _ENDS, axis=1)
     return Run(
-        entry["mass_g"], entry["repetition"], entry["status"], entry["settled_m"], path[:, 0], joints, tip, wanted,
-        shortfall, held.astype(np.int32), force, stability[:, 0], *beside_obstacle(scenario, tip, wanted),
-    )  # fmt: skip
+        entry["mass_g"],
+        entry["repetition"],
+        entry["status"],
+        entry["settled_m"],
+        path[:, 0],
+        joints,
+        tip,
+        wanted,
+        shortfall,
+        held.astype(np.int32),
+        force,
+        stability[:, 0],
+        *beside_obstacle(scenario, tip, wanted),
+    )
 
 
 _ENDS = np.cumsum([1, 3, len(TASKS), 4, 3])

@@ -3,10 +3,10 @@
 import html
 from pathlib import Path
 
-from ctcr import html_page
-from ctcr.html_page import bullets, cards, figure, table
-from ctcr.output import atomic_writer
-from ctcr.robot import Robot
+from ctcr.robot.description import Robot
+from ctcr.show import html_page
+from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.output import atomic_writer
 from ctcr.track import figures
 from ctcr.track.runs import FAILED, FAR, Run
 from ctcr.track.scenario import Scenario
@@ -60,18 +60,12 @@ def _opening(numbers: dict, scenario: Scenario) -> str:
     shown = []
     if done:
         shown += [
-            (
-                "good",
-                f"{max(f['mean_mm'] for f in done):.3f} mm",
-                "largest mean error of a weight that did not fail",
-            ),
+            ("good", f"{max(f['mean_mm'] for f in done):.3f} mm", "largest mean error of a weight that did not fail"),
             ("good", f"{max(f['max_mm'] for f in done):.2f} mm", "largest error of all these"),
         ]
     if scenario.obstacle:
         clearance = min(f["obstacle_mm"] for f in numbers.values())
-        shown.append(
-            ("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle")
-        )
+        shown.append(("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle"))
     shown.append(("error" if failed else "good", str(len(failed)), f"weights failed, of {len(numbers)}"))
     lead = f"<p class='lead'>{html.escape(scenario.about)}</p>" if scenario.about else ""
     return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}" + bullets(
@@ -85,10 +79,7 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) 
         f"means. Left out: references nearer than {1e3 * FAR:g} mm to the obstacle, where the tip has to deviate."
     )
     told = figure(figures.boxes, runs, 8.5, 3.8, text, wide=True)
-    columns = [
-        "weight",
-        *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS),
-    ]
+    columns = ["weight", *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS)]
     noise = "as measured, with noise" if measured else f"noise {scenario.noise_mm:g} mm a reading and axis"
     note = (
         f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
@@ -99,11 +90,13 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) 
 
 def _one(run: Run, scenario: Scenario, robot: Robot) -> str:
     drawn = figure(
-        figures.actuators, (run, robot, scenario), 10.4, 3.6,
-        "Grasped ends and angles of the tubes, with their limits; red: held at a limit.", wide=True,
-    )  # fmt: skip
-    gave = figure(
-        figures.tasks, (run, scenario), 10.4, 3.8, "The error, and when each task gave way.", wide=True
+        figures.actuators,
+        (run, robot, scenario),
+        10.4,
+        3.6,
+        "Grasped ends and angles of the tubes, with their limits; red: held at a limit.",
+        wide=True,
     )
+    gave = figure(figures.tasks, (run, scenario), 10.4, 3.8, "The error, and when each task gave way.", wide=True)
     heading = html.escape(f"{run.mass_g:g} g, run {run.repetition}: {run.verdict()}")
     return f"<h2>{heading}</h2>{drawn}{gave}"

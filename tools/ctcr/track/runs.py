@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core, effects, free_parameters
+from ctcr import _core
+from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
-from ctcr.robot import Robot
+from ctcr.model import parameters
+from ctcr.robot.description import Robot
 from ctcr.track.device import Device
 from ctcr.track.scenario import TASKS, Scenario, radians
 
@@ -107,9 +109,7 @@ def _limit(kind: int, tube: int, n: int) -> str:
 
 def system_values(robot: Robot, steps: int = 1) -> _core.SystemValues:
     """The robot with its effects as the compiled library takes it."""
-    return _core.SystemValues(
-        parameters=free_parameters.values(robot), effects=effects.values(robot), steps=steps
-    )
+    return _core.SystemValues(parameters=parameters.values(robot), effects=catalogue.values(robot), steps=steps)
 
 
 def run_once(
@@ -137,32 +137,62 @@ def run_once(
         device=None if simulated else plant,
         tasks=_core.TaskValues(
             weights=np.array([getattr(tasks, name.replace(" ", "_")) for name in TASKS]),
-            gain=tasks.feedback_per_s, correction=1e-3 * tasks.fastest_feedback_mm_s, tracking_tolerance=1e-3,
-            damping_translation=20e-3, damping_rotation=2.0,
-            avoidance_rate=tasks.limit_rate_per_s, comfort=5e-3 + 1e-3 * max(limits.base_gap_mm, limits.tip_gap_mm),
+            gain=tasks.feedback_per_s,
+            correction=1e-3 * tasks.fastest_feedback_mm_s,
+            tracking_tolerance=1e-3,
+            damping_translation=20e-3,
+            damping_rotation=2.0,
+            avoidance_rate=tasks.limit_rate_per_s,
+            comfort=5e-3 + 1e-3 * max(limits.base_gap_mm, limits.tip_gap_mm),
             obstacle=1e-3 * np.array(obstacle.centre_mm) if obstacle else np.zeros(3),
             obstacle_radius=1e-3 * obstacle.radius_mm if obstacle else 0.0,
-            strength=tasks.obstacle_strength_m3_s, range=FAR, stability=tasks.stability_wanted, stability_rate=1.0,
+            strength=tasks.obstacle_strength_m3_s,
+            range=FAR,
+            stability=tasks.stability_wanted,
+            stability_rate=1.0,
             posture_beta=per_tube(tasks.posture_beta_mm, 1e-3, 0.0),
-            posture_alpha=per_tube(tasks.posture_alpha_deg, np.pi / 180, 0.0), posture_rate=tasks.posture_rate_per_s,
+            posture_alpha=per_tube(tasks.posture_alpha_deg, np.pi / 180, 0.0),
+            posture_rate=tasks.posture_rate_per_s,
         ),
         limits=_core.LimitValues(
-            base_gap=1e-3 * limits.base_gap_mm, tip_gap=1e-3 * limits.tip_gap_mm,
-            translation_speed=1e-3 * limits.translation_mm_s, rotation_speed=np.radians(limits.rotation_deg_s),
+            base_gap=1e-3 * limits.base_gap_mm,
+            tip_gap=1e-3 * limits.tip_gap_mm,
+            translation_speed=1e-3 * limits.translation_mm_s,
+            rotation_speed=np.radians(limits.rotation_deg_s),
             beta_low=per_tube(limits.beta_low_mm, 1e-3, -np.inf),
-            beta_high=per_tube(limits.beta_high_mm, 1e-3, np.inf), redistribute=limits.at_limits == "redistribute",
+            beta_high=per_tube(limits.beta_high_mm, 1e-3, np.inf),
+            redistribute=limits.at_limits == "redistribute",
         ),
-        points=s.trajectory.points, spline=s.trajectory.kind == "spline", speed=1e-3 * s.trajectory.speed_mm_s,
-        acceleration=1e-3 * s.trajectory.acceleration_mm_s2, period=1 / s.rate_Hz, settle=s.start.settle_s,
-        beta=1e-3 * np.array(s.start.beta_mm), alpha=radians(s.start.alpha_deg), force=s.force(mass_g),
-        tip_force=s.load.controller, noise_position=1e-3 * s.noise_mm, noise_rotation=np.radians(s.noise_deg),
-        seed=seed, reading_age=reading_age,
-    )  # fmt: skip
+        points=s.trajectory.points,
+        spline=s.trajectory.kind == "spline",
+        speed=1e-3 * s.trajectory.speed_mm_s,
+        acceleration=1e-3 * s.trajectory.acceleration_mm_s2,
+        period=1 / s.rate_Hz,
+        settle=s.start.settle_s,
+        beta=1e-3 * np.array(s.start.beta_mm),
+        alpha=radians(s.start.alpha_deg),
+        force=s.force(mass_g),
+        tip_force=s.load.controller,
+        noise_position=1e-3 * s.noise_mm,
+        noise_rotation=np.radians(s.noise_deg),
+        seed=seed,
+        reading_age=reading_age,
+    )
     return Run(
-        mass_g, seed, result.status, result.settled, result.time, result.joints, result.tip, result.wanted,
-        result.shortfall, result.held, result.force, result.stability,
+        mass_g,
+        seed,
+        result.status,
+        result.settled,
+        result.time,
+        result.joints,
+        result.tip,
+        result.wanted,
+        result.shortfall,
+        result.held,
+        result.force,
+        result.stability,
         *beside_obstacle(s, result.tip, result.wanted),
-    )  # fmt: skip
+    )
 
 
 def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[NDArray[np.bool_], float]:
@@ -215,9 +245,7 @@ def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:
     problems = []
     for kind, one in (("robot", robot), ("plant", plant)):
         if one.n_tubes != len(scenario.start.beta_mm):
-            text = (
-                f"the {kind} has {one.n_tubes} tubes, the scenario starts with {len(scenario.start.beta_mm)}"
-            )
+            text = f"the {kind} has {one.n_tubes} tubes, the scenario starts with {len(scenario.start.beta_mm)}"
             problems.append(scenario.problem(text, "start", "beta_mm"))
         if one.tracker.sensor_on_tube != 1:
             text = f"the sensor of the {kind} is on tube {one.tracker.sensor_on_tube}: control needs it on tube 1"
@@ -232,14 +260,10 @@ def _excluded(scenario: Scenario, robot: Robot) -> list[Problem]:
     beta = np.array(scenario.start.beta_mm)
     tips = np.array([tube.length_mm for tube in robot.tubes]) + beta
     found, n = [], robot.n_tubes
-    for kind, (name, least) in enumerate(
-        (("base", scenario.limits.base_gap_mm), ("tip", scenario.limits.tip_gap_mm))
-    ):
+    for kind, (name, least) in enumerate((("base", scenario.limits.base_gap_mm), ("tip", scenario.limits.tip_gap_mm))):
         gaps = -np.diff(np.append(tips, 0)) if kind else np.diff(np.append(beta, 0))
         for tube in np.flatnonzero(gaps < least):
-            text = (
-                f"{_limit(kind, tube, n)}: {gaps[tube]:g} mm, but limits.{name}_gap_mm asks for {least:g} mm"
-            )
+            text = f"{_limit(kind, tube, n)}: {gaps[tube]:g} mm, but limits.{name}_gap_mm asks for {least:g} mm"
             found.append(scenario.problem(f"the limits exclude the start: {text}", "start", "beta_mm"))
     for low, high in ((scenario.limits.beta_low_mm, scenario.limits.beta_high_mm),):
         for tube in range(n):

@@ -15,11 +15,11 @@ from annotated_types import Len
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationError
 
-from ctcr import yaml_document
 from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
-from ctcr.quantities import Quantity
-from ctcr.robot import Section, Three
-from ctcr.robot_checks import path_text
+from ctcr.robot import yaml_document
+from ctcr.robot.checks import path_text
+from ctcr.robot.description import Section, Three
+from ctcr.robot.units import Quantity
 
 Array = NDArray[np.float64]
 
@@ -30,9 +30,7 @@ TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stabil
 MOST_BYTES = 1 << 18
 
 Lengths = Annotated[list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")]
-Weight = Annotated[
-    list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)
-]
+Weight = Annotated[list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)]
 
 
 class Trajectory(Section):
@@ -80,9 +78,7 @@ class Tasks(Section):
     obstacle_strength_m3_s: Annotated[float, Quantity("m^3/s", usual=(1e-6, 100), least=0)] = 0.1
     stability_wanted: Annotated[float, Quantity("", usual=(0.01, 1), least=0)] = 0.3
     posture_beta_mm: Lengths = None
-    posture_alpha_deg: Annotated[
-        list[float] | None, Quantity("deg", usual=(0, 720), count="one number a tube,")
-    ] = None
+    posture_alpha_deg: Annotated[list[float] | None, Quantity("deg", usual=(0, 720), count="one number a tube,")] = None
     posture_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 10), least=0)] = 0.1
 
 
@@ -108,13 +104,9 @@ class Obstacle(Section):
 class TipLoad(Section):
     """Weights that hang at the tip; `direction` in the base frame is that of their pull."""
 
-    mass_g: Annotated[
-        list[float], Len(1), Quantity("g", usual=(0.1, 500), least=0, count="a list of numbers")
-    ] = [0.0]
+    mass_g: Annotated[list[float], Len(1), Quantity("g", usual=(0.1, 500), least=0, count="a list of numbers")] = [0.0]
     direction: Annotated[Three, Quantity("", usual=(0, 1), count="three numbers")] = [0.0, -1.0, 0.0]
-    controller: Literal["unknown", "known", "estimated"] = Field(
-        "unknown", description="unknown, known or estimated"
-    )
+    controller: Literal["unknown", "known", "estimated"] = Field("unknown", description="unknown, known or estimated")
 
 
 class Scenario(Section):
@@ -146,8 +138,13 @@ class Scenario(Section):
 
 
 _SECTIONS = {
-    "trajectory": Trajectory, "start": Start, "tasks": Tasks, "limits": Limits, "obstacle": Obstacle, "load": TipLoad,
-}  # fmt: skip
+    "trajectory": Trajectory,
+    "start": Start,
+    "tasks": Tasks,
+    "limits": Limits,
+    "obstacle": Obstacle,
+    "load": TipLoad,
+}
 
 
 def shipped(name: str) -> Scenario:
@@ -175,9 +172,7 @@ def parse(text: str, file: str, n_tubes: int) -> Scenario:
     """The scenario described by a text; `file` is its name in errors."""
     document = yaml_document.parse(text, file)
     if not isinstance(document.data, dict):
-        raise InputError(
-            Problem("does not describe a scenario: no fields such as name, trajectory, start", file)
-        )
+        raise InputError(Problem("does not describe a scenario: no fields such as name, trajectory, start", file))
     scenario, faults = None, []
     try:
         scenario = Scenario.model_validate(document.data)
@@ -220,8 +215,14 @@ def _relations(s: Scenario, n: int):
             yield ("trajectory", "points_mm"), f"a {t.kind} needs at least {least} different points"
         elif t.kind == "spline" and (np.linalg.norm(np.diff(t.points_mm, axis=0), axis=1) == 0).any():
             yield ("trajectory", "points_mm"), "a point of a spline may not follow itself"
-    per_tube = [("start", "beta_mm"), ("start", "alpha_deg"), ("tasks", "posture_beta_mm"),
-                ("tasks", "posture_alpha_deg"), ("limits", "beta_low_mm"), ("limits", "beta_high_mm")]  # fmt: skip
+    per_tube = [
+        ("start", "beta_mm"),
+        ("start", "alpha_deg"),
+        ("tasks", "posture_beta_mm"),
+        ("tasks", "posture_alpha_deg"),
+        ("limits", "beta_low_mm"),
+        ("limits", "beta_high_mm"),
+    ]
     for section, field in per_tube:
         values = getattr(getattr(s, section), field)
         if values is not None and len(values) != n:

@@ -11,9 +11,7 @@ COLUMNS = ["mean", "p99.8", "max", "< 1 mm, %", "obstacle", "failed"]
 
 def by_mass(runs: list[Run]) -> dict[float, list[Run]]:
     """The runs of each weight [g], in order."""
-    return {
-        mass: [run for run in runs if run.mass_g == mass] for mass in sorted({run.mass_g for run in runs})
-    }
+    return {mass: [run for run in runs if run.mass_g == mass] for mass in sorted({run.mass_g for run in runs})}
 
 
 def errors_mm(runs: list[Run]) -> np.ndarray:
@@ -53,7 +51,14 @@ def rows(numbers: dict[str, dict[str, Any]]) -> list[list[str]]:
         return "-" if value is None or not np.isfinite(value) else format(value, form)
 
     return [
-        [weight, text(f["mean_mm"]), text(f["p99_8_mm"]), text(f["max_mm"]), text(f["below_1_mm_percent"], ".2f"),
-         text(f["obstacle_mm"], ".2f"), f"{f['failed']} of {f['runs']}"]
+        [
+            weight,
+            text(f["mean_mm"]),
+            text(f["p99_8_mm"]),
+            text(f["max_mm"]),
+            text(f["below_1_mm_percent"], ".2f"),
+            text(f["obstacle_mm"], ".2f"),
+            f"{f['failed']} of {f['runs']}",
+        ]
         for weight, f in numbers.items()
-    ]  # fmt: skip
+    ]

@@ -1,0 +1,116 @@
+"""Motion that a table leaves out is seen where readings return to joints; and only there."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr.audit import missing_motion
+from ctcr.diagnose import add, diagnose
+from ctcr.model import simulation
+from ctcr.robot import robot_file
+from ctcr.table.measurements import Measurements
+
+STOPS, RUNS = 7, 12
+FRICTION = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(Path(__file__).parents[3] / "examples" / "robots" / "table2.yaml")
+
+
+def sweeps(plan: Measurements) -> tuple[Measurements, np.ndarray]:
+    """Out, back, to the end once more and back to the middle, run by run; and which rows are that way to the end."""
+    rng = np.random.default_rng(5)
+    out = np.linspace(0, 1, STOPS)
+    way = np.r_[out, out[-2::-1], 1.0, 0.5]
+    starts = rng.choice(len(plan), RUNS, replace=False)
+    turn = rng.uniform(0.5, 1.2, (RUNS, 3)) * rng.choice([-1, 1], (RUNS, 3))
+    alpha = np.concatenate([plan.alpha[k] + way[:, None] * t for k, t in zip(starts, turn, strict=True)])
+    count = len(way)
+    hidden = np.tile(np.arange(count) == count - 2, RUNS)
+    return Measurements(
+        t=2.0 * np.arange(RUNS * count),
+        run=np.repeat(np.arange(RUNS), count),
+        beta=np.repeat(plan.beta[starts], count, axis=0),
+        alpha=alpha,
+        force=np.zeros((RUNS * count, 3)),
+        position=None,
+        quaternion=None,
+        row=np.arange(RUNS * count) + 2,
+    ), hidden
+
+
+def rows_of(table: Measurements, kept: np.ndarray) -> Measurements:
+    columns = {f.name: getattr(table, f.name) for f in fields(table) if f.name not in ("warnings", "from_home")}
+    return replace(table, **{name: None if old is None else old[kept] for name, old in columns.items()})
+
+
+@pytest.fixture(scope="module")
+def rubbing(robot):
+    return add.with_values(robot, ["friction"], FRICTION)
+
+
+@pytest.fixture(scope="module")
+def left_out(rubbing, plan):
+    """Readings of a robot with friction whose way round was not recorded, and the whole table."""
+    whole, hidden = sweeps(plan)
+    made = simulation.simulate(rubbing, whole, "realistic", seed=2)
+    return rows_of(made, ~hidden), made
+
+
+def test_the_way_is_put_back(robot, left_out):
+    table, whole = left_out
+    found, said = missing_motion.completed(robot, table)
+    assert len(said) == 1
+    assert f"{RUNS} readings" in said[0]
+    assert len(found) == len(whole)
+    np.testing.assert_allclose(found.alpha, whole.alpha, atol=1e-12)
+    np.testing.assert_array_equal(found.run, whole.run)
+    assert np.isnan(found.position[15::16]).all() == np.isnan(found.quaternion[15::16]).all()
+    assert np.sum(np.isnan(found.position).any(axis=1)) == RUNS
+    assert (np.diff(found.t) > 0).all()
+    assert (np.diff(found.row) >= 0).all()
+    again, nothing = missing_motion.completed(robot, found)
+    assert len(again) == len(found)
+    assert not nothing
+
+
+def test_the_error_is_that_of_the_whole_table(robot, left_out):
+    """Without the way the readings at its end miss by millimetres."""
+    table, whole = left_out
+    added = add.add(robot, table, ["friction"])
+    assert any("without a reading" in notice for notice in added.notices)
+    rms = added.rms("rms_mm")
+    assert rms["friction"] < 1.15 * add.add(robot, whole, ["friction"]).rms("rms_mm")["friction"]
+
+
+def test_a_diagnosis_says_so(robot, left_out):
+    result = diagnose(robot, left_out[0])
+    assert result.accepted[0].ids[0] == "friction"
+    assert any("without a reading" in notice for notice in result.notices)
+    assert 0 < result.judged.sum() < result.locked.sum()  # a way that was put back is no reading
+
+
+@pytest.mark.parametrize("noise", ["jitter", "realistic"])
+def test_what_came_straight_is_left_alone(robot, rubbing, plan, noise):
+    whole, hidden = sweeps(plan)
+    table = simulation.simulate(rubbing, rows_of(whole, ~hidden), noise, seed=3)
+    assert missing_motion.completed(robot, table) == (table, [])
+
+
+def test_without_memory_there_is_nothing_to_see(robot, plan):
+    whole, hidden = sweeps(plan)
+    table = rows_of(simulation.simulate(robot, whole, "realistic", seed=4), ~hidden)
+    assert missing_motion.completed(robot, table) == (table, [])
+
+
+def test_a_table_without_poses_or_times_is_no_obstacle(robot, left_out):
+    table = left_out[0]
+    silent = robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"jitter_mm": None})})
+    assert missing_motion.completed(silent, table) == (table, [])
+    assert missing_motion.completed(robot, replace(table, position=None))[1] == []
+    found, said = missing_motion.completed(robot, replace(table, t=np.full(len(table), np.nan)))
+    assert len(said) == 1
+    assert np.isnan(found.t).all()

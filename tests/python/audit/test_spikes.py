@@ -1,0 +1,147 @@
+"""Spikes of the tracker are told from what a robot does to its tip, and judge no model."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.audit import spikes
+from ctcr.diagnose import add, diagnose
+from ctcr.model import simulation
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+from ctcr.table.measurements import Measurements
+
+TABLE2 = Path(__file__).parents[3] / "examples" / "robots" / "table2.yaml"
+STOPS, RUNS = 13, 12
+EFFECTS = {
+    "friction": {f"effects.friction.coefficient.{i}": 0.08 for i in (1, 2, 3)},
+    "backlash_rotation": {f"effects.backlash_rotation.play.{i}": 0.15 for i in (1, 2, 3)},
+    "contact": {"effects.contact.stiffness": 200.0, "effects.contact.distance": 0.02},
+    "frame_jump": {"effects.frame_jump.y": 0.02, "effects.frame_jump.when": 0.5},
+    "softening": {f"effects.softening.gamma.{i}": 0.01 for i in (1, 2, 3)},
+}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(TABLE2)
+
+
+@pytest.fixture(scope="module")
+def paths(plan):
+    """Out and back, run by run, under three loads: each step moves the tip by a few millimetres."""
+    rng = np.random.default_rng(11)
+    out = np.linspace(0, 1, STOPS)
+    way = np.r_[out, out[-2::-1]]
+    starts = rng.choice(len(plan), RUNS, replace=False)
+    turn = rng.uniform(0.3, 0.8, (RUNS, 3)) * rng.choice([-1, 1], (RUNS, 3))
+    count = RUNS * len(way)
+    force = np.zeros((count, 3))
+    force[:, 1] = -0.1 * np.repeat(np.arange(RUNS) % 3, len(way))
+    return Measurements(
+        t=2.0 * np.arange(count),
+        run=np.repeat(np.arange(RUNS), len(way)),
+        beta=np.repeat(plan.beta[starts], len(way), axis=0),
+        alpha=np.concatenate([plan.alpha[k] + way[:, None] * t for k, t in zip(starts, turn, strict=True)]),
+        force=force,
+        position=None,
+        quaternion=None,
+        row=np.arange(count) + 2,
+    )
+
+
+def measured(robot, paths, effect=None, seed=1):
+    hidden = add.with_values(robot, [effect], EFFECTS[effect]) if effect else robot
+    return simulation.simulate(hidden, paths, "jitter", seed=seed)
+
+
+def struck(table, rows, size=0.03, seed=1):
+    """The table with readings that are off by `size` [m]."""
+    way = np.random.default_rng(seed).normal(size=(len(rows), 3))
+    position = table.position.copy()
+    position[rows] += size * way / np.linalg.norm(way, axis=1)[:, None]
+    return replace(table, position=position)
+
+
+def interior(rng, count):
+    """Rows of as many runs between their start and where they turn."""
+    runs = rng.choice(RUNS, count, replace=False)
+    return np.sort(runs * (2 * STOPS - 1) + rng.integers(2, STOPS - 2, count))
+
+
+@pytest.mark.parametrize("effect", [None, *EFFECTS])
+def test_all_spikes_are_found_and_nothing_else(robot, paths, effect):
+    table = measured(robot, paths, effect)
+    assert np.isnan(spikes.leaps(robot, table)).all()
+    assert spikes.left_out(robot, table) == (table, [])
+    rows = interior(np.random.default_rng(3), 8)
+    with_spikes = struck(table, rows)
+    leap = spikes.leaps(robot, with_spikes)
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(leap)), rows)
+    assert (leap[rows] > 0.02).all()
+    rest, said = spikes.left_out(robot, with_spikes)
+    assert len(said) == 1
+    assert "8 readings leap" in said[0]
+    assert str(rows[0] + 2) in said[0]  # as the table numbers it
+    assert np.isnan(rest.position[rows]).all()
+    assert np.isnan(rest.quaternion[rows]).all()
+    np.testing.assert_array_equal(np.delete(rest.position, rows, axis=0), np.delete(table.position, rows, axis=0))
+
+
+def test_where_neighbours_do_not_say_it_a_reading_stays(robot, paths):
+    """At the ends of a run, where a path turns, beside another spike, and where the joints move the tip as far."""
+    table, length = measured(robot, paths), 2 * STOPS - 1
+    for rows in ([0], [length - 1], [length], [STOPS - 1], [5, 6]):
+        assert np.isnan(spikes.leaps(robot, struck(table, rows))).all()
+    assert np.isnan(spikes.leaps(robot, struck(table, [5], size=3e-4))).all()
+    every = np.arange(0, len(table), 6)
+    names = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+    coarse = replace(table, **{name: getattr(table, name)[every] for name in names})
+    assert np.isnan(spikes.leaps(robot, struck(coarse, [2], size=0.004))).all()
+
+
+def test_a_model_that_has_another_frame_finds_the_same(robot, paths):
+    """Only steps are compared: a frame that nobody registered yet moves all of them alike."""
+    table = struck(measured(robot, paths), rows := [7, 60, 111])
+    moved = robot.model_copy(deep=True)
+    moved.tracker.position_mm = [400.0, -300.0, 200.0]
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(spikes.leaps(moved, table))), rows)
+
+
+def test_a_table_without_positions_or_jitter_is_no_obstacle(robot, paths):
+    table = struck(measured(robot, paths), [7])
+    silent = robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"jitter_mm": None})})
+    assert spikes.left_out(silent, table) == (table, [])
+    without = replace(table, position=None)
+    assert spikes.left_out(robot, without) == (without, [])
+
+
+def test_the_error_falls_in_spite_of_spikes(robot, paths):
+    table = measured(robot, paths, "softening")
+    rows = interior(np.random.default_rng(5), 10)
+    plain, result = (diagnose(robot, readings) for readings in (table, struck(table, rows)))
+    assert result.verdict.word == plain.verdict.word
+    assert [a.ids for a in result.accepted] == [a.ids for a in plain.accepted] == [["softening"]]
+    assert result.rms_mm["with_effects"] == pytest.approx(plain.rms_mm["with_effects"], rel=0.1)
+    assert result.judged.sum() < plain.judged.sum()
+    assert any("spikes of the tracker" in notice for notice in result.notices)
+
+
+def test_a_comparison_counts_no_spikes_and_says_so(robot, paths, tmp_path, capsys):
+    table = struck(measured(robot, paths), [7, 60])
+    header = measurements.column_names(3)
+    rows = np.column_stack([table.t, table.run, table.beta, table.alpha, table.force, table.position, table.quaternion])
+    np.savetxt(tmp_path / "table.csv", rows, delimiter=",", header=",".join(header), comments="")
+    numbers, page = tmp_path / "numbers.json", tmp_path / "page.html"
+    files = ["--json", str(numbers), "--report", str(page)]
+    assert cli.run(["compare", str(TABLE2), str(tmp_path / "table.csv"), *files]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "2 readings leap" in said
+    assert "rows 9, 62" in said
+    found = json.loads(numbers.read_text())
+    assert found["position_mm"]["maximum"] < 0.5
+    assert found["rows"]["not_measured"] == [9, 62]
+    assert found["notices"][0] in page.read_text(encoding="utf-8")

@@ -1,0 +1,339 @@
+"""The tracker: protocol, driver, simulator, and two clients written by others that take the simulator for an Aurora."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.bench.devices import ndi_protocol as ndi
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.ndi_replies import Garbled, parse_bx, parse_tx
+from ctcr.bench.devices.private_folder import private_folder
+from ctcr.bench.devices.transmission import joints_of_turns, turns_of_joints
+from ctcr.bench.simulators.aurora import FAULTS
+from ctcr.bench.simulators.aurora_device import AuroraDevice, Sight
+from ctcr.bench.simulators.control import request
+from ctcr.bench.simulators.faults import Faults, Scenario
+from ctcr.bench.simulators.motors import shared_motors
+from ctcr.errors import InputError
+from ctcr.frames import angle_between, base_to_tracker
+from ctcr.model.model import Model
+from ctcr.robot import robot_file
+from simulated_bench import ROBOT, ctcr, running
+
+SENSOR = 0x0A
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a running simulator of the demo robot, without noise."""
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    folder = tmp_path_factory.mktemp("bench")
+    with running(*ctcr("sim", "aurora", ROBOT, "--noise", "none", "--folder", folder)):
+        yield folder
+
+
+@pytest.fixture
+def port(folder):
+    """The port of a tracker without faults, just switched on."""
+    request(folder, "aurora", {"faults": dict(FAULTS), "break": True})
+    time.sleep(0.3)
+    return str(folder / "aurora")
+
+
+def tracker(port, **options):
+    from ctcr.bench.devices.aurora import Aurora
+
+    return Aurora(port, **options)
+
+
+def set_faults(folder, **faults):
+    return request(folder, "aurora", {"faults": faults})
+
+
+# ---- protocol
+
+
+def test_crc():
+    assert ndi.framed(b"INIT:") == b"INIT:E3A5\r"
+    assert ndi.framed(b"OKAY") == b"OKAYA896\r"
+    assert ndi.framed(b"RESET") == ndi.RESET_MESSAGE
+
+
+def tracking_device(see) -> AuroraDevice:
+    device = AuroraDevice(see)
+    for command in (b"INIT ", b"PINIT 0A", b"PINIT 0B", b"PINIT 0C", b"PENA 0AD", b"PENA 0BD", b"TSTART 80"):
+        assert device.answer(command) == ndi.framed(b"OKAY"), command
+    return device
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_replies_come_back_as_they_were_sent(seed):
+    rng = np.random.default_rng(seed)
+    quaternion = rng.standard_normal(4)
+    quaternion /= np.linalg.norm(quaternion)
+    position = rng.uniform(-0.5, 0.5, 3)
+    sights = {0x0A: Sight((position, quaternion), bool(rng.integers(2))), 0x0B: Sight(None)}
+    device = tracking_device(lambda handle, frame: sights[handle])
+    text, binary = device.answer(b"TX 0801"), device.answer(b"BX 0801")
+    assert text[-5:] == b"%04X\r" % ndi.crc16(text[:-5])
+    for readings, precision in ((parse_tx(text[:-5])[0], 6e-6), (parse_bx(binary[6:-2])[0], 1e-7)):
+        seen, missing = readings[:2]
+        assert seen.handle == SENSOR and missing.position is None and missing.handle == 0x0B
+        assert seen.out_of_volume == sights[SENSOR].out_of_volume
+        np.testing.assert_allclose(seen.position, position, atol=precision)
+        np.testing.assert_allclose(seen.quaternion, quaternion, atol=6e-5)
+    assert len(parse_tx(text[:-5])[0]) == 3  # 0C is told as disabled
+    assert device.answer(b"TX 0001")[2:11] == (b"0AMISSING" if sights[SENSOR].out_of_volume else text[2:11])
+
+
+def test_damaged_replies_are_garbled():
+    device = tracking_device(lambda handle, frame: Sight((np.zeros(3), np.array([1.0, 0, 0, 0]))))
+    text, body = device.answer(b"TX 0801")[:-5], device.answer(b"BX 0801")[6:-2]
+    for cut in range(1, len(text) - 4, 7):
+        with pytest.raises(Garbled):
+            parse_tx(text[:cut])
+    for cut in range(len(body) - 1):
+        with pytest.raises(Garbled):
+            parse_bx(body[:cut])
+
+
+@pytest.mark.parametrize(
+    ("before", "command", "code"),
+    [
+        ([], b"PHSR 00", 0x10),
+        ([], b"NOPE ", 0x01),
+        ([], b"INIT:0000", 0x04),
+        ([], b"INIT:12", 0x03),
+        ([], b"COMM 90000", 0x06),
+        ([], b"COMM 5", 0x07),
+        ([b"INIT "], b"TX 0001", 0x0C),
+        ([b"INIT "], b"PINIT 77", 0x08),
+        ([b"INIT "], b"PINIT 0B", 0x08),
+        ([b"INIT "], b"PENA 0AD", 0x0E),
+        ([b"INIT ", b"PINIT 0A"], b"PENA 0AX", 0x09),
+        ([b"INIT ", b"TSTART 80"], b"PINIT 0A", 0x0C),
+        ([b"INIT "], b"PHRQ 1", 0x2D),
+    ],
+)
+def test_refusals(before, command, code):
+    device = AuroraDevice(lambda handle, frame: Sight(None))
+    for earlier in before:
+        device.answer(earlier)
+    assert device.answer(command) == ndi.framed(b"ERROR%02X" % code)
+    assert code in ndi.ERRORS
+
+
+# ---- driver on the simulator
+
+
+@pytest.mark.parametrize("replies", ["BX", "TX"])
+def test_driver_reads_the_pose_of_the_model(port, folder, replies):
+    robot = robot_file.load(ROBOT)
+    joints = np.array([-0.31, -0.23, -0.15, 0.4, -1.2, 2.0])
+    turns = np.zeros(8)
+    turns[:6] = turns_of_joints(robot, joints)
+    np.testing.assert_allclose(joints_of_turns(robot, turns[:6]), joints, atol=1e-15)
+    shared_motors(folder, writer=True).write(t=time.monotonic(), turns=turns)
+    expected = Model(robot, steps=2).predict(joints[None, :3], joints[None, 3:])
+    position, quaternion = base_to_tracker(robot.tracker, expected.position[0], expected.quaternion[0])
+    with tracker(port, replies=replies) as aurora:
+        aurora.connect()
+        assert [tool.handle for tool in aurora.tools] == [0x0A, 0x0B, 0x0C]
+        assert "Freeze Tag" in aurora.version and aurora.tools[0].serial_number == "1B0E8C01"
+        time.sleep(0.1)
+        reading = aurora.read().readings[0]
+    np.testing.assert_allclose(reading.position, position, atol=2e-5)
+    assert angle_between(np.array(reading.quaternion), quaternion) < 1e-3
+    (folder / "motors").unlink()
+
+
+@pytest.mark.slow  # asks that nothing else keeps the machine busy
+def test_every_frame_is_read_once(port):
+    with tracker(port) as aurora:
+        aurora.connect()
+        frames, end = [], time.monotonic() + 1.0
+        while time.monotonic() < end:
+            frames.append(aurora.read().readings[0].frame)
+    numbers = sorted(set(frames))
+    assert 36 <= len(numbers) <= 42
+    assert len(numbers) >= 0.9 * (numbers[-1] - numbers[0] + 1)
+
+
+@pytest.mark.slow
+def test_answers_take_the_time_of_the_line(port):
+    with tracker(port, baud=9600, replies="TX") as aurora:
+        aurora.connect()
+        start = time.monotonic()
+        aurora.read()
+        assert time.monotonic() - start > 200 * 10 / 9600
+
+
+def test_unseen_tools(port, folder):
+    with tracker(port) as aurora:
+        aurora.connect()
+        set_faults(folder, missing=1.0)
+        time.sleep(0.06)
+        assert aurora.read().readings[0].position is None
+        set_faults(folder, missing=None, out_of_volume=True)
+        time.sleep(0.06)
+        reading = aurora.read().readings[0]
+        assert reading.out_of_volume and reading.position is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["garbage", "wrong_crc"])
+@pytest.mark.parametrize("replies", ["BX", "TX"])
+def test_damaged_answers_are_asked_again(port, folder, fault, replies):
+    with tracker(port, replies=replies, answer_s=0.1, tries=20) as aurora:
+        aurora.connect()
+        good = aurora.read().readings[0].position
+        set_faults(folder, **{fault: 0.3})
+        for _ in range(12):
+            np.testing.assert_allclose(aurora.read().readings[0].position, good, atol=1e-5)
+        assert aurora.damaged_answers > 0
+        set_faults(folder, garbage=None, wrong_crc=1.0)
+        with pytest.raises(DeviceFault, match="answers in a row came damaged: check the cable"):
+            aurora.read()
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [("unplugged", "the port is gone"), ("hang", "no answer within"), ("wrong_baud", "no answer within|came damaged")],
+)
+def test_back_after_a_fault(port, folder, fault, says):
+    with tracker(port, answer_s=0.3) as aurora:
+        aurora.connect()
+        set_faults(folder, **{fault: True})
+        with pytest.raises(DeviceFault, match=says) as caught:
+            aurora.read()
+        assert caught.value.remedy
+        set_faults(folder, **{fault: None})
+        aurora.connect()
+        assert aurora.read().readings[0].position is not None
+
+
+@pytest.mark.slow
+def test_connects_through_a_bad_line(port, folder):
+    set_faults(folder, garbage=0.1)
+    with tracker(port, answer_s=0.1, tries=20) as aurora:
+        for _ in range(4):
+            aurora.connect()
+        assert aurora.damaged_answers > 0
+
+
+def test_one_program_at_a_time(port):
+    with tracker(port) as aurora:
+        aurora.connect()
+        with pytest.raises(DeviceFault, match="cannot open the port"):
+            tracker(port).connect()
+        aurora.read()
+
+
+def test_no_device(tmp_path):
+    pytest.importorskip("serial", reason="pyserial is not installed")
+    with pytest.raises(DeviceFault, match="cannot open the port .*dialout"):
+        tracker(str(tmp_path / "nothing")).connect()
+
+
+# ---- clients written by others
+
+
+def test_ndicapi(port, folder):
+    pytest.importorskip("ndicapy", reason="ndicapi is not installed")
+    script = f"""
+import ndicapy as ndi, time
+assert ndi.ndiProbe({port!r}) == ndi.NDI_OKAY
+device = ndi.ndiOpen({port!r})
+print(ndi.ndiCommand(device, "INIT:"), ndi.ndiCommand(device, "COMM:50000"))
+ndi.ndiCommand(device, "PHSR:02")
+for i in range(ndi.ndiGetPHSRNumberOfHandles(device)):
+    handle = ndi.ndiGetPHSRHandle(device, i)
+    print(ndi.ndiCommand(device, f"PINIT:{{handle:02X}}"), ndi.ndiCommand(device, f"PENA:{{handle:02X}}D"))
+print(ndi.ndiCommand(device, "TSTART:"))
+frames = set()
+end = time.monotonic() + 1
+while time.monotonic() < end:
+    answer = ndi.ndiCommand(device, "TX:0801")
+    frames.add(answer[63:71])
+print(answer[4:55])
+print(len(frames), ndi.ndiGetError(device))
+ndi.ndiClose(device)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    *setup, transform, last = done.stdout.splitlines()
+    assert " ".join(setup).split() == ["OKAY"] * 7
+    distinct, error = map(int, last.split())
+    assert distinct >= 36 and error == 0
+    with tracker(port, replies="TX") as aurora:
+        aurora.connect()
+        reading = aurora.read().readings[0]
+    np.testing.assert_allclose([1e-5 * int(transform[24 + 7 * i : 31 + 7 * i]) for i in range(3)], reading.position)
+
+
+def test_scikit_surgerynditracker(port, folder):
+    pytest.importorskip("sksurgerynditracker", reason="scikit-surgerynditracker is not installed")
+    from sksurgerynditracker.nditracker import NDITracker
+
+    client = NDITracker({"tracker type": "aurora", "serial port": port})
+    try:
+        client.start_tracking()
+        _, _, frames, poses, _ = client.get_frame()
+        assert np.isfinite(poses[0]).all() and len(frames) == 3
+        set_faults(folder, missing=1.0)
+        time.sleep(0.1)
+        assert np.isnan(client.get_frame()[3][0]).any()
+        client.stop_tracking()
+    finally:
+        client.close()
+
+
+# ---- faults, control, privacy
+
+
+def test_faults_are_checked_together():
+    faults = Faults(FAULTS)
+    with pytest.raises(InputError) as caught:
+        faults.set({"mising": 0.5, "hang": 3, "garbage": "x", "missing": 0.5})
+    assert len(caught.value.problems) == 3 and "did you mean missing?" in str(caught.value)
+    assert faults.missing == 0.0
+    faults.set({"missing": 0.5})
+    faults.set({"missing": None})
+    assert faults.as_dict() == FAULTS
+
+
+def test_scenario(tmp_path):
+    path = tmp_path / "scenario.yaml"
+    path.write_text("- {at_s: 2, hang: true}\n- {at_s: 1, missing: 0.3}\n- {at_s: 3, hang: null}\n")
+    scenario = Scenario.load(path, Faults(FAULTS))
+    assert list(scenario.due(0.5)) == []
+    assert list(scenario.due(2.5)) == [{"missing": 0.3}, {"hang": True}]
+    assert list(scenario.due(9)) == [{"hang": None}]
+    path.write_text("- {at_s: 2, hung: true}\n- {missing: 0.3}\n")
+    with pytest.raises(InputError) as caught:
+        Scenario.load(path, Faults(FAULTS))
+    assert [problem.line for problem in caught.value.problems] == [1, 2]
+
+
+def test_control_socket_is_private(folder, port):
+    assert (folder.stat().st_mode & 0o777) == 0o700
+    folder.chmod(0o755)
+    with pytest.raises(InputError, match="chmod 700"):
+        private_folder(folder)
+    folder.chmod(0o700)
+    made = private_folder(folder / "new")
+    assert (made.stat().st_mode & 0o777) == 0o700
+
+
+def test_set_command(folder, port, capfd):
+    assert cli.run(["sim", "set", "aurora", "missing=0.25", "--force", "0", "-0.1", "0", "--folder", str(folder)]) == 0
+    assert "0.25" in capfd.readouterr().out
+    assert request(folder, "aurora", {})["force"] == [0, -0.1, 0]
+    assert cli.run(["sim", "set", "aurora", "mising=1", "--folder", str(folder)]) == 1
+    assert "did you mean missing?" in capfd.readouterr().err
+    request(folder, "aurora", {"force": [0, 0, 0]})
+    assert cli.run(["sim", "aurora", str(ROBOT), "--folder", str(folder)]) == 1
+    assert "is running there already" in capfd.readouterr().err

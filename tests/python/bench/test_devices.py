@@ -1,0 +1,328 @@
+"""What moves the joints, without hardware: limits, motions, stops, the bench file, records shared between processes."""
+
+import multiprocessing
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.bench.devices import bench_file, emergency_stop, ethercat_codes
+from ctcr.bench.devices.axis_control import SLACK_M, AxisControl
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.joint_limits import JointLimits
+from ctcr.bench.devices.lateness import Lateness
+from ctcr.bench.devices.motion import StraightMove, VelocityMove
+from ctcr.bench.devices.real_time import BUS, TRACKER, real_time
+from ctcr.bench.devices.shared_record import SharedRecord
+from ctcr.diagnose import add
+from ctcr.errors import InputError
+from ctcr.model import simulation
+from ctcr.model.moving import RECENT_S, MovingModel
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+
+ROOT = Path(__file__).parents[3]
+DATA = ROOT / "examples" / "data"
+BENCH = DATA / "bench" / "bench.yaml"
+DT = 0.004
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(DATA / "demo" / "robot.yaml")
+
+
+@pytest.fixture(scope="module")
+def settings(robot):
+    return bench_file.load(BENCH).axis_settings(robot)
+
+
+HOME = np.array([-0.298, -0.2205, -0.145, 0, 0, 0])
+
+
+# ---- limits
+
+
+def test_every_limit_is_said(settings):
+    limits: JointLimits = settings.limits
+    assert limits.problem(HOME) is None
+    for way, text in (
+        ([0, 0, 0.09, 0, 0, 0], "beta3 = -55.00 mm: may be -200.00 to -100.00 mm"),
+        ([0, 0, 0, 0, 8, 0], "alpha2 = 458.37 deg: may be"),
+        ([0.04, -0.035, 0, 0, 0, 0], "carriages of tubes 1 and 2 come too near: 2.50 mm"),
+        ([-0.06, 0, 0, 0, 0, 0], "tube 1 would end 5.00 mm inside tube 2"),
+        ([np.inf, 0, 0, 0, 0, 0], "not a number"),
+    ):
+        assert text in limits.problem(HOME + way)
+    wide = replace(limits, travel=np.tile([-1.0, 1.0], (3, 1)))
+    assert "in front of the plate" in wide.problem([-0.2, -0.1, 0.01, 0, 0, 0])
+    assert "the tip of tube 3 would be 1.00 mm behind" in wide.problem([-0.4, -0.3, -0.2, 0, 0, 0])
+
+
+def test_between_two_allowed_places_all_is_allowed(settings):
+    """Limits are convex: what a straight move passes need not be searched."""
+    rng, limits = np.random.default_rng(5), settings.limits
+    scale = np.array([0.1, 0.08, 0.05, 3, 3, 3])
+    places = [place for place in HOME + scale * rng.uniform(-1, 1, (4000, 6)) if not limits.problem(place)]
+    assert len(places) > 100
+    for a, b in zip(places[:100], places[100:], strict=False):
+        assert all(limits.problem(a + s * (b - a)) is None for s in rng.uniform(0, 1, 5))
+
+
+# ---- motions
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_straight_move(seed):
+    """In one line, from rest to rest, no joint faster than allowed, and its speed is the derivative of its place."""
+    rng = np.random.default_rng(seed)
+    start, end = rng.standard_normal((2, 6)) * 10 ** rng.uniform(-3, 0)
+    speeds, ramp = rng.uniform(0.1, 2, 6), rng.uniform(0.05, 0.5)
+    move = StraightMove(start, end, speeds, ramp)
+    places, rates = (
+        np.array(rows) for rows in zip(*(move.advance(1e-3) for _ in range(int(1e3 * move.duration) + 2)), strict=True)
+    )
+    assert move.is_finished
+    np.testing.assert_allclose(places[-1], end, atol=1e-12)
+    share = (places - start) @ (end - start) / np.sum((end - start) ** 2)
+    np.testing.assert_allclose(places, start + share[:, None] * (end - start), atol=1e-12)
+    assert (np.diff(share) >= -1e-12).all() and (np.abs(rates) <= speeds + 1e-9).all()
+    np.testing.assert_allclose(
+        np.diff(places, axis=0)[:-2] / 1e-3, (rates[1:] + rates[:-1])[:-2] / 2, atol=0.02 * np.abs(rates).max()
+    )
+    assert (np.abs(np.diff(rates, axis=0)) <= 1.01 * speeds / ramp * 1e-3 + 1e-9).all()
+
+
+def test_no_way_is_no_move():
+    move = StraightMove(HOME, HOME, np.ones(6), 0.2)
+    place, rate = move.advance(DT)
+    assert np.array_equal(place, HOME) and not rate.any()
+
+
+def test_velocity_move_rests_where_it_says():
+    move = VelocityMove(np.zeros(2), np.zeros(2), [0.5, -1.0], np.array([2.0, 1.0]), valid_s=1.0)
+    while move._left > 0:
+        move.advance(1e-4)
+    rest = move.resting_place()
+    while not move.is_finished:
+        place, _ = move.advance(1e-4)
+    np.testing.assert_allclose(place, rest, atol=1e-3)
+
+
+# ---- control of the axes
+
+
+class Motors:
+    """Ideal motors: joints integrate the speeds they are given. `stuck` ones do not."""
+
+    def __init__(self, control, stuck=()):
+        self.control, self.joints, self.stuck = control, control.joints.copy(), list(stuck)
+
+    def run(self, seconds):
+        for _ in range(int(seconds / DT)):
+            speeds = self.control.cycle(DT, self.joints.copy())
+            speeds[self.stuck] = 0.0
+            self.joints += DT * speeds
+            if not self.control.is_moving:
+                break
+
+
+def test_move_and_order(settings):
+    control = AxisControl(settings, HOME, homed=True)
+    motors, target = Motors(control), HOME + [-0.01, -0.01, -0.01, 1, 0, -1]
+    control.move(target)
+    with pytest.raises(DeviceFault, match="still moving"):
+        motors.run(0.1)
+        control.move(HOME)
+    motors.run(9)
+    assert not control.is_moving
+    np.testing.assert_allclose(motors.joints, target, atol=1e-3)
+    np.testing.assert_allclose(motors.joints[:3], target[:3], atol=1.1e-5)
+    with pytest.raises(DeviceFault, match="nothing has moved"):
+        control.move(HOME - 1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_velocities_never_leave_the_limits(settings, seed):
+    rng = np.random.default_rng(seed)
+    control = AxisControl(settings, HOME, homed=True)
+    motors = Motors(control)
+    for _ in range(20):
+        control.velocity(rng.uniform(-3, 3, 6) * settings.speeds, 0.5)
+        motors.run(rng.uniform(0.1, 2.0))
+        assert control.fault is None and settings.limits.problem(motors.joints, SLACK_M, 5e-3) is None
+    assert control.limited or np.ptp(motors.joints) > 0
+
+
+def test_a_stuck_axis_stops_all(settings):
+    control = AxisControl(settings, HOME, homed=True)
+    motors = Motors(control, stuck=[4])
+    control.move(HOME + [-0.01, -0.01, -0.01, 1, 1, 1])
+    motors.run(9)
+    assert "rotation of tube 2: it does not follow" in str(control.fault)
+    at_rest = motors.joints.copy()
+    motors.run(1)
+    np.testing.assert_array_equal(motors.joints, at_rest)
+    for request in (
+        lambda: control.move(HOME),
+        lambda: control.velocity(np.zeros(6), 1),
+        lambda: control.jog(np.zeros(6)),
+    ):
+        with pytest.raises(DeviceFault, match="does not follow"):
+            request()
+
+
+def test_an_encoder_that_jumps(settings):
+    control = AxisControl(settings, HOME, homed=True)
+    control.cycle(DT, HOME)
+    control.cycle(DT, HOME + [0.8e-3, 0, 0, 0, 0, 0])
+    assert "translation of tube 1: its encoder jumped" in str(control.fault)
+
+
+def test_outside_of_the_limits_nothing_starts(settings):
+    control = AxisControl(settings, HOME - [0.06, 0, 0, 0, 0, 0], homed=True)
+    with pytest.raises(DeviceFault, match="5.00 mm inside tube 2"):
+        control.move(HOME)
+
+
+# ---- bench file
+
+
+def test_bench_file_faults_come_together(tmp_path):
+    path = tmp_path / "bench.yaml"
+    text = BENCH.read_text().replace("port:", "prot:").replace("current_mA: 1000", "current_mA: none")
+    path.write_text(text.replace("clearance_mm: 5", "clearance_mm: -5"))
+    with pytest.raises(InputError) as caught:
+        bench_file.load(path)
+    said = str(caught.value)
+    assert "did you mean port?" in said and "motors.current_mA" in said and "limits.clearance_mm" in said
+    assert "line 3" in said
+
+
+def test_bench_file_for_another_robot(robot):
+    two = robot.model_copy(update={"tubes": robot.tubes[:2]})
+    with pytest.raises(InputError, match="has 3 entries, the robot has 2 tubes"):
+        bench_file.load(BENCH).axis_settings(two)
+
+
+# ---- stop
+
+
+def test_stop_stays_until_it_is_released(tmp_path, capfd):
+    folder = tmp_path / "bench"
+    assert cli.run(["stop", "--folder", str(folder)]) == 0
+    emergency_stop.stop(folder, "a later reason")
+    assert emergency_stop.is_stopped(folder) and "ctcr stop was called" in str(emergency_stop.stop_fault(folder))
+    assert cli.run(["stop", "--release", "--folder", str(folder)]) == 0
+    assert not emergency_stop.is_stopped(folder) and emergency_stop.reason(folder) is None
+    cli.run(["stop", "--release", "--folder", str(folder)])
+    assert "nothing was stopped" in capfd.readouterr().out
+
+
+def test_codes_in_words():
+    assert "watchdog" in ethercat_codes.status_text(0x1B)[0]
+    assert ethercat_codes.state_name(0x14) == "SAFEOP with an error"
+    for code in (*ethercat_codes.DIAGNOSES,):
+        assert all(ethercat_codes.diagnosis_text(code))
+    assert "manual" in ethercat_codes.status_text(0xFFFF)[1]
+
+
+# ---- between processes
+
+
+def _write_for_a_while(path, seconds):
+    record = SharedRecord(path, np.dtype([("number", "i8"), ("copies", "i8", 200)]), writer=True)
+    end, number = time.monotonic() + seconds, 0
+    while time.monotonic() < end:
+        number += 1
+        record.write(number=number, copies=number)
+
+
+def test_a_reader_never_sees_half_of_a_write(tmp_path):
+    context = multiprocessing.get_context("fork")
+    path = tmp_path / "record"
+    fields = np.dtype([("number", "i8"), ("copies", "i8", 200)])
+    assert SharedRecord(path, fields).read() is None
+    writer = context.Process(target=_write_for_a_while, args=(path, 0.5))
+    writer.start()
+    record, seen = SharedRecord(path, fields), set()
+    while writer.is_alive():
+        if (values := record.read()) is not None:
+            assert (values["copies"] == values["number"]).all()
+            seen.add(int(values["number"]))
+    writer.join()
+    assert len(seen) > 2 and (os.stat(path).st_mode & 0o777) == 0o600
+
+
+def test_lateness():
+    late = Lateness()
+    for value in np.linspace(0, 1e-3, 1001):
+        late.add(value)
+    late.add(0.5)
+    assert late.quantile(0.5) == pytest.approx(0.5e-3, abs=3e-5)
+    assert late.quantile(0.99) == pytest.approx(0.99e-3, abs=3e-5) and late.worst == 0.5
+    assert late.as_dict()["count"] == 1002
+
+
+def scheduling():
+    return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, os.sched_getaffinity(0)
+
+
+def test_real_time_is_given_back():
+    before = scheduling()
+    for duty, core in ((BUS, min(before[2])), (TRACKER, max(before[2]))):
+        with real_time(duty) as granted:
+            assert scheduling() == ((os.SCHED_FIFO, duty.priority, {core}) if granted else before)
+        assert scheduling() == before
+    with pytest.raises(KeyboardInterrupt), real_time(BUS):
+        raise KeyboardInterrupt
+    assert scheduling() == before
+
+
+def test_without_the_permission_nothing_changes(monkeypatch):
+    def refused(*_):
+        raise PermissionError
+
+    before = scheduling()
+    monkeypatch.setattr(os, "sched_setscheduler", refused)
+    with real_time(BUS) as granted:
+        assert not granted and scheduling() == before
+
+
+# ---- the model that moves
+
+
+@pytest.mark.parametrize(
+    ("effect", "strength", "shares", "off"),
+    [
+        ("friction", "coefficient", (), 1e-5),
+        ("friction", "coefficient", (0.25, 0.5, 0.75), 1e-5),
+        ("backlash_rotation", "play", (0.25, 0.5, 0.75), 1e-6),
+    ],
+)
+def test_moving_model_is_that_of_a_whole_table(robot, effect, strength, shares, off):
+    """Reading after reading it says what the simulation of the whole path says, with effects that remember the path."""
+    effects = {f"effects.{effect}.{strength}.{i}": 0.02 for i in (1, 2, 3)}
+    true = add.with_values(robot, [effect], effects)
+    plan = measurements.load(DATA / "plan.csv", 3)
+    rows = np.arange(40)
+    names = ("t", "run", "beta", "alpha", "force", "row")
+    few = replace(plan, **{name: getattr(plan, name)[rows] for name in names}, position=None, quaternion=None)
+    few = replace(few, run=np.zeros(len(rows), np.int64), from_home=False)
+    expected = simulation.simulate(true, few, "none", steps=2)
+    moving = MovingModel(true)
+    for i in rows:
+        if i:
+            for share in shares:
+                between = [
+                    few.__dict__[n][i - 1] + share * (few.__dict__[n][i] - few.__dict__[n][i - 1])
+                    for n in ("t", "beta", "alpha")
+                ]
+                moving.move(*between, few.force[i])
+        moving.move(few.t[i], few.beta[i], few.alpha[i], few.force[i])
+        position, quaternion = moving.reading()
+        np.testing.assert_allclose(position, expected.position[i], atol=off)
+    assert len(moving._turns) < 4 * len(rows) and RECENT_S < 1

@@ -1,0 +1,196 @@
+"""Recordings without hardware: what is written stays through kills and power cuts, plans are checked before moves."""
+
+import io
+import multiprocessing
+import os
+import random
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.bench.devices import bench_file
+from ctcr.bench.devices.person import PersonPresent
+from ctcr.bench.record.display import picture
+from ctcr.bench.record.live_page import LivePage
+from ctcr.bench.record.plan import Approach, steps_of
+from ctcr.bench.record.row_file import RowFile
+from ctcr.bench.record.session import Progress
+from ctcr.errors import InputError
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+from ctcr.table.measurements import column_names
+
+ROOT = Path(__file__).parents[3]
+DATA = ROOT / "examples" / "data"
+COLUMNS = 2 + 2 * 2 + 3 + 7  # of two tubes
+
+
+def rows_of(number, group):
+    """The rows of one group: t_s counts, the last field is not measured."""
+    return [np.array([number * group + i, number, *range(COLUMNS - 3), np.nan]) for i in range(group)]
+
+
+def _append_for_ever(path, group, pipe):
+    file = RowFile(path, column_names(2), group)
+    while True:
+        file.append(rows_of(file.groups, group))
+        pipe.send(file.groups)
+
+
+def test_a_hundred_kills_lose_no_row(tmp_path):
+    """SIGKILL at random moments: every row whose writing was reported is in the file, whole, once, in order."""
+    context, rng, group = multiprocessing.get_context("fork"), random.Random(1), 3
+    path, reported = tmp_path / "measurements.csv", 0
+    for _ in range(100):
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_append_for_ever, args=(path, group, theirs))
+        process.start()
+        theirs.close()
+        ours.recv()
+        time.sleep(rng.uniform(0, 0.01))
+        os.kill(process.pid, signal.SIGKILL)
+        process.join()
+        try:
+            while True:
+                reported = ours.recv()
+        except EOFError:
+            pass
+        lines = path.read_text().splitlines()[1:]
+        assert len(lines) >= reported * group
+        assert [int(float(line.split(",")[0])) for line in lines] == list(range(len(lines)))
+    assert reported > 100
+
+
+@pytest.mark.parametrize("cut", [1, 20, 70, 150])
+def test_a_power_cut_costs_the_group_it_hit(tmp_path, cut):
+    path = tmp_path / "measurements.csv"
+    file = RowFile(path, column_names(2), 2)
+    for number in range(5):
+        file.append(rows_of(number, 2))
+    file.close()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-cut])
+    again = RowFile(path, column_names(2), 2)
+    assert 2 <= again.groups < 5 and float(again.last[0]) == 2 * again.groups - 1
+    while again.groups < 5:
+        again.append(rows_of(again.groups, 2))
+    again.close()
+    assert path.read_bytes() == whole
+
+
+def test_another_table_is_left_alone(tmp_path):
+    path = tmp_path / "measurements.csv"
+    path.write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match="other columns"):
+        RowFile(path, column_names(2))
+    assert path.read_text() == "a,b\n1,2\n"
+
+
+def test_full_disk(tmp_path, monkeypatch):
+    """No half of a group stays, and what was there before does."""
+    path = tmp_path / "measurements.csv"
+    file = RowFile(path, column_names(2))
+    file.append(rows_of(0, 1))
+    before, write = path.read_bytes(), os.pwrite
+
+    def half(handle, data, place):
+        write(handle, data[: len(data) // 2], place)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "pwrite", half)
+    with pytest.raises(InputError, match="no space left on device"):
+        file.append(rows_of(1, 1))
+    monkeypatch.undo()
+    assert path.read_bytes() == before and file.groups == 1
+    file.append(rows_of(1, 1))
+    assert path.read_bytes().startswith(before) and file.groups == 2
+
+
+def test_recorded_tables_can_be_read(tmp_path):
+    path = tmp_path / "measurements.csv"
+    file = RowFile(path, column_names(3))
+    joints = [-0.3, -0.2, -0.1, 0.1, 0.2, 0.3]
+    file.append([np.array([0.5, 1, *joints, 0, -0.1, 0, 0.1, 0.2, 0.3, 1, 0, 0, 0])])
+    file.append([np.array([1.5, 1, *joints, 0, -0.1, 0, *[np.nan] * 7])])
+    table = measurements.load(path, 3)
+    np.testing.assert_array_equal(table.beta[0], joints[:3])
+    assert np.isnan(table.position[1]).all() and not table.warnings
+
+
+@pytest.fixture(scope="module")
+def limits():
+    robot = robot_file.load(DATA / "demo" / "robot.yaml")
+    return bench_file.load(DATA / "bench" / "bench.yaml").axis_settings(robot).limits
+
+
+def test_approach(limits):
+    plan = measurements.load(DATA / "plan.csv", 3)
+    for direction, sign in (("forward", -1), ("backward", 1)):
+        step = steps_of(plan, Approach(direction, 1e-3, 0.1), limits, "plan")[3]
+        np.testing.assert_allclose(step.way_point - step.joints, sign * np.repeat([1e-3, 0.1], 3))
+        assert step.row == 5
+    assert all(step.way_point is None for step in steps_of(plan, Approach(), limits, "plan"))
+
+
+def test_forbidden_rows_are_said_before_anything_moves(tmp_path, capfd):
+    lines = (DATA / "plan.csv").read_text().splitlines()[:5]
+    lines[2] = lines[2].replace("-0.158925341", "-0.05")
+    plan = tmp_path / "plan.csv"
+    plan.write_text("\n".join(lines) + "\n")
+    code = cli.run(
+        [
+            "record",
+            str(DATA / "demo" / "robot.yaml"),
+            str(plan),
+            "--bench",
+            str(DATA / "bench" / "bench.yaml"),
+            "-o",
+            str(tmp_path / "out"),
+            "--folder",
+            str(tmp_path / "bench"),
+        ]
+    )
+    assert code == 1 and "row 3: beta3 = -50.00 mm: may be" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
+    answers = io.StringIO("\n\n12.5\n")
+    monkeypatch.setattr("sys.stdin", answers)
+    person = PersonPresent()
+    person.hang(np.array([0.0, -0.0980665, 0.0]))
+    person.hang(np.zeros(3))
+    assert person.deployed(1) == pytest.approx(12.5e-3)
+    said = capfd.readouterr().err
+    assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
+    assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
+
+
+def test_live_page(tmp_path, monkeypatch):
+    """It shows the newest state, loads itself anew while the recording goes on, and rests in the end."""
+    target, now = tmp_path / "page.html", [0.0]
+    monkeypatch.setattr("ctcr.bench.record.live_page.time.monotonic", lambda: now[0])
+    progress = Progress(10, done=2, doing="row 4: moving", errors_mm=[3.0, 4.0])
+    with LivePage(target, "A <robot>") as live:
+        live.show(progress)
+        first = target.read_text()
+        progress.errors_mm += [float("nan"), 5.0]
+        live.show(progress)
+        assert target.read_text() == first  # not before its time
+        now[0] += 2.0
+        live.show(progress)
+        second = target.read_text()
+    assert 'http-equiv="refresh" content="2"' in first and first.count("<circle") == 2
+    assert "A &lt;robot&gt;" in first and "row 4: moving" in first and "3.54 mm" in first
+    assert second.count("<circle") == 3 and "5.00 mm" in second
+    assert "refresh" not in target.read_text() and target.read_text().count("<circle") == 3
+
+
+def test_live_picture():
+    assert picture([0.0, 0.5, 1.0, float("nan")]) == "▁▅█ "
+    progress = Progress(10, errors_mm=[3.0, 4.0, float("nan")])
+    assert progress.rms_mm == pytest.approx(12.5**0.5)
+    assert np.isnan(Progress(10).rms_mm)

@@ -1,0 +1,370 @@
+"""The joint fit: the truth of the shipped session, its figures, its robot file and report; bad input in words."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from ctcr import cli, frames
+from ctcr.calibrate import joint_fit, report, terminal
+from ctcr.errors import InputError
+from ctcr.fit import folds
+from ctcr.model import effect_model, fields
+from ctcr.model.model import Model
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+from scipy.spatial.transform import Rotation
+
+ROOT = Path(__file__).parents[3]
+DATA = ROOT / "examples" / "data" / "calibration"
+ROBOT, TABLE = DATA / "robot.yaml", DATA / "measurements.csv"
+FEW = ["tracker.frame", "actuation.home_rotation.*"]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def readings():
+    return measurements.load(TABLE, 3)
+
+
+@pytest.fixture(scope="module")
+def calibration(robot, readings):
+    return joint_fit.calibrate(robot, readings, ["standard"])
+
+
+def truth(name: str) -> list[float]:
+    (row,) = re.findall(rf"\| {name}, [^|]*\|(.*)\|", (DATA / "README.md").read_text())
+    return [float(number) for number in row.split("|")]
+
+
+def rms_mm(robot, readings) -> float:
+    """RMS error of a robot file's model, as any other command computes it."""
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
+    answer = Model(robot, steps=4).predict(beta, alpha, readings.force)
+    tip, _ = frames.base_to_tracker(robot.tracker, answer.position, answer.quaternion)
+    return 1e3 * float(np.sqrt(np.mean(np.sum((readings.position - tip) ** 2, axis=1))))
+
+
+def test_the_truth_is_within_its_standard_deviations(calibration):
+    fitted = {item.name: item for item in calibration.fitted}
+    pulls = []
+    for kind, name in (
+        ("youngs_modulus", "Young's modulus"),
+        ("length", "length"),
+        ("curved_length", "curved length"),
+        ("curvature", "curvature"),
+        ("home_translation", "home translation"),
+        ("home_rotation", "home rotation"),
+    ):
+        for i, true in enumerate(truth(name)):
+            full = f"actuation.{kind}.{i + 1}" if kind.startswith("home") else f"tubes.{i + 1}.{kind}"
+            pulls.append((fitted[full].value - true) / fitted[full].sd)
+    assert np.max(np.abs(pulls)) < 3.2 and np.mean(np.square(pulls)) < 2
+
+
+def test_held_out_error_comes_near_the_noise_floor(calibration):
+    held_out = calibration.held_out
+    assert held_out.kind == "runs" and held_out.fits == 4 and held_out.readings == 120
+    assert held_out.error.rms_mm < 2 * held_out.floor.rms_mm  # one smooth field error has few degrees of freedom
+    nominal, alone, calibrated = calibration.stages
+    assert nominal.rms_mm > alone.rms_mm > calibrated.rms_mm
+    assert 0.7 < calibration.fit.reduced_chi_square < 1.3
+    assert calibration.halves.rms_mm < 1.5 * calibration.halves.noise_mm
+
+
+def test_the_robot_file_holds_what_the_fit_found(calibration, readings, tmp_path):
+    """Homes, turned frame and recorded homes together: the file's model has the error that the fit reports."""
+    joint_fit.write_robot(calibration, tmp_path / "new.yaml", TABLE)
+    written = robot_file.load(tmp_path / "new.yaml")
+    assert rms_mm(written, readings) == pytest.approx(calibration.stages[-1].rms_mm, abs=2e-4)
+    assert written.uncertainty == calibration.before.uncertainty
+    figures = written.history[0]["figures"]["rms_mm"]
+    assert figures["held_out"] == pytest.approx(calibration.held_out.error.rms_mm, rel=1e-6)
+    assert list(figures) == ["nominal", "frame_alone", "calibrated", "held_out", "noise_floor"]
+
+
+def test_a_calibrated_file_is_a_fixed_point(calibration, readings):
+    again = joint_fit.calibrate(calibration.after, readings, FEW, hold_out=0, halves=False)
+    assert again.stages[0].rms_mm == pytest.approx(calibration.stages[-1].rms_mm, abs=1e-6)
+    assert np.max(np.abs(again.fit.shift)) < 1
+
+
+def test_the_report_is_one_page_that_needs_nothing_else(calibration):
+    page = report.page(calibration, "a table fitted with a robot")
+    shown = page.split("<script>")[0]
+    for title in (
+        "What calibration brings",
+        "The parameters",
+        "What the data cannot tell apart",
+        "Two halves of the data",
+    ):
+        assert f"<h2>{title}</h2>" in shown
+    assert shown.count("<svg") == 6 and "noise floor" in shown
+    assert not re.search(r"""(?:src|href)=["']https?:""", shown)
+    drawing = json.loads(re.search(r"const drawing = (.*);\nPlotly", page)[1].replace("<\\/", "</"))
+    assert len(drawing["data"]) == 4 and drawing["data"][3]["visible"] and not drawing["data"][0]["visible"]
+
+
+def test_json_holds_the_figures_and_standard_output_stays_clean(capsys):
+    code = cli.run(
+        ["calibrate", "fit", str(ROBOT), str(TABLE), "--free", ",".join(FEW), "--hold-out", "3", "--json", "-"]
+    )
+    printed = capsys.readouterr()
+    data = json.loads(printed.out)
+    assert code == 0 and "6 parameters" not in printed.out and "9 parameters fitted" in printed.err
+    assert data["held_out"]["readings"] == 30 and len(data["parameters"]) == 9
+    assert set(data["rms_mm"]) == {"nominal", "frame_alone", "calibrated", "held_out", "noise_floor"}
+
+
+def outcome(robot, readings, free=None, **options):
+    return joint_fit.calibrate(robot, readings, free or FEW, halves=False, **{"hold_out": 0} | options)
+
+
+def some(readings, keep):
+    """The readings at some rows."""
+    parts = {name: value[keep] for name, value in vars(readings).items() if isinstance(value, np.ndarray)}
+    return replace(readings, **parts)
+
+
+def said(calibration) -> str:
+    return " ".join([*calibration.notices, *terminal.undetermined(calibration), *fields.doubts(calibration.fitted)])
+
+
+def test_one_run_is_told_and_places_are_held_out_instead(robot, readings):
+    one = replace(readings, run=np.zeros_like(readings.run))
+    found = outcome(robot, one, hold_out=None)
+    assert "only one run" in said(found) and found.held_out.kind == "places"
+    with pytest.raises(InputError, match="--hold-out 1 needs more than 1 runs: the table has 1"):
+        outcome(robot, one, hold_out=1)
+
+
+def test_no_orientation_is_told(robot, readings):
+    found = outcome(robot, replace(readings, quaternion=None))
+    assert "no orientation was measured" in said(found).lower() and np.isnan(found.stages[-1].rms_deg)
+    assert "look like outliers" not in said(found)
+
+
+@pytest.fixture(scope="module")
+def loose(robot):
+    """The robot before anyone has found how its sensor is glued in."""
+    return robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"sensor_roll": "unknown"})})
+
+
+def spun(readings, roll):
+    """The readings of a sensor with other rolls [rad], of all rows or of each."""
+    turn = np.multiply.outer(np.broadcast_to(roll, len(readings)), [0.0, 0.0, 1.0])
+    turned = frames.product(readings.quaternion, frames.quaternion_from_rotation_vector(turn))
+    return replace(readings, quaternion=turned)
+
+
+@pytest.mark.parametrize("roll_deg", [-175.0, 57.0])
+def test_an_unknown_roll_is_found_and_written(robot, loose, readings, roll_deg, tmp_path):
+    plain, turned = outcome(robot, readings), spun(readings, np.radians(roll_deg))
+    found = outcome(loose, turned)
+    (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_roll")
+    assert abs((roll.value - roll_deg + 180) % 360 - 180) < 3 * roll.sd < 2 and roll.ratio < 0.01
+    assert "roll is unknown" in said(found) and found.fit.observations == plain.fit.observations
+    others = [item for item in found.fitted if item is not roll]
+    assert max(abs(a.value - b.value) / a.sd for a, b in zip(others, plain.fitted, strict=True)) < 1
+    joint_fit.write_robot(found, tmp_path / "new.yaml", TABLE)
+    written = robot_file.load(tmp_path / "new.yaml")
+    assert written.tracker.sensor_roll_deg == pytest.approx(roll.value, abs=1e-4) and written.tracker.roll_known
+    again = outcome(written, turned)
+    assert again.stages[0].rms_deg == pytest.approx(found.stages[-1].rms_deg, abs=1e-4)
+
+
+def test_a_roll_that_differs_from_reading_to_reading_leaves_positions(loose, readings):
+    rolls = np.random.default_rng(3).uniform(-np.pi, np.pi, len(readings))
+    found = outcome(loose, spun(readings, rolls))
+    assert "differs from reading to reading" in said(found) and np.isnan(found.stages[-1].rms_deg)
+    assert found.fit.observations == 3 * len(readings) and np.max(np.abs(found.fit.shift)) < 4
+    found = outcome(loose, replace(readings, quaternion=None))
+    assert "roll" not in said(found) and np.isnan(found.stages[-1].rms_deg)
+
+
+def test_constant_joints_leave_most_undetermined(robot, readings):
+    noise = np.random.default_rng(1).normal(0, 3.5e-5, (30, 3))
+    one = some(readings, np.zeros(30, int))
+    one = replace(one, t=np.arange(30.0), position=one.position + noise)
+    found = outcome(robot, one, ["standard"], noise="jitter")
+    assert "all joints are the same" in said(found).lower()
+    assert sum(item.says_nothing for item in found.fitted) > 10
+
+
+def test_a_frame_further_off_than_the_file_allows_is_told(robot, readings):
+    moved = robot.model_copy(deep=True)
+    moved.tracker.position_mm = [value + 12.0 for value in robot.tracker.position_mm]
+    found = outcome(moved, readings)
+    assert found.stages[-1].rms_mm > 5 and "Another tracker frame leaves" in said(found)
+    assert "Another tracker frame" not in said(outcome(robot, readings))
+
+
+def test_too_few_rows_are_told(robot, readings):
+    found = outcome(robot, some(readings, np.arange(2)), ["standard"], hold_out=None)
+    assert "for 24 parameters: the prior decides" in said(found) and found.held_out is None
+    found = outcome(robot, some(readings, np.arange(5)), ["standard"])
+    assert "only 30 numbers were measured for 24 parameters: few are left" in said(found).lower()
+    assert "numbers were measured" not in said(outcome(robot, some(readings, np.arange(20)), ["standard"]))
+
+
+def test_a_frame_that_is_metres_off_is_refused(robot, readings):
+    with pytest.raises(InputError, match="the measured tips lie [0-9]+ mm from those predicted.*registration"):
+        outcome(robot, replace(readings, position=readings.position + [2.0, 0, 0]))
+
+
+def test_effects_that_the_robot_has_take_part_fixed_or_freed(robot, readings, tmp_path):
+    beside = robot.model_copy(update={"effects": {"sensor_offset": {"x": 2e-3}}})
+    beside._source = robot._source
+    seen = effect_model.readings(beside, readings)
+    position, quaternion = frames.base_to_tracker(robot.tracker, seen.position, seen.quaternion)
+    noise = np.random.default_rng(1).normal(0, 3.5e-5, position.shape)
+    made = replace(readings, position=position + noise, quaternion=quaternion)
+
+    fixed = outcome(beside, made, noise="jitter")
+    assert fixed.stages[0].rms_mm < 0.1 and np.max(np.abs(fixed.fit.shift)) < 1
+    assert outcome(robot, made, noise="jitter").stages[-1].rms_mm > 0.5
+
+    neutral = beside.model_copy(update={"effects": {"sensor_offset": {"x": 0.0}}})
+    freed = outcome(neutral, made, [*FEW, "effects.sensor_offset.x"], noise="jitter")
+    (found,) = [item for item in freed.fitted if item.name.startswith("effects.")]
+    assert found.unit == "m" and abs(found.value - 2e-3) < 4 * found.sd < 1e-3
+    assert freed.stages[0].rms_mm > 1 > 0.1 > freed.stages[-1].rms_mm
+    joint_fit.write_robot(freed, tmp_path / "new.yaml", TABLE)
+    assert robot_file.load(tmp_path / "new.yaml").effects["sensor_offset"]["x"] == pytest.approx(found.value)
+    with pytest.raises(InputError, match=r"effects.friction.coefficient.1"):
+        outcome(beside, made, ["effects.friction.coefficient.1"])
+
+
+def test_nothing_measured_is_refused(robot, readings):
+    with pytest.raises(InputError, match="no position is measured"):
+        outcome(robot, replace(readings, position=None, quaternion=None))
+
+
+def test_repeated_rows_count_once(robot, readings):
+    twice = some(readings, np.r_[0:120, 30:60])
+    found, once = outcome(robot, twice), outcome(robot, readings)
+    assert "30 rows" in said(found) and "repeat earlier rows exactly" in said(found)
+    np.testing.assert_allclose(found.fit.values, once.fit.values, atol=1e-9)
+    np.testing.assert_allclose(found.fit.sd, once.fit.sd, rtol=1e-3)
+
+
+def test_outliers_are_named_and_hardly_move_the_result(robot, readings):
+    rng = np.random.default_rng(5)
+    bad = rng.choice(120, 12, replace=False)
+    position = readings.position.copy()
+    position[bad] += rng.normal(0, 1, (12, 3)) * 8e-3
+    found, clean = outcome(robot, replace(readings, position=position)), outcome(robot, readings)
+    named = {int(row) for row in re.search(r"([0-9]+) rows \(([0-9, ]+)", said(found))[2].split(",")}
+    assert len(named & set((bad + 2).tolist())) >= 10
+    assert np.max(np.abs(found.fit.values - clean.fit.values) / clean.fit.sd) < 1.5
+
+
+@pytest.mark.parametrize(
+    "free, message",
+    [
+        (["tubes.1.youngs_modulos"], "no parameter is named .*youngs_modulos: did you mean tubes.1.youngs_modulus"),
+        (["tracker.frme"], "did you mean tracker.frame"),
+        (["tubes.4.length"], "no parameter is named tubes.4.length"),
+        (["tubes.1.poisson_ratio"], "tubes.1.poisson_ratio: the robot file does not state its uncertainty"),
+    ],
+)
+def test_names_that_cannot_be_freed(robot, readings, free, message):
+    with pytest.raises(InputError, match=message):
+        outcome(robot, readings, free)
+
+
+def test_a_prior_of_zero_width_is_refused(readings):
+    text = re.sub(r"rotation_offset_deg: .*", "rotation_offset_deg: 0.0", ROBOT.read_text())
+    with pytest.raises(InputError, match="home_rotation.1: its prior standard deviation is 0, but must be above 0"):
+        outcome(robot_file.parse(text.encode()), readings)
+
+
+@pytest.mark.parametrize("option", ["-o", "--json", "--report"])
+def test_refused_input_writes_nothing(tmp_path, capsys, option):
+    lines = [",".join(line.split(",")[:11]) for line in TABLE.read_text().splitlines()]  # nothing is measured
+    (tmp_path / "table.csv").write_text("\n".join(lines))
+    arguments = ["calibrate", "fit", str(ROBOT), str(tmp_path / "table.csv"), option, str(tmp_path / "out")]
+    assert cli.run(arguments) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"] and "Traceback" not in capsys.readouterr().err
+
+
+def moved_runs(readings) -> tuple:
+    """The readings with each run seen in a frame of its own, and those frames' shifts [m] and turns [rad]."""
+    rng = np.random.default_rng(8)
+    shift, turn = rng.normal(0, 0.02, (12, 3)), rng.normal(0, 0.05, (12, 3))
+    origin, index = np.array([-60.0, 20.0, -180.0]) * 1e-3, readings.run
+    position = origin + Rotation.from_rotvec(turn[index]).apply(readings.position - origin) + shift[index]
+    quaternion = frames.product(frames.quaternion_from_rotation_vector(turn[index]), readings.quaternion)
+    return replace(readings, position=position, quaternion=quaternion), shift, turn
+
+
+def test_runs_with_frames_of_their_own_are_told_and_fitted(robot, readings):
+    moved, shift, turn = moved_runs(readings)
+    plain = outcome(robot, moved)
+    assert "The runs do not share one frame" in said(plain)
+    framed = outcome(robot, moved, ["actuation.home_rotation.*", "tubes.*.curvature"], frame_per_run=True)
+    assert framed.stages[-1].rms_mm < 0.5 < 10 < plain.stages[-1].rms_mm
+    found = framed.frames
+    own = (Rotation.from_rotvec(found.turn[0]) * Rotation.from_rotvec(found.turn).inv()).as_rotvec()
+    true = (Rotation.from_rotvec(turn[0]) * Rotation.from_rotvec(turn).inv()).as_rotvec()
+    np.testing.assert_allclose(own, true, atol=np.radians(1.0))
+    np.testing.assert_allclose(found.shift - found.shift[0], shift - shift[0], atol=2e-3)
+    with pytest.raises(InputError, match="--frame-per-run fits the frames by itself"):
+        outcome(robot, moved, ["tracker.frame"], frame_per_run=True)
+
+
+def test_places_hold_every_pass_through_them(readings):
+    there = np.r_[0:120, 119:-1:-1]
+    both_ways = replace(some(readings, there), run=np.zeros(240, int))
+    split = folds.parts_of(both_ways, lever=0.05, parts=4)
+    assert split.kind == "places" and np.mean(split.part[:120] == split.part[120:][::-1]) == 1
+    assert np.bincount(split.part).min() > 30
+
+
+def test_runs_left_out_are_spread(readings):
+    for count in range(1, 12):
+        split = folds.runs_left_out(readings, count)
+        assert len(np.unique(readings.run[split.part == 1])) == count
+
+
+def test_what_the_file_does_not_state_can_be_given(robot, readings):
+    sd = {"tubes.*.poisson_ratio": 0.05, "tubes.1.length": 0.25}
+    found = outcome(robot, readings, ["tubes.*.poisson_ratio", "tubes.1.length", *FEW], sd=sd)
+    fitted = {item.name: item for item in found.fitted}
+    assert [fitted[f"tubes.{i}.poisson_ratio"].prior_sd for i in (1, 2, 3)] == [0.05] * 3
+    assert fitted["tubes.1.length"].prior_sd == pytest.approx(0.25)
+
+
+def test_a_malformed_width_is_one_sentence(capsys):
+    assert cli.run(["calibrate", "fit", str(ROBOT), str(TABLE), "--sd", "tubes.1.length"]) == 1
+    assert "'tubes.1.length' is not NAME=SD" in capsys.readouterr().err
+
+
+def doubtful(name: str, value: float, shift: float = 0.0, ratio: float = 0.5) -> list[fields.Fitted]:
+    """A fitted parameter by itself; `value` in SI."""
+    one = {"prior_mean": 0.3, "prior_sd": 0.1, "values": value, "sd": 0.05, "shift": shift, "ratio": ratio}
+    fit = SimpleNamespace(names=[name], **{key: np.array([number]) for key, number in one.items()})
+    return fields.fitted(fit)
+
+
+@pytest.mark.parametrize(
+    "item, flag, words",
+    [
+        (("tubes.2.poisson_ratio", -0.1), "implausible", "tubes.2.poisson_ratio: -0.10 is negative, which no tube is"),
+        (("tubes.1.youngs_modulus", 400e9), "implausible", "tubes.1.youngs_modulus: 400 GPa is unusual"),
+        (("tubes.1.length", 0.3, -2.4), "moved far", "tubes.1.length (-2.4)"),
+        (("tracker.position.x", 0.3, 0.1, 0.95), "unknown", "The data say nothing of tracker.position.x."),
+        (("tracker.position.x", 0.3), "", ""),
+    ],
+)
+def test_doubts_are_flagged_and_told(item, flag, words):
+    fitted = doubtful(*item)
+    assert fitted[0].flag == flag and words in " ".join(fields.doubts(fitted))
+    assert bool(words) == bool(fields.doubts(fitted))

@@ -1,0 +1,212 @@
+"""The procedures that measure one thing at a time: the shipped tables give the truth, bad tables give words."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.robot import robot_file
+
+ROOT = Path(__file__).parents[3]
+DATA = ROOT / "examples" / "data" / "calibration"
+ROBOT = DATA / "robot.yaml"
+
+
+def truth(name: str) -> list[float]:
+    """One number a tube, as the README of the data tells."""
+    (row,) = re.findall(rf"\| {name}, [^|]*\|(.*)\|", (DATA / "README.md").read_text())
+    return [float(number) for number in row.split("|")]
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments) -> tuple[int, str, str]:
+        code = cli.run(["calibrate", *(str(argument) for argument in arguments)])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def values(run):
+    """The values of a procedure by name: (value, standard deviation, value of the robot file)."""
+
+    def values(*arguments) -> dict[str, tuple[float, float, float]]:
+        code, out, err = run(*arguments, "--json", "-")
+        assert code == 0, err
+        return {row["name"].strip(): (row["value"], row["sd"], row["old"]) for row in json.loads(out)["values"]}
+
+    return values
+
+
+def assert_within(found: tuple, true: float, most_sd: float) -> None:
+    value, sd, _ = found
+    assert abs(value - true) < 3 * sd and sd < most_sd, (found, true)
+
+
+def test_circles_give_the_rotation_offsets(values):
+    found = values("rotation-offset", DATA / "circles.csv", "--robot", ROBOT)
+    for i, true in enumerate(truth("home rotation")):
+        assert_within(found[f"tube {i + 1}: rotation offset"], true, 1.0)
+        assert abs(found[f"tube {i + 1}: rotation offset"][0] - true) < 0.6  # a few tenths of a degree
+
+
+def test_the_two_directions_are_apart_by_the_drag(run):
+    code, out, _ = run("rotation-offset", DATA / "circles.csv", "--robot", ROBOT, "--json", "-")
+    tubes = json.loads(out)["tubes"]
+    differences = [abs(tube["direction_difference_deg"]) for tube in tubes.values()]
+    np.testing.assert_allclose(differences, 0.6, atol=0.15)  # forward and backward lag by 0.3 deg each
+
+
+def test_points_give_the_tracker_frame(values):
+    found = values("registration", DATA / "points.csv", "--robot", ROBOT, "--placement-sd-mm", 0.1)
+    for axis, true in zip("xyz", (-60.082, 19.556, -179.905), strict=True):
+        assert abs(found[f"origin of the base frame, {axis}"][0] - true) < 0.5
+    for axis, true in zip("xyz", (0.0008, 1.1967, 0.2996), strict=True):
+        assert abs(found[f"rotation vector, {axis}"][0] - true) < np.radians(0.3)
+    assert 0 < found["expected error at tool, RMS"][0] < 2
+
+
+def test_ruler_and_encoder_give_homes_and_lengths(values):
+    found = values("home", DATA / "home.csv", "--robot", ROBOT)
+    for i, (beta, length) in enumerate(zip(truth("home translation"), truth("length"), strict=True)):
+        assert_within(found[f"tube {i + 1}: home translation"], beta, 1.5)
+        assert_within(found[f"tube {i + 1}: length"], length, 1.5)
+        deployed = list(found.values())[3 * i + 2] if len(found) == 9 else None
+        assert deployed is None or abs(deployed[0] - beta - length) < 1
+
+
+def test_hung_masses_give_the_stiffness(values):
+    found = values("cantilever", DATA / "cantilever.csv", "--robot", ROBOT, "--tube", 1)
+    assert_within(found["Young's modulus"], truth("Young's modulus")[0], 1.0)
+    assert found["Young's modulus"][2] == 58.0
+    blunt = values(
+        "cantilever", DATA / "cantilever.csv", "--inner-mm", 1.3, "--outer-mm", 1.52, "--diameter-sd-mm", 0.01
+    )
+    assert blunt["Young's modulus"][1] > 3 * found["Young's modulus"][1]  # diameters count with the fourth power
+
+
+def test_a_photograph_gives_the_curvature(values):
+    scale = ["--mm-per-px", 1 / 12, "--scale-sd-percent", 0.5]
+    found = values("curvature", DATA / "picture.csv", "--robot", ROBOT, "--tube", 2, *scale)
+    assert_within(found["curvature"], truth("curvature")[1], 0.2)
+    assert_within(found["curved length"], truth("curved length")[1], 3.0)
+    reference = ["--reference", 0, 0, 0, 1200, 100]
+    other = values("curvature", DATA / "picture.csv", *reference)
+    assert other["curvature"][0] == pytest.approx(found["curvature"][0], rel=1e-3)
+
+
+STEPS = [
+    ("registration", "points.csv", [], "tracker.position_mm[0]"),
+    ("home", "home.csv", [], "tubes[0].length_mm"),
+    ("rotation-offset", "circles.csv", [], "actuation.home_rotation_deg[0]"),
+    ("cantilever", "cantilever.csv", ["--tube", 1], "tubes[0].youngs_modulus_GPa"),
+    ("curvature", "picture.csv", ["--tube", 2, "--mm-per-px", 1 / 12], "tubes[1].curvature_per_m"),
+]
+
+
+def test_one_after_another_they_make_a_calibrated_file(run, tmp_path):
+    robot = ROBOT
+    for number, (name, table, options, field) in enumerate(STEPS):
+        target = tmp_path / f"{number}.yaml"
+        code, out, err = run(name, DATA / table, "--robot", robot, *options, "-o", target)
+        assert code == 0 and f"Robot file: {target}" in out, err
+        entry = robot_file.load(target).history[-1]
+        assert entry["command"] == f"ctcr calibrate {name}" and entry["sources"][0]["file"] == table
+        changed = {change["field"]: change for change in entry["changes"]}
+        assert changed[field]["sd"] > 0 and changed[field]["old"] != changed[field]["new"]
+        robot = target
+    final = robot_file.load(robot)
+    assert len(final.history) == len(STEPS)
+    assert final.actuation.recorded_home_rotation_deg == [0.0, 0.0, 0.0]
+    np.testing.assert_allclose(final.actuation.home_translation_mm, truth("home translation"), atol=2.5)
+
+
+def test_the_robot_file_is_changed_only_when_told(run, tmp_path):
+    robot = tmp_path / "robot.yaml"
+    robot.write_bytes(ROBOT.read_bytes())
+    code, _, err = run("home", DATA / "home.csv", "--robot", robot, "-o", robot)
+    assert code == 1 and "--in-place" in err and robot.read_bytes() == ROBOT.read_bytes()
+    assert run("home", DATA / "home.csv", "--robot", robot, "--in-place")[0] == 0
+    assert len(robot_file.load(robot).history) == 1
+
+
+def rows(table: str) -> list[str]:
+    return (DATA / table).read_text().splitlines()
+
+
+def doubled_first_point() -> list[str]:
+    lines = rows("points.csv")
+    return [*lines, lines[1].replace("A,-60", "A,-61", 1)]
+
+
+@pytest.mark.parametrize(
+    "name, lines, options, message",
+    [
+        ("rotation-offset", rows("circles.csv")[:4], ["--robot", ROBOT], "circles"),
+        ("rotation-offset", rows("circles.csv"), [], "give --ratio, turns of a tube in one turn of its motor"),
+        (
+            "rotation-offset",
+            [rows("circles.csv")[0], "4" + rows("circles.csv")[1][1:]],
+            ["--robot", ROBOT],
+            "row 2, tube: tube 4 is not there: the robot has 3",
+        ),
+        ("rotation-offset", rows("circles.csv"), ["--ratio", 1, "-o", "x.yaml"], "give --robot"),
+        ("rotation-offset", rows("circles.csv"), ["--robot", ROBOT, "--ratio", 1], "turns"),
+        ("registration", rows("points.csv")[:7], [], ""),
+        ("registration", doubled_first_point(), [], "row 27, cad_x: the CAD coordinates of A differ"),
+        ("home", rows("home.csv")[:5], ["--robot", ROBOT], "tube 3 has no row: needs every tube, 1 to 3"),
+        ("home", rows("home.csv"), [], "give --pitch-mm"),
+        ("cantilever", rows("cantilever.csv"), [], "needs the tube's diameters"),
+        ("cantilever", rows("cantilever.csv"), ["--robot", ROBOT], "give --tube, 1 to 3 from the innermost"),
+        ("cantilever", rows("cantilever.csv"), ["--robot", ROBOT, "--tube", 4], "tube 4 is not there: the robot has 3"),
+        ("curvature", rows("picture.csv"), [], "points in px need their scale: give --mm-per-px, or --reference"),
+        ("curvature", rows("picture.csv")[:4], ["--mm-per-px", 0.1], ""),
+    ],
+)
+def test_bad_input_gives_words_and_writes_nothing(run, tmp_path, name, lines, options, message):
+    table = tmp_path / "circles.csv"
+    table.write_text("\n".join(lines) + "\n")
+    if "--robot" in options and "-o" not in options:
+        options = [*options, "-o", tmp_path / "new.yaml"]
+    code, out, err = run(name, table, *options, "--json", tmp_path / "a.json")
+    assert code == 1 and out == "" and message in err and "Traceback" not in err
+    assert err.startswith("Error: ") and "this should not happen" not in err
+    assert [path.name for path in tmp_path.iterdir()] == ["circles.csv"]
+
+
+@pytest.mark.parametrize(
+    ("command", "table", "options", "title"),
+    [
+        ("rotation-offset", "circles.csv", [], "Rotation offsets: new robot"),
+        ("registration", "points.csv", [], "Tracker frame: new robot"),
+        ("home", "home.csv", [], "Home: new robot"),
+        ("cantilever", "cantilever.csv", ["--tube", 1], "Cantilever: new robot"),
+        ("curvature", "picture.csv", ["--tube", 2, "--mm-per-px", 0.083333], "Shape of the tube: new robot"),
+    ],
+)
+def test_each_procedure_writes_a_page_that_needs_nothing_else(run, tmp_path, command, table, options, title):
+    page = tmp_path / "page.html"
+    code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "--report", page)
+    assert code == 0 and f"Report: {page}" in out, err
+    text = page.read_text()
+    assert f"<h1>{title}</h1>" in text and text.count("<svg") == 1 and "<th>sd</th>" in text
+    assert f"{table}. Made by ctcr calibrate {command} on" in text
+    assert not re.search(r"""(?:src|href)=["']https?:""", text)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_picture_of_a_circle_shows_how_far_each_way_is_off(sign):
+    from ctcr.calibrate.procedure_figures import Circle
+
+    angle = np.tile(np.linspace(-3, 3, 40), 2)
+    forward = np.arange(80) < 40
+    seen = sign * (angle + 0.7 + np.where(forward, 0.02, -0.02))
+    position = np.column_stack([3 + 0.5 * np.cos(seen), 0.5 * np.sin(seen), np.full(80, 2.0)])
+    circle = Circle(
+        "tube 1", position, angle, forward, np.ones(80, bool), np.array([3.0, 0, 2]), np.array([0.0, 0, 1]), 0.5
+    )
+    assert np.degrees(0.02) * np.where(forward, 1, -1) == pytest.approx(circle.behind(), abs=1e-9)

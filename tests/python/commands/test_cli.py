@@ -1,0 +1,231 @@
+"""The commands: what they print and write, one clear error, nothing half written. The model here is a stand-in."""
+
+import json
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli, frames
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+
+ROOT = Path(__file__).parents[3]
+ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
+
+
+class StandIn:
+    """A robot that stays straight: its tip is at (0, 0, deployed length), turned by alpha_1 about z."""
+
+    def __init__(self, robot, steps=1, integrator="default"):
+        self.lengths = np.array([tube.length for tube in robot.tubes])
+        self.steps = steps
+
+    def predict(self, beta, alpha, force=None, moment=None, *, derivatives=False, threads=0):
+        length = self.lengths[0] + beta[:, 0]
+        position = np.stack([force[:, 0], 0 * length, length], axis=1)
+        turn = np.stack([0 * length, 0 * length, alpha[:, 0]], axis=1)
+        quaternion = frames.quaternion_from_rotation_vector(turn)
+        status = np.where(alpha[:, 0] > 3, 3, 0)
+        return types.SimpleNamespace(position=position, quaternion=quaternion, status=status, stability=0 * length + 1)
+
+    def shape(self, beta, alpha, force=None, moment=None, *, points=200):
+        length = np.linspace(0, self.lengths[0] + beta[0], points)
+        position = np.outer(length, [0, 0, 1])
+        return types.SimpleNamespace(
+            arc_length=length, position=position, quaternion=np.tile([1.0, 0, 0, 0], (points, 1))
+        )
+
+
+@pytest.fixture(autouse=True)
+def stand_in(monkeypatch):
+    model = types.ModuleType("ctcr.model.model")
+    model.Model = StandIn
+    model.status_text = lambda code: {3: "not converged"}[code]
+    monkeypatch.setitem(sys.modules, "ctcr.model.model", model)
+
+
+@pytest.fixture
+def run(capsys):
+    def run(*arguments) -> tuple[int, str, str]:
+        code = cli.run([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def table(tmp_path):
+    """A table of 50 rows whose rows 11 and 40 the stand-in cannot solve."""
+    rng = np.random.default_rng(6)
+    lines = ["t_s,run,beta1_m,beta2_m,beta3_m,alpha1_rad,alpha2_rad,alpha3_rad,fx_N,fy_N,fz_N"]
+    for row in range(2, 52):
+        beta = np.sort(rng.uniform(-0.15, -0.05, 3))
+        alpha = [3.1 if row in (11, 40) else rng.uniform(-3, 3), 0, 0]
+        lines.append(",".join(str(x) for x in ["", 0, *beta, *alpha, *rng.normal(size=3)]))
+    path = tmp_path / "table.csv"
+    path.write_text("\r\n".join(lines) + "\r\n", newline="")
+    return path
+
+
+def test_info_shows_the_file_the_stiffnesses_and_what_looks_wrong(run, tmp_path):
+    code, out, _ = run("info", ROBOT)
+    assert code == 0 and "bending stiffness EI" in out and "Nothing looks wrong" in out
+    doubtful = tmp_path / "robot.yaml"
+    doubtful.write_text(ROBOT.read_text().replace("length_mm: 463.0", "length_mm: 463000"))
+    code, out, _ = run("info", doubtful, "--json", tmp_path / "info.json")
+    assert code == 0 and "463000 mm: is this um?" in out
+    data = json.loads((tmp_path / "info.json").read_text())
+    robot = robot_file.load(doubtful)
+    assert [tube["bending_stiffness_N_m2"] for tube in data["derived"]] == [t.bending_stiffness for t in robot.tubes]
+    assert data["robot"] == robot.model_dump(exclude_unset=True)
+    assert [doubt["field"] for doubt in data["looks_wrong"]] == ["tubes[0].length_mm"]
+
+
+@pytest.mark.parametrize("frame", ["base", "tracker"])
+@pytest.mark.parametrize("chunk", [7, 1 << 16])
+def test_predict_adds_the_pose_to_each_row(run, tmp_path, table, monkeypatch, frame, chunk):
+    from ctcr.commands import predict
+
+    monkeypatch.setattr(predict, "CHUNK_ROWS", chunk)
+    code, out, _ = run("predict", ROBOT, table, "--frame", frame, "-o", tmp_path / "out.csv", "--steps", 3)
+    assert code == 0 and "48 of 50 rows" in out
+    assert "row 11: not converged" in out and "row 40: not converged" in out
+    before, after = table.read_text().splitlines(), (tmp_path / "out.csv").read_text().splitlines()
+    assert after[0] == before[0] + ",pred_x_m,pred_y_m,pred_z_m,pred_qw,pred_qx,pred_qy,pred_qz"
+    robot, readings = robot_file.load(ROBOT), measurements.load(table, 3)
+    answer = StandIn(robot).predict(readings.beta, readings.alpha, readings.force)
+    position, quaternion = answer.position, answer.quaternion
+    if frame == "tracker":
+        position, quaternion = frames.base_to_tracker(robot.tracker, position, quaternion)
+    for i, (old, new) in enumerate(zip(before[1:], after[1:], strict=True)):
+        assert new.startswith(old + ",")
+        added = new.removeprefix(old + ",").split(",")
+        if i + 2 in (11, 40):
+            assert added == [""] * 7
+        else:
+            np.testing.assert_allclose([float(x) for x in added], [*position[i], *quaternion[i]], atol=1e-9)
+
+
+def test_predict_may_write_over_its_own_table_and_lists_rows_as_json(run, table):
+    code, out, err = run("predict", ROBOT, table, "-o", table, "--json", "-")
+    summary = json.loads(out)
+    assert code == 0 and summary["solved"] == 48 and "48 of 50" in err
+    assert summary["unsolved"] == [{"row": 11, "status": "not converged"}, {"row": 40, "status": "not converged"}]
+    assert "pred_qz" in table.read_text()
+
+
+JOINTS_SI = ["--beta", "-0.33,-0.24,-0.165", "--alpha", "1.5707963267948966,0,-0.5235987755982988"]
+JOINTS = ["--beta-mm", "-330,-240,-165", "--alpha-deg", "90,0,-30"]
+
+
+def test_shape_tells_where_each_tube_ends_in_either_unit(run, tmp_path):
+    answers = []
+    for joints in (JOINTS_SI, JOINTS):
+        code, out, err = run("shape", ROBOT, *joints, "--force", "0,0.1,0", "--json", "-", "-o", tmp_path / "robot.png")
+        assert code == 0 and "Where the tubes end" in err
+        answers.append(json.loads(out))
+    ends = [133.0, 90.5, 34.0]
+    for data in answers:
+        np.testing.assert_allclose([1e3 * tube["tip_arc_length_m"] for tube in data["tubes"]], ends)
+        np.testing.assert_allclose([1e3 * tube["tip_position_m"][2] for tube in data["tubes"]], ends)
+    picture = (tmp_path / "robot.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
+
+
+def test_bench_counts_what_it_solved(run, monkeypatch):
+    from ctcr.commands import bench
+
+    monkeypatch.setattr(bench, "ROWS", 200)
+    code, out, _ = run("bench", "--json", "-")
+    results = json.loads(out)["results"]
+    assert code == 0 and {(r["load"], r["derivatives"]) for r in results} == {
+        (load, derivatives) for load in ("none", "tip force") for derivatives in (False, True)
+    }
+    assert all(90 < result["solved_percent"] < 100 and result["per_second"] > 0 for result in results)
+
+
+def test_bench_joints_are_within_reach():
+    from ctcr.commands import bench
+
+    lengths = np.array([tube.length for tube in bench.table_ii().tubes])
+    beta, alpha = bench.random_joints(bench.table_ii(), 500, np.random.default_rng(2))
+    tips = beta + lengths
+    assert (np.diff(beta, axis=1) >= 0).all() and (beta <= 0).all() and alpha.shape == beta.shape
+    assert (np.diff(tips, axis=1) <= 0).all() and (tips >= 0).all()
+
+
+def test_the_built_in_robot_is_the_example():
+    from ctcr.commands import bench
+
+    assert bench.table_ii().tubes == robot_file.load(ROBOT).tubes
+
+
+def test_faulty_input_writes_nothing_and_tells_row_field_and_unit(run, tmp_path, table):
+    lines = table.read_text().splitlines()
+    fields = lines[4].split(",")
+    lines[4] = ",".join([*fields[:2], "-120", *fields[3:]])
+    table.write_text("\n".join(lines))
+    code, out, err = run("predict", ROBOT, table, "-o", tmp_path / "out.csv")
+    assert (code, out) == (1, "")
+    assert err == f"Error: {table}, row 5, beta1_m: -120 m: is this mm?\n"
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_all_faults_of_a_robot_file_are_listed(run, tmp_path):
+    path = tmp_path / "robot.yaml"
+    path.write_text(ROBOT.read_text().replace("poisson_ratio: 0.3", "poisson_ratio: x"))
+    code, _, err = run("info", path)
+    assert code == 1 and err.count("'x' is not a number") == 3 and "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["info", "absent.yaml"], "absent.yaml: cannot read it: no such file or directory"),
+        (["info"], "Missing argument 'ROBOT'"),
+        (["nonsense"], "No such command 'nonsense'"),
+        (["predict", ROBOT, ROBOT, "-o", "x.csv"], "alpha1_rad"),
+        (["shape", ROBOT], "give either --beta or --beta-mm"),
+        (["shape", ROBOT, "--beta", "-300,-200,-100", "--alpha", "0,0,0"], "--beta: -300 m: is this mm?"),
+        (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "0,0"], "--alpha: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta", "-.3,-.2,nan", "--alpha", "0,0,0"], "--beta: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta", "a,b", "--alpha", "0,0,0"], "is not a list of numbers"),
+        (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "3.1,0,0"], "no shape at these joints: not converged"),
+    ],
+)
+def test_an_error_is_one_clear_sentence_and_exit_code_1(run, arguments, message):
+    code, out, err = run(*arguments)
+    assert code == 1 and message in err and "Traceback" not in err and out == ""
+
+
+def test_an_unexpected_error_is_a_sentence_too(run, monkeypatch):
+    monkeypatch.setattr(robot_file, "load", lambda path: 1 / 0)
+    code, _, err = run("info", ROBOT)
+    assert code == 1 and "division by zero (ZeroDivisionError" in err and "Traceback" not in err
+    monkeypatch.setenv("CTCR_DEBUG", "1")
+    with pytest.raises(ZeroDivisionError):
+        cli.run(["info", str(ROBOT)])
+
+
+def test_a_missing_extension_is_told(run, monkeypatch, table, tmp_path):
+    class Absent:
+        def find_spec(self, name, *_):
+            if name == "ctcr.model.model":
+                raise ModuleNotFoundError("No module named 'ctcr._core'", name="ctcr._core")
+
+    monkeypatch.delitem(sys.modules, "ctcr.model.model")
+    monkeypatch.setattr(sys, "meta_path", [Absent(), *sys.meta_path])
+    code, _, err = run("predict", ROBOT, table, "-o", tmp_path / "out.csv")
+    assert code == 1 and "the compiled part of ctcr is missing" in err
+
+
+def test_help_names_every_command_and_loads_nothing_heavy():
+    code = "import sys; from ctcr.cli import run; run(['--help'])\n"
+    code += "print([name for name in ('numpy', 'pydantic', 'rich', 'matplotlib', 'ctcr._core') if name in sys.modules])"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert all(f"\n  {name} " in out for name in ("bench", "info", "predict", "shape"))
+    assert out.splitlines()[-1] == "[]"

@@ -1,0 +1,256 @@
+"""`ctcr compare` finds what was planted, says nothing where nothing was, and counts what it left out."""
+
+import json
+
+import numpy as np
+import pytest
+from compare_bench import JITTER_MM, bench, outward, stop_and_go, stream, tips
+from ctcr.compare import compare
+from ctcr.compare.analysis import LEVEL
+from ctcr.compare.limits import limits
+from ctcr.compare.summary import differs, findings, headline, is_noise, quiet
+from ctcr.errors import InputError
+from ctcr.frames import product, quaternion_from_rotation_vector
+from ctcr.show import output
+
+
+def constant(vector_mm):
+    return lambda joints, t, run: np.tile(np.array(vector_mm) * 1e-3, (len(run), 1))
+
+
+def test_noise_alone_gives_findings_no_more_often_than_stated(monkeypatch):
+    """At 5 % a table, 7 or more alarms in 40 tables come once in 300 times; in every other one, runs share joints."""
+    monkeypatch.setattr("ctcr.compare.dependence.TRIALS", 399)
+    alarms = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        result = compare(*bench(random, stop_and_go(random, runs=8, stops=6, shared=seed % 2 == 0)))
+        alarms += bool(findings(result))
+        assert result.position_mm.rms == pytest.approx(JITTER_MM * 3**0.5, rel=0.15)
+    assert alarms <= 6
+
+
+def test_noise_alone_is_called_noise():
+    random = np.random.default_rng(1)
+    result = compare(*bench(random, stop_and_go(random)))
+    assert is_noise(result)
+    assert "nothing to explain" in headline(result)
+    assert any("Out and return agree" in text for text in quiet(result))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_constant_offset_is_found_with_its_size(seed):
+    random = np.random.default_rng(seed)
+    vector = random.normal(0, 0.5, 3)
+    result = compare(*bench(random, stop_and_go(random), constant(vector), turn=(0, 0, 0)))
+    assert result.shift.p_value <= LEVEL
+    np.testing.assert_allclose(result.shift.vector_mm, vector, atol=4 * JITTER_MM / np.sqrt(180))
+    assert result.shift.share == pytest.approx(1 - 3 * JITTER_MM**2 / (vector @ vector + 3 * JITTER_MM**2), abs=0.02)
+    assert findings(result)[0].text.startswith("A constant offset")
+    assert not result.ranking.chosen
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("alpha1", lambda q, t, run: 1e-3 * np.column_stack([np.cos(q[:, 2]), 0 * t, 0 * t])),
+        ("alpha12", lambda q, t, run: 1e-3 * np.column_stack([0 * t, 0 * t, np.cos(q[:, 2] - q[:, 3])])),
+        ("length2", lambda q, t, run: 0.1 * np.column_stack([0 * t, q[:, 1] + 0.08, 0 * t])),
+    ],
+)
+def test_a_dependence_is_ranked_first(name, error):
+    random = np.random.default_rng(5)
+    path = stop_and_go(random, runs=14)
+    result = compare(*bench(random, path, error))
+    first = result.ranking.alone[0]
+    best = next(found for found in result.ranking.alone if found.name == name)
+    planted = error(path[0], path[2], path[1])
+    variance = np.mean(np.sum((planted - planted.mean(axis=0)) ** 2, axis=1))
+    # The tip's place follows the joints: what it predicts as well may come first by a hair.
+    assert best.share > first.share - 0.01
+    assert best.p_value <= LEVEL
+    assert 0.8 < best.share <= 1
+    assert best.size_mm == pytest.approx(np.sqrt(variance) * 1e3, rel=0.1)
+    assert result.ranking.chosen[0].name == first.name
+
+
+def test_two_dependences_are_found_one_after_the_other():
+    random = np.random.default_rng(6)
+
+    def error(q, t, run):
+        return 1e-3 * np.column_stack([np.cos(q[:, 2]), 0 * t, 0.6 * np.cos(q[:, 2] - q[:, 3])])
+
+    result = compare(*bench(random, stop_and_go(random, runs=20), error))
+    first, second = result.ranking.chosen[:2]
+    assert "base angle α1" in (first.label, *first.indistinct)
+    assert "joint difference α1 − α2" in (second.label, *second.indistinct)
+    assert result.ranking.explained > 0.85
+
+
+def test_joints_that_move_alike_are_called_indistinct():
+    """The second angle stands still, so the difference of the angles is the first angle."""
+    random = np.random.default_rng(7)
+    joints, run, t = stop_and_go(random, runs=12)
+    joints[:, 3] = 0.4
+    result = compare(*bench(random, (joints, run, t), lambda q, t, run: 1e-3 * np.cos(q[:, [2, 2, 2]])))
+    first = result.ranking.chosen[0]
+    assert {"base angle α1", "joint difference α1 − α2"} <= {first.label, *first.indistinct}
+    assert "base angle α2" in result.fixed
+    assert any("base angle α2" in text for text in limits(result))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_direction_dependent_offset_sets_the_floor(seed):
+    random = np.random.default_rng(seed)
+    path = stop_and_go(random)
+    vector = random.normal(0, 0.3, 3)
+    result = compare(*bench(random, path, lambda q, t, run: outward(q, run)[:, None] * vector * 1e-3))
+    d = result.direction
+    size = np.linalg.norm(vector)
+    assert differs(d)
+    assert d.p_against_same <= LEVEL
+    assert d.typical_rms_mm == pytest.approx(d.rms_mm, rel=0.4)
+    assert d.floor_mm == pytest.approx(np.hypot(size, JITTER_MM * np.sqrt(1.5)), rel=0.05)
+    assert any("Out and return differ" in item.text for item in findings(result))
+
+
+def test_outliers_are_not_taken_for_history():
+    random = np.random.default_rng(4)
+    robot, readings, prediction = bench(random, stop_and_go(random))
+    readings.position[[31, 77, 140]] += 0.003
+    result = compare(robot, readings, prediction)
+    assert not differs(result.direction)
+    assert result.direction.outliers == 3
+    assert result.direction.typical_rms_mm == pytest.approx(JITTER_MM * 6**0.5, rel=0.15)
+    assert any("Pairs far beyond that: 3" in text for text in quiet(result))
+
+
+def test_history_that_spoils_same_direction_visits_is_told_too():
+    """Every visit errs by itself, far beyond the jitter: it is no matter of direction, and it is not called noise."""
+    random = np.random.default_rng(8)
+    result = compare(*bench(random, stop_and_go(random), noise_mm=0.6))
+    assert result.direction.p_against_same > LEVEL
+    assert differs(result.direction)
+    assert "readings repeat only to" in headline(result)
+    assert any("do not give the same pose again" in item.text for item in findings(result))
+
+
+@pytest.mark.parametrize("delay", [0.12, -0.05])
+def test_a_delay_is_measured(delay):
+    random = np.random.default_rng(9)
+    path = stream(random)
+
+    def late(joints, t, run):
+        late_joints = np.column_stack([np.interp(t - delay, t, column) for column in joints.T])
+        return tips(late_joints)[0] - tips(joints)[0]
+
+    result = compare(*bench(random, path, late))
+    d = result.direction
+    assert abs(d.delay_s - delay) < max(4 * d.delay_uncertainty_s, 0.02 * abs(delay))
+    assert d.rms_without_delay_mm < 0.2 * d.rms_mm
+    assert result.ranking.chosen[0].name == "lag"
+    assert any(f"a delay of {d.delay_s:.3f}" in item.text for item in findings(result))
+
+
+def test_runs_off_at_the_same_joints_are_noticed():
+    random = np.random.default_rng(10)
+    offsets = random.normal(0, 2e-3, (10, 3))
+    planted = bench(random, stop_and_go(random, shared=True), lambda q, t, run: offsets[run])
+    result = compare(*planted)
+    assert result.run_offsets.p_value <= LEVEL
+    assert result.run_offsets.found
+    assert result.run_offsets.share > 0.98
+    assert np.linalg.norm(result.ranking.error, axis=1).mean() * 1e3 < 2 * JITTER_MM
+    assert not result.ranking.chosen
+
+
+def off_in_two_runs(q, t, run):
+    return np.isin(run, (3, 7))[:, None] * np.array([0.0, 0.04, 0.0]) + 1e-4 * np.cos(q[:, [0, 1, 2]])
+
+
+def test_outlying_runs_are_named():
+    random = np.random.default_rng(11)
+    result = compare(*bench(random, stop_and_go(random, runs=12, shared=True), off_in_two_runs))
+    assert result.run_offsets.outlying == (3, 7)
+    assert result.run_offsets.outlying_mm == pytest.approx(40, rel=0.02)
+    assert any("runs 3, 7 lie about 40.0 mm" in item.text for item in findings(result))
+
+
+def test_runs_whose_joints_no_other_run_came_near_are_not_called_off():
+    """The same error in runs of their own region may as well belong to their joints."""
+    random = np.random.default_rng(11)
+    joints, run, t = stop_and_go(random, runs=12, shared=True)
+    joints[np.isin(run, (3, 7)), 2] += 100.0
+    result = compare(*bench(random, (joints, run, t), off_in_two_runs))
+    assert result.run_offsets.outlying == ()
+
+
+def test_a_grossly_turned_frame_is_named_and_taken_out():
+    random = np.random.default_rng(12)
+    robot, readings, prediction = bench(random, stop_and_go(random), turn=(0, 0, 0))
+    x, y, z = readings.position.T
+    readings.position = np.column_stack([-y, x, z])
+    result = compare(robot, readings, prediction)
+    assert result.turn.turn_deg == pytest.approx(90, abs=0.5)
+    np.testing.assert_allclose(result.turn.axis, (0, 0, 1), atol=0.01)
+    assert result.position_mm.rms > 10
+    assert np.linalg.norm(result.sample.error, axis=1).mean() * 1e3 < 3 * JITTER_MM
+    assert "grossly wrong" in findings(result)[0].text
+
+
+@pytest.mark.parametrize("roll", ["known", "unknown"])
+def test_orientation_error_counts_the_roll_only_where_it_is_known(roll):
+    random = np.random.default_rng(13)
+    path = stop_and_go(random)
+    robot, readings, prediction = bench(random, path, roll=roll)
+    count = len(path[1])
+    base = quaternion_from_rotation_vector(robot.tracker.rotation_vector_rad)
+    seen = product(np.tile(base, (count, 1)), prediction.quaternion)
+    turned = {"roll": (0, 0, 0.2), "bend": (0.1, 0, 0)}
+    expected = {"roll": np.degrees(0.2) if roll == "known" else 0.0, "bend": np.degrees(0.1)}
+    for name, vector in turned.items():
+        spin = product(seen, np.tile(quaternion_from_rotation_vector(vector), (count, 1)))
+        readings.quaternion = spin * random.choice([-1.0, 1.0], (count, 1))  # q and -q are one rotation
+        result = compare(robot, readings, prediction)
+        assert result.angle_deg.maximum == pytest.approx(expected[name], abs=1e-6)
+    assert result.angle_kind == ("orientation" if roll == "known" else "tip direction")
+
+
+def test_rows_that_cannot_be_compared_are_listed():
+    random = np.random.default_rng(14)
+    robot, readings, prediction = bench(random, stop_and_go(random))
+    readings.position[[3, 20]] = np.nan
+    prediction.status[[5, 20]] = 3
+    prediction.position[5] = np.nan
+    result = compare(robot, readings, prediction)
+    assert result.sample.not_measured.tolist() == [5, 22]
+    assert result.sample.not_solved.tolist() == [7]
+    assert result.position_mm.count == len(readings.row) - 3
+    assert result.as_dict()["rows"] == {"compared": 177, "not_measured": [5, 22], "not_solved": [7]}
+    readings.position[:] = np.nan
+    with pytest.raises(InputError, match="no row can be compared"):
+        compare(robot, readings, prediction)
+
+
+def test_a_handful_of_readings_is_compared_without_claims():
+    random = np.random.default_rng(15)
+    joints, run, t = stop_and_go(random, runs=1, stops=9)
+    for count in (1, 2, 5):
+        planted = bench(random, (joints[:count], run[:count], t[:count]), constant((1, 0, 0)))
+        result = compare(*planted)
+        assert result.position_mm.count == count
+        assert not findings(result)
+        assert any("too few to judge" in text for text in limits(result))
+        json.dumps(output.plain(result.as_dict()), allow_nan=False)
+
+
+def test_the_order_of_error_sizes_and_runs_holds():
+    random = np.random.default_rng(16)
+    result = compare(*bench(random, stop_and_go(random), constant((0.2, 0, 0))))
+    for spread in (result.position_mm, result.percent_of_length, *(item.position_mm for item in result.runs)):
+        assert 0 < spread.mean <= spread.rms <= spread.maximum
+        assert spread.p95 <= spread.maximum
+    assert sum(item.position_mm.count for item in result.runs) == result.position_mm.count
+    square = sum(item.position_mm.count * item.position_mm.rms**2 for item in result.runs)
+    assert square == pytest.approx(result.position_mm.count * result.position_mm.rms**2)
+    assert result.percent_of_length.count == result.position_mm.count

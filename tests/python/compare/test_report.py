@@ -1,0 +1,161 @@
+"""The report is one page that needs nothing else, the command writes what it says, and a big table stays bounded."""
+
+import json
+import re
+import time
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compare_bench import bench, stop_and_go
+from ctcr import cli
+from ctcr.commands import compare as compare_command
+from ctcr.compare import compare, report, scene
+from ctcr.compare.summary import findings, headline
+from ctcr.show import output
+
+ROOT = Path(__file__).parents[3]
+SHARED = ROOT.parent / "shared" / "data" / "real" / "boston_2016"
+ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
+FETCHING = ("src", "href", "data", "poster", "srcset", "action", "xlink:href")
+
+
+class Page(HTMLParser):
+    """Collects the text, the scripts, and what a browser would fetch."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.fetched, self.scripts, self.words, self._inside = [], [], [], None
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self._inside = tag
+        self.fetched += [value for name, value in attributes if name in FETCHING and not (value or "#").startswith("#")]
+
+    def handle_endtag(self, tag):
+        self._inside = None
+
+    def handle_data(self, data):
+        (self.scripts if self._inside == "script" else self.words).append(data)
+
+
+def planted(seed=1, runs=10):
+    random = np.random.default_rng(seed)
+    path = stop_and_go(random, runs=runs)
+    return bench(random, path, lambda q, t, run: 1e-3 * np.column_stack([np.cos(q[:, 2]), 0 * t, 0 * t + 0.5]))
+
+
+def without_links(svg_or_css):
+    """url(#...) points into the page itself."""
+    return re.sub(r"url\(\s*[\"']?#", "", svg_or_css)
+
+
+@pytest.fixture(autouse=True)
+def short_plotly(monkeypatch):
+    """The page holds plotly.js, 5 MB, as it is; what it contains is not ours to test."""
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "/* plotly.js */")
+
+
+def test_the_page_fetches_nothing_and_says_what_was_found():
+    result = compare(*planted())
+    page = Page(report.page(result, "a table & a <robot>"))
+    text = "".join(page.words)
+    for fetched in page.fetched:
+        assert fetched.startswith("data:"), fetched[:60]
+    assert not re.search(r"@import|url\(", without_links(text))
+    assert headline(result) in text
+    for item in findings(result):
+        assert item.text in text
+    assert "a table & a <robot>" in text
+    assert len(page.scripts) == 2
+
+
+def test_the_scene_is_valid_json_and_shows_true_points():
+    result = compare(*planted())
+    drawing = json.loads(scene.scene(result))
+    by_name = {trace.get("name"): trace for trace in drawing["data"]}
+    rows = scene.shown_rows(result)
+    for name, points in (("measured", result.headline.measured), ("predicted", result.headline.predicted)):
+        shown = np.column_stack([by_name[name][axis] for axis in "xyz"])
+        np.testing.assert_allclose(shown, points[rows] * 1e3, atol=5.1e-4)
+    factor = scene.arrow_factor(result)
+    assert factor >= 1
+    shafts = by_name[f"error × {factor:g}"]
+    start, end = (np.column_stack([shafts[axis][k::3] for axis in "xyz"]) for k in (0, 1))
+    np.testing.assert_allclose(end - start, factor * result.headline.error[rows] * 1e3, atol=2e-3)
+
+
+def test_a_name_cannot_break_the_page():
+    robot, readings, prediction = planted()
+    robot.name = "</script><script>alert(1)</script>"
+    page = Page(report.page(compare(robot, readings, prediction), "x"))
+    assert len(page.scripts) == 2
+    assert not any("alert(1)" in script for script in page.scripts)
+
+
+def write_table(path, readings):
+    header = "t_s,run,beta1_m,beta2_m,beta3_m,alpha1_rad,alpha2_rad,alpha3_rad,x_m,y_m,z_m"
+    rows = np.column_stack([readings.t, readings.run, readings.beta, readings.alpha, readings.position])
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.9g")
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """A table for a three-tube robot whose predictions are given, so that no compiled model is needed."""
+    robot, readings, prediction = planted()
+    third = np.zeros((len(readings.run), 1))
+    readings.beta, readings.alpha = np.hstack([readings.beta, third]), np.hstack([readings.alpha, third])
+    write_table(tmp_path / "table.csv", readings)
+    monkeypatch.setattr(compare_command, "_predict", lambda robot, readings, steps: prediction)
+    return tmp_path / "table.csv"
+
+
+def test_the_command_writes_report_and_numbers(table, tmp_path, capsys):
+    page, numbers = tmp_path / "report.html", tmp_path / "numbers.json"
+    assert cli.run(["compare", str(ROBOT), str(table), "--report", str(page), "--json", str(numbers)]) == 0
+    said = capsys.readouterr().out
+    assert "The model is wrong by" in said
+    assert "Findings" in said
+    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
+    data = json.loads(numbers.read_text())
+    assert data["position_mm"]["count"] == 180
+    assert {item["run"] for item in data["runs"]} == set(range(10))
+    assert data["dependence"]["ranked"][0]["share"] >= data["dependence"]["ranked"][1]["share"]
+
+
+def test_json_on_standard_output_is_nothing_but_json(table, capsys):
+    assert cli.run(["compare", str(ROBOT), str(table), "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["rows"]["compared"] == 180
+
+
+def test_an_unwritable_report_is_one_clear_error(table, tmp_path, capsys):
+    assert cli.run(["compare", str(ROBOT), str(table), "--report", str(tmp_path / "no" / "r.html")]) == 1
+    assert "cannot write" in capsys.readouterr().err
+
+
+def test_a_long_table_takes_bounded_time_and_memory():
+    """50 000 rows; the limit is generous, a quadratic step would take far longer."""
+    random = np.random.default_rng(2)
+    joints, run, _ = stop_and_go(random, runs=2_500, stops=10)
+    start = time.process_time()
+    result = compare(*bench(random, (joints, run, np.arange(len(run)) * 2.0)))
+    assert time.process_time() - start < 30
+    assert result.position_mm.count == 50_000
+    json.dumps(output.plain(result.as_dict()), allow_nan=False)
+
+
+@pytest.mark.skipif(not SHARED.exists(), reason="the real measurements are not here")
+def test_out_and_return_of_a_real_robot_agree_with_an_analysis_by_hand():
+    if not hasattr(pytest.importorskip("ctcr._core"), "Model"):
+        pytest.skip("the compiled model is not built")
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
+
+    robot = robot_file.load(SHARED / "robot.yaml")
+    readings = measurements.load(SHARED / "measurements.csv", robot.n_tubes)
+    result = compare(robot, readings, compare_command._predict(robot, readings, 4))
+    assert result.position_mm.mean == pytest.approx(5.4, abs=0.1)
+    assert result.direction.delay_s == pytest.approx(0.10, abs=0.01)
+    assert result.direction.rms_without_delay_mm == pytest.approx(3.5, abs=0.1)
+    assert result.ranking.chosen[0].name == "lag"

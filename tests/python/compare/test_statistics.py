@@ -1,0 +1,101 @@
+"""The held-out sums, the chance level and the blocks are what they are said to be."""
+
+import numpy as np
+import pytest
+from compare_bench import bench, stop_and_go, stream
+from ctcr.compare import crossvalidation as cv
+from ctcr.compare.blocks import PLACES, split
+from ctcr.compare.forms import local_frames
+from ctcr.compare.offsets import rigid_motion
+from ctcr.compare.sample import take_sample
+from ctcr.frames import matrix_from_rotation_vector
+
+
+def plain_held_out(design, target, label, ridge):
+    """Leave each block out, fit the others, sum what is left: written directly."""
+    total = 0.0
+    scale = np.diag(design.T @ design)
+    for block in np.unique(label):
+        out = label == block
+        x, y = design[~out], target[~out]
+        coefficients = np.linalg.solve(x.T @ x + np.diag(ridge * scale), x.T @ y)
+        total += np.sum((target[out] - design[out] @ coefficients) ** 2)
+    return total
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_held_out_sums_equal_the_plain_computation_for_every_sign_pattern(seed):
+    random = np.random.default_rng(seed)
+    label = np.sort(random.integers(0, 6, 90))
+    design, target = random.normal(size=(90, 3)), random.normal(size=(90, 2))
+    folds = cv.make_folds(np.unique(label, return_inverse=True)[1], trials=12, seed=seed)
+    sums = cv.unexplained(design, target, folds)
+    assert len(sums) == 13
+    for signs, value in zip(folds.signs, sums, strict=True):
+        flipped = target * signs[folds.label][:, None]
+        expected = min(plain_held_out(design, flipped, label, ridge) for ridge in cv.RIDGES)
+        assert value == pytest.approx(expected, rel=1e-9)
+    left = target - cv.held_out_prediction(design, target, folds)
+    assert np.sum(left**2) == pytest.approx(sums[0], rel=1e-9)
+
+
+def test_chance_counts_the_observed_one():
+    assert cv.chance(5.0, np.array([1.0, 5.0, 9.0])) == 0.75
+    assert cv.chance(10.0, np.zeros(99)) == 0.01
+
+
+def test_p_values_of_noise_are_not_too_small():
+    """Under noise a p-value is below x at most a share x of the time (here x = 0.2, 200 tries, 4 sigma)."""
+    below = 0
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        label = np.repeat(np.arange(10), 8)
+        folds = cv.make_folds(label, trials=99, seed=seed)
+        target = random.normal(size=(80, 3))
+        gain = np.sum(target**2) - cv.unexplained(random.normal(size=(80, 2)), target, folds)
+        below += cv.chance(gain[0], gain[1:]) <= 0.2
+    assert below <= 200 * 0.2 + 4 * np.sqrt(200 * 0.2 * 0.8)
+
+
+def test_many_runs_are_the_blocks():
+    random = np.random.default_rng(1)
+    sample = take_sample(*bench(random, stop_and_go(random, runs=9)))
+    rows, label, kind = split(sample)
+    assert kind == "runs"
+    np.testing.assert_array_equal(sample.run[rows], label)
+
+
+def test_one_run_is_split_into_places_that_hold_both_passes():
+    """Out and return lie in the same place, so that nothing leaks from one to the other."""
+    random = np.random.default_rng(2)
+    sample = take_sample(*bench(random, stream(random)))
+    rows, label, kind = split(sample)
+    assert kind == "places"
+    assert np.bincount(label).min() > 0.8 * len(rows) / PLACES
+    place = np.empty(len(rows), int)
+    place[rows] = label
+    half = len(rows) // 2  # the second half of the path is the first one backwards, between its readings
+    mirrored = place[half + np.arange(1, half - 1)] == place[half - np.arange(1, half - 1)]
+    assert mirrored.mean() > 0.95
+
+
+def test_local_frames_are_rotations():
+    random = np.random.default_rng(3)
+    sample = take_sample(*bench(random, stop_and_go(random)))
+    rows = np.arange(len(sample.row))
+    for name, axes in local_frames(sample, rows).items():
+        known = np.linalg.norm(axes, axis=(1, 2)) > 0
+        assert known.mean() > 0.9, name
+        products = np.einsum("kji,kjl->kil", axes[known], axes[known])
+        np.testing.assert_allclose(products, np.broadcast_to(np.eye(3), products.shape), atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(np.linalg.det(axes[known]), 1, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_rigid_motion_is_recovered(seed):
+    random = np.random.default_rng(seed)
+    source = random.normal(size=(30, 3))
+    turn, shift = matrix_from_rotation_vector(random.normal(size=3)), random.normal(size=3)
+    found_turn, found_shift = rigid_motion(source, source @ turn.T + shift)
+    np.testing.assert_allclose(found_turn, turn, atol=1e-12)
+    np.testing.assert_allclose(found_shift, shift, atol=1e-12)

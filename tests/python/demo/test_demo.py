@@ -1,0 +1,129 @@
+"""The demonstration on the simulated bench, and what it is made of."""
+
+import json
+import os
+import re
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ctcr.bench.record.joined import PAUSE_S, joined, start_of
+from ctcr.demo.hidden_robot import VALUE
+from ctcr.demo.story import LOG, Story, new_folder
+from ctcr.errors import InputError
+from ctcr.table import measurements
+from simulated_bench import ROOT, before_others, ctcr, skip_without_bench, was_starved
+
+TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
+
+
+# ---- recordings put together
+
+
+def test_joined_recordings():
+    """Rows keep their order, runs their borders, times their distance by one clock."""
+    table = measurements.load(TABLE, 3)
+    for starts, shift in (([1e9, 1e9 + 500], 500), ([None, 3.0], table.t.max() + PAUSE_S)):
+        whole = joined([table, table], starts)
+        n = len(table)
+        np.testing.assert_array_equal(whole.t[:n], table.t)
+        np.testing.assert_allclose(whole.t[n:], table.t + shift)
+        np.testing.assert_array_equal(np.diff(whole.run[:n]) != 0, np.diff(table.run) != 0)
+        assert whole.run[n] == whole.run[n - 1] + 1 and len(np.unique(whole.run)) == 2 * len(np.unique(table.run))
+        np.testing.assert_array_equal(whole.alpha, np.vstack([table.alpha] * 2))
+        assert list(whole.row[[0, -1]]) == [2, 2 * n + 1]
+    without = replace(table, quaternion=None)
+    assert joined([table, without], [None, None]).quaternion is None
+
+
+def test_start_of_a_recording(tmp_path):
+    assert start_of(tmp_path / "measurements.csv") is None
+    (tmp_path / "session.json").write_text(json.dumps({"started_unix_s": 12.5}))
+    assert start_of(tmp_path / "measurements.csv") == 12.5
+
+
+# ---- stories
+
+
+class Silent:
+    def begins(self, why, command):
+        pass
+
+    def ended(self, step):
+        pass
+
+
+def test_a_story_keeps_what_commands_say(tmp_path):
+    story = Story(new_folder(tmp_path / "story"), Silent())
+    robot = ROOT / "examples" / "data" / "demo" / "robot.yaml"
+    story.do("describe it", f"info {robot}", lambda told: told["robot"]["name"], "described")
+    assert story.steps[0].found == "demo" and story.answers["described"]["robot"]["name"] == "demo"
+    assert (story.folder / LOG).read_text().startswith("$ ctcr info")
+    with pytest.raises(InputError, match="ctcr info nothing.yaml.*cannot read it"):
+        story.do("fail", "info nothing.yaml", lambda told: "")
+
+
+def test_foreign_folders_are_left_alone(tmp_path):
+    (tmp_path / "mine.txt").write_text("keep me")
+    with pytest.raises(InputError, match="holds no demonstration"):
+        new_folder(tmp_path)
+    assert (tmp_path / "mine.txt").exists()
+    story = new_folder(tmp_path / "story")
+    (story / "old.csv").touch()
+    assert list(new_folder(story).iterdir()) == [story / LOG]
+
+
+def run_demo(tmp_path, *options):
+    """What the demonstration printed, and its folder."""
+    skip_without_bench()
+    for attempt in ("1", "2"):
+        target = tmp_path / attempt / "demo"
+        target.parent.mkdir()
+        command = ctcr("demo", "bench", "-o", target, "--folder", tmp_path / attempt / "wires", *options)
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            env=os.environ | {"COLUMNS": "150"},
+            timeout=600,
+            preexec_fn=before_others,
+        )
+        if done.returncode == 0 or not was_starved(done.stdout + done.stderr):
+            break
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout, target
+
+
+def check_story(said, folder):
+    added = json.loads((folder / "added.json").read_text())
+    assert added["added"] == ["friction"]
+    rms = added["rms_mm"]
+    assert rms["friction"] < 0.8 * rms["calibrated"] < 0.8 * rms["nominal"]
+    # Few rows, and how the tubes moved between them in real time is not in the table: farther off than their sd says.
+    coefficients = [found["value"] for name, found in added["parameters"].items() if ".coefficient." in name]
+    assert 0.7 * VALUE < np.median(coefficients) < 1.3 * VALUE
+    diagnosis = json.loads((folder / "diagnosis.json").read_text())
+    assert diagnosis["effects"][0]["class"][0] == "friction"
+    assert "The error of the model fell from" in said
+    page = (folder / "report.html").read_text()
+    # The drawing library names pages in its texts.
+    tags = re.sub(r"(?s)(<script[^>]*>).*?</script>", r"\1", page)
+    assert not re.search(r'(src|href)="http', tags) and page.count("<svg") >= 3
+
+
+@pytest.mark.alone
+def test_demo_on_the_simulated_bench(tmp_path):
+    """Shortened, but through the same serial line and the same bus."""
+    check_story(*run_demo(tmp_path, "--short"))
+
+
+@pytest.mark.slow
+def test_whole_demo(tmp_path):
+    said, folder = run_demo(tmp_path)
+    check_story(said, folder)
+    first = json.loads((folder / "first_diagnosis.json").read_text())
+    assert first["verdict"] == "ambiguous" and "friction" in first["effects"][0]["class"]
+    assert json.loads((folder / "diagnosis.json").read_text())["verdict"] == "identified"
+    before, after = map(float, re.search(r"off by ([\d.]+) mm before and ([\d.]+) mm after", said).groups())
+    assert after < 0.6 * before

@@ -1,0 +1,103 @@
+"""Effects fitted to measurements together with the calibration."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import ctcr
+import numpy as np
+import pytest
+from ctcr.diagnose import add, fitted_effects
+from ctcr.diagnose.split import locked_rows
+from ctcr.effects import catalogue
+from ctcr.model import effect_model, recording, simulation
+from ctcr.robot import robot_file
+from ctcr.show import output
+
+ROBOT = Path(__file__).parents[3] / "examples" / "robots" / "table2.yaml"
+CALIBRATION = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROBOT)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"sensor_offset__x": "0.001"}, {"backlash_rotation": "0.01,0.02,0.01"}, {"anisotropy__along": "0.05,-0.05,0.05"}],
+    ids=lambda given: next(iter(given)),
+)
+def test_a_hidden_effect_is_found(robot, plan, given, hidden):
+    true = hidden(robot, **given)
+    (identity,) = true.effects
+    made = simulation.simulate(true, plan, "jitter", seed=1)
+    added = add.add(robot, made, [identity], free=CALIBRATION)
+    value_of = catalogue.value_of(true)
+    for name, found in added.parameters().items():
+        assert abs(found["value"] - value_of[name]) < 3 * found["sd"] + 1e-12, name
+    rms = added.rms("rms_mm")
+    assert list(rms) == ["nominal", "calibrated", identity, "noise_floor"]
+    assert rms[identity] < 0.7 * rms["calibrated"]
+    locked = np.unique(made.run[locked_rows(robot, made)])
+    assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
+
+
+def places_to_find(robot, plan) -> dict[str, dict[str, float]]:
+    """Effects that are somewhere: at a moment, at a plane, beside the tracker."""
+    tips = ctcr.Model(robot).predict(plan.beta, plan.alpha, plan.force).position
+    read = effect_model.readings(robot, plan).position
+    normal = np.array([np.cos(0.5) * np.cos(1.2), np.cos(0.5) * np.sin(1.2), np.sin(0.5)])
+    metal = read.mean(axis=0) + 1.1 * np.ptp(read, axis=0).max() * np.array([0.6, -0.64, 0.48])
+    return {
+        "frame_jump": {"x": 4e-4, "y": -3e-4, "when": 0.371},
+        "contact": {"stiffness": 20.0, "azimuth": 1.2, "elevation": 0.5, "distance": np.quantile(tips @ normal, 0.6)},
+        "field_distortion": {"metal_volume": 1e-4} | dict(zip(("metal_x", "metal_y", "metal_z"), metal, strict=True)),
+    }
+
+
+@pytest.mark.parametrize("identity", ["frame_jump", "contact", "field_distortion"])
+def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
+    given = {f"effects.{identity}.{name}": x for name, x in places_to_find(robot, plan)[identity].items()}
+    made = simulation.simulate(add.with_values(robot, [identity], given), plan, "jitter", seed=1)
+    added = add.add(robot, made, [identity], free=CALIBRATION)
+    rms = added.rms("rms_mm")
+    assert rms["calibrated"] > 1.5 * rms["noise_floor"]
+    assert rms[identity] < 1.25 * rms["noise_floor"]
+    if identity == "frame_jump":
+        part = recording.session_part(made)
+        np.testing.assert_array_equal(part > added.robot.effects["frame_jump"]["when"], part > 0.371)
+
+
+def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan, hidden):
+    """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
+    true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")
+    made = simulation.simulate(true, plan, "jitter", seed=1)
+    there = {name: value for name, value in catalogue.value_of(true).items() if ".softening." in name}
+    alone, begun = (add.add(robot, made, ["softening"], start=start, free=CALIBRATION) for start in (None, there))
+    for name in ("nominal", "calibrated"):
+        assert begun.rms("rms_mm")[name] == pytest.approx(alone.rms("rms_mm")[name], rel=1e-9)
+    for name, found in begun.parameters().items():
+        assert abs(found["value"] - alone.parameters()[name]["value"]) < 0.5 * found["sd"], name
+
+
+def test_what_the_data_cannot_say_is_said(robot, plan):
+    timeless = replace(simulation.simulate(robot, plan, "jitter"), t=np.full(len(plan), np.nan))
+    one_run = replace(timeless, run=0 * plan.run)
+    added = add.add(robot, one_run, ["delay"], free=["tracker.position.*"])
+    assert any("say nothing of delay" in notice for notice in added.notices)
+    assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
+
+
+def test_of_many_coefficients_the_clearest_are_shown(capsys):
+    """All parameters of a few; of a field of many terms those that stand out, and how many do not."""
+    field = catalogue.get("field_distortion", 3)
+    many = [(name, 1e-4 * (k % 7), 1e-4) for k, name in enumerate(field.names())]
+    console = output.console(None)
+    fitted_effects.show(console, 3, [("tracker.position.x", 0.1, 0.1), ("effects.delay.delay", 0.0606, 0.0015), *many])
+    out = capsys.readouterr().out
+    assert "Fitted: delay (SI)" in out and "0.0606" in out and "tracker" not in out.split("Fitted: field")[0]
+    told = [line.split()[0] for line in out.split("Fitted: field_distortion")[1].splitlines() if line.strip()]
+    names = [p.name for p in field.parameters]
+    shown = [name for name in names if name in told]
+    assert {"metal_volume", "metal_x", "coils_z", "scale"} < set(shown) and len(shown) < 25
+    assert f"and {len(names) - len(shown)} coefficients" in out

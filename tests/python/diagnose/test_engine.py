@@ -1,0 +1,69 @@
+"""What a diagnosis asks of its fits: slopes by parameters that were fitted or are neutral, and memory given back."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr.diagnose import add
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.model import simulation
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+
+DEMO = Path(__file__).parents[3] / "examples" / "data" / "demo"
+ADDED = ["effects.tip_load.force_z", "effects.sensor_offset.x"]
+
+
+@pytest.fixture(scope="module")
+def engine():
+    robot = robot_file.load(DEMO / "robot.yaml")
+    readings = measurements.load(DEMO / "measurements.csv", robot.n_tubes)
+    rows = np.arange(len(readings)) % 3 > 0
+    return Engine(robot, readings, noise_of_readings(robot, readings), rows, threads=1)
+
+
+@pytest.fixture(scope="module")
+def fit(engine):
+    return engine.fit(ADDED[:1], max_iterations=3)
+
+
+@pytest.mark.parametrize("names", [ADDED, ADDED[::-1], ["tracker.position.x", ADDED[1]]])
+def test_slopes_are_those_of_the_residual_in_prior_deviations(engine, fit, names):
+    slopes = engine.slopes(fit, names)
+    everything = list(dict.fromkeys([*fit.names, *names]))
+    neutral, sd, _, _ = engine.priors(everything)
+    at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
+    table = engine.recording(everything)
+    values = np.array([at[name] for name in everything])
+    for k, name in enumerate(names):
+        step = np.zeros(len(everything))
+        step[everything.index(name)] = 1e-3 * sd[everything.index(name)]
+        there = [table.residual(values + side * step)[0].reshape(-1, 6) for side in (-1, 1)]
+        difference = (there[1] - there[0]) / 2e-3
+        np.testing.assert_allclose(slopes[engine.rows, :, k], difference[engine.rows], rtol=1e-4, atol=1e-8)
+        assert np.abs(difference).max() > 1e-5
+    assert (slopes[~engine.rows] == 0).all()
+
+
+def test_a_fit_at_rest_holds_no_table_and_says_the_same(fit):
+    before = fit.jacobian_all.copy()
+    assert any(np.size(part) >= before.size for part in fit.__dict__["_report"])
+    rested = fit.at_rest()
+    assert "_report" not in rested.__dict__
+    np.testing.assert_array_equal(rested.jacobian_all, before)
+    np.testing.assert_array_equal(rested.residual, fit.residual)
+
+
+@pytest.mark.parametrize("from_home", [True, False])
+def test_readings_say_how_the_robot_came_to_its_first_row(engine, plan, from_home):
+    play = [f"effects.backlash_translation.play.{i}" for i in (1, 2, 3)]
+    made = add.with_values(engine.robot, ["backlash_translation"], dict.fromkeys(play, 2e-4))
+    readings = simulation.simulate(made, replace(plan, from_home=from_home), "jitter", seed=3)
+    noise = noise_of_readings(engine.robot, readings)
+    taken = Engine(engine.robot, replace(readings, from_home=True), noise, np.ones(len(readings), bool))
+    fit = taken.fit(play)
+    assert taken.begins_otherwise(fit, play) is not from_home
+    assert taken.measurements.from_home is from_home
+    assert not taken.begins_otherwise(taken.fit(play), play)

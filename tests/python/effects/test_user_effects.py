@@ -1,0 +1,359 @@
+"""Effects of the user's own in Python: neutral values change nothing, derivatives are those of differences, fits find
+what was hidden, and what is wrong in the user's file is said."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr import cli
+from ctcr.diagnose import add
+from ctcr.effects import catalogue, user_effects
+from ctcr.effects.user_effects import Effect, Parameter
+from ctcr.errors import InputError
+from ctcr.frames import matrix_from_rotation_vector
+from ctcr.model import effect_model, recording, simulation
+from ctcr.model.user_recording import Predictor
+from ctcr.robot import robot_file
+
+ROOT = Path(__file__).parents[3]
+EXAMPLE = ROOT / "examples" / "05_own_effect.py"
+NAMES = ["tubes.2.curvature", "tubes.1.length", "actuation.home_rotation.1", "tracker.position.x", "tracker.rotation.y"]
+
+
+class Everything(Effect):
+    """Acts at every place where an effect can."""
+
+    id, title, physics = "everything", "t", "p"
+    parameters = [Parameter("gain", sigma=0.1, per_tube=True), Parameter("size", unit="m", sigma=1e-3)]
+
+    def joints(self, rows, values):
+        return rows.beta + 0.1 * values.size * np.sin(rows.alpha), rows.alpha + values.gain * np.sin(2 * rows.alpha)
+
+    def force(self, rows, values):
+        return values.gain[0] * np.stack([rows.beta[:, 0], rows.force[:, 1], np.cos(rows.alpha[:, 1])], axis=1)
+
+    def base(self, rows, values):
+        return values.size * np.sin(rows.alpha), values.gain[1] * rows.alpha
+
+    def reading(self, position, rotation, rows, values):
+        turn = matrix_from_rotation_vector(values.gain[2] * position)
+        return position + values.size * rotation[:, :, 0] + 20 * values.size * position**2, turn @ rotation
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
+
+
+@pytest.fixture(scope="module")
+def readings(plan):
+    return plan
+
+
+@pytest.fixture
+def file(tmp_path):
+    def write(text: str) -> Path:
+        path = tmp_path / "mine.py"
+        path.write_text("from ctcr.user_effects import Effect, Parameter\nimport numpy as np\n" + text)
+        return path
+
+    yield write
+    catalogue._own.clear()
+    user_effects._loaded.clear()
+
+
+def own_names(effect):
+    return effect.described(3).names()
+
+
+def test_neutral_values_change_nothing(robot, readings):
+    effect = Everything()
+    mine = Predictor(robot, readings, NAMES + own_names(effect), [effect])
+    library = recording.recording_of(robot, readings, NAMES)
+    x = library.nominal()
+    ours, theirs = mine.residual(np.append(x, np.zeros(4)))[0], library.residual(x)[0]
+    np.testing.assert_allclose(ours, theirs, atol=1e-12)
+    for ours, theirs in zip(mine.predicted(), library.predicted(), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=1e-12)
+
+
+def test_derivatives(robot, readings):
+    effect = Everything()
+    names = NAMES + own_names(effect)
+    mine = Predictor(robot, readings, names, [effect])
+    x = mine.nominal() + np.array([0.05, 1e-3, 0.01, 1e-3, 0.02, 0.04, -0.03, 0.05, 2e-3])
+    residual, jacobian, solved = mine.residual(x, True)
+    assert solved and residual.shape == (6 * len(readings),) and jacobian.shape == (residual.size, len(x))
+    for k, name in enumerate(names):
+        step = 1e-6 if "tracker" in name or "length" in name else 1e-5
+        up, down = (mine.residual(x + sign * step * np.eye(len(x))[k])[0] for sign in (1, -1))
+        difference = (up - down) / (2 * step)
+        scale = np.abs(difference).max()
+        np.testing.assert_allclose(jacobian[:, k], difference, atol=2e-5 * scale, err_msg=name)
+
+
+def test_an_effect_written_again_in_python_is_that_of_the_library(robot, readings):
+    class Offset(Effect):
+        id, title, physics = "offset", "t", "p"
+        parameters = [Parameter("x", unit="m", sigma=1e-3)]
+
+        def reading(self, position, rotation, rows, values):
+            return position + values.x * rotation[:, :, 0], rotation
+
+    class Pull(Effect):
+        id, title, physics = "pull", "t", "p"
+        parameters = [Parameter("x", unit="N", sigma=1e-2)]
+
+        def force(self, rows, values):
+            return values.x * np.tile([1.0, 0, 0], (len(rows.run), 1))
+
+    class Play(Effect):
+        id, title, physics = "play", "t", "p"
+        parameters = [Parameter("gap", unit="rad", sigma=1e-2)]
+
+        def joints(self, rows, values):
+            alpha = rows.alpha.copy()
+            stands = np.zeros(alpha.shape[1])  # as in the library: the robot comes from home
+            for i in range(len(alpha)):
+                stands = np.clip(stands, rows.alpha[i] - values.gap, rows.alpha[i] + values.gap)
+                alpha[i] = stands
+            return rows.beta, alpha
+
+    twins = {
+        Offset: ("effects.sensor_offset.x", "effects.offset.x", 2e-3),
+        Pull: ("effects.tip_load.force_x", "effects.pull.x", 0.02),
+        Play: ("effects.backlash_rotation", "effects.play.gap", 0.01),
+    }
+    library_names = recording.names_of(3)
+    for effect, (theirs, ours, value) in twins.items():
+        names = [name for name in library_names if name.startswith(theirs)]
+        library = recording.recording_of(robot, readings, names)
+        mine = Predictor(robot, readings, [ours], [effect()])
+        a = library.residual(np.full(len(names), value), True)
+        b = mine.residual(np.array([value]), True)
+        np.testing.assert_allclose(b[0], a[0], atol=2e-9, err_msg=ours)
+        scale = np.abs(a[1]).sum(axis=1).max()
+        np.testing.assert_allclose(b[1][:, 0], a[1].sum(axis=1), atol=1e-5 * scale, err_msg=ours)
+
+
+def test_a_base_that_has_moved_is_another_tracker_frame(robot, readings):
+    class Moved(Effect):
+        id, title, physics = "moved", "t", "p"
+        parameters = [Parameter("gain", sigma=1e-3)]
+
+        def base(self, rows, values):
+            shape = (len(rows.run), 1)
+            return values.gain * np.tile([1.0, 2, 3], shape), values.gain * np.tile([0.0, 0, 5], shape)
+
+    weightless = robot.model_copy(update={"gravity": None})
+    unloaded = replace(readings, force=0 * readings.force)
+    mine = Predictor(weightless, unloaded, ["effects.moved.gain"], [Moved()])
+    mine.residual(np.array([1e-3]))
+    turned = matrix_from_rotation_vector([0, 0, 5e-3])
+    tip, _ = _tips(weightless, unloaded)
+    tracker = weightless.tracker
+    expected = (tip @ turned.T + 1e-3 * np.array([1, 2, 3])) @ tracker.rotation.T + tracker.position
+    np.testing.assert_allclose(mine.predicted()[0], expected, atol=1e-9)
+
+
+def _tips(robot, readings):
+    found = effect_model.readings(robot, readings, recording.STEPS)
+    return found.position, found.quaternion
+
+
+def test_rows_that_cannot_be_solved_are_left_out(robot, readings):
+    beta = readings.beta.copy()
+    beta[5] = beta[5][::-1]  # tubes out of order
+    mine = Predictor(robot, replace(readings, beta=beta), own_names(Everything()), [Everything()])
+    answer = mine(np.zeros(4), True)
+    assert answer is not None and mine.unsolved() == [5]
+    assert np.isnan(answer[0].reshape(-1, 6)[5]).all() and np.isfinite(answer[1]).all()
+    wanted = np.arange(len(readings)) < 3
+    mine.activate(wanted.tolist())
+    residual = mine.residual(np.zeros(4))[0].reshape(-1, 6)
+    assert (np.isfinite(residual).all(axis=1) == wanted).all() and mine.active() == wanted.tolist()
+
+
+def test_a_hidden_effect_is_found(robot, readings, file):
+    (effect,) = user_effects.load(EXAMPLE)
+    truth = {f"effects.rotation_pickup.gain.{i + 1}": value for i, value in enumerate((2.0, -1.0, 0.5))}
+    hidden = add.with_values(robot, [effect.id], truth)
+    made = simulation.simulate(hidden, readings, "jitter", seed=3)
+    added = add.add(robot, made, [effect.id], free=["tubes.*.curvature", "actuation.home_rotation.*"])
+    for name, value in truth.items():
+        found = added.parameters()[name]
+        assert abs(found["value"] - value) < 3 * found["sd"], name
+        assert found["sd"] < 0.1
+    rms = added.rms("rms_mm")
+    assert rms["rotation_pickup"] < 0.5 * rms["calibrated"] < rms["nominal"]
+    position, _ = _tips(added.robot, made)
+    plain, _ = _tips(robot, made)
+    true, _ = _tips(hidden, made)
+    assert np.linalg.norm(position - true, axis=1).max() < 0.05 * np.linalg.norm(plain - true, axis=1).max()
+
+
+def test_commands_take_files_of_effects(robot, readings, file, tmp_path, capsys):
+    path = file(GOOD)
+    plan, made, new, poses, old = (tmp_path / name for name in ("p.csv", "m.csv", "n.yaml", "q.csv", "o.yaml"))
+    simulation.write(replace(readings, position=None, quaternion=None), plan, 3)
+    table2 = ROOT / "examples" / "robots" / "table2.yaml"
+
+    def run(*words) -> str:
+        code = cli.run([str(word) for word in words])
+        printed = capsys.readouterr()
+        assert code == 0, printed.err
+        return printed.out
+
+    own = ("--effects", path)
+    assert "mine" in run("effects", "mine", *own)
+    run("add", table2, "mine", "--set", "gain=0.02", "-o", new, *own)
+    run("simulate", table2, plan, "--hide", "mine=0.02", "--noise", "none", "-o", made, *own)
+    run("predict", new, made, "-o", poses, "--steps", 4, *own)
+    columns = np.genfromtxt(poses, delimiter=",", names=True)
+    np.testing.assert_allclose(columns["pred_x_m"], columns["x_m"], atol=1e-9)
+    assert json.loads(run("compare", new, made, "--json", "-", *own))["position_mm"]["rms"] < 1e-4
+    assert "added mine" in run("history", new, *own)
+    run("remove", new, "mine", "-o", old, *own)
+    assert robot_file.load(old).effects == {}
+    catalogue._own.clear()
+    assert cli.run(["predict", str(new), str(made), "-o", str(poses)]) == 1
+    assert "unknown effect" in capsys.readouterr().err
+
+
+GOOD = """
+class Mine(Effect):
+    id, title, physics = "mine", "t", "p"
+    parameters = [Parameter("gain", sigma=0.1)]
+    def joints(self, rows, values):
+        return rows.beta, rows.alpha + values.gain * rows.alpha
+"""
+
+
+def test_a_file_makes_its_effects_known(file, robot, tmp_path):
+    (effect,) = user_effects.load(file(GOOD))
+    assert effect.hooks == ["joints"] and "mine" in catalogue.known_effects()
+    assert catalogue.get("mine", 3).amplitudes == ["effects.mine.gain"]
+    assert "mine" not in catalogue.catalogue(3)
+    assert not list(tmp_path.glob("__pycache__"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("class Mine(Effect):", "class Mine(Effect:"), "line 4"),
+        (("id, title", "_id, title"), "needs an id"),
+        (('"mine"', '"friction"'), "the library has an effect of this id"),
+        (('"t"', '""'), "mine.title: needs a text"),
+        (("sigma=0.1", "sigma=0"), "sigma = 0: needs a number above 0"),
+        (("sigma=0.1", "sigma=1, bounds=(1, 2)"), "with the neutral value 0 between"),
+        (("sigma=0.1", "sigma=1, shape=True"), "strength of the effect"),
+        (("def joints", "def other"), "needs at least one of the functions joints"),
+        (("class Mine(Effect)", "class Mine"), "holds no effect"),
+        (("import numpy as np", "import nonsense_module"), "nonsense_module"),
+    ],
+)
+def test_faults_of_a_file(change, message, file):
+    path = file(GOOD)
+    path.write_text(path.read_text().replace(*change))
+    with pytest.raises(InputError) as error:
+        user_effects.load(path)
+    assert message in str(error.value) and str(path) in str(error.value)
+
+
+def test_all_faults_of_a_file_at_once(file):
+    text = GOOD.replace('"mine"', '"Mine!"').replace("sigma=0.1", "sigma=-1").replace('"p"', '""')
+    with pytest.raises(InputError) as error:
+        user_effects.load(file(text))
+    assert len(error.value.problems) == 3
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return rows.beta, rows.alpha + 1e-6 + values.gain", "changes alpha by 1e-06 at its neutral values"),
+        ("return rows.beta", "must return two arrays"),
+        ("return rows.beta, rows.alpha[:2]", "it must be ("),
+        ("return rows.beta, rows.alpha / (values.gain - values.gain)", "not finite, first in row 2"),
+        ("return rows.beta, rows.nothing", "mine.py, line 8: Mine.joints fails"),
+        ("return 'a', 'b'", "arrays of numbers"),
+    ],
+)
+def test_faults_of_a_function(body, message, file, robot, readings):
+    path = file(GOOD)
+    path.write_text(path.read_text().replace("return rows.beta, rows.alpha + values.gain * rows.alpha", body))
+    own = user_effects.load(path)
+    with pytest.raises(InputError) as error, np.errstate(all="ignore"):
+        Predictor(robot, readings, ["effects.mine.gain"], own)
+    assert message in str(error.value)
+
+
+def test_names_that_do_not_exist(robot, readings):
+    with pytest.raises(InputError, match="no parameter is named effects.everything.gian"):
+        Predictor(robot, readings, ["effects.everything.gian"], [Everything()])
+
+
+class Profile(Effect):
+    """What the data sheet says too: a curvature over the curved part, another stiffness."""
+
+    id, title, physics = "profile", "t", "p"
+    parameters = [Parameter("bend", unit="1/m", sigma=0.5, per_tube=True), Parameter("stiff", sigma=0.1, per_tube=True)]
+    lengths, curved = (0.463, 0.3305, 0.199), 0.05
+
+    def curvature(self, tube, along, values):
+        part = np.clip((along - self.lengths[tube - 1] + self.curved) / 1e-6, 0, 1)
+        return np.stack([values.bend[tube - 1] * part, 0 * along], axis=1)
+
+    def stiffness(self, tube, along, values):
+        return np.full(len(along), 1 + values.stiff[tube - 1])
+
+
+def test_profiles_along_the_tubes_are_those_of_the_data_sheet(robot, readings):
+    mine = Predictor(robot, readings, own_names(Profile()), [Profile()])
+    kinds = ("curvature", "youngs_modulus", "poisson_ratio")
+    library = recording.recording_of(
+        robot, readings, [f"tubes.{i}.{kind}" for kind in kinds for i in (1, 2, 3)], steps=16
+    )
+    file = library.nominal()
+    bend, stiff = np.array([0.5, -0.3, 0.4]), np.array([0.1, -0.05, 0.08])
+    np.testing.assert_allclose(mine.residual(np.zeros(6))[0], library.residual(file)[0], atol=1e-12)
+    # EI grows with the torsional stiffness EI / (1 + nu) as it is.
+    x = np.concatenate([file[:3], file[3:6] * (1 + stiff), (1 + file[6:]) * (1 + stiff) - 1])
+    softer = mine.residual(np.append(np.zeros(3), stiff))[0]
+    np.testing.assert_allclose(softer, library.residual(x)[0], atol=1e-8)
+    assert np.abs(softer - library.residual(file)[0]).max() > 1e-4
+    # The step at the start of the curved part lies between two places of the table.
+    bent, file[:3] = mine.residual(np.append(bend, np.zeros(3)))[0], file[:3] + bend
+    change = np.abs(bent - mine.residual(np.zeros(6))[0]).max()
+    np.testing.assert_allclose(bent, library.residual(file)[0], atol=0.02 * change)
+
+
+def test_derivatives_by_profiles(robot, readings):
+    names = ["tubes.2.length", *own_names(Profile())]
+    mine = Predictor(robot, readings, names, [Profile()])
+    mine.activate((np.arange(len(readings)) % 8 == 0).tolist())
+    x = np.array([0.3305, 0.2, -0.1, 0.1, 0.05, 0.02, -0.04])
+    jacobian = mine.residual(x, True)[1]
+    for k, name in enumerate(names):
+        step = 1e-6 if k == 0 else 1e-4
+        up, down = (mine.residual(x + sign * step * np.eye(7)[k])[0] for sign in (1, -1))
+        difference = np.nan_to_num(up - down) / (2 * step)
+        np.testing.assert_allclose(jacobian[:, k], difference, atol=1e-5 * np.abs(difference).max(), err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("hook", "answer", "message"),
+    [
+        ("curvature", "np.zeros(len(along))", "must be (201, 2)"),
+        ("curvature", "np.ones((len(along), 2))", "changes a tube by 1 at its neutral values"),
+        ("stiffness", "0 * along + values.gain", "factor that is not above 0"),
+        ("stiffness", "1 / along", "first in place 1 along the tube"),
+    ],
+)
+def test_faults_of_a_profile(hook, answer, message, file, robot, readings):
+    text = GOOD.replace("joints(self, rows, values)", f"{hook}(self, tube, along, values)")
+    text = text.replace("rows.beta, rows.alpha + values.gain * rows.alpha", answer)
+    with pytest.raises(InputError) as error, np.errstate(divide="ignore"):
+        Predictor(robot, readings, ["effects.mine.gain"], user_effects.load(file(text)))
+    assert message in str(error.value)

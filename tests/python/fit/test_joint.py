@@ -1,0 +1,380 @@
+"""Joint identification: names and priors, and fits of simulated tables whose truth is known."""
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+from ctcr.errors import InputError
+from ctcr.fit import joint
+from ctcr.frames import base_to_tracker, product, quaternion_from_rotation_vector
+from ctcr.model import parameters
+from ctcr.model.model import Model
+from ctcr.model.noise import Noise, noise_of
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+NOISE = Noise(position_jitter=5e-5, rotation_jitter=5e-4)
+
+
+def robot(**uncertainty) -> Robot:
+    tube = {"youngs_modulus_GPa": 58.0, "poisson_ratio": 0.3, "density_kg_m3": 6450.0}
+    return Robot.model_validate(
+        {
+            "name": "bench",
+            "gravity": [0.0, -9.81, 0.0],
+            "tubes": [
+                tube
+                | {
+                    "inner_diameter_mm": 1.3,
+                    "outer_diameter_mm": 1.52,
+                    "length_mm": 400.0,
+                    "curved_length_mm": 50.0,
+                    "curvature_per_m": 10.0,
+                },
+                tube
+                | {
+                    "inner_diameter_mm": 1.62,
+                    "outer_diameter_mm": 1.8,
+                    "length_mm": 300.0,
+                    "curved_length_mm": 50.0,
+                    "curvature_per_m": 5.0,
+                },
+            ],
+            "actuation": {
+                "translation_mm_per_rev": 2.0,
+                "rotation_rev_per_rev": -1.0,
+                "home_translation_mm": [-298.0, -220.5],
+                "home_rotation_deg": [0.0, 10.0],
+            },
+            "tracker": {
+                "sensor_on_tube": 1,
+                "rate_Hz": 40.0,
+                "jitter_mm": 0.05,
+                "jitter_deg": 0.03,
+                "accuracy_95_mm": 0.9,
+                "accuracy_95_deg": 0.5,
+                "position_mm": [-48.0, -7.0, 5.0],
+                "rotation_vector_rad": [2.0, 0.1, 0.0],
+            },
+            "uncertainty": {
+                "tracker_frame_mm": 0.5,
+                "tracker_frame_deg": 0.3,
+                "rotation_offset_deg": 1.0,
+                "translation_offset_mm": 1.0,
+                "length_mm": 1.0,
+                "curved_length_mm": 2.5,
+                "curvature_percent": 5.0,
+                "youngs_modulus_percent": 15.0,
+            }
+            | uncertainty,
+        }
+    )
+
+
+def table(truth: Robot, rows: int = 80, seed: int = 0, noise: Noise = NOISE) -> Measurements:
+    """What a robot reads at random joints, in eight runs, with jitter."""
+    random = np.random.default_rng(seed)
+    n = truth.n_tubes
+    beta = np.array([-0.26, -0.22][:n]) + random.uniform(-0.02, 0.02, (rows + 10, n))
+    alpha = random.uniform(-3, 3, (rows + 10, n))
+    tips = Model(truth).predict(*truth.joints_of_table(beta, alpha))
+    quiet = np.flatnonzero(tips.solved & (tips.stability > 0.1))[:rows]  # a tube may snap here and there
+    beta, alpha, tips = beta[quiet], alpha[quiet], replace(tips, **_taken(tips, quiet))
+    position, quaternion = base_to_tracker(truth.tracker, tips.position, tips.quaternion)
+    turn = quaternion_from_rotation_vector(noise.rotation_jitter * random.standard_normal((rows, 3)))
+    return Measurements(
+        t=np.arange(rows, dtype=float),
+        run=np.arange(rows) * 8 // rows,
+        beta=beta,
+        alpha=alpha,
+        force=np.zeros((rows, 3)),
+        position=position + noise.position_jitter * random.standard_normal((rows, 3)),
+        quaternion=product(turn, quaternion),
+        row=np.arange(2, rows + 2),
+    )
+
+
+def _taken(tips, rows):
+    return {name: getattr(tips, name)[rows] for name in ("position", "quaternion", "status", "stability")}
+
+
+def test_names_are_expanded_in_the_order_of_the_library():
+    assert parameters.expand("tubes.*.length", robot()) == ["tubes.1.length", "tubes.2.length"]
+    assert parameters.expand(["tracker.frame", "tracker.position.x"], robot()) == [
+        f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"
+    ]
+    assert len(parameters.expand("standard", robot())) == 6 + 6 * 2
+    assert parameters.expand("tubes.1.*,gravity.x", robot())[-1] == "gravity.x"
+
+
+def test_standard_leaves_out_what_does_not_exist():
+    bench = robot()
+    bench.tubes[1].curvature_per_m = 0.0
+    bench.tubes[0].bending_stiffness_Nm2 = 0.01
+    names = parameters.expand("standard", bench)
+    assert "tubes.2.curvature" not in names and "tubes.2.length" in names
+    assert "tubes.1.bending_stiffness" in names and "tubes.1.youngs_modulus" not in names
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"), [("tubes.1.lenght", "tubes.1.length"), ("standart", "standard"), ("zzz", "names are")]
+)
+def test_an_unknown_name_is_refused_with_the_nearest(name, hint):
+    with pytest.raises(InputError, match=hint):
+        parameters.expand(name, robot())
+
+
+def test_priors_come_from_the_file_or_from_the_caller():
+    names = ["tubes.1.youngs_modulus", "tubes.1.curvature", "actuation.home_rotation.2", "tracker.rotation.x"]
+    mean, sd, _, _ = parameters.priors(robot(), names)
+    np.testing.assert_allclose(mean, [58e9, 10, np.deg2rad(10), 0])
+    np.testing.assert_allclose(sd, [0.15 * 58e9, 0.5, np.deg2rad(1), np.deg2rad(0.3)])
+    assert parameters.priors(robot(), names, {"tubes.*.curvature": 2.0})[1][1] == 2.0
+    assert parameters.priors(robot(), names, {"tubes.1.curvature": inf})[1][1] == inf
+    with pytest.raises(InputError, match=r"poisson_ratio: .* does not state its uncertainty"):
+        parameters.priors(robot(), ["tubes.1.poisson_ratio"])
+    with pytest.raises(InputError, match=r"length: .* is 0, but must be above 0"):
+        parameters.priors(robot(length_mm=0.0), ["tubes.1.length"])
+
+
+def test_values_go_into_the_robot_and_come_back():
+    bench = robot()
+    names = [name for name in parameters.names_of(2) if not name.startswith("tracker.rotation")]
+    values = parameters.values(bench)[[parameters.names_of(2).index(name) for name in names]]
+    for i in (1, 2):
+        values[names.index(f"tubes.{i}.bending_stiffness")] = 0.01
+    changed = parameters.applied(bench, names, 1.01 * values)
+    again = parameters.values(changed)[[parameters.names_of(2).index(name) for name in names]]
+    np.testing.assert_allclose(again, 1.01 * values, rtol=1e-12)
+    assert changed.actuation.recorded_home_translation_mm == bench.actuation.home_translation_mm
+    assert bench.tubes[0].length_mm == 400.0
+
+
+def test_a_fit_finds_the_robot_that_was_measured():
+    bench = robot()
+    names = ["tubes.1.curvature", "actuation.home_rotation.2", "tracker.position.x", "tracker.rotation.y"]
+    truth = parameters.applied(bench, names, [10.4, np.deg2rad(11.0), -0.0475, 0.004])
+    readings = table(truth)
+    held_out = readings.run == 3
+    fit = joint.fit(bench, readings, names, rows=~held_out, noise=NOISE)
+    assert fit.converged and fit.names == parameters.expand(names, bench)
+    expected = dict(zip(names, [10.4, np.deg2rad(11.0), -0.0475, 0.004], strict=True))
+    error = fit.values - [expected[name] for name in fit.names]
+    assert (np.abs(error) < 4 * fit.sd).all()
+    assert 0.7 < fit.reduced_chi_square < 1.3 and 0.001 < fit.p_value
+    assert fit.nominal_rms_mm() > 5 * fit.rms_mm()
+    assert fit.rms_mm(held_out) == pytest.approx(fit.floor_mm(held_out), rel=0.3)
+    assert not fit.used[held_out].any() and np.isfinite(fit.residual[held_out]).all()
+    # The fitted robot predicts what the fit says it does.
+    again = joint.fit(fit.apply(bench), readings, "tracker.position.x", noise=NOISE)
+    np.testing.assert_allclose(again.nominal_residual, fit.residual, atol=1e-7)
+
+
+def test_whitened_columns_are_those_of_the_fit():
+    bench = robot()
+    fit = joint.fit(bench, table(bench), ["tubes.*.length", "tracker.frame"])
+    residual, jacobian = fit.whitened()
+    assert residual @ residual == pytest.approx(fit.chi_square, rel=1e-6)
+    information = jacobian.T @ jacobian + np.diag(1 / fit.prior_sd**2)
+    np.testing.assert_allclose(np.linalg.inv(information), fit.covariance, rtol=1e-4, atol=1e-15)
+    np.testing.assert_allclose(fit.whiten(fit.residual)[:, 0], residual)
+    # They take rows that were fitted alone; all that is said of every row is said after them, too.
+    some = joint.fit(bench, table(bench), "tracker.frame", rows=table(bench).run < 2)
+    residual, jacobian = some.whitened()
+    slope = some.slope_where_used("tracker.position.x")
+    assert np.isnan(some._of_used[0].reshape(-1, 6)[~some.used]).all() and np.isfinite(some.residual).all()
+    np.testing.assert_allclose(some.whiten(some.residual)[:, 0], residual, atol=1e-9)
+    column = some.names.index("tracker.position.x")
+    np.testing.assert_allclose(some.whiten(slope)[:, 0], jacobian[:, column], atol=1e-9)
+    every = some.jacobian_all[:, column].reshape(-1, 6)
+    np.testing.assert_allclose(slope[some.used], every[some.used])
+    assert not slope[~some.used].any() and every[~some.used].any()
+
+
+def test_the_gauge_of_a_robot_is_named():
+    bench = robot()
+    fit = joint.fit(bench, table(bench), "standard", starts=1)
+    assert any(d.text.startswith("common rotation of all tubes = yaw") for d in fit.directions)
+    assert any(d.text.startswith("translation offset of tube 2 against its length") for d in fit.directions)
+
+
+def test_a_model_error_is_admitted_and_told():
+    bench = robot()
+    readings = table(bench)
+    bent = replace(readings, position=readings.position + 2e-3 * np.sin(40 * readings.alpha[:, :1]))
+    fit = joint.fit(bench, bent, "tracker.frame", noise=NOISE)
+    assert fit.reduced_chi_square > 100 and fit.inflation[0] > 10 and fit.inflation[1] == 1
+    assert any("something is missing in the model" in text for text in fit.warnings)
+    assert np.abs(fit.shift).max() < 4
+    same = joint.fit(bench, bent, "tracker.frame", noise=NOISE, weights=fit.weights, inflation=fit.inflation)
+    assert same.log_evidence == pytest.approx(fit.log_evidence, abs=0.01)
+
+
+def test_outliers_count_for_little():
+    bench = robot()
+    readings = table(bench)
+    clean = joint.fit(bench, readings, "tracker.frame", noise=NOISE)
+    readings.position[::10] += 3e-3
+    fit = joint.fit(bench, readings, "tracker.frame", noise=NOISE)
+    assert (fit.weights[::10, 0] < 0.1).all() and (fit.weights[1::10, 0] > 0.5).all()
+    assert (np.abs(fit.values - clean.values) < clean.sd).all()
+
+
+def test_joints_that_a_table_holds_stay_possible():
+    """Tips that are recorded flush, grasped points at the plate, tubes curved over all their length."""
+    bench = robot()
+    bench.tubes[1].curved_length_mm = 300.0
+    readings = table(bench)
+    flush = np.column_stack([np.full(80, -0.1), np.zeros(80)])
+    names = parameters.expand("standard", bench)
+    limits = {
+        text: (dict(zip(names, row, strict=True)), low) for text, row, low in parameters.admissible(bench, flush, names)
+    }
+    assert limits["the tips of tubes 1 and 2 are flush"][1] == pytest.approx(0, abs=1e-12)
+    assert limits["tube 2 is grasped at the plate"][1] == 0
+    assert limits["tube 2 is curved over all its length"][1] == 0
+    assert limits["tubes 1 and 2 are grasped at one place"][1] == pytest.approx(-0.1)
+    row = {name: part for name, part in limits["the tips of tubes 1 and 2 are flush"][0].items() if part}
+    assert row == {
+        "tubes.1.length": 1,
+        "tubes.2.length": -1,
+        "actuation.home_translation.1": 1,
+        "actuation.home_translation.2": -1,
+    }
+
+    angles = np.linspace(-3, 3, 80)
+    tips = Model(bench).predict(flush, np.column_stack([angles, 0.3 * angles]))
+    position, quaternion = base_to_tracker(bench.tracker, tips.position, tips.quaternion)
+    readings = replace(
+        readings,
+        beta=flush,
+        alpha=np.column_stack([angles, 0.3 * angles]),
+        quaternion=quaternion,
+        position=position + 4e-4 * np.random.default_rng(1).standard_normal((80, 3)),
+    )
+    fit = joint.fit(bench, readings, "standard", noise=NOISE)
+    assert fit.converged and not fit.excluded
+    after = fit.apply(bench)
+    beta = after.joints_of_table(flush, readings.alpha)[0]
+    tip = beta + [tube.length for tube in after.tubes]
+    assert (tip[:, 0] > tip[:, 1] - 1e-9).all() and (beta[:, 1] <= 1e-9).all()
+    assert after.tubes[1].curved_length <= after.tubes[1].length + 1e-9
+
+
+def test_missing_and_unsolved_rows_are_left_out():
+    bench = robot()
+    readings = table(bench)
+    readings.position[3] = np.nan
+    readings.quaternion[4] = np.nan
+    readings.beta[5] = [0.01, 0.02]
+    fit = joint.fit(bench, readings, "tracker.frame", noise=NOISE)
+    assert fit.excluded == [5] and any("number 6" in text for text in fit.warnings)
+    assert (fit.weights[3] == [0, fit.weights[3, 1]]).all() and fit.weights[3, 1] > 0
+    assert np.isnan(fit.residual[5]).all() and np.isnan(fit.residual[3, :3]).all()
+    only_positions = joint.fit(bench, replace(readings, quaternion=None), "tracker.frame", noise=NOISE)
+    assert only_positions.observations == 3 * 78 and np.isnan(only_positions.rms_deg())
+
+
+def test_doubtful_tables_are_commented():
+    bench = robot()
+    readings = table(bench, rows=5)
+    one = replace(readings, run=np.zeros(5, int), beta=readings.beta[[0] * 5], alpha=readings.alpha[[0] * 5])
+    text = " ".join(joint.fit(bench, one, "standard").warnings)
+    assert "all joints are the same" in text and "only one run" in text
+    text = " ".join(joint.fit(bench, table(bench, rows=2), "standard").warnings)
+    assert "only 12 numbers were measured for 18 parameters" in text
+    with pytest.raises(InputError, match="no reading is left"):
+        joint.fit(bench, replace(readings, position=None, quaternion=None), "standard")
+    bench.tracker.jitter_mm = None
+    with pytest.raises(InputError, match="jitter_mm: a fit needs"):
+        joint.fit(bench, readings, "standard")
+
+
+def test_any_function_can_be_fitted():
+    slope = np.random.default_rng(1).standard_normal((60, 2))
+    measured = slope @ [1.0, -0.5]
+    fit = joint.identify_with(
+        lambda x, derivatives: (measured - slope @ x, -slope),
+        ["a", "b"],
+        np.zeros(2),
+        np.ones(2),
+        np.full(2, -inf),
+        np.full(2, inf),
+        Noise(position_jitter=0.01, rotation_jitter=0.01),
+        np.zeros((10, 3)),
+    )
+    np.testing.assert_allclose(fit.values, [1, -0.5], atol=1e-3)
+
+
+def _with_field(readings, noise, random):
+    """The same readings with the tracker's smooth error."""
+    distance = np.linalg.norm(readings.position[:, None] - readings.position[None], axis=2)
+    covariance = np.exp(-(distance**2) / (2 * noise.correlation_length**2)) + 1e-9 * np.eye(len(readings))
+    field = np.linalg.cholesky(covariance) @ random.standard_normal((len(readings), 6))
+    readings.position[:] += noise.position_field * field[:, :3]
+    turn = quaternion_from_rotation_vector(noise.rotation_field * field[:, 3:])
+    readings.quaternion[:] = product(turn, readings.quaternion)
+    return readings
+
+
+@pytest.mark.slow
+def test_truth_and_unseen_readings_lie_where_the_fits_say():
+    """A long study over 200 robots."""
+    nominal = robot()
+    names = parameters.expand("standard", nominal)
+    mean, sd, _, _ = parameters.priors(nominal, names)
+    noise = noise_of(nominal)
+    within, chi_square, p_values, errors, floors = [], [], [], [], []
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        truth = parameters.applied(nominal, names, mean + sd * random.standard_normal(len(names)))
+        readings = _with_field(table(truth, 80, seed, noise), noise, random)
+        held_out = readings.run % 4 == 3
+        fit = joint.fit(nominal, readings, names, rows=~held_out, noise=noise, starts=1)
+        assert fit.converged, fit.status
+        true_values = _values(truth, nominal, names)
+        within.append(np.abs(fit.values - true_values) < 2 * fit.sd)
+        chi_square.append(fit.reduced_chi_square)
+        p_values.append(fit.p_value)
+        errors.append(fit.rms_mm(held_out) ** 2)
+        floors.append(fit.floor_mm(held_out) ** 2)
+    assert 0.90 < np.mean(within) < 0.98
+    assert np.mean(chi_square) == pytest.approx(1, abs=0.03)
+    assert np.mean(np.array(p_values) < 0.05) < 0.12
+    assert np.sqrt(np.mean(errors) / np.mean(floors)) == pytest.approx(1, abs=0.1)
+
+
+def _values(truth, nominal, names):
+    """The truth in the parameters of a fit that starts from the nominal robot."""
+    from scipy.spatial.transform import Rotation
+
+    known = parameters.names_of(truth.n_tubes)
+    values = parameters.values(truth)[[known.index(name) for name in names]]
+    turn = Rotation.from_matrix(truth.tracker.rotation @ nominal.tracker.rotation.T).as_rotvec()
+    for i, name in enumerate(names):
+        if name.startswith("tracker.rotation."):
+            values[i] = turn["xyz".index(name[-1])]
+    return values
+
+
+def test_many_rows_are_fitted_as_few_are(monkeypatch):
+    """Where the starts are compared on a part of the rows, the fit of all of them is the same."""
+    nominal = robot()
+    readings = table(nominal, rows=200)
+    at_once = joint.fit(nominal, readings, noise=NOISE)
+    monkeypatch.setattr(joint, "FEW_ROWS", 50)
+    from_a_part = joint.fit(nominal, readings, noise=NOISE)
+    assert from_a_part.starts and from_a_part.evaluations < at_once.evaluations
+    np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)
+
+
+def test_a_frame_far_off_is_found_first():
+    bench = robot()
+    readings = table(bench, rows=40)
+    moved = bench.model_copy(deep=True)
+    moved.tracker.position_mm = [p + s for p, s in zip(bench.tracker.position_mm, (80, -60, 90), strict=True)]
+    moved.tracker.rotation_vector_rad = [1.0, 1.5, -1.3]
+    found = joint.fit(moved, readings, "standard", noise=NOISE, starts=1, sd={"tracker.frame": inf})
+    assert found.nominal_rms_mm() > 100 and found.rms_mm() < 0.1
+    assert found.evaluations <= 6  # twice as many where the rest is dragged along

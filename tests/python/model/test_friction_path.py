@@ -1,0 +1,128 @@
+"""Tubes that rub wind each other up: in predictions, and in fits, which are repeated until they say so themselves."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ctcr.diagnose import add
+from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
+from ctcr.diagnose.candidates import Candidate, forms
+from ctcr.diagnose.engine import FITS, Engine, Gain
+from ctcr.diagnose.race import Entry
+from ctcr.effects import catalogue
+from ctcr.fit import joint
+from ctcr.model import simulation, user_recording
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot import robot_file
+
+ROOT = Path(__file__).parents[3]
+FREE = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
+LAW = "effects.friction.law"
+TRUE = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)} | {"effects.friction.slip_angle": 0.03, LAW: 1.0}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
+
+
+def test_stiff_friction_is_found(robot, plan):
+    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=1)
+    added = add.add(robot, made, ["friction"], fixed={LAW: 1.0}, free=FREE)
+    found = added.parameters()
+    for i in (1, 2):
+        name = f"effects.friction.coefficient.{i}"
+        assert abs(found[name]["value"] - 0.03) < 0.02 * 0.03, found[name]
+    # The fit begins at 0.105. Without what the tubes wind each other up it would end at 0.18.
+    assert abs(found["effects.friction.slip_angle"]["value"] - 0.03) < 0.003
+    rms = added.rms("rms_mm")
+    assert rms["friction"] < 2 * rms["noise_floor"] < 0.05 * rms["calibrated"]
+
+
+def test_what_is_predicted_is_wound_up(robot, plan):
+    rubbing = add.with_values(robot, ["friction"], TRUE)
+    table = user_recording.recording_of(rubbing, plan, list(TRUE))
+    assert table.wind_up(table.nominal()) < joint.WOUND  # it was, when it was made
+    table.residual(table.nominal())
+    wound = table.predicted()[0]
+    assert table.wind_up(0 * table.nominal()) == 0  # nothing rubs: nothing changes
+    table.residual(table.nominal())
+    np.testing.assert_array_equal(table.predicted()[0], wound)
+    simulated = simulation.simulate(rubbing, plan, "none").position
+    np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
+
+
+def test_a_recording_begins_at_the_twist_of_another(robot, plan):
+    x, still = np.array(list(TRUE.values())), np.zeros(len(TRUE))
+    first, like, unlike, fresh = (user_recording.recording_of(robot, plan, list(TRUE)) for _ in range(4))
+    assert first.wind_up(x) > 10 * joint.WOUND
+    for table in (like, unlike):
+        table.begin_at(first)
+    assert like.wind_up(x) < 1e-3
+    np.testing.assert_allclose(predicted(like, x), predicted(first, x), atol=1e-6)
+    assert unlike.wind_up(still) == 0  # where nothing rubs, tubes are not wound up
+    np.testing.assert_array_equal(predicted(unlike, still), predicted(fresh, still))
+
+
+def test_candidates_are_screened_where_the_tubes_of_a_fit_are_wound_up(robot, plan):
+    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
+    noise = noise_of_readings(robot, made)
+    engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
+    rubbing = [name for name in TRUE if name != LAW]
+    fit = engine.fit(rubbing, start=TRUE, fixed={LAW: 1.0})
+    assert fit.predict.is_wound
+    own = fit.jacobian_all.reshape(*fit.residual.shape, -1) * fit.prior_sd
+    np.testing.assert_allclose(engine.slopes(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
+    # A fit in which nothing rubs comes between: what was wound up is not forgotten.
+    assert not engine.fit().predict.is_wound
+    again = engine.recording(fit.names, {LAW: 1.0})
+    again.begin_at(engine._wound)
+    assert again.wind_up(fit.values) < joint.WOUND
+
+
+def predicted(table, x):
+    table.residual(x)
+    return table.predicted()[0]
+
+
+def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
+    effect = catalogue.get("friction", 3)
+    coefficient = effect.names("coefficient")
+    held = Candidate("friction", tuple(coefficient), (("effects.friction.insertion", 0.0),))
+    laws = [dict(form.shape) for form in forms(effect, held)]
+    held_or_begun = {"effects.friction.insertion": 0.0, LAW: 1.0, "effects.friction.slip_angle": 0.03}
+    assert laws == [{"effects.friction.insertion": 0.0}, held_or_begun]
+    for form in forms(effect, held):  # a torque per length enters the race alone, never beside the coefficient
+        assert list(form.names) == coefficient + effect.shapes
+    second = Candidate("friction", tuple(coefficient), tuple(held_or_begun.items())[::-1])
+    once = [held_or_begun, {name: value for name, value in held_or_begun.items() if name != LAW}]
+    assert [dict(form.shape) for form in forms(effect, second)] == once
+    softening = catalogue.get("softening", 3)
+    alone = Candidate("softening", tuple(softening.amplitudes))
+    assert forms(softening, alone) == [replace(alone, names=(*alone.names, *softening.shapes))]
+    effect = catalogue.get("straight_curvature", 3)
+    plane, across = effect.names("bend_x"), effect.names("bend_y")
+    flat, free = forms(effect, Candidate("straight_curvature", tuple(plane)))
+    assert list(flat.names) == plane + effect.shapes and list(free.names) == plane + across + effect.shapes
+
+
+def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot, plan):
+    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=3)
+    noise = noise_of_readings(robot, made)
+    engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
+    names = {
+        strength: tuple(catalogue.get("friction", 3).names(strength))
+        for strength in ("torque_per_length", "coefficient")
+    }
+    for given, fitted in names.items():
+        fit = engine.fit(fitted)
+        gain = Gain(0.0, *4 * [np.zeros(1)])
+        entry = Entry(Candidate("friction", fitted), gain, fit=fit)
+        one = Accepted(entry, ["friction"], 100.0, 50.0, 0.5)
+        after = with_shapes(engine, [one], one, fit, lambda _: None)
+        assert (np.max(fit.inflation) > WRONG) == (given == "torque_per_length")
+        assert set(names["coefficient"]) <= set(one.entry.candidate.names)
+        assert not set(names["torque_per_length"]) & set(one.entry.candidate.names)
+        assert np.max(after.inflation) < FITS
+        assert after.rms_mm() < 1.2 * joint.noise_floor(after, noise, engine.places)[0]

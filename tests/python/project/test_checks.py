@@ -1,0 +1,105 @@
+"""The checks of tools/ find what is planted, and nothing else; the benchmark comparison computes what it says."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+
+
+def load(name: str, folder: str = "tools"):
+    spec = importlib.util.spec_from_file_location(name, ROOT / folder / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+layers = load("check_layers")
+text = load("check_text")
+bench = load("bench_against")
+counting = load("count_instructions", "bench")
+
+
+def plant(root: Path, path: str, content: str) -> Path:
+    file = root / path
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(content)
+    return file
+
+
+@pytest.mark.parametrize("own", layers.LAYERS)
+@pytest.mark.parametrize("other", layers.LAYERS)
+@pytest.mark.parametrize("form", ["<ctcr/{}/x.hpp>", '"ctcr/{}/x.hpp"', '"../{}/x.hpp"'])
+def test_an_include_is_wrong_exactly_when_it_points_upwards(tmp_path, own, other, form):
+    header = plant(tmp_path, f"ctcr/{own}/y.hpp", f"#pragma once\n#include {form.format(other)}\n")
+    device = own in ("actuation", "sensing")
+    allowed = own == other or layers.LAYERS[other] < (3 if device else layers.LAYERS[own])
+    expected = [] if allowed else [f"{header}:2: layer '{own}' must not include layer '{other}'"]
+    assert layers.problems(tmp_path) == expected
+
+
+def test_a_folder_that_is_no_layer_is_named(tmp_path):
+    header = plant(tmp_path, "ctcr/utilities/x.hpp", "#pragma once\n")
+    assert layers.problems(tmp_path) == [f"{header}:1: folder 'utilities' is not a layer"]
+
+
+def test_umbrella_headers_include_any_layer(tmp_path):
+    plant(tmp_path, "ctcr/ctcr.hpp", "#include <ctcr/control/gdls.hpp>\n")
+    assert layers.problems(tmp_path) == []
+
+
+# Written in pieces, so that this file passes the check itself.
+@pytest.mark.parametrize("line", ["/" + "home/ann/data", '"/' + 'tmp/x"', "pypi" + ".org", "see issue " + "#3"])
+def test_forbidden_text_is_found_with_its_line(tmp_path, line):
+    file = plant(tmp_path, "include/ctcr/x.hpp", f"#pragma once\n// {line}\n")
+    assert [problem.rsplit(":", 1)[0] for problem in text.problems(tmp_path)] == [f"{file}:2"]
+
+
+@pytest.mark.parametrize("line", ["include/" + "home/x", "${prefix}/" + "tmp/x", "~/" + "work/x", "tissue 3", "1/home"])
+def test_harmless_text_passes(tmp_path, line):
+    plant(tmp_path, "tools/x.py", f"# {line}\n")
+    assert text.problems(tmp_path) == []
+
+
+@pytest.mark.parametrize(("lines", "found"), [(400, 0), (401, 1)])
+def test_length_limit(tmp_path, lines, found):
+    plant(tmp_path, "bench/x.cpp", "\n" * lines)
+    assert len(text.problems(tmp_path)) == found
+
+
+def test_benchmark_ratios_are_paired_by_round():
+    """The machine slows down fivefold, the new program takes 0.8 of the old one's time: the ratio shows only that."""
+    pairs = [({"solve": 100.0 * k}, {"solve": 80.0 * k, "added": 1.0}) for k in (1, 2, 3, 5)]
+    solve, added = bench.summary(pairs)
+    assert solve.split()[1:] == ["250.0", "200.0", "0.800", "[0.800,", "0.800]", "faster"]
+    assert added.endswith("only in one commit")
+
+
+def test_benchmark_report_gives_nanoseconds_and_no_failed_run():
+    report = {
+        "benchmarks": [
+            {"name": "a", "run_type": "iteration", "cpu_time": 2.0, "time_unit": "us"},
+            {"name": "b", "run_type": "iteration", "cpu_time": 2.0, "time_unit": "ns", "error_occurred": True},
+            {"name": "a_mean", "run_type": "aggregate", "cpu_time": 2.0, "time_unit": "us"},
+        ]
+    }
+    assert bench.cpu_times(report) == {"a": 2000.0}
+
+
+@pytest.mark.parametrize(
+    ("growth", "left_out", "compiler", "code"),
+    [(1.029, None, "g++ 1", 0), (1.031, None, "g++ 1", 1), (1.0, "effects", "g++ 1", 1), (2.0, None, "g++ 2", 0)],
+)
+def test_more_instructions_than_recorded_are_refused(tmp_path, monkeypatch, capsys, growth, left_out, compiler, code):
+    recorded = {case: 1000 for case in counting.CASES if case != left_out}
+    baseline = tmp_path / "instructions.json"
+    baseline.write_text(json.dumps({"compiler": "g++ 1", "instructions_per_step": recorded}))
+    monkeypatch.setattr(counting, "BASELINE", baseline)
+    monkeypatch.setattr(counting, "run", lambda command: compiler)
+    monkeypatch.setattr(counting, "per_step", lambda driver, case: round(1000 * (growth if case == "loaded" else 1.0)))
+    monkeypatch.setattr("sys.argv", ["count_instructions", "--driver", "x"])
+    assert counting.main() == code
+    named = left_out or ("loaded" if code else None)
+    assert named is None or f"\n{named}: " in capsys.readouterr().out

@@ -1,0 +1,157 @@
+"""Runs what the documents tell the reader to run, and the examples: commands, C++ blocks, Python blocks.
+
+Commands that build or test everything (`tools/dev ...`) are only looked up in the command's own help.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+DOCUMENTS = [
+    ROOT / "README.md",
+    *sorted(
+        path for folder in ("docs", "include", "examples", "bench", "tools") for path in (ROOT / folder).rglob("*.md")
+    ),
+]
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def blocks(document: Path, language: str) -> list[str]:
+    return [body for kind, body in BLOCK.findall(document.read_text()) if kind == language] if document.exists() else []
+
+
+def all_blocks(language: str) -> list:
+    return [
+        pytest.param(body, id=f"{name(document)}-{number}")
+        for document in DOCUMENTS
+        for number, body in enumerate(blocks(document, language), start=1)
+    ]
+
+
+def commands(document: Path) -> list[str]:
+    lines = [line for body in blocks(document, "sh") for line in body.replace("\\\n", " ").splitlines()]
+    return [line.split(" #")[0].strip() for line in lines if line.startswith(("tools/dev", ".venv/bin/ctcr"))]
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A folder that looks like the project to a command, but keeps what the command writes away from it."""
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    (tmp_path / "build").mkdir()
+    return tmp_path
+
+
+def run(command: list, folder: Path) -> str:
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | {"MPLBACKEND": "Agg"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=900,
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def test_readme_opens_with_the_two_commands():
+    assert commands(ROOT / "README.md")[:2] == ["tools/dev demo", "tools/dev test"]
+
+
+@pytest.mark.parametrize("language", ["cpp", "python"])
+def test_readme_shows(language):
+    assert blocks(ROOT / "README.md", language)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name)
+def test_commands(document, project):
+    usage = run([ROOT / "tools/dev", "--help"], project)
+    for command in commands(document):
+        if command.startswith("tools/dev"):
+            _, subcommand, *rest = command.split()
+            for word in (subcommand, *(word for word in rest if word.startswith("-"))):
+                assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
+        else:
+            run(["bash", "-c", command], project)
+
+
+@pytest.mark.parametrize("block", all_blocks("python"))
+def test_python_block(block, project):
+    run([sys.executable, "-c", block], project)
+
+
+@pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=name)
+def test_python_example(example, project):
+    run([sys.executable, example], project)
+
+
+def as_program(block: str) -> str:
+    """A block without main is the body of one, below its own includes."""
+    if "int main(" in block:
+        return block
+    lines = block.splitlines()
+    includes = [line for line in lines if line.startswith("#include")]
+    return "\n".join([*includes, "int main() {", *(line for line in lines if line not in includes), "}\n"])
+
+
+def is_quoted(block: str) -> bool:
+    """Whether all lines of a block stand, in this order, in an example, which is built and run with the C++ tests."""
+    for example in sorted((ROOT / "examples").glob("*.cpp")):
+        lines = iter([line.split(" //")[0].strip() for line in example.read_text().splitlines()])
+        if all(line.split(" //")[0].strip() in lines for line in block.splitlines()):
+            return True
+    return False
+
+
+def test_quoted_lines_are_those_of_an_example_in_their_order():
+    quotation = "#include <vector>\nint main() {"
+    assert is_quoted(quotation)
+    assert not is_quoted("\n".join(reversed(quotation.splitlines())))
+    assert not is_quoted(quotation + "\nnot there")
+
+
+@pytest.mark.parametrize("block", all_blocks("cpp"))
+def test_cpp_block(block, project):
+    """Also shows that the library works as a subdirectory of somebody's project."""
+    if is_quoted(block):
+        return
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is not installed")
+    (project / "main.cpp").write_text(as_program(block))
+    (project / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\n"
+        "project(reader LANGUAGES CXX)\n"
+        f'add_subdirectory("{ROOT}" ctcr)\n'
+        "add_executable(reader main.cpp)\n"
+        "target_link_libraries(reader PRIVATE ctcr::ctcr)\n"
+    )
+    run(["cmake", "-G", "Ninja", "-B", "build"], project)  # without a build type: the shortest to compile
+    run(["cmake", "--build", "build"], project)
+    run([project / "build/reader"], project)
+
+
+def test_scores_told_are_those_kept():
+    """Of all noises together, as the page that the README names keeps them."""
+    page, told = (ROOT / "docs" / "diagnosis_scores_unseen.md").read_text(), (ROOT / "README.md").read_text()
+
+    def of(score):
+        counts = re.findall(rf"^\| {score} \| \w+ \| (\d+)/(\d+) =", page, re.MULTILINE)
+        assert counts
+        return [sum(int(count) for count in column) for column in zip(*counts, strict=True)]
+
+    right, sets = of("right class first")
+    assert f"right effect first in {right} of {sets}" in " ".join(told.split())
+    quiet, controls = of("controls: nothing named")
+    assert quiet == controls and f"none in {controls} that hide nothing" in " ".join(told.split())

@@ -1,0 +1,216 @@
+"""The sensitivity study: against the model itself, on other workers, after interruptions, and what it advises."""
+
+import json
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from ctcr.cli import cli
+from ctcr.errors import InputError
+from ctcr.frames import base_to_tracker
+from ctcr.model import parameters
+from ctcr.model.model import Model
+from ctcr.robot import robot_file
+from ctcr.sensitivity import closed_loop, open_loop
+from ctcr.sensitivity.advice import advise, grouped
+from ctcr.sensitivity.ranges import all_varied, together
+from ctcr.sensitivity.work import workers
+from ctcr.track import scenario as scenario_file
+
+ROOT = Path(__file__).parents[3]
+ROBOT = ROOT / "examples/robots/table2.yaml"
+S2 = ROOT / "examples/data/scenarios/S2.yaml"
+COUNT = 2500
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return robot_file.load(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def varied(robot):
+    return all_varied(robot)
+
+
+@pytest.fixture(scope="module")
+def whole(robot, varied):
+    return open_loop.study(robot, varied, COUNT)
+
+
+def test_the_papers_ranges(robot, varied):
+    assert len(varied) == 3 * 8 + 6
+    names, nominal = parameters.names_of(3), parameters.values(robot)
+    for one in varied:
+        assert np.array_equal(one.at(0.0), nominal)
+        changed = {names[i] for fraction in (-1, 1) for i in np.flatnonzero(one.at(fraction) != nominal)}
+        assert len(changed) == (3 if one.kind.startswith("tracker rotation") else 1), one.name
+    ends = {one.name: (one.low, one.high, one.unit) for one in varied}
+    assert ends["length, tube 2"] == (-5, 5, "mm") and ends["Young's modulus, tube 1"] == (-15, 15, "GPa")
+    assert ends["Poisson's ratio, tube 3"][:2] == pytest.approx((-0.3, 0.2))
+    inner = names.index("tubes.1.inner_diameter")
+    wall = next(one for one in varied if one.name == "wall thickness, tube 1")
+    assert robot.tubes[0].outer_diameter - wall.at(1.0)[inner] == pytest.approx(1.15 * 0.22e-3)
+
+
+def test_a_shift_of_the_tracker_moves_every_tip_as_much(whole):
+    for one in whole.influences:
+        if one.name.startswith("tracker position"):
+            assert one.mean == pytest.approx(3) and one.maximum == pytest.approx(3)
+
+
+def test_influences_agree_with_the_model(robot, varied, whole):
+    """Other random configurations, solved by the model one by one: means agree within their spread."""
+    random = np.random.default_rng(3)
+    beta, alpha = uniform_joints(robot, 3000, random)
+    direction = random.standard_normal((len(beta), 3))
+    force = 0.3 * random.uniform(size=(len(beta), 1)) * direction / np.linalg.norm(direction, axis=1)[:, None]
+    nominal = Model(robot, steps=1).predict(beta, alpha, force)
+    for name, other in (
+        ("precurvature, tube 3", parameters.applied(robot, ["tubes.3.curvature"], [7.7])),
+        ("Young's modulus, tube 1", parameters.applied(robot, ["tubes.1.youngs_modulus"], [73e9])),
+    ):
+        there = Model(other, steps=1).predict(beta, alpha, force)
+        a, _ = base_to_tracker(robot.tracker, nominal.position, nominal.quaternion)
+        b, _ = base_to_tracker(robot.tracker, there.position, there.quaternion)
+        distance = 1e3 * np.linalg.norm(a - b, axis=1)
+        one = single_end(robot, varied, name)
+        assert one.mean == pytest.approx(distance.mean(), rel=0.1), name
+
+
+def uniform_joints(robot, count, random):
+    """Uniform over what the order of the tubes allows, by rejection."""
+    lengths = np.array([tube.length for tube in robot.tubes])
+    beta = -lengths * random.uniform(size=(200 * count, 3))
+    bases = np.hstack([beta, np.zeros((len(beta), 1))])
+    tips = np.hstack([lengths + beta, np.zeros((len(beta), 1))])
+    good = (np.diff(bases) >= 0).all(axis=1) & (np.diff(tips) <= 0).all(axis=1)
+    return beta[good][:count], random.uniform(-np.pi, np.pi, (count, 3))
+
+
+def single_end(robot, varied, name):
+    one = next(v for v in varied if v.name == name)
+    only = replace(one, at=lambda fraction: one.at(abs(fraction)))  # both ends are the upper one
+    return open_loop.study(robot, [only], 3000).influences[0]
+
+
+def test_together_is_drawn_within_the_ranges(robot, varied):
+    low, high = together(robot, varied)
+    names = parameters.names_of(3)
+    spread = {name for name, a, b in zip(names, low, high, strict=True) if a < b}
+    assert len(spread) == 3 * 8 + 6 and (low <= high).all()
+    assert high[names.index("tracker.rotation.x")] == pytest.approx(np.radians(3))
+
+
+def test_results_do_not_depend_on_who_works(robot, varied, whole, monkeypatch):
+    monkeypatch.setattr(open_loop, "CHUNK", 1)
+    assert open_loop.study(robot, varied, COUNT) == whole
+
+
+def test_an_interrupted_study_goes_on(robot, varied, whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(open_loop, "CHUNK", 1)
+    kept, seen = tmp_path / "kept.json", []
+
+    def stop(amount: float) -> None:
+        seen.append(amount)
+        if len(seen) == 3:  # the first call tells what was kept
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        open_loop.study(robot, varied, COUNT, keep=str(kept), advance=stop)
+    assert json.loads(kept.read_text())["state"]["jobs"] == 2
+    again = []
+    assert open_loop.study(robot, varied, COUNT, keep=str(kept), advance=again.append) == whole
+    assert again[0] == 2 * open_loop.BLOCK and len(again) == 2
+    with pytest.raises(InputError, match="another robot or other options"):
+        open_loop.study(robot, varied, COUNT + 1, keep=str(kept))
+    kept.write_text("no json")
+    with pytest.raises(InputError, match="not the progress"):
+        open_loop.study(robot, varied, COUNT, keep=str(kept))
+
+
+def test_what_has_not_begun_is_left_when_interrupted():
+    begun, first = [], threading.Event()
+
+    def work(job: int) -> int:
+        begun.append(job)
+        if job:
+            first.wait(10)
+        return job
+
+    with pytest.raises(KeyboardInterrupt), workers(None, threads=2) as in_order:
+        for _ in in_order(work, range(100)):
+            threading.Timer(0.2, first.set).start()
+            raise KeyboardInterrupt
+    assert len(begun) <= 3
+
+
+def test_memory_does_not_grow():
+    totals = open_loop.Totals.empty(61)
+    assert sum(np.asarray(value).nbytes for value in vars(totals).values()) < 200_000
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    s = scenario_file.load(S2, 3)
+    s.trajectory.kind = "polyline"
+    s.trajectory.points_mm = [[-18.0, 9.0, 170.0], [-18.0, 39.0, 170.0], [8.0, 39.0, 170.0]]
+    return s
+
+
+def test_closed_loop_is_a_hundred_times_less_sensitive(robot, varied, whole, scenario):
+    study = closed_loop.study(robot, varied, scenario, points=3)
+    for curve in study.curves:
+        assert curve.maximum[1] == 0 and curve.mean[1] == 0  # the nominal robot itself
+        if not curve.varied.name.startswith("tracker rotation"):
+            opened = next(one for one in whole.influences if one.name == curve.varied.name)
+            assert curve.worst_maximum < 0.05 * opened.maximum, curve.varied.name
+    assert study.cumulated_maximum == pytest.approx(sum(curve.worst_maximum for curve in study.curves))
+
+
+def test_dask_gives_the_same(robot, varied, whole, scenario):
+    distributed = pytest.importorskip("distributed")
+    few = varied[:3]
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert open_loop.study(robot, varied, COUNT, dask=address) == whole
+        there = closed_loop.study(robot, few, scenario, points=3, dask=address)
+    here = closed_loop.study(robot, few, scenario, points=3)
+    assert [c.maximum.tolist() for c in there.curves] == [c.maximum.tolist() for c in here.curves]
+
+
+def test_no_cluster_is_named(robot, varied):
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no dask scheduler answers at"):
+        open_loop.study(robot, varied, 10, dask="not an address")
+
+
+def test_advice():
+    influence = {"length, tube 1": 0.5, "length, tube 3": 0.4, "tracker position x": 0.05, "wall, tube 1": 0.04}
+    advice = advise(influence, 0.5)
+    assert advice.calibrate == ["length, tube 1"] and advice.error == pytest.approx(0.49)
+    assert advise(influence, 0.2, base_mm=0.1).calibrate == ["length, tube 1", "length, tube 3"]
+    assert advise(influence, 0.65, independent=True).calibrate == []
+    assert "out of reach" in advise(influence, 0.1, base_mm=0.2).text()
+    assert grouped(advice.calibrate + ["length, tube 3", "tracker position x"]) == (
+        "length of tubes 1 and 3, tracker position x"
+    )
+    assert grouped(["E, tube 2", "E, tube 3", "E, tube 1", "nu, tube 1"]) == "E of tubes 1, 2 and 3, nu of tube 1"
+
+
+def test_command(tmp_path):
+    page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
+    asked = ["sensitivity", str(ROBOT), "--open-loop", "300", "--report", str(page), "--json", str(numbers)]
+    done = CliRunner().invoke(cli, asked)
+    assert done.exit_code == 0, done.output
+    assert "calibrate" in done.output and "evaluations a second and core" in done.output
+    data = json.loads(numbers.read_text())["open_loop"]
+    assert data["configurations"] == 300 and len(data["influence"]) == 31 and data["calibrate"]
+    assert "<svg" in page.read_text()
+    nothing = CliRunner().invoke(cli, ["sensitivity", str(ROBOT)])
+    assert nothing.exit_code != 0 and isinstance(nothing.exception, InputError)

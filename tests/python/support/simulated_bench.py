@@ -1,0 +1,114 @@
+"""Starts simulators as processes of their own, as a user does, and stops them again."""
+
+import os
+import subprocess
+import sys
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
+T_REF = [-59.6, 20.3, -180.5], [0.004, 1.203, 0.297]  # [mm], [rad]
+BUS_STARVED = ("no frame came back whole", "no process data for 100 ms")  # as master and terminals say it
+ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
+
+
+def ctcr(*arguments) -> list[str]:
+    return [sys.executable, "-m", "ctcr", *map(str, arguments)]
+
+
+def skip_without_bench() -> None:
+    """Skips the test that asks, where no bench can be simulated."""
+    from ctcr.bench.simulators import network
+
+    if not network.is_permitted():
+        pytest.skip("this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing")
+    for package in ("pysoem", "serial"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
+
+
+def was_starved(said: str) -> bool:
+    """Whether the bus stopped because simulators slept: they have no real-time priority in a network of their own, and
+    a computer busy with other tests may let them sleep. Only then a test is run once more."""
+    return any(sign in said for sign in BUS_STARVED)
+
+
+def before_others() -> None:
+    """Lets this process and its children run before other tests, where that is permitted: a `preexec_fn`."""
+    with suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, -15)
+
+
+def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) -> None:
+    """Runs pytest beside the simulators that `ctcr sim bench` starts with `bench`; tests find what they need in the
+    environment, and the fixtures of bench_fixtures.py. Processes of different folders do not meet."""
+    skip_without_bench()
+    known = {"PYTHONPATH": Path(__file__).parent, **environment}
+    for attempt in (1, 2):
+        command = ctcr(
+            "sim",
+            "bench",
+            *bench,
+            "--folder",
+            folder / str(attempt),
+            "--",
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "--durations=9",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            "-p",
+            "bench_fixtures",
+            *tests,
+        )
+        done = subprocess.run(
+            command,
+            capture_output=True,
+            text=True,
+            cwd=ROOT,
+            timeout=900,
+            preexec_fn=before_others,
+            env=os.environ | {name: str(value) for name, value in known.items()},
+        )
+        print(done.stdout)
+        if done.returncode == 0 or not was_starved(done.stdout):
+            break
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " passed" in done.stdout
+
+
+@contextmanager
+def running(*command):
+    """A process that says on its standard output when it is ready; ended when the block ends."""
+    process = subprocess.Popen(
+        list(command), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | {"COLUMNS": "200"}
+    )
+    try:
+        first = process.stdout.readline()
+        if process.poll() is not None:
+            raise RuntimeError(first + process.stdout.read())
+        yield process
+    finally:
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+def mended_bench() -> Path:
+    """The folder of the bench on which this program runs, with every fault of the simulators mended."""
+    from ctcr.bench.devices import emergency_stop
+    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.simulators import aurora, ethercat
+    from ctcr.bench.simulators.control import request
+
+    folder = private_folder()
+    request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})
+    request(folder, "aurora", {"faults": dict(aurora.FAULTS), "force": [0, 0, 0]})
+    emergency_stop.release(folder)
+    return folder

@@ -1,0 +1,271 @@
+"""Control and calibration with the devices: what needs a running bench is in on_bench_live.py."""
+
+import io
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from ctcr.bench.devices import bench_file
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.person import PersonPresent
+from ctcr.bench.record.row_file import RowFile
+from ctcr.calibrate import tables
+from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table
+from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
+from ctcr.calibrate.still_reading import still_reading
+from ctcr.calibrate.tables import Column
+from ctcr.effects.one_tube import one_tube
+from ctcr.errors import InputError
+from ctcr.frames import base_to_tracker
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+from ctcr.track import scenario as scenario_file
+from ctcr.track.live import within
+from ctcr.track.recording import COLUMNS, runs_of
+from ctcr.track.runs import run_once, system_values
+from ruamel.yaml import YAML
+from simulated_bench import HOMES, ROBOT, ROOT, T_REF, run_on_bench
+
+ON_BENCH = Path(__file__).parent / "on_bench_live.py"
+DATA = ROOT / "examples" / "data"
+
+
+@pytest.fixture
+def robot():
+    return robot_file.load(ROBOT)
+
+
+@pytest.fixture
+def bench():
+    return bench_file.load(DATA / "bench" / "bench.yaml")
+
+
+@pytest.fixture
+def scenario():
+    return scenario_file.load(DATA / "bench" / "track.yaml", 3)
+
+
+class Ideal:
+    """A device in Python that moves at once and reads what the model says."""
+
+    def __init__(self, robot, start):
+        from ctcr import Model
+        from ctcr.frames import base_to_tracker, matrix_from_quaternion
+
+        self.robot, self.joints, self.rows = robot, np.array(start), []
+        self._model, self._to_tracker, self._matrix = Model(robot), base_to_tracker, matrix_from_quaternion
+
+    def measure(self):
+        n = self.robot.n_tubes
+        tip = self._model.predict(self.joints[None, :n], self.joints[None, n:], np.zeros((1, 3)))
+        position, quaternion = self._to_tracker(self.robot.tracker, tip.position, tip.quaternion)
+        known = self.robot.actuation
+        ratios = np.repeat([known.translation_mm_per_rev / 2e3 / np.pi, known.rotation_rev_per_rev], n)
+        self._ratios = ratios
+        homes = np.concatenate([1e-3 * np.array(known.home_translation_mm), np.deg2rad(known.home_rotation_deg)])
+        return (self.joints - homes) / ratios, position[0], self._matrix(quaternion[0])
+
+    def record(self, so_far, row):
+        self.rows.append(so_far.tip[row].copy())
+
+    def move(self, velocity, period):
+        self.joints += self._ratios * velocity * period
+
+
+def test_a_device_in_python_is_controlled_as_the_simulated_robot_is(robot, scenario):
+    scenario.noise_mm, values = 0.0, system_values(robot)
+    start = [*(1e-3 * np.array(scenario.start.beta_mm)), *np.deg2rad(scenario.start.alpha_deg)]
+    device = Ideal(robot, start)
+    here, there = run_once(scenario, values, device, 0.0), run_once(scenario, values, values, 0.0)
+    np.testing.assert_allclose(here.tip, there.tip, atol=1e-7)  # the integrators differ
+    np.testing.assert_allclose(here.joints, there.joints, atol=1e-5)
+    np.testing.assert_array_equal(device.rows, here.tip)
+
+
+@pytest.mark.parametrize("where", ["measure", "record", "move"])
+def test_what_a_device_raises_ends_the_run(robot, scenario, where):
+    start = [*(1e-3 * np.array(scenario.start.beta_mm)), *np.deg2rad(scenario.start.alpha_deg)]
+    device = Ideal(robot, start)
+
+    def fails(*_):
+        raise InputError([])
+
+    setattr(device, where, fails)
+    with pytest.raises(InputError):
+        run_once(scenario, system_values(robot), device, 0.0)
+    assert len(device.rows) == 0
+
+
+def test_late_readings_are_held_against_where_the_tip_was(robot, scenario, tmp_path):
+    """Two runs at constant speed, exactly on their paths, read late: nothing is left but for the last of each run."""
+    age, period, speed, count = 0.036, 0.025, 0.02, 20
+    t = period * np.arange(count)
+    along = np.array([0.6, 0.0, 0.8])
+    folder = SimpleNamespace(path=tmp_path, about={"runs": []})
+    rows, control = (
+        RowFile(tmp_path / "measurements.csv", measurements.column_names(3)),
+        RowFile(tmp_path / "control.csv", COLUMNS),
+    )
+    with closing(rows), closing(control):
+        for run in (1, 2):
+            entry = {"run": run, "mass_g": 0, "repetition": run, "ended": "finished", "status": "ok"}
+            folder.about["runs"].append(entry | {"settled_m": 0.0})
+            for now in t:
+                wanted, seen = ([*(run * 0.01 + speed * when * along)] for when in (now, now - age))
+                seen, quaternion = base_to_tracker(robot.tracker, np.array([seen]), np.array([[1.0, 0, 0, 0]]))
+                clock = 100.0 * run + now
+                joints = [-0.4, -0.3, -0.2, 0, 0, 0]
+                rows.append([[clock, run, *joints, 0, 0, 0, *map(float, [*seen[0], *quaternion[0]])]])
+                control.append([[clock, run, now, *map(repr, map(float, wanted)), *[0.0] * (len(COLUMNS) - 6)]])
+    for run in runs_of(folder, scenario, robot, age):
+        assert run.error[:-2].max() < 1e-6
+    for run in runs_of(folder, scenario, robot):
+        np.testing.assert_allclose(run.error, speed * age, rtol=1e-3)
+
+
+def test_the_limits_are_those_of_bench_and_scenario(robot, bench, scenario):
+    scenario.limits.beta_high_mm = [-250.0, -210.0, 0.0]
+    scenario.limits.base_gap_mm = 56.5
+    scenario.tasks.feedback_per_s = 30.0
+    limits = within(scenario, bench, robot).limits
+    braking = 10**2 / (2 * 10 / 0.2)  # mm
+    assert limits.base_gap_mm == 56.5 and limits.tip_gap_mm == pytest.approx(2 * braking)
+    assert limits.translation_mm_s == 10 and limits.rotation_deg_s == pytest.approx(60)
+    np.testing.assert_allclose(limits.beta_high_mm, [-250, -210, -101])
+    np.testing.assert_allclose(limits.beta_low_mm, [-464, -334, -199])
+    assert within(scenario, bench, robot).tasks.feedback_per_s == 15
+    scenario.rate_Hz = 100.0
+    with pytest.raises(InputError, match="the tracker sets the pace, 40 Hz"):
+        within(scenario, bench, robot)
+
+
+# ---- calibration
+
+
+def test_a_tube_alone_is_that_of_a_robot_whose_other_tubes_end_at_the_plate(robot):
+    """The others are straight behind the plate, and no effect between tubes acts."""
+    from ctcr import Model
+
+    for tube in range(3):
+        alone = one_tube(robot, tube)
+        beta = -np.array([one.length for one in alone.tubes]) + 0.05
+        tip = Model(alone).predict(beta[None], np.array([[0.3]]), np.zeros((1, 3)))
+        assert tip.solved.all()
+        if tube == 0:
+            lengths = np.array([one.length for one in robot.tubes])
+            beta = -lengths + [0.05, 0.0, 0.0]
+            whole = Model(robot).predict(beta[None], np.array([[0.3, 0, 0]]), np.zeros((1, 3)))
+            np.testing.assert_allclose(whole.position, tip.position, atol=1e-6)
+    hidden = robot.model_copy(
+        update={"effects": {"backlash_rotation": {"play": [0.1, 0.2, 0.3]}, "delay": {"delay": 0.02}}}
+    )
+    assert one_tube(hidden, 1).effects == {"backlash_rotation": {"play": [0.2]}, "delay": {"delay": 0.02}}
+
+
+def test_tubes_stand_out_one_by_one(robot, bench):
+    limits = bench.axis_settings(robot).limits
+    one_by_one = replace(limits, one_by_one=True)
+    flush = np.concatenate([-limits.length, np.zeros(3)])
+    for tube in range(3):
+        place = flush + 0.05 * (np.arange(6) == tube)
+        assert one_by_one.problem(place) is None and (limits.problem(place) is None) == (tube == 0)
+        assert all(one_by_one.problem(flush + s * (place - flush)) is None for s in np.linspace(0, 1, 9))
+    two = flush + [0, 0.05, 0.06, 0, 0, 0]
+    assert "tube 1 would end 50.00 mm inside tube 2" in one_by_one.problem(two)
+
+
+def test_a_tube_that_cannot_be_retracted_is_told_before_anything_moves(robot, bench, tmp_path):
+    bench.limits.translation_mm[0] = [-450.0, -245.0]
+    desk = Desk(bench, tmp_path, None, print)
+    with pytest.raises(InputError) as caught:
+        rotation_table(tmp_path / "circles.csv", robot, desk, Circles(0.3, 8))
+    assert len(caught.value.problems) == 2  # tubes 2 and 3
+    assert "tube 2 cannot stand out alone: beta1 = -463.00 mm: may be -450.00 to" in str(caught.value)
+
+
+def test_a_person_is_told_what_to_fasten_and_to_touch(monkeypatch, capfd):
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
+    person = PersonPresent()
+    person.fasten(1)
+    person.fasten(None)
+    person.touch("B", np.array([0.06, -0.04, -0.02]))
+    said = capfd.readouterr().err
+    assert "Fasten the sensor to the tip of tube 2" in said and "Take the sensor off the tube" in said
+    assert "Touch point B (CAD 60, -40, -20 mm) with the tip of the probe" in said
+
+
+def test_a_table_of_other_angles_is_not_gone_on_with(robot, bench, tmp_path):
+    table = tmp_path / "circles.csv"
+    table.write_text(",".join(ROTATION_COLUMNS) + "\n1,180,1,0,0,0,0.03,8\n1,90,1,0,0,0,0.03,8\n")
+    with pytest.raises(InputError, match="row 3: holds rows at other angles"):
+        rotation_table(table, robot, Desk(bench, tmp_path, None, print), Circles(np.deg2rad(60), 8))
+
+
+def test_names_of_points_may_hold_commas(tmp_path):
+    path = tmp_path / "points.csv"
+    with closing(RowFile(path, ["point", "x_mm"])) as file:
+        file.append([["hole 3, left", 1.5]])
+        file.append([['"B"', float("nan")]])
+    read = tables.read(path, [Column("point", "text"), Column("x", "length", filled=False)])
+    assert read["point"] == ["hole 3, left", '"B"'] and read["x"][0] == 1.5e-3
+    with closing(RowFile(path, ["point", "x_mm"])) as again:
+        assert again.groups == 2 and again.last == ['"B"', ""]
+
+
+class Seen:
+    """A sight of a sensor that moves as a function of the frame's number."""
+
+    patience_s = 0.1
+
+    def __init__(self, place):
+        self._place, self.count = place, 0
+
+    def forget(self):
+        pass
+
+    def seen(self):
+        self.count += 1
+        return SimpleNamespace(reading=SimpleNamespace(position=tuple(self._place(self.count))))
+
+
+def test_a_reading_waits_for_rest():
+    rng = np.random.default_rng(4)
+    sight = Seen(lambda k: [1e-3 * max(0, 30 - k), 0.2, -0.1] + 3e-5 * rng.standard_normal(3))
+    reading = still_reading(sight, 20, 0.5e-3)
+    assert 45 < sight.count < 55  # the last frames of the motion lie within the limit
+    np.testing.assert_allclose(reading.position, [0, 0.2, -0.1], atol=2e-4)
+    resting = still_reading(Seen(lambda k: 3e-5 * rng.standard_normal(3)), 400, 0.5e-3)
+    assert resting.scatter == pytest.approx(3e-5, rel=0.1) and np.abs(resting.position).max() < 6e-6
+    with pytest.raises(DeviceFault, match="has not rested within 0.5 mm"):
+        still_reading(Seen(lambda k: [2e-3 * (k % 2), 0, 0]), 4, 0.5e-3)
+
+
+def test_scatter_of_means_is_their_noise(robot, tmp_path):
+    table = tmp_path / "circles.csv"
+    table.write_text("motor_angle_deg,x_mm,y_mm,z_mm,scatter_mm,readings\n0,0,0,0,0.03,9\n5,0,0,0,0.05,25\n")
+    noise = tracker_noise(robot, tables.read(table, ROTATION_OFFSETS))
+    assert noise["jitter"] == pytest.approx(1e-5) and noise["field_error"] == tracker_noise(robot)["field_error"]
+
+
+def on_bench(tmp_path, *options):
+    """The tests of ON_BENCH around a robot whose homes and tracker frame are not those of the file that they use."""
+    document, known, real = YAML().load(ROBOT), tmp_path / "known.yaml", tmp_path / "real.yaml"
+    document["actuation"]["translation_mm_per_rev"] = 20.0  # tubes are in and out in a second
+    YAML().dump(document, known)
+    document["actuation"]["home_rotation_deg"] = HOMES
+    document["tracker"]["position_mm"], document["tracker"]["rotation_vector_rad"] = T_REF
+    YAML().dump(document, real)
+    run_on_bench(tmp_path / "bench", [real], ["-s", ON_BENCH, *options], ROBOT_FILE=known)
+
+
+@pytest.mark.alone
+def test_on_the_simulated_bench(tmp_path):
+    on_bench(tmp_path)
+
+
+@pytest.mark.slow
+def test_more_on_the_simulated_bench(tmp_path):
+    on_bench(tmp_path, "-m", "slow")

@@ -1,0 +1,66 @@
+"""Readings that leap away and back: spikes of the tracker, told by the readings around them and not by a fit."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.show.output import listed
+from ctcr.table.joint_space import loaded_places
+from ctcr.table.measurements import Measurements
+
+Array = NDArray[np.float64]
+
+FARTHER = 2.0  # than the tip moves by the model, both to the reading before and to that after,
+BACK = 0.5  # ... with these so near each other, of the leap
+VISIBLE = 10.0  # times the noise of a difference
+SHOWN = 6
+
+
+def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """The table without the poses of spikes, and what to say about them.
+
+    What a robot does to its tip shows in more than one reading of a path that goes on, or moves the tip no farther than
+    its joints and load do. The model is that of the robot file: no fit decides which readings it is judged by.
+    """
+    leap = leaps(robot, measurements)
+    spikes = np.isfinite(leap)
+    if not spikes.any():
+        return measurements, []
+    rows = listed(measurements.row[spikes], SHOWN)
+    what = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
+    said = (
+        f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {FARTHER:g} times as "
+        "far as the joints and the load move the tip: spikes of the tracker, left out of all fits and errors"
+    )
+    poses = {name: getattr(measurements, name) for name in ("position", "quaternion")}
+    return replace(
+        measurements, **{name: np.where(spikes[:, None], np.nan, old) for name, old in poses.items() if old is not None}
+    ), [said]
+
+
+def leaps(robot: Robot, measurements: Measurements) -> Array:
+    """How far each spike (M,) leaps [m]; NaN where a reading is none."""
+    leap, jitter = np.full(len(measurements), np.nan), robot.tracker.jitter_mm
+    if measurements.position is None or not jitter:
+        return leap
+    read = np.flatnonzero(np.isfinite(measurements.position).all(axis=1))
+    beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
+    predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
+    measured, run = measurements.position[read], measurements.run[read]
+    step = np.diff(loaded_places(measurements)[read], axis=0)
+    measured_step, predicted_step = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (measured, predicted))
+    leaped = np.minimum(measured_step[:-1], measured_step[1:])
+    moved = np.maximum(predicted_step[:-1], predicted_step[1:])
+    goes_on = np.sum(step[:-1] * step[1:], axis=1) >= 0  # else a leap is one step that the model misses
+    found = (
+        goes_on
+        & (run[:-2] == run[2:])
+        & (leaped > FARTHER * moved)  # NaN, where the model has no solution, says nothing
+        & (leaped > VISIBLE * np.sqrt(6) * 1e-3 * jitter)
+        & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < BACK * leaped)
+    )
+    leap[read[1:-1][found]] = leaped[found]
+    return leap

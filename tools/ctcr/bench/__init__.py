@@ -1,0 +1,1 @@
+"""The measuring bench: devices, their simulators and recordings."""

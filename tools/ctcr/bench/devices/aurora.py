@@ -1,0 +1,272 @@
+"""The NDI Aurora tracker on a serial port: connects, finds the tools, reads frames."""
+
+import os
+import struct
+import time
+from dataclasses import dataclass
+
+from ctcr.bench.devices import ndi_protocol as ndi
+from ctcr.bench.devices.fault import DeviceFault, needed
+from ctcr.bench.devices.ndi_replies import Garbled, ToolReading, parse_bx, parse_tx
+
+RESET_S = 5.0  # from the break to the device's message
+PROBES_S = (0.2, 0.6)  # longest silences, in two rounds of looking for the baud rate
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A sensor coil as the device sees it; a 6D tool is one, two 5D tools in one plug are two."""
+
+    handle: int
+    serial_number: str
+    part_number: str
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What one TX or BX answered, and when it came in (`time.monotonic`)."""
+
+    t: float  # [s]
+    readings: list[ToolReading]
+    system_status: int
+
+
+class Aurora:
+    """One tracker. `connect` before `read`; every method raises DeviceFault. Not real-time safe: it waits.
+
+    `replies` is BX (short, exact to 32 bits) or TX (text, rounded to 0.01 mm). After a fault, `connect` starts anew,
+    also where the cable was pulled in between.
+    """
+
+    def __init__(self, port: str, baud: int = 115200, replies: str = "BX", answer_s: float = 1.0, tries: int = 3):
+        """`answer_s`: longest silence before an answer [s]; `tries`: of a command whose answer came damaged."""
+        self.port, self.baud, self.replies = port, baud, replies
+        self._answer_s, self._tries = answer_s, tries
+        self.version, self.tools = "", []
+        self.damaged_answers = 0
+        self._line = None
+
+    # ---- connection
+
+    def connect(self) -> None:
+        """Resets the device, raises the baud rate, initialises and enables every tool, starts tracking."""
+        for left in reversed(range(self._tries)):
+            damaged = self.damaged_answers
+            try:
+                self._set_up()
+                return
+            except DeviceFault:  # a command asked twice is refused where only the first answer was damaged
+                if not left or self.damaged_answers == damaged:
+                    raise
+
+    def _set_up(self) -> None:
+        self.close()
+        self._open()
+        self._reset()
+        self._set_baud()
+        self.version = self._ask("VER", "4")
+        self._find_tools()
+        self._ask("TSTART", "80")  # frame numbers start at 0
+
+    def close(self) -> None:
+        """Lets go of the port; the device goes on tracking until the next reset."""
+        if self._line:
+            self._line.close()
+        self._line = None
+
+    def __enter__(self) -> "Aurora":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    # ---- frames
+
+    def read(self) -> Frame:
+        """The newest frame. Frames come at the tracker's rate: asked faster, the same frame number comes again."""
+        options = f"{ndi.REPORT_OUT_OF_VOLUME | ndi.TRANSFORMS:04X}"
+
+        def once() -> Frame:
+            self._send(self.replies, options)
+            if self.replies == "BX":
+                body = self._binary_answer()
+                return Frame(time.monotonic(), *parse_bx(body))
+            text = self._text_answer()
+            return Frame(time.monotonic(), *parse_tx(text))
+
+        return self._tried(once)
+
+    # ---- steps of the connection
+
+    def _open(self) -> None:
+        serial = needed("pyserial", "serial", f"tracker {self.port}")
+        try:
+            self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s, exclusive=True)
+        except serial.SerialException as error:
+            reason = os.strerror(error.errno) if error.errno else str(error)
+            remedy = "is it plugged in and switched on, and is the user in the port's group (usually dialout)?"
+            raise self._fault(f"cannot open the port ({reason.lower()})", remedy) from None
+
+    def _reset(self) -> None:
+        """A break returns a device to 9600 baud from whatever it was told before.
+
+        A pseudo-terminal carries no break, so there the device is asked at each baud rate.
+        """
+        if not os.path.realpath(self.port).startswith("/dev/pts/"):
+            self._guarded(lambda: self._line.send_break(0.3))
+            self._line.timeout = RESET_S
+            message = self._until_return()
+            self._line.timeout = self._answer_s
+            if message == ndi.RESET_MESSAGE[:-1]:
+                self._ask("INIT", "")
+                return
+        for patience in PROBES_S:
+            for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
+                if self._answers_at(baud, patience):
+                    return
+        remedy = "switch it off and on; is this the tracker's port, and the cable whole?"
+        raise self._fault("no answer at any baud rate", remedy)
+
+    def _answers_at(self, baud: int, patience: float) -> bool:
+        self._line.baudrate, self._line.timeout = baud, patience
+        self._line.reset_input_buffer()
+        try:
+            for name in ("TSTOP", "INIT"):  # a device left tracking would refuse what follows
+                self._send(name, "")
+                answer = self._until_return() + b"\r"
+            return answer == ndi.framed(b"OKAY")
+        except Garbled:
+            return False
+        finally:
+            self._line.timeout = self._answer_s
+
+    def _set_baud(self) -> None:
+        if self._line.baudrate == self.baud:
+            return
+        if self.baud not in ndi.BAUD_CODES:
+            raise self._fault(f"{self.baud} baud is none of its rates", f"use one of {sorted(ndi.BAUD_CODES)}")
+        self._ask("COMM", f"{ndi.BAUD_CODES[self.baud]}0000")
+        time.sleep(0.1)  # the device answers at the old rate, then changes
+        self._line.baudrate = self.baud
+
+    def _find_tools(self) -> None:
+        for handle in self._handles("01"):
+            self._ask("PHF", f"{handle:02X}")
+        while waiting := self._handles("02"):  # the second coil of a plug shows once the first is initialised
+            for handle in waiting:
+                self._ask("PINIT", f"{handle:02X}")
+        self.tools = []
+        for handle in self._handles("03"):
+            about = self._ask("PHINF", f"{handle:02X}0005")
+            self.tools.append(Tool(handle, about[23:31].strip(), about[33:53].strip()))
+            self._ask("PENA", f"{handle:02X}D")
+        if not self.tools:
+            raise self._fault("no tool is plugged in", "plug the sensor into the device and connect again")
+
+    def _handles(self, kind: str) -> list[int]:
+        for _ in range(self._tries):
+            text = self._ask("PHSR", kind)
+            try:
+                return [int(text[2 + 5 * i : 4 + 5 * i], 16) for i in range(int(text[:2], 16))]
+            except ValueError:  # the late answer to an earlier command
+                self.damaged_answers += 1
+        raise self._fault("its answers belong to other commands", "connect again")
+
+    # ---- questions and answers
+
+    def _ask(self, name: str, arguments: str) -> str:
+        """The text that answers a command."""
+
+        def once() -> str:
+            self._send(name, arguments)
+            return self._text_answer().decode("latin-1")
+
+        return self._tried(once)
+
+    def _tried(self, once):
+        """The answer, asked again where it came damaged."""
+        for _ in range(self._tries):
+            try:
+                return once()
+            except Garbled:
+                self.damaged_answers += 1
+                self._drain()
+        remedy = "check the cable and its plugs, keep it away from the motors' cables, or lower the baud rate"
+        raise self._fault(f"{self._tries} answers in a row came damaged", remedy)
+
+    def _send(self, name: str, arguments: str) -> None:
+        self._guarded(lambda: self._line.write(ndi.framed(f"{name}:{arguments}".encode())))
+
+    def _text_answer(self) -> bytes:
+        line = self._until_return()
+        if not line:
+            raise self._silence()
+        return self._checked(line)
+
+    def _binary_answer(self) -> bytes:
+        start = self._exactly(2)
+        if start == b"ER":  # refusals are text
+            self._checked(start + self._until_return())
+        rest = self._exactly(4)
+        length = struct.unpack("<H", rest[:2])[0]
+        if struct.unpack("<H", start)[0] != ndi.BX_START or struct.unpack("<H", rest[2:])[0] != ndi.crc16(
+            start + rest[:2]
+        ):
+            raise Garbled("wrong head")
+        body = self._exactly(length + 2)
+        if struct.unpack("<H", body[-2:])[0] != ndi.crc16(body[:-2]):
+            raise Garbled("wrong CRC")
+        return body[:-2]
+
+    def _checked(self, line: bytes) -> bytes:
+        """The text of a line whose CRC is right and that is no refusal."""
+        text = line[:-4]
+        if b"%04X" % ndi.crc16(text) != line[-4:]:
+            raise Garbled("wrong CRC")
+        if text.startswith(b"ERROR"):
+            code = int(text[5:7], 16)
+            what, remedy = ndi.ERRORS.get(code, ("refused", "see the device's manual for this code"))
+            raise self._fault(f"error {code:02X}, {what}", remedy, code)
+        return text
+
+    def _exactly(self, count: int) -> bytes:
+        data = self._guarded(lambda: self._line.read(count))
+        if not data:
+            raise self._silence()
+        if len(data) < count:
+            raise Garbled("cut short")
+        return data
+
+    def _until_return(self) -> bytes:
+        """A line without its end; empty where none came in time."""
+        data = self._guarded(lambda: self._line.read_until(b"\r"))
+        if data and not data.endswith(b"\r"):
+            raise Garbled("cut short")
+        return data[:-1]
+
+    def _drain(self) -> None:
+        """Waits until the line is silent, so that the next answer starts at its start."""
+        end = time.monotonic() + self._answer_s
+        while time.monotonic() < end and self._guarded(lambda: self._line.in_waiting):
+            self._guarded(self._line.reset_input_buffer)
+            time.sleep(0.02)
+
+    def _guarded(self, action):
+        """Runs what touches the port; raises DeviceFault where the port is gone."""
+        import serial
+
+        if not self._line:
+            raise self._fault("not connected", "connect first")
+        try:
+            return action()
+        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: pyserial on a port closed meanwhile
+            self.close()
+            reason = str(error).split(":")[0]
+            raise self._fault(f"the port is gone ({reason})", "plug the cable in and connect again") from None
+
+    def _silence(self) -> DeviceFault:
+        remedy = "wait, or switch it off and on; after a change of its baud rate connect again"
+        return self._fault(f"no answer within {self._answer_s:g} s", remedy)
+
+    def _fault(self, what: str, remedy: str, code: int | None = None) -> DeviceFault:
+        return DeviceFault(f"tracker {self.port}", what, remedy, code)

@@ -1,0 +1,134 @@
+"""The bench file: which devices there are, where they are connected, and what the joints may do."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Len
+from pydantic import Field, ValidationError
+
+from ctcr.bench.devices.axis_control import AxisSettings
+from ctcr.bench.devices.joint_limits import JointLimits
+from ctcr.bench.devices.stepper_drive import DriveSettings
+from ctcr.errors import InputError, Problem, did_you_mean, file_fault
+from ctcr.robot import yaml_document
+from ctcr.robot.description import MAX_TUBES, Robot, Section
+from ctcr.robot.units import Quantity
+
+SIMULATED = "simulated"
+
+Pair = Annotated[list[float], Len(2, 2)]
+Axes = Annotated[list[int], Len(1, MAX_TUBES)]
+
+
+class TrackerPort(Section):
+    """The Aurora and its serial port."""
+
+    port: str = Field(description="a serial port such as /dev/ttyUSB0, or simulated")
+    baud: int = Field(115200, description="a rate such as 115200")
+    replies: Literal["BX", "TX"] = Field("BX", description="BX or TX")
+    tool: str = Field("0A", pattern="^[0-9A-F]{2}$", description="the handle of the sensor, two hexadecimal digits")
+    probe: str | None = Field(
+        None, pattern="^[0-9A-F]{2}$", description="the handle of the probe, two hexadecimal digits; else as tool"
+    )
+    reading_age_ms: Annotated[float, Quantity("ms", usual=(1, 150), least=0)] = 12.0
+
+
+class Motors(Section):
+    """The stepper terminals; the lists hold one value a tube, innermost first."""
+
+    interface: str = Field(description="a network interface such as enp3s0, or simulated")
+    translation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
+    rotation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
+    current_mA: Annotated[int, Quantity("mA", usual=(50, 5000), above=0)] = 1000
+    full_steps: Annotated[int, Quantity("", usual=(20, 1000), above=0)] = 200
+    encoder_counts: Annotated[int, Quantity("", usual=(100, 100000), above=0)] = 4096
+    period_ms: Annotated[float, Quantity("ms", usual=(1, 20), above=0)] = 4.0
+    speed_mm_s: Annotated[float, Quantity("mm/s", usual=(0.1, 100), above=0)] = 10.0
+    speed_deg_s: Annotated[float, Quantity("deg/s", usual=(1, 720), above=0)] = 60.0
+    ramp_s: Annotated[float, Quantity("s", usual=(0.05, 5), above=0)] = 0.2
+    lag_mm: Annotated[float, Quantity("mm", usual=(0.1, 10), above=0)] = 1.0
+    lag_deg: Annotated[float, Quantity("deg", usual=(0.5, 45), above=0)] = 5.0
+
+
+class Limits(Section):
+    """Soft limits, one pair a tube, innermost first."""
+
+    translation_mm: Annotated[list[Pair], Len(1, MAX_TUBES)] = Field(description="a pair [lowest, highest] a tube, mm")
+    rotation_deg: Annotated[list[Pair], Len(1, MAX_TUBES)] = Field(description="a pair [lowest, highest] a tube, deg")
+    clearance_mm: Annotated[float, Quantity("mm", usual=(0, 50), least=0)]
+
+
+class Bench(Section):
+    """The whole file. `person` is who hangs weights and looks at the tubes."""
+
+    tracker: TrackerPort = Field(description="its fields, indented below it")
+    motors: Motors = Field(description="its fields, indented below it")
+    limits: Limits = Field(description="its fields, indented below it")
+    person: Literal["present", "simulated"] = Field("present", description="present or simulated")
+
+    @property
+    def drive_settings(self) -> DriveSettings:
+        motors = self.motors
+        return DriveSettings(motors.current_mA, motors.full_steps, motors.encoder_counts)
+
+    def axis_settings(self, robot: Robot) -> AxisSettings:
+        """Of this robot's joints. Raises InputError where the file is for another number of tubes."""
+        n, motors, limits = robot.n_tubes, self.motors, self.limits
+        counts = {
+            "motors.translation_terminals": motors.translation_terminals,
+            "motors.rotation_terminals": motors.rotation_terminals,
+            "limits.translation_mm": limits.translation_mm,
+            "limits.rotation_deg": limits.rotation_deg,
+        }
+        wrong = [
+            Problem(f"has {len(value)} entries, the robot has {n} tubes", field=name)
+            for name, value in counts.items()
+            if len(value) != n
+        ]
+        if wrong:
+            raise InputError(wrong)
+        return AxisSettings(
+            speeds=np.repeat([1e-3 * motors.speed_mm_s, np.deg2rad(motors.speed_deg_s)], n),
+            ramp_s=motors.ramp_s,
+            lag=np.repeat([1e-3 * motors.lag_mm, np.deg2rad(motors.lag_deg)], n),
+            limits=JointLimits(
+                length=np.array([tube.length for tube in robot.tubes]),
+                travel=1e-3 * np.array(limits.translation_mm),
+                rotation=np.deg2rad(limits.rotation_deg),
+                clearance=1e-3 * limits.clearance_mm,
+            ),
+        )
+
+
+def load(path: str | Path) -> Bench:
+    """The bench that a file describes. Raises InputError with all its faults."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+    except UnicodeDecodeError:
+        raise InputError(Problem("is not text in UTF-8", str(path))) from None
+    document = yaml_document.parse(text, str(path))
+    if not isinstance(document.data, dict):
+        raise InputError(Problem("does not describe a bench: no fields tracker, motors, limits", str(path)))
+    try:
+        return Bench.model_validate(document.data)
+    except ValidationError as error:
+        problems = [_problem(fault, str(path), document) for fault in error.errors(include_url=False)]
+        raise InputError(problems) from None
+
+
+def _problem(fault: dict, file: str, document: yaml_document.YamlDocument) -> Problem:
+    where = fault["loc"]
+    sections = {"tracker": TrackerPort, "motors": Motors, "limits": Limits}
+    section = sections.get(where[0], Bench) if len(where) > 1 else Bench
+    field = str(where[1] if len(where) > 1 else where[0])
+    name = ".".join(map(str, where))
+    if fault["type"] == "extra_forbidden":
+        meant = did_you_mean(field, section.model_fields)
+        return Problem(
+            "unknown field" + (f": did you mean {meant}?" if meant else ""), file, document.line(where), name
+        )
+    complaint = "is missing" if fault["type"] == "missing" else fault["msg"].lower()
+    return Problem(f"{complaint}: needs {section.expected(field)}", file, document.line(where), name)

@@ -1,0 +1,142 @@
+"""The robot's joints as a program uses them: asks the process that owns the bus."""
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ctcr.bench.devices import bus_process, emergency_stop
+from ctcr.bench.devices.bench_file import Bench
+from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.places import interface_of
+from ctcr.bench.devices.transmission import home_joints, transmission, turns_of_joints
+from ctcr.robot.description import Robot
+
+Array = NDArray[np.float64]
+
+CONNECT_S = 20.0
+ANSWER_S = 2.0
+POLL_S = 0.005
+
+
+class Motors:
+    """Starts the bus owner; ends it when closed. Methods raise DeviceFault; none is real-time safe."""
+
+    def __init__(self, bench: Bench, robot: Robot, folder: Path, one_by_one: bool = False):
+        """`one_by_one`: as in JointLimits."""
+        self._robot, self._folder, self._number = robot, folder, 0
+        section, axes = bench.motors, bench.axis_settings(robot)
+        self.settings = bus_process.BusSettings(
+            interface=interface_of(bench),
+            positions=[*section.translation_terminals, *section.rotation_terminals],
+            drive=bench.drive_settings,
+            axes=replace(axes, limits=replace(axes.limits, one_by_one=one_by_one)),
+            ratios=transmission(robot),
+            home=home_joints(robot),
+            period=1e-3 * section.period_ms,
+        )
+        self.names: list[str] = []
+        self._pipe = self._process = None
+
+    def connect(self) -> None:
+        """Brings the bus up, motors off."""
+        context = multiprocessing.get_context("spawn")  # a fork would keep the pipe open after this process has died
+        self._pipe, other = context.Pipe()
+        target = bus_process.run
+        self._process = context.Process(target=target, args=(self.settings, self._folder, other), name="bus owner")
+        self._process.start()
+        other.close()
+        self.names = self._answer(CONNECT_S)
+        self._state = bus_process.state_record(self._folder)
+
+    def close(self) -> None:
+        """Stops the motors and lets go of the bus."""
+        if self._process:
+            try:
+                self._pipe.send((0, "close", ()))
+            except OSError:
+                pass
+            self._process.join(CONNECT_S)
+            self._pipe.close()
+        self._process = None
+
+    def __enter__(self) -> "Motors":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self.close()
+
+    @property
+    def state(self) -> np.void:
+        """The newest state, with the fields of bus_process.STATE."""
+        return self._state.read()
+
+    @property
+    def joints(self) -> Array:
+        """(2N,) [m], [rad], from the encoders, as the controller that records knows them."""
+        return self.state["joints"][: len(self.settings.home)]
+
+    def move(self, joints: ArrayLike, speed: float = 1.0) -> None:
+        """Starts a straight move of all joints (2N,) at a share of the highest speed."""
+        self._ask("move", np.array(joints, float), speed)
+
+    def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
+        """Starts a short move without limits, for homing."""
+        self._ask("jog", np.array(way, float), speed)
+
+    def velocity(self, speeds: ArrayLike, valid_s: float = 0.1) -> None:
+        """Joint speeds (2N,) for `valid_s`, or until new ones come."""
+        self._ask("velocity", np.array(speeds, float), valid_s)
+
+    def halt(self) -> None:
+        """To rest, softly."""
+        self._ask("halt")
+
+    def set_joints(self, joints: ArrayLike) -> None:
+        """The robot stands at these joints (2N,) now: from here on places are known."""
+        self._ask("home", turns_of_joints(self._robot, joints))
+        self.wait()
+
+    def wait(self, meanwhile: Callable[[], None] = lambda: time.sleep(POLL_S)) -> None:
+        """Until the last request is done. Raises DeviceFault where it is stopped on the way."""
+        while True:
+            state = self.state
+            if state["stopped"]:
+                raise emergency_stop.stop_fault(self._folder)
+            if state["done"] == self._number:
+                return
+            self._require_alive()
+            meanwhile()
+
+    def _ask(self, name: str, *arguments) -> None:
+        self._require_alive()
+        if emergency_stop.is_stopped(self._folder):
+            raise emergency_stop.stop_fault(self._folder)
+        self._number += 1
+        try:
+            self._pipe.send((self._number, name, arguments))
+        except OSError:
+            raise self._gone() from None
+        self._answer(ANSWER_S)
+
+    def _answer(self, seconds: float):
+        try:
+            if not self._pipe.poll(seconds):
+                raise self._gone()
+            kind, content = self._pipe.recv()
+        except (EOFError, OSError):
+            raise self._gone() from None
+        if kind == "fault":
+            raise content
+        return content
+
+    def _require_alive(self) -> None:
+        if not self._process or not self._process.is_alive():
+            raise self._gone()
+
+    def _gone(self) -> DeviceFault:
+        return DeviceFault("motors", "the process that owns the bus is not there", "connect again")

@@ -1,0 +1,88 @@
+"""A recording while it is made, as a page that the browser loads anew by itself: a file, so nothing listens."""
+
+import time
+from html import escape
+from math import isnan
+from pathlib import Path
+
+from ctcr.bench.record.session import Progress
+from ctcr.show import html_page
+from ctcr.show.output import atomic_writer
+
+EVERY_S = 2
+SHOWN = 400  # newest readings
+WIDTH, HEIGHT, LEFT, BOTTOM = 860, 300, 60, 30  # of the picture and its margins [px]
+
+
+class LivePage:
+    """`show` as often as there is news; in a block, whose end makes the page rest."""
+
+    def __init__(self, path: str | Path, title: str):
+        self._path, self._title = path, title
+        self._next, self._last = 0.0, Progress(0)
+
+    def __enter__(self) -> "LivePage":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._write(reload_s=0)
+
+    def show(self, progress: Progress) -> None:
+        """Raises InputError where the file cannot be written."""
+        self._last, now = progress, time.monotonic()
+        if now >= self._next:
+            self._next = now + EVERY_S
+            self._write(EVERY_S)
+
+    def _write(self, reload_s: int) -> None:
+        with atomic_writer(self._path) as file:
+            file.write(page(self._last, self._title, reload_s))
+
+
+def page(progress: Progress, title: str, reload_s: int) -> str:
+    """The whole HTML text."""
+    errors = progress.errors_mm
+    known = [error for error in errors if not isnan(error)]
+    numbers = [("good", f"{progress.done} of {progress.total}", "rows of the plan")]
+    if known:
+        numbers += [
+            ("good", f"{errors[-1]:.2f} mm", "error of the last reading"),
+            ("good", f"{progress.rms_mm:.2f} mm", "RMS error against the model"),
+            ("error", f"{max(known):.2f} mm", "largest error"),
+        ]
+    doing = progress.doing if progress.seen else f"{progress.doing}: the tracker does not see the sensor"
+    sections = [
+        f"<h1>{escape(title)}</h1><p class='lead'>{escape(doing if reload_s else 'ended')}</p>",
+        html_page.cards(numbers),
+        picture(errors[-SHOWN:], len(errors)) if known else "",
+    ]
+    return html_page.page(
+        title, sections, "Error against the model at the joints of the encoders", "ctcr record", reload_s=reload_s
+    )
+
+
+def picture(errors_mm: list[float], count: int) -> str:
+    """The newest errors over the number of the reading, of `count`, as SVG; no point where one is not known."""
+    top = max(error for error in errors_mm if not isnan(error)) or 1.0
+    step = (WIDTH - LEFT) / max(1, len(errors_mm) - 1)
+
+    def place(i: int, error: float) -> tuple[float, float]:
+        return LEFT + i * step, 10 + (HEIGHT - BOTTOM - 10) * (1 - error / top)
+
+    points = [place(i, error) for i, error in enumerate(errors_mm) if not isnan(error)]
+    dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5"/>' for x, y in points)
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    levels = "".join(
+        f'<line x1="{LEFT}" x2="{WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e1e6ea"/>'
+        f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:.2f}</text>'
+        for value in (0.0, top / 2, top)
+        for _, y in [place(0, value)]
+    )
+    first, base = count - len(errors_mm) + 1, HEIGHT - 8
+    return (
+        f'<figure class="wide"><svg viewBox="0 0 {WIDTH + 10} {HEIGHT}" font-size="12" fill="#6b7785">{levels}'
+        f'<text x="{LEFT}" y="{base}">reading {first}</text>'
+        f'<text x="{WIDTH}" y="{base}" text-anchor="end">{count}</text>'
+        f'<polyline points="{line}" fill="none" stroke="#b8c4ce"/><g fill="#b3361e">{dots}</g></svg>'
+        "<figcaption>Distance between measured and predicted tip, mm, newest right.</figcaption></figure>"
+    )

@@ -1,0 +1,70 @@
+"""The robot that stands on the simulated bench: motors turn, its tip moves, a tracker sees it."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ctcr.bench.devices.transmission import joints_of_turns
+from ctcr.bench.simulators.oracle import Oracle
+from ctcr.effects.one_tube import one_tube
+from ctcr.model.moving import MovingModel
+from ctcr.model.simulation import ReadingNoise
+from ctcr.robot.description import Robot
+
+Array = NDArray[np.float64]
+
+INSIDE_M = 2e-4  # a tip that stands out no farther than this is behind the plate
+
+
+class SimulatedRobot:
+    """A robot with its effects, known or hidden. `force` is what hangs at its tip [N], base frame."""
+
+    def __init__(self, robot: Robot, noise: str = "jitter", seed: int = 1, oracle: Oracle | None = None):
+        """`noise`: none, jitter or realistic; see `model.simulation`; `oracle`: its physics instead of the model.
+
+        Raises InputError where ratios are unknown.
+        """
+        self.robot, self.force = robot, np.zeros(3)
+        self._model = oracle or MovingModel(robot)
+        self._noise = ReadingNoise(robot, noise, seed) if noise != "none" else None
+        self.fasten(robot.tracker.sensor_on_tube - 1)
+        self.turn(0.0, np.zeros(2 * robot.n_tubes))
+
+    def turn(self, t: float, turns: ArrayLike) -> None:
+        """The motors' shafts stand so many turns (2N,) from home at the time t [s]."""
+        n = self.robot.n_tubes
+        self._joints = joints_of_turns(self.robot, turns)
+        self._model.move(t, self._joints[:n], self._joints[n:], self.force)
+        if self.sensor is not None:
+            own = [self.sensor]
+            self._alone.move(t, self._joints[:n][own], self._joints[n:][own], self.force)
+
+    def fasten(self, tube: int | None) -> None:
+        """The sensor sits at the tip of this tube (0: innermost) from now on, or nowhere."""
+        self.sensor = tube
+        if tube is not None:
+            self._alone = MovingModel(one_tube(self.robot, tube))
+
+    def reading(self) -> tuple[Array, Array] | None:
+        """Position (3,) [m] and quaternion (4,) in the tracker frame; None where the model has no solution."""
+        if self.sensor is None:
+            return None
+        if (np.delete(self.deployed(), self.sensor) < INSIDE_M).all():
+            pose = self._alone.reading()
+        elif self.sensor == self.robot.tracker.sensor_on_tube - 1:
+            pose = self._model.reading()
+        else:
+            return None
+        return self.as_read(*pose) if np.isfinite(pose[0]).all() else None
+
+    def as_read(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
+        """A pose in the tracker frame with the noise of the tracker."""
+        if not self._noise:
+            return position, quaternion
+        position, quaternion = self._noise.added(position[None], quaternion[None])
+        return position[0], quaternion[0]
+
+    def deployed(self) -> Array:
+        """How far each tube's tip stands out of the front plate (N,) [m]: what a person sees."""
+        n = self.robot.n_tubes
+        beta, _ = self.robot.joints_of_table(self._joints[None, :n], self._joints[None, n:])
+        return beta[0] + np.array([tube.length for tube in self.robot.tubes])

@@ -1,0 +1,356 @@
+"""Effects put into a robot, fitted together with its calibration, and taken out again: `ctcr add` and `remove`."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.audit.preparation import prepared
+from ctcr.calibrate.checks import sentence
+from ctcr.diagnose import distorted, far_off, unsteady
+from ctcr.diagnose.candidates import candidates
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.prediction import predictive
+from ctcr.diagnose.race import begin, likeliest, screen
+from ctcr.diagnose.split import locked_rows
+from ctcr.effects import catalogue
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.fit import joint, one_sided
+from ctcr.fit.result import rms
+from ctcr.model import fields
+from ctcr.model import parameters as free_parameters
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot import ledger
+from ctcr.robot.description import Robot
+from ctcr.robot.ledger import Change, Entry
+from ctcr.show.output import Progress
+from ctcr.table.measurements import Measurements
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PLACES = 2  # of an effect that are tried, the best by their slopes, with outliers and without
+SAYS_NOTHING = 0.9  # posterior over prior standard deviation
+
+
+@dataclass(frozen=True)
+class Stage:
+    """The error of the judging rows at one stage, RMS; NaN: not measured."""
+
+    name: str
+    rms_mm: float
+    rms_deg: float
+
+
+@dataclass(frozen=True)
+class Added:
+    """Effects fitted to measurements."""
+
+    robot: Robot  # with them
+    ids: list[str]
+    fit: joint.Fit  # of all rows
+    stages: list[Stage]  # nominal, calibrated, each effect, noise floor
+    held_out: str  # what judged: runs, or blocks of time; empty: the rows that were fitted
+    notices: list[str]
+
+    def parameters(self) -> dict[str, dict[str, float]]:
+        """Value and standard deviation of every fitted parameter of an effect, SI."""
+        return {
+            name: {"value": float(value), "sd": float(sd)}
+            for name, value, sd in zip(self.fit.names, self.fit.values, self.fit.sd, strict=True)
+            if name.startswith("effects.")
+        }
+
+    def rms(self, unit: str) -> dict[str, float]:
+        """By stage; `unit` is rms_mm or rms_deg."""
+        return {stage.name: getattr(stage, unit) for stage in self.stages}
+
+
+def with_values(robot: Robot, ids: Sequence[str], given: Mapping[str, float]) -> Robot:
+    """The robot with these effects at their neutral values, but for those `given` by full name."""
+    for identity in ids:
+        catalogue.get(identity, robot.n_tubes)
+    holder = _copy(robot, robot.effects | {identity: robot.effects.get(identity, {}) for identity in ids})
+    return _copy(robot, catalogue.as_section(given.keys(), given.values(), holder))
+
+
+def add(
+    robot: Robot,
+    readings: Measurements,
+    ids: Sequence[str],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    start: Mapping[str, float] | None = None,
+    free: Sequence[str] = ("standard",),
+) -> Added:
+    """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
+
+    Of each effect the amplitudes are fitted first, then its shape parameters are freed too, also from where slopes say
+    that they may be. `fixed` parameters, by full name in SI, keep their value, those of `start` begin at one. Every
+    fourth run (where there are few: block of time) is kept out of the fits that give the errors; the values are those
+    of a fit to all rows. Raises InputError where no fit is possible.
+    """
+    readings, said = prepared(robot, readings)
+    fixed = dict(fixed or {})
+    robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
+    before = robot_before(robot, ids)
+    held, fitted = locked_rows(before, readings), [*before.effects]
+    with Progress("fitting", 2 * len(ids) + 2) as progress:
+        stage = _Fitter(robot, readings, free, fixed)
+        now, nominal = stage.values(), stage.nominal(fitted)
+        fit = stage(fitted, fitted, ~held, [now])
+        progress.advance(1)
+        errors = {"nominal": nominal, "calibrated": fit.residual}
+        for identity in ids:
+            fitted.append(identity)
+            begun = set(catalogue.get(identity, robot.n_tubes).names()) & {*fixed, *(start or {})}
+            elsewhere = [] if begun else [now | values for values in stage.places(identity, fit, fitted)]
+            now |= values_of(fit)
+            fit = stage(fitted, fitted[:-1], ~held, [now])
+            progress.advance(1)
+            now |= values_of(fit)
+            if stage.shapes(identity):
+                fit = stage(fitted, fitted, ~held, [*elsewhere, now])
+            progress.advance(1)
+            errors[identity] = fit.residual
+        glitches = far_off.alone(readings, fit, held)
+        judged = held & ~glitches if held.any() else np.ones(len(readings), bool)
+        stages = [_stage(name, residual, judged) for name, residual in errors.items()]
+        off = [sentence(text) for text in far_off.in_words(readings, fit, glitches)]
+        if held.any():
+            fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
+        progress.advance(1)
+    varies = unsteady.followed(stage.engine, fit)[1]
+    if (smooth := distorted.noise_of(stage.engine, fit)) is not None:
+        varies.append(distorted.in_words(smooth))
+    fit = unsteady.widened(stage.engine, one_sided.widened(fit))
+    stages.append(Stage("noise_floor", *joint.noise_floor(fit, fit.noise, stage.engine.places)))
+    return Added(
+        _applied(stage.robot, fit),
+        list(ids),
+        fit,
+        stages,
+        _in_words(readings, held),
+        [*said, *off, *_notices(robot, fit, ids), *varies],
+    )
+
+
+def robot_before(robot: Robot, ids: Sequence[str]) -> Robot:
+    """The robot without these effects."""
+    return _copy(robot, {name: given for name, given in robot.effects.items() if name not in ids})
+
+
+def write_added(
+    before: Robot, added: Added, target: str | Path, measurements: str | Path, in_place: bool = False
+) -> Robot:
+    """Writes the robot with its effects and an entry of the ledger."""
+    fit = _only(added.fit, lambda name: not name.startswith("effects."))
+    changes = fields.changes(fit, before, added.robot)
+    figures: dict[str, Any] = {"added": added.ids, "rms_mm": added.rms("rms_mm")}
+    if np.isfinite([stage.rms_deg for stage in added.stages]).all():
+        figures["rms_deg"] = added.rms("rms_deg")
+    figures |= {"held_out": added.held_out, "parameters": added.parameters()}
+    figures["effects_before"] = before.effects
+    command = f"ctcr add {' '.join(added.ids)}"
+    return ledger.write(
+        before,
+        target,
+        changes,
+        Entry(command, [measurements], figures, " ".join(added.notices)),
+        effects=added.robot.effects,
+        in_place=in_place,
+    )
+
+
+def write_values(before: Robot, after: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> Robot:
+    """Writes the robot with effects whose values were given, not fitted."""
+    figures = {"added": list(ids), "effects_before": before.effects}
+    entry = Entry(f"ctcr add {' '.join(ids)}", [], figures, "Values as given, not fitted.")
+    return ledger.write(before, target, [], entry, effects=after.effects, in_place=in_place)
+
+
+def remove(robot: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> tuple[Robot, list[str]]:
+    """Writes the robot without these effects; returns it and what there is to know.
+
+    Values that were fitted together with them go back to what they were, where nothing has changed them since and no
+    other effect that the robot keeps was added with them. Raises InputError for effects that it does not have.
+    """
+    absent = [identity for identity in ids if identity not in robot.effects]
+    if absent:
+        meant = did_you_mean(absent[0], robot.effects)
+        hint = f"did you mean {meant}?" if meant else f"it has {', '.join(robot.effects) or 'none'}"
+        raise InputError(Problem(f"the robot has no effect {absent[0]}: {hint}"))
+    section = {name: given for name, given in robot.effects.items() if name not in ids}
+    changes, notices = [], []
+    for entry in reversed(robot.history):
+        figures = entry.get("figures") or {}
+        with_it = figures.get("added") or []
+        if not set(with_it) & set(ids):
+            continue
+        if not set(with_it) <= set(ids):
+            notices.append(f"{', '.join(with_it)} were fitted together: fit the others again with ctcr add --fit")
+            continue
+        undone, kept = _undone(robot, entry)
+        changes += [change for change in undone if change.path not in {other.path for other in changes}]
+        if kept:
+            notices.append(f"{kept} values of the calibration were changed since and stay: fit them again")
+        earlier = figures.get("effects_before") or {}
+        section = {name: earlier.get(name, given) for name, given in section.items()}
+    entry = Entry(f"ctcr remove {' '.join(ids)}", [], {"removed": list(ids)}, " ".join(notices))
+    return ledger.write(robot, target, changes, entry, effects=section, in_place=in_place), notices
+
+
+def _undone(robot: Robot, entry: Mapping[str, Any]) -> tuple[list[Change], int]:
+    """The changes that bring the values of an entry back, and how many cannot be."""
+    changes, kept = [], 0
+    for row in entry.get("changes") or []:
+        path = _path(str(row.get("field", "")))
+        try:
+            now = fields.value_at(robot, path)
+        except (AttributeError, IndexError, TypeError, KeyError):
+            kept += 1
+            continue
+        if row.get("old") is None or now != row.get("new"):
+            kept += 1
+        else:
+            changes.append(Change(path, str(row.get("unit", "")), float(row["old"])))
+    return changes, kept
+
+
+def _path(text: str) -> tuple[str | int, ...]:
+    """tubes[0].length_mm as ("tubes", 0, "length_mm")."""
+    return tuple(int(part) if part.isdigit() else part for part in re.split(r"[.\[\]]+", text) if part)
+
+
+class _Fitter:
+    """Fits of one recording with more and more parameters free."""
+
+    def __init__(self, robot: Robot, readings: Measurements, free: Sequence[str], fixed: Mapping[str, float]):
+        self.robot, self.fixed = robot, fixed
+        measured = joint.measured_rows(readings)
+        if not measured.any():
+            raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
+        self.engine = Engine(robot, readings, noise_of_readings(robot, readings), measured, free=free)
+
+    def shapes(self, identity: str) -> list[str]:
+        return [name for name in catalogue.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]
+
+    def values(self) -> dict[str, float]:
+        """Of all parameters, as the robot has them."""
+        known = [*self.engine.base, *catalogue.value_of(self.robot)]
+        return dict(zip(known, self.engine.recording(known).nominal().tolist(), strict=True))
+
+    def nominal(self, ids: Sequence[str]) -> Array:
+        """Residuals (M, 6) of the robot as its file describes it, with these effects alone."""
+        self.engine.robot = self._with(ids)
+        recorded = self.engine.recording([])
+        return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
+
+    def _with(self, ids: Sequence[str]) -> Robot:
+        return _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
+
+    def __call__(
+        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, begins: Sequence[Mapping[str, float]]
+    ) -> joint.Fit:
+        engine = self.engine
+        engine.robot, engine.rows = self._with(ids), rows
+        known = [catalogue.get(identity, self.robot.n_tubes) for identity in ids]
+        own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
+        own += [name for identity in shaped for name in self.shapes(identity)]
+        likely = likeliest(engine, own, self._best(own, begins), {})
+        if any("order" in effect.needs for effect in known) and engine.begins_otherwise(likely, own):
+            likely = likeliest(engine, own, values_of(likely), {})
+        # The robot is to predict; how sure its values are is another question.
+        fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
+        fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
+        return replace(fit, units=[fields.field_of(name).unit for name in fit.names])
+
+    def places(self, identity: str, before: joint.Fit, ids: Sequence[str]) -> list[dict[str, float]]:
+        """Where slopes at the fit before, of all rows, say that an effect may be: a plane, a piece of metal.
+
+        A jump is put where they say: between which rows it was, no fit can find.
+        """
+        engine = self.engine
+        engine.robot, engine.rows = self._with(ids), np.ones(len(engine.measurements), bool)
+        usual, _ = candidates(engine.robot, engine.measurements)
+        plain = [one for one in usual if one.id == identity and not one.shape]
+        found = []
+        # What a contact does to a few readings looks like outliers: with and without these.
+        for weights in (None, np.ones((len(engine.measurements), 2))):
+            there = engine.linear_fit(before, weights=weights)
+            entries = [e for e in screen(*engine.thinned(there), plain, {}) if e.candidate.shape]
+            found += [(entry, begin(engine, there, entry)) for entry in entries[:PLACES]]
+        if found:
+            fitted = catalogue.get(identity, self.robot.n_tubes).shapes
+            chosen = {name: x for name, x in found[0][0].candidate.shape if name not in fitted}
+            self.robot = with_values(self.robot, [identity], chosen)
+        return [start for _, start in found]
+
+    def _best(self, own: Sequence[str], begins: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        """The best of all starts for these parameters of effects."""
+        first, *others = [dict(values) for values in begins]
+        if not others:
+            return first
+        fit = self.engine.fit(own, start=first, near=True, tolerance=joint.COARSE)
+        fits = [fit]
+        for other in others:
+            fits.append(self.engine.fit_like(fit, own, start=other, near=True, tolerance=joint.COARSE))
+        return values_of(max(fits, key=lambda tried: tried.log_evidence))
+
+
+def _in_words(readings: Measurements, held: Mask) -> str:
+    if not held.any():
+        return ""
+    runs = np.unique(readings.run[held])
+    if np.isin(readings.run[~held], runs).any():
+        return "one of every four blocks of time"
+    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
+
+
+def _applied(robot: Robot, fit: joint.Fit) -> Robot:
+    own = [i for i, name in enumerate(fit.names) if name.startswith("effects.")]
+    rest = [i for i in range(len(fit.names)) if i not in own]
+    section = catalogue.as_section([fit.names[i] for i in own], fit.values[own], robot)
+    return _copy(free_parameters.applied(robot, [fit.names[i] for i in rest], fit.values[rest]), section)
+
+
+def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
+    made = robot.model_copy(update={"effects": dict(section)})
+    made._source = robot._source
+    return made
+
+
+def _only(fit: joint.Fit, kept) -> joint.Fit:
+    """Names, values and deviations of some parameters of a fit."""
+    places = [i for i, name in enumerate(fit.names) if kept(name)]
+    return replace(fit, names=[fit.names[i] for i in places], values=fit.values[places], sd=fit.sd[places])
+
+
+def _stage(name: str, residual: Array, rows: Mask) -> Stage:
+    return Stage(name, 1e3 * rms(residual[:, :3], rows), float(np.degrees(rms(residual[:, 3:], rows))))
+
+
+def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str]) -> list[str]:
+    """What to doubt of the fitted effects."""
+    known = catalogue.parameter_of(robot.n_tubes)
+    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
+    place = {name: i for i, name in enumerate(fit.names)}
+    for identity in ids:
+        effect = catalogue.get(identity, robot.n_tubes)
+        mine = [name for name in effect.amplitudes if name in place]
+        if mine and all(fit.ratio[place[name]] > SAYS_NOTHING for name in mine):
+            said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
+        elif mine and all(abs(fit.values[place[name]]) < 2 * fit.sd[place[name]] for name in mine):
+            said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")
+        for name in effect.names():
+            if name in place and not known[name].soft[0] <= fit.values[place[name]] <= known[name].soft[1]:
+                low, high = known[name].soft
+                said.append(
+                    f"{name} = {fit.values[place[name]]:.3g} is hardly physical ({low:g} to {high:g} is usual): the "
+                    "effect may stand in for another one."
+                )
+    return said

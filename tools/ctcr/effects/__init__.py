@@ -1,0 +1,1 @@
+"""The catalogue of physical effects, and effects that users write in Python."""

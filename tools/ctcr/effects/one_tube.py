@@ -1,0 +1,29 @@
+"""One tube of a robot alone out of the plate, with the sensor on it: a robot of one tube."""
+
+from ctcr.effects import catalogue
+from ctcr.robot.description import Robot
+
+
+def one_tube(robot: Robot, tube: int) -> Robot:
+    """The robot of which this tube (0: innermost) alone stands out of the plate, with the effects that it has then.
+
+    Behind the plate the others are straight: they do not act on it.
+    """
+    actuation = {
+        name: [value[tube]] if isinstance(value, list) else value for name, value in vars(robot.actuation).items()
+    }
+    own = {
+        identity: {
+            p.name: [given[p.name][tube]] if p.per_tube else given[p.name]
+            for p in catalogue.get(identity, robot.n_tubes).parameters
+            if p.name in given
+        }
+        for identity, given in robot.effects.items()
+    }
+    changes = {
+        "tubes": [robot.tubes[tube]],
+        "actuation": robot.actuation.model_copy(update=actuation),
+        "tracker": robot.tracker.model_copy(update={"sensor_on_tube": 1}),
+        "effects": own,
+    }
+    return robot.model_copy(update=changes)

@@ -1,0 +1,108 @@
+"""Values of effects' parameters as the command line gives them: friction.coefficient.1=0.02, delay=0.05."""
+
+import json
+from collections.abc import Iterable, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from ctcr.effects import catalogue
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.robot.description import Robot
+
+
+def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dict[str, float]:
+    """Values by full name, SI, from texts such as EFFECT.PARAMETER.TUBE=VALUE.
+
+    Without a tube the value is that of all tubes, or a list, one value a tube. Without a parameter it is that of the
+    effect's only amplitude. With a single effect in `ids` its name may be left out. Raises InputError with all that is
+    wrong.
+    """
+    found, problems = {}, []
+    for text in given:
+        try:
+            found |= _one(text, robot.n_tubes, list(ids))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
+    """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
+    try:
+        return found(json.loads(Path(path).read_text(encoding="utf-8")), robot)
+    except OSError as error:
+        raise InputError(Problem(f"cannot be read: {error.strerror}", path)) from None
+    except (ValueError, LookupError, TypeError):
+        raise InputError(Problem("is not what ctcr diagnose writes with --json", path)) from None
+
+
+def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
+    """The effects of a diagnosis (its as_json()), the first of each class, the values of what it held (choices, and
+    what the data did not ask for, at its neutral value), and of what it fitted."""
+    ids, held, values = [], {}, {}
+    for entry in answer["effects"]:
+        effect, parameters = catalogue.get(entry["class"][0], robot.n_tubes), dict(entry["parameters"])
+        ids.append(effect.id)
+        for parameter in effect.parameters:
+            for name in parameter.full_names:
+                value = parameters.get(name.removeprefix(f"effects.{effect.id}."))
+                if value is None:
+                    held[name] = parameter.neutral
+                else:
+                    (held if parameter.kind == "choice" else values)[name] = float(value)
+    return ids, held, values
+
+
+def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
+    key, sign, value = text.partition("=")
+    if not sign:
+        raise _fault(text, "needs NAME=VALUE, such as friction.coefficient=0.02")
+    parts = key.strip().split(".")
+    parts = parts[1:] if parts[0] == "effects" else parts
+    known = catalogue.all_effects(n_tubes)
+    if len(ids) == 1 and parts[0] not in known:
+        parts = [ids[0], *parts]
+    effect = catalogue.get(parts[0], n_tubes)
+    if ids and effect.id not in ids:
+        raise _fault(text, f"{effect.id} is not among the effects to add")
+    if len(parts) == 1:
+        amplitudes = [p.name for p in effect.parameters if p.kind == "strength"]
+        if len(amplitudes) != 1:
+            raise _fault(text, f"{effect.id} has several parameters, name one: {', '.join(amplitudes)}")
+        parts.append(amplitudes[0])
+    parameter = next((p for p in effect.parameters if p.name == parts[1]), None)
+    if parameter is None:
+        names = [p.name for p in effect.parameters]
+        meant = did_you_mean(parts[1], names)
+        hint = f"did you mean {meant}?" if meant else f"its parameters are {', '.join(names)}"
+        raise _fault(text, f"{effect.id} has no parameter {parts[1]}: {hint}")
+    names = list(parameter.full_names)
+    if len(parts) > 2:
+        name = ".".join(["effects", *parts])
+        if name not in names:
+            what = f"a tube from 1 to {n_tubes}" if parameter.per_tube else "no tube: it has one value"
+            raise _fault(text, f"{parts[1]} needs {what}")
+        names = [name]
+    numbers = [_number(item, text, parameter) for item in value.split(",")]
+    if len(numbers) not in (1, len(names)):
+        raise _fault(text, f"needs one number, or {len(names)}")
+    return dict(zip(names, numbers * (len(names) // len(numbers)), strict=True))
+
+
+def _number(item: str, text: str, parameter: catalogue.EffectParameter) -> float:
+    unit = parameter.unit or "no unit"
+    try:
+        number = float(item)
+    except ValueError:
+        raise _fault(text, f"{item.strip()!r} is not a number (in {unit})") from None
+    low, high = parameter.hard
+    if not isfinite(number) or not low <= number <= high:
+        raise _fault(text, f"{number:g} is impossible: {parameter.name} is {low:g} to {high:g} ({unit})")
+    return number
+
+
+def _fault(text: str, message: str) -> InputError:
+    return InputError(Problem(message, field=text))

@@ -1,0 +1,288 @@
+"""Effects of one's own, in a Python file that needs no compiler: `--effects my_effects.py`.
+
+    from ctcr.user_effects import Effect, Parameter
+
+    class Pickup(Effect):
+        id = "rotation_pickup"
+        title = "Rotation picked up with translation"
+        physics = "The carriage twists a tube a little while it pushes it."
+        parameters = [Parameter("gain", unit="rad/m", sigma=1.0, bounds=(-5, 5), per_tube=True)]
+
+        def joints(self, rows, values):
+            return rows.beta, rows.alpha + values.gain * rows.beta
+
+Values are SI: a number, or an array (N,) where a parameter is per tube, innermost first. At the neutral values of its
+amplitudes an effect must change nothing. Hooks, any of them; M rows in the order measured, N tubes:
+
+    joints(rows, values) -> beta (M, N) [m], alpha (M, N) [rad]
+        what the tubes get where the controller asks for rows.beta and rows.alpha
+    force(rows, values) -> (M, 3) [N]
+        at the robot tip, added to the known one, base frame
+    base(rows, values) -> position (M, 3) [m], rotation vector (M, 3) [rad]
+        of the base in the base frame of the file; the weight of the tubes themselves does not turn with it
+    curvature(tube, along, values) -> (K, 2) [1/m]
+        of the free tube (1: innermost) about its x and y axes, added to the data sheet's, at `along` (K,) [m] from the
+        grasped point; smooth over some millimetres
+    stiffness(tube, along, values) -> (K,)
+        factor on the tube's bending stiffness at the same places
+    reading(position, rotation, rows, values) -> position, rotation
+        what the tracker makes of the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
+"""
+
+import importlib.util
+import re
+import sys
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.effects import catalogue
+from ctcr.errors import InputError, Problem, shown
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+Array = NDArray[np.float64]
+
+HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
+NEEDS = ("order", "time", "orientation", "loads", "gravity")
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect, SI. `sigma`: how large it plausibly is; beyond `bounds` it is impossible.
+
+    A `shape` parameter changes nothing by itself: it is fitted once the effect has been accepted.
+    """
+
+    name: str
+    unit: str = ""
+    sigma: float = 1.0
+    bounds: tuple[float, float] = (-inf, inf)
+    neutral: float = 0.0
+    per_tube: bool = False
+    shape: bool = False
+    usual: tuple[float, float] | None = None  # beyond: hardly this physics; by default 5 sigma
+    meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The rows that a hook sees: as the table has them, in the order measured."""
+
+    t: Array  # (M,) [s], NaN where unknown
+    run: NDArray[np.int64]  # (M,)
+    beta: Array  # (M, N) [m]
+    alpha: Array  # (M, N) [rad]
+    force: Array  # (M, 3) [N], base frame
+
+    @classmethod
+    def of(cls, measurements: Measurements) -> "Rows":
+        return cls(*(getattr(measurements, name) for name in cls.__dataclass_fields__))
+
+
+class Effect:
+    """To derive from; see the top of this file."""
+
+    id: ClassVar[str] = ""
+    title: ClassVar[str] = ""
+    physics: ClassVar[str] = ""
+    signature: ClassVar[str] = ""
+    measure: ClassVar[str] = ""
+    look_alikes: ClassVar[tuple[str, ...]] = ()
+    reference: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
+    parameters: ClassVar[list[Parameter]] = []
+
+    @property
+    def hooks(self) -> list[str]:
+        return [name for name in HOOKS if callable(getattr(self, name, None))]
+
+    def described(self, n_tubes: int) -> catalogue.Effect:
+        """As the catalogue describes its own."""
+        stem = f"effects.{self.id}."
+
+        def full(p: Parameter) -> tuple[str, ...]:
+            return tuple(f"{stem}{p.name}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem + p.name,)
+
+        def usual(p: Parameter) -> tuple[float, float]:
+            return p.usual or (p.neutral - 5 * p.sigma, p.neutral + 5 * p.sigma)
+
+        return catalogue.Effect(
+            self.id,
+            self.title or self.id,
+            self.physics,
+            self.signature,
+            self.measure,
+            tuple(self.look_alikes),
+            self.reference,
+            frozenset(self.needs),
+            tuple(
+                catalogue.EffectParameter(
+                    p.name,
+                    p.unit,
+                    p.meaning,
+                    float(p.neutral),
+                    float(p.sigma),
+                    usual(p),
+                    p.bounds,
+                    p.per_tube,
+                    "shape" if p.shape else "strength",
+                    full(p),
+                )
+                for p in self.parameters
+            ),
+        )
+
+    def values(self, n_tubes: int, given: dict[str, float]) -> SimpleNamespace:
+        """What hooks get: neutral values, but for those `given` by full name."""
+        made = SimpleNamespace()
+        for p in self.described(n_tubes).parameters:
+            numbers = np.array([given.get(name, p.neutral) for name in p.full_names])
+            setattr(made, p.name, numbers if p.per_tube else float(numbers[0]))
+        return made
+
+    def call(self, hook: str, *arguments: Any) -> Any:
+        """What a hook returns. Raises InputError that says where in the user's file it failed."""
+        try:
+            return getattr(self, hook)(*arguments)
+        except Exception as error:
+            raise InputError(_fault(error, _file_of(type(self)), f"{type(self).__name__}.{hook} fails: ")) from error
+
+
+_loaded: dict[str, Effect] = {}  # by id: those of the files loaded so far
+
+
+def load(path: str | Path) -> list[Effect]:
+    """The effects of a Python file, which is run; from then on robot files may hold them.
+
+    Raises InputError with everything that is wrong in the file.
+    """
+    module = _module(Path(path))
+    classes = [
+        found
+        for found in vars(module).values()
+        if isinstance(found, type) and issubclass(found, Effect) and found.__module__ == module.__name__
+    ]
+    if not classes:
+        text = "holds no effect: a class derived from ctcr.user_effects.Effect"
+        raise InputError(Problem(text, str(path)))
+    problems = [problem for found in classes for problem in _faults(found, str(path))]
+    names = [found.id for found in classes]
+    problems += [
+        Problem("two effects of the file have this id", str(path), field=name)
+        for name in dict.fromkeys(names)
+        if name and names.count(name) > 1
+    ]
+    if problems:
+        raise InputError(problems)
+    made = [found() for found in classes]
+    for effect in made:
+        _loaded[effect.id] = effect
+        catalogue.register(effect.id, effect.described)
+    return made
+
+
+def load_all(paths: tuple[str, ...] | list[str]) -> list[Effect]:
+    """The effects of several files."""
+    return [effect for path in paths for effect in load(path)]
+
+
+def used_by(robot: Robot, names: Sequence[str] = ()) -> list[Effect]:
+    """The effects of loaded files that a robot has or that parameters are named of."""
+    wanted = [*robot.effects, *(name.split(".")[1] for name in names if name.startswith("effects."))]
+    return [_loaded[identity] for identity in dict.fromkeys(wanted) if identity in _loaded]
+
+
+def _module(path: Path) -> ModuleType:
+    """The file as a module of its own name."""
+    if not path.is_file():
+        raise InputError(Problem("no such file" if not path.exists() else "is not a file", str(path)))
+    name = f"ctcr_user_effects_{re.sub(r'[^0-9a-zA-Z_]', '_', str(path.resolve()))}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None:
+        raise InputError(Problem("is not a Python file: its name must end in .py", str(path)))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    writes = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True  # no __pycache__ beside the user's file
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise InputError(_fault(error, str(path), "")) from None
+    finally:
+        sys.dont_write_bytecode = writes
+    return module
+
+
+def _faults(found: type[Effect], file: str) -> list[Problem]:
+    """What is wrong with a class of the file."""
+    where, problems = found.id or found.__name__, []
+
+    def say(text: str, field: str = "") -> None:
+        problems.append(Problem(text, file, field=f"{where}.{field}" if field else where))
+
+    if not isinstance(found.id, str) or not _NAME.fullmatch(found.id):
+        say("needs an id of small letters, digits and _, such as rotation_pickup", "id")
+    elif found.id in catalogue.catalogue(1):
+        say("the library has an effect of this id: choose another one", "id")
+    for name in ("title", "physics"):
+        if not isinstance(getattr(found, name), str) or not getattr(found, name).strip():
+            say("needs a text", name)
+    strange = [need for need in found.needs if need not in NEEDS]
+    if strange:
+        say(f"{shown(strange[0])} is none of {', '.join(NEEDS)}", "needs")
+    if not any(callable(getattr(found, name, None)) for name in HOOKS):
+        say(f"needs at least one of the functions {', '.join(HOOKS)}")
+    if not found.parameters or not all(isinstance(p, Parameter) for p in found.parameters):
+        say('needs a list such as [Parameter("gain", unit="rad/m", sigma=1.0)]', "parameters")
+        return problems
+    if all(p.shape for p in found.parameters):
+        say("needs one that is not a shape: the strength of the effect", "parameters")
+    for p in found.parameters:
+        for text in _parameter_faults(p):
+            say(text, f"parameters.{p.name}")
+    names = [p.name for p in found.parameters]
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            say("two parameters have this name", f"parameters.{name}")
+    return problems
+
+
+def _parameter_faults(p: Parameter):
+    if not isinstance(p.name, str) or not _NAME.fullmatch(p.name):
+        yield "needs a name of small letters, digits and _"
+    if not _is_number(p.sigma) or not p.sigma > 0:
+        yield f"sigma = {shown(p.sigma)}: needs a number above 0, in {p.unit or 'no unit'}"
+    if not _is_number(p.neutral):
+        yield f"neutral = {shown(p.neutral)}: needs a number"
+    elif not (isinstance(p.bounds, tuple) and len(p.bounds) == 2 and p.bounds[0] <= p.neutral <= p.bounds[1]):
+        yield f"bounds = {shown(p.bounds)}: needs (lowest, highest) with the neutral value {p.neutral:g} between"
+    elif p.bounds[0] == p.bounds[1]:
+        yield "bounds leave no room"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and isfinite(value)
+
+
+def _file_of(owner: Callable | type) -> str:
+    return getattr(sys.modules.get(owner.__module__), "__file__", None) or owner.__module__
+
+
+def _fault(error: BaseException, file: str, doing: str) -> Problem:
+    """An exception of the user's code, at the last line of it that was reached."""
+    reason = " ".join(str(getattr(error, "msg", None) or error).split()) or "no reason given"
+    line = getattr(error, "lineno", None)
+    for frame in traceback.extract_tb(error.__traceback__):
+        if frame.filename == file or Path(frame.filename).resolve() == Path(file).resolve():
+            line = frame.lineno
+    return Problem(f"{doing}{reason} ({type(error).__name__})", file, line)

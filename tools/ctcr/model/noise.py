@@ -1,0 +1,46 @@
+"""The tracker's noise: the jitter of single readings and the smooth error of its field."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ctcr import _core
+from ctcr.errors import InputError, Problem
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+Noise = _core.Noise
+
+
+def noise_of(
+    robot: Robot, correlation_length: float = 0.1, field: bool = True, kinds: Sequence[str] = ("position", "rotation")
+) -> Noise:
+    """The tracker's noise: its jitter, and with `field` the smooth error that its 95 % accuracy implies.
+
+    `correlation_length` [m] is the distance over which that error changes; `kinds` is what was measured. Raises
+    InputError where the robot file does not state the jitter of one of these.
+    """
+    tracker, problems, figures = robot.tracker, [], {}
+    for kind, unit, scale in (("position", "mm", 1e-3), ("rotation", "deg", np.pi / 180)):
+        jitter, accuracy = (getattr(tracker, f"{name}_{unit}") for name in ("jitter", "accuracy_95"))
+        if kind in kinds and not jitter:
+            text = f"a fit needs the standard deviation of one reading, above 0, in {unit}"
+            problems.append(Problem(text, field=f"tracker.jitter_{unit}"))
+            continue
+        figures[f"{kind}_jitter"] = scale * (jitter or 1.0)  # of what was not measured any will do
+        smooth = field and kind in kinds and accuracy
+        figures[f"{kind}_field"] = scale * _core.field_of_accuracy(accuracy, jitter) if smooth else 0.0
+    if problems:
+        raise InputError(problems)
+    return Noise(**figures, correlation_length=correlation_length)
+
+
+def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = True) -> Noise:
+    """noise_of() what the table holds: who measured no orientations need not state their jitter."""
+    kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
+    return noise_of(robot, field=field, kinds=kinds)
+
+
+def _is_measured(measurements: Measurements, kind: str) -> bool:
+    values = measurements.position if kind == "position" else measurements.quaternion
+    return values is not None and bool(np.isfinite(values).all(axis=1).any())

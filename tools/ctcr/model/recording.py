@@ -1,0 +1,105 @@
+"""Measurements in the order in which they were taken, beside a robot with effects."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import _core
+from ctcr.effects import catalogue
+from ctcr.model import parameters
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+Array = NDArray[np.float64]
+
+STEPS = 2  # integration steps per segment
+MOST_STEPS = 16
+UNSEEN = 0.25  # chi-square of integration errors that shifts no parameter by more than half its standard deviation
+SAMPLE = 300  # rows from which that is told
+
+
+def names_of(n_tubes: int) -> tuple[str, ...]:
+    """All parameters of a robot and of all effects."""
+    return (*parameters.names_of(n_tubes), *catalogue.names_of(n_tubes))
+
+
+def values(robot: Robot) -> Array:
+    """Their values, those of the robot's effects included; the turn of the tracker frame counts from the file's: 0."""
+    own = parameters.values(robot)
+    for i, name in enumerate(parameters.names_of(robot.n_tubes)):
+        if name.startswith("tracker.rotation."):
+            own[i] = 0.0
+    return np.concatenate([own, catalogue.values(robot)])
+
+
+def session_part(measurements: Measurements) -> Array:
+    """When each row was measured, from 0 (first in time) to 1 (last); by its number where times are missing."""
+    t = measurements.t if np.isfinite(measurements.t).all() else np.arange(len(measurements), dtype=float)
+    return (t - t.min()) / max(np.ptp(t), np.finfo(float).tiny)
+
+
+def steps_for(robot: Robot, measurements: Measurements, noise: _core.Noise, chi_square: float = UNSEEN) -> int:
+    """The fewest integration steps per segment whose errors, of all rows against the tracker's jitter, stay below that.
+
+    Integration errors are systematic: what one reading hides, many show. They fall with the fourth power of the steps.
+    """
+    sample = np.zeros(len(measurements), bool)
+    sample[np.linspace(0, len(measurements) - 1, min(len(measurements), SAMPLE)).astype(np.int64)] = True
+    coarse, fine = (_residual(robot.standard, measurements, steps, sample) for steps in (STEPS, 2 * STEPS))
+    error = (coarse - fine) * 16 / 15 / np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
+    known = np.isfinite(error).any(axis=1)
+    if not known.any():
+        return STEPS
+    missed = np.nansum(error[known] ** 2) * len(measurements) / np.sum(known)
+    return int(np.clip(np.ceil(STEPS * (missed / chi_square) ** 0.125), STEPS, MOST_STEPS))
+
+
+def recording_of(
+    robot: Robot,
+    measurements: Measurements,
+    names: Sequence[str] = (),
+    *,
+    fixed: Mapping[str, float] | None = None,
+    steps: int = STEPS,
+    threads: int = 0,
+    profiles: Array | None = None,
+) -> _core.Recording:
+    """The compiled residuals of all rows as functions of the named parameters.
+
+    `fixed` gives parameters of effects other values than the robot's. `profiles` (K, 3N): at K places along each tube,
+    equally spaced from its grasped point to its tip, the curvature about its x and y axes to add [1/m], and the
+    relative change of its bending stiffness.
+    """
+    known = names_of(robot.n_tubes)
+    own = dict(zip(catalogue.names_of(robot.n_tubes), catalogue.values(robot), strict=True)) | dict(fixed or {})
+    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
+    missing = np.full((len(measurements), 4), np.nan)
+    position = missing[:, :3] if measurements.position is None else measurements.position
+    measured = position[np.isfinite(position).all(axis=1)]
+    return _core.Recording(
+        parameters=parameters.values(robot),
+        effects=np.array(list(own.values())),
+        sensor_tube=robot.tracker.sensor_on_tube - 1,
+        beta=beta,
+        alpha=alpha,
+        force=measurements.force,
+        position=position,
+        quaternion=missing if measurements.quaternion is None else measurements.quaternion,
+        time=measurements.t,
+        part=session_part(measurements),
+        run=measurements.run.astype(np.int32),
+        centre=measured.mean(axis=0) if len(measured) else np.zeros(3),
+        free=[known.index(name) for name in names],
+        steps=steps,
+        threads=threads,
+        from_home=measurements.from_home,
+        profiles=profiles,
+    )
+
+
+def _residual(robot: Robot, measurements: Measurements, steps: int, rows: NDArray[np.bool_]) -> Array:
+    """Of some rows (M,), as (M, 6); NaN elsewhere."""
+    table = recording_of(robot, measurements, steps=steps)
+    table.activate(rows.tolist())
+    return table.residual(np.empty(0))[0].reshape(-1, 6)

@@ -1,0 +1,111 @@
+"""Measurements made by the library's own model, to plan with: what a robot with some effects would read, and its noise.
+
+They are no proof of the model: it made them itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.frames import product, quaternion_from_rotation_vector
+from ctcr.model import parameters, user_recording
+from ctcr.model.noise import noise_of
+from ctcr.robot.description import Robot
+from ctcr.show.output import atomic_writer
+from ctcr.table.measurements import Measurements, group_columns
+
+Array = NDArray[np.float64]
+Field = Callable[[Array], Array]
+
+NOISES = ("none", "jitter", "realistic")
+OUTLIERS = 0.005  # share of readings that are off by 1 to 3 mm
+OUTLIER_M = (1e-3, 3e-3)
+WAVES = 400  # of which the smooth field is the sum
+
+
+def simulate(robot: Robot, plan: Measurements, noise: str = "jitter", seed: int = 1, steps: int = 4) -> Measurements:
+    """What the tracker reads in the rows of a plan, as the robot with its effects moves along them.
+
+    Noise: none; jitter, that of the robot file; realistic, with the smooth error of the tracker's field and outliers
+    too. Rows that the model cannot solve have no pose. Raises InputError where the robot file does not state the noise.
+    """
+    recorded = user_recording.recording_of(robot, plan, (), steps=steps)
+    recorded.residual(np.empty(0))
+    position, quaternion = recorded.predicted()
+    if noise != "none":
+        position, quaternion = ReadingNoise(robot, noise, seed).added(position, quaternion)
+    return replace(plan, position=position, quaternion=quaternion)
+
+
+def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
+    """The table in the format of measurements; columns without any value are left out."""
+    columns = group_columns(n_tubes)
+    groups = {
+        "t": readings.t[:, None],
+        "run": readings.run[:, None],
+        "beta": readings.beta,
+        "alpha": readings.alpha,
+        "force": readings.force,
+        "position": readings.position,
+        "quaternion": readings.quaternion,
+    }
+    kept = [name for name in groups if groups[name] is not None and np.isfinite(groups[name]).any()]
+    header = ",".join(column for name in kept for column in columns[name])
+    rows = np.hstack([groups[name] for name in kept]).tolist()
+    with atomic_writer(target) as file:
+        file.write(header + "\n")
+        file.writelines(",".join("" if value != value else f"{value:.12g}" for value in row) + "\n" for row in rows)
+
+
+def as_built(robot: Robot, rng: np.random.Generator, share: float = 0.5) -> Robot:
+    """A robot that differs from its file in every calibrated parameter: normal, with a share of the file's sd."""
+    names = parameters.expand("standard", robot)
+    mean, sd, low, high = parameters.priors(robot, names)
+    drawn = np.clip(mean + share * sd * rng.standard_normal(len(mean)), low, high)
+    return parameters.applied(robot, names, drawn)
+
+
+class ReadingNoise:
+    """What a tracker adds to poses: jitter, and for "realistic" the smooth error of its field and outliers.
+
+    One field stays as long as the object. Raises InputError where the robot file does not state the noise.
+    """
+
+    def __init__(self, robot: Robot, kind: str, seed: int):
+        self._noise, self._realistic = noise_of(robot), kind == "realistic"
+        self._rng = np.random.default_rng(seed)
+        self._fields: tuple[Field, Field] | None = None
+
+    def added(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
+        """Poses (M, 3) [m], (M, 4) as read; NaN stays NaN."""
+        noise, rng, shape = self._noise, self._rng, position.shape
+        shift = noise.position_jitter * rng.standard_normal(shape)
+        turn = noise.rotation_jitter * rng.standard_normal(shape)
+        if self._realistic:
+            if not self._fields:
+                self._fields = tuple(_field(noise.correlation_length, rng) for _ in range(2))
+            places = np.nan_to_num(position)
+            shift += noise.position_field * self._fields[0](places)
+            turn += noise.rotation_field * self._fields[1](places)
+            off = rng.random(len(position)) < OUTLIERS
+            direction = rng.standard_normal(shape)
+            direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+            shift += np.where(off, rng.uniform(*OUTLIER_M, len(position)), 0.0)[:, None] * direction
+        turned = product(quaternion_from_rotation_vector(turn), quaternion)
+        turned *= np.where(turned[:, :1] < 0, -1.0, 1.0)
+        return position + shift, np.where(np.isfinite(quaternion), turned, nan)
+
+
+def _field(length: float, rng: np.random.Generator) -> Field:
+    """Three smooth random functions of places (M, 3), variance 1, correlation exp(-d^2 / (2 length^2))."""
+    waves = [(rng.standard_normal((3, WAVES)) / length, rng.uniform(0, 2 * np.pi, WAVES)) for _ in range(3)]
+
+    def value(places: Array) -> Array:
+        columns = [np.sqrt(2 / WAVES) * np.cos(places @ wave + phase).sum(axis=1) for wave, phase in waves]
+        return np.stack(columns, axis=1)
+
+    return value

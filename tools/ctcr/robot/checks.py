@@ -1,0 +1,198 @@
+"""What is wrong with a robot description: single fields, relations between fields, and what only looks wrong."""
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ctcr.errors import Problem, did_you_mean, shown
+from ctcr.robot.description import Actuation, Robot, Section, Tracker, Tube, Uncertainty
+from ctcr.robot.units import LARGEST
+from ctcr.robot.yaml_document import FieldPath
+
+Fault = tuple[FieldPath, str]
+
+_SECTIONS = {"tubes": Tube, "actuation": Actuation, "tracker": Tracker, "uncertainty": Uncertainty}
+_PER_TUBE = ("home_translation_mm", "home_rotation_deg", "recorded_home_translation_mm", "recorded_home_rotation_deg")
+_MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
+
+
+def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
+    """Every fault of a parsed file, each told once. `errors`: what pydantic found field by field."""
+    tubes = _tubes(data)
+    missing = [error["loc"] for error in errors if error["type"] == "missing"]
+    missing += _missing_of_tubes(tubes, weighed=_has_weight(data.get("gravity")))
+    found: list[Fault] = []
+    for error in errors:
+        path = error["loc"]
+        section, field = _owner(path)
+        if error["type"] in ("extra_forbidden", "invalid_key"):
+            meant = did_you_mean(str(field), section.model_fields)
+            missing = [other for other in missing if other != (*path[:-1], meant)]  # one mistake, one fault
+            found.append((path, _unknown(section, str(field), meant)))
+        elif error["type"] != "missing":
+            found.append((path, f"{_complaint(error)}: needs {section.expected(field)}"))
+    for path in dict.fromkeys(missing):
+        section, field = _owner(path)
+        found.append((path, f"is missing: needs {section.expected(field)}"))
+    return found + list(_relations(data, tubes))
+
+
+def doubts(robot: Robot) -> Iterator[Fault]:
+    """What is possible but looks wrong, or leaves the model without something it could use."""
+    yield from _unusual(robot, ())
+    for i, tube in enumerate(robot.tubes):
+        yield from _unusual(tube, ("tubes", i))
+        if tube.straightened_strain > _MAX_STRAIN:
+            text = f"straightening this tube strains it by {100 * tube.straightened_strain:.1f} %: it would yield"
+            yield ("tubes", i, "curvature_per_m"), text
+        if (tube.curved_length == 0) != (tube.curvature == 0):
+            text = "curvature and curved length are zero together or not at all: this tube counts as straight"
+            yield ("tubes", i, "curved_length_mm"), text
+    for i, (tube, around) in enumerate(pairwise(robot.tubes)):
+        if around.inner_diameter > 0 and tube.outer_diameter > around.inner_diameter:
+            text = _too_narrow(around.inner_diameter_mm, i, tube.outer_diameter_mm)
+            yield ("tubes", i + 1, "inner_diameter_mm"), text
+    for name in ("actuation", "tracker", "uncertainty"):
+        yield from _unusual(getattr(robot, name), (name,))
+    if robot.gravity is None:
+        yield ("gravity",), "not known: the tubes' own weight is left out"
+    elif 0 < np.linalg.norm(robot.gravity) < 9.7:
+        yield ("gravity",), f"its size is {np.linalg.norm(robot.gravity):.2f} m/s^2: on Earth it is 9.8"
+    for unit in ("mm", "deg"):
+        jitter, accuracy = (getattr(robot.tracker, f"{kind}_{unit}") for kind in ("jitter", "accuracy_95"))
+        if jitter and accuracy and jitter > accuracy:
+            text = f"{jitter:g} {unit} of one reading is more than the accuracy, {accuracy:g} {unit}"
+            yield ("tracker", f"jitter_{unit}"), text
+
+
+def problems(found: list[Fault], file: str, line_of: Callable[[FieldPath], int | None]) -> list[Problem]:
+    """Faults with their place in the file, in the file's order."""
+    placed = [Problem(text, file, line_of(path), path_text(path)) for path, text in found]
+    return sorted(placed, key=lambda problem: problem.line or 0)
+
+
+def path_text(path: FieldPath) -> str:
+    """("tubes", 0, "length_mm") -> tubes[0].length_mm"""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path).removeprefix(".")
+
+
+def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
+    """Faults between fields; a field that is faulty by itself is passed over."""
+    for i, tube in enumerate(tubes):
+        yield from _relations_in_tube(("tubes", i), tube)
+    yield from _nesting(tubes)
+    actuation, tracker = _mapping(data.get("actuation")), _mapping(data.get("tracker"))
+    for key in _PER_TUBE:
+        home = actuation.get(key)
+        if tubes and isinstance(home, list) and len(home) != len(tubes):
+            yield ("actuation", key), f"has {len(home)} values: needs {len(tubes)}, one a tube"
+    sensor = tracker.get("sensor_on_tube")
+    if tubes and isinstance(sensor, int) and sensor > len(tubes):
+        yield ("tracker", "sensor_on_tube"), f"{sensor} is not a tube: the robot has {len(tubes)}"
+
+
+def _relations_in_tube(path: FieldPath, tube: dict) -> Iterator[Fault]:
+    if tube.get("bending_stiffness_Nm2") is not None and tube.get("youngs_modulus_GPa") is not None:
+        text = "the stiffness is given twice: keep this or bending_stiffness_Nm2"
+        yield (*path, "youngs_modulus_GPa"), text
+    inner, outer = _number(tube, "inner_diameter_mm"), _number(tube, "outer_diameter_mm")
+    if inner is not None and outer is not None and inner >= outer:
+        yield (*path, "outer_diameter_mm"), f"{outer:g} mm is not above the inner diameter, {inner:g} mm"
+    length, curved = _number(tube, "length_mm"), _number(tube, "curved_length_mm")
+    if length is not None and curved is not None and curved > length:
+        yield (*path, "curved_length_mm"), f"{curved:g} mm is more than the length of the tube, {length:g} mm"
+
+
+def _nesting(tubes: list[dict]) -> Iterator[Fault]:
+    outer = [_number(tube, "outer_diameter_mm") for tube in tubes]
+    if len(tubes) > 1 and None not in outer and all(np.diff(outer) < 0):
+        yield ("tubes",), "go from the outermost inwards: list the innermost first"
+        return
+    for i, (tube, around) in enumerate(pairwise(tubes)):
+        inner = _number(around, "inner_diameter_mm")
+        # Published diameters are often fitted: a tube that dips into the wall around it is a doubt, one that is past
+        # the middle of that wall a fault.
+        if None not in (outer[i], inner, outer[i + 1]) and outer[i] > (inner + outer[i + 1]) / 2:
+            yield ("tubes", i + 1, "inner_diameter_mm"), _too_narrow(inner, i, outer[i])
+        length, length_around = _number(tube, "length_mm"), _number(around, "length_mm")
+        if length is not None and length_around is not None and length_around > length:
+            text = f"{length_around:g} mm is more than tube {i + 1} inside it, {length:g} mm: no joints fit both"
+            yield ("tubes", i + 1, "length_mm"), text
+
+
+def _too_narrow(inner_mm: float, tube_inside: int, outer_mm: float) -> str:
+    return f"{inner_mm:g} mm is too narrow for tube {tube_inside + 1} inside it, outer diameter {outer_mm:g} mm"
+
+
+def _missing_of_tubes(tubes: list[dict], weighed: bool) -> list[FieldPath]:
+    """Fields that only some tubes need: those of the stiffness, and of the weight where gravity acts."""
+    absent = []
+    for i, tube in enumerate(tubes):
+        stiff = tube.get("bending_stiffness_Nm2") is not None
+        needed = [] if stiff else ["youngs_modulus_GPa"]
+        needed += ["density_kg_m3"] if weighed else []
+        needed += ["inner_diameter_mm", "outer_diameter_mm"] if weighed or not stiff else []
+        absent += [("tubes", i, key) for key in needed if tube.get(key) is None]
+    return absent
+
+
+def _unusual(section: Section, path: FieldPath) -> Iterator[Fault]:
+    for field in type(section).model_fields:
+        quantity, value = section.quantity(field), getattr(section, field)
+        for index, number in enumerate(value) if isinstance(value, list) else ((None, value),):
+            if quantity and number is not None and not quantity.is_usual(number):
+                yield (*path, field, *(() if index is None else (index,))), quantity.doubt(number)
+
+
+def _unknown(section: type[Section], field: str, meant: str | None) -> str:
+    if meant is None:
+        return "unknown field: the fields here are " + ", ".join(section.model_fields)
+    quantity = section.quantity(meant)
+    other_unit = quantity and "_" in field and field.rpartition("_")[0] == meant.rpartition("_")[0]
+    return f"unknown field: did you mean {meant}" + (f", in {quantity.unit}?" if other_unit else "?")
+
+
+def _complaint(error: dict[str, Any]) -> str:
+    value = error["input"]
+    match error["type"]:
+        case "impossible":
+            return error["msg"]
+        case "too_short" | "too_long":
+            return f"has {len(value)} entries"
+        case "finite_number":
+            return f"{shown(value)} is not finite"
+        case _ if value is None:
+            return "is empty"
+        case "float_type":
+            return f"{shown(value)} is not a number"
+        case _:
+            return f"{shown(value)} does not fit"
+
+
+def _owner(path: FieldPath) -> tuple[type[Section], str]:
+    """The section that holds the field at `path`, and the field's name."""
+    depth = 2 if path[0] == "tubes" else 1
+    if path[0] in _SECTIONS and len(path) > depth:
+        return _SECTIONS[path[0]], path[depth]
+    return Robot, path[0]
+
+
+def _tubes(data: dict) -> list[dict]:
+    tubes = data.get("tubes")
+    return [_mapping(tube) for tube in tubes] if isinstance(tubes, list) else []
+
+
+def _mapping(part: Any) -> dict:
+    return part if isinstance(part, dict) else {}
+
+
+def _has_weight(gravity: Any) -> bool:
+    return isinstance(gravity, list) and any(isinstance(g, int | float) and g != 0 for g in gravity)
+
+
+def _number(section: dict, key: str) -> float | None:
+    value = section.get(key)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return float(value) if is_number and abs(value) <= LARGEST else None

@@ -1,0 +1,265 @@
+"""The robot of a robot.yaml: the fields are the file's own, the properties give SI units.
+
+Tubes go from the innermost outwards. Base frame: origin where the tubes leave the front plate, z along insertion.
+"""
+
+from math import pi
+from typing import Annotated, Any, Literal, get_args
+
+import numpy as np
+from annotated_types import Len
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
+
+from ctcr.frames import matrix_from_rotation_vector
+from ctcr.robot.units import Quantity
+
+MAX_TUBES = 4  # the compiled model covers 1 to 4
+AT_PLATE = 10e-6  # [m] in front of the plate: a calibration of a tube that never moves from it ends there
+
+Array = NDArray[np.float64]
+Three = Annotated[list[float], Len(3, 3)]
+
+
+class Section(BaseModel):
+    """A part of the file: its keys are exactly the fields, its numbers finite and possible."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, validate_assignment=True)
+
+    @classmethod
+    def quantity(cls, field: str) -> Quantity | None:
+        """Unit and range of a field."""
+        metadata = cls.model_fields[field].metadata if field in cls.model_fields else ()
+        return next((item for item in metadata if isinstance(item, Quantity)), None)
+
+    @classmethod
+    def expected(cls, field: str) -> str:
+        """What a field must hold, in words."""
+        info, quantity = cls.model_fields[field], cls.quantity(field)
+        may_be_null = info.is_required() and type(None) in get_args(info.annotation)
+        return (quantity.expected if quantity else info.description) + (" (null: not known)" if may_be_null else "")
+
+    @field_validator("*")
+    @classmethod
+    def _possible(cls, value: Any, info: ValidationInfo) -> Any:
+        quantity = cls.quantity(info.field_name)
+        for number in value if isinstance(value, list) else [value]:
+            if quantity and number is not None and not quantity.is_possible(number):
+                raise PydanticCustomError("impossible", "{value} is impossible", {"value": f"{number:g}"})
+        return value
+
+
+class Tube(Section):
+    """One tube: straight from the grasped point, precurved over `curved_length_mm` before the tip.
+
+    Its bending stiffness comes from Young's modulus and the diameters, or is given where only it is known.
+    """
+
+    youngs_modulus_GPa: Annotated[float | None, Quantity("GPa", usual=(1, 250), above=0)] = None
+    bending_stiffness_Nm2: Annotated[float | None, Quantity("N m^2", usual=(1e-5, 10), above=0)] = None
+    poisson_ratio: Annotated[float, Quantity("", usual=(0.2, 0.5), above=-1, most=0.5)]
+    density_kg_m3: Annotated[float | None, Quantity("kg/m^3", usual=(800, 20000), least=0)] = None
+    inner_diameter_mm: Annotated[float | None, Quantity("mm", usual=(0.05, 20), least=0)] = None
+    outer_diameter_mm: Annotated[float | None, Quantity("mm", usual=(0.1, 20), above=0)] = None
+    length_mm: Annotated[float, Quantity("mm", usual=(5, 2000), above=0)]
+    curved_length_mm: Annotated[float, Quantity("mm", usual=(1, 1000), least=0)]
+    curvature_per_m: Annotated[float, Quantity("1/m", usual=(0.1, 200))]
+
+    @property
+    def length(self) -> float:
+        """From the grasped point to the tip [m]."""
+        return 1e-3 * self.length_mm
+
+    @property
+    def curved_length(self) -> float:
+        """The precurved part, which ends at the tip [m]."""
+        return 1e-3 * self.curved_length_mm
+
+    @property
+    def curvature(self) -> float:
+        """Precurvature about the tube's x axis [1/m]."""
+        return self.curvature_per_m
+
+    @property
+    def youngs_modulus(self) -> float:
+        """E [Pa]; 0 where the file gives the bending stiffness instead."""
+        return 1e9 * (self.youngs_modulus_GPa or 0.0)
+
+    @property
+    def inner_diameter(self) -> float:
+        """[m]; 0 where unknown."""
+        return 1e-3 * (self.inner_diameter_mm or 0.0)
+
+    @property
+    def outer_diameter(self) -> float:
+        """[m]; 0 where unknown."""
+        return 1e-3 * (self.outer_diameter_mm or 0.0)
+
+    @property
+    def bending_stiffness(self) -> float:
+        """EI [N m^2]."""
+        if self.bending_stiffness_Nm2 is not None:
+            return self.bending_stiffness_Nm2
+        return self.youngs_modulus * pi * (self.outer_diameter**4 - self.inner_diameter**4) / 64
+
+    @property
+    def torsional_stiffness(self) -> float:
+        """GJ = EI / (1 + nu) [N m^2], true of every annulus."""
+        return self.bending_stiffness / (1 + self.poisson_ratio)
+
+    @property
+    def mass_per_length(self) -> float:
+        """[kg/m]; 0 where density or diameters are unknown."""
+        return (self.density_kg_m3 or 0.0) * pi * (self.outer_diameter**2 - self.inner_diameter**2) / 4
+
+    @property
+    def straightened_strain(self) -> float:
+        """Largest strain when the precurved part is straightened, kappa * outer diameter / 2."""
+        return abs(self.curvature) * self.outer_diameter / 2
+
+
+class Actuation(Section):
+    """Transmission: q = rho * theta_motor + Delta. The homes, Delta, hold one value a tube.
+
+    Joints in a table are those of the controller that recorded it. Where a calibration has found other homes since,
+    the homes of that controller are kept as the recorded ones; without them both are the same.
+    """
+
+    translation_mm_per_rev: Annotated[float | None, Quantity("mm", usual=(0.01, 100))]
+    rotation_rev_per_rev: Annotated[float | None, Quantity("", usual=(1e-4, 10))]
+    home_translation_mm: Annotated[list[float], Quantity("mm", usual=(0.1, 2000), count="one number a tube,")]
+    home_rotation_deg: Annotated[list[float], Quantity("deg", usual=(0, 360), count="one number a tube,")]
+    recorded_home_translation_mm: Annotated[
+        list[float] | None, Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
+    ] = None
+    recorded_home_rotation_deg: Annotated[
+        list[float] | None, Quantity("deg", usual=(0, 360), count="one number a tube,")
+    ] = None
+
+    @property
+    def translation_correction(self) -> Array:
+        """What the joints beta of a table lack (N,) [m]."""
+        recorded = self.recorded_home_translation_mm or self.home_translation_mm
+        return 1e-3 * (np.array(self.home_translation_mm) - np.array(recorded))
+
+    @property
+    def rotation_correction(self) -> Array:
+        """What the joints alpha of a table lack (N,) [rad]."""
+        recorded = self.recorded_home_rotation_deg or self.home_rotation_deg
+        return np.deg2rad(np.array(self.home_rotation_deg) - np.array(recorded))
+
+
+class Tracker(Section):
+    """The sensor, and T_ref, the pose of the robot base frame in the tracker frame.
+
+    `sensor_roll_deg` is how far the sensor's axes are turned against those of the tip, about their common z axis;
+    without it they agree. Where `sensor_roll` is unknown, fits find it.
+    """
+
+    sensor_on_tube: Annotated[int, Field(ge=1, description="the number of a tube, innermost 1")]
+    rate_Hz: Annotated[float | None, Quantity("Hz", usual=(0.1, 10000), above=0)]
+    jitter_mm: Annotated[float | None, Quantity("mm", usual=(1e-4, 5), least=0)]
+    jitter_deg: Annotated[float | None, Quantity("deg", usual=(1e-4, 5), least=0)]
+    accuracy_95_mm: Annotated[float | None, Quantity("mm", usual=(1e-3, 20), least=0)]
+    accuracy_95_deg: Annotated[float | None, Quantity("deg", usual=(1e-3, 20), least=0)]
+    position_mm: Annotated[Three, Quantity("mm", usual=(0, 5000), count="three numbers")]
+    rotation_vector_rad: Annotated[Three, Quantity("rad", usual=(0, 2 * pi), count="three numbers")]
+    sensor_roll: Literal["known", "unknown"] = Field("known", description="known or unknown")
+    sensor_roll_deg: Annotated[float | None, Quantity("deg", usual=(0, 360))] = None
+
+    @property
+    def position(self) -> Array:
+        """Origin of the base frame in the tracker frame (3,) [m]."""
+        return 1e-3 * np.array(self.position_mm)
+
+    @property
+    def rotation(self) -> Array:
+        """R_tracker_base (3, 3)."""
+        return matrix_from_rotation_vector(self.rotation_vector_rad)
+
+    @property
+    def roll(self) -> float:
+        """Of the sensor's axes against those of the tip, about their common z axis [rad]."""
+        return np.deg2rad(self.sensor_roll_deg or 0.0)
+
+    @property
+    def roll_known(self) -> bool:
+        """Whether measured orientations can be compared: by the file, or by an earlier fit."""
+        return self.sensor_roll == "known" or self.sensor_roll_deg is not None
+
+
+class Uncertainty(Section):
+    """One standard deviation of what calibration may move, independent per tube and per axis."""
+
+    tracker_frame_mm: Annotated[float, Quantity("mm", usual=(1e-3, 100), least=0)]
+    tracker_frame_deg: Annotated[float, Quantity("deg", usual=(1e-3, 90), least=0)]
+    rotation_offset_deg: Annotated[float, Quantity("deg", usual=(1e-3, 180), least=0)]
+    translation_offset_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
+    length_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
+    curved_length_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
+    curvature_percent: Annotated[float, Quantity("%", usual=(0.01, 100), least=0)]
+    youngs_modulus_percent: Annotated[float, Quantity("%", usual=(0.01, 200), least=0)]
+
+
+class Robot(Section):
+    """The whole file. `gravity` [m/s^2] in the base frame; null where its direction is not known.
+
+    `effects` are the physical effects beyond the standard model, by id; `history` is the ledger of calibrations, see
+    `ctcr.robot.ledger`.
+    """
+
+    name: str = Field(description="text")
+    gravity: Annotated[Three | None, Quantity("m/s^2", usual=(0, 9.9), count="three numbers")]
+    tubes: Annotated[list[Tube], Len(1, MAX_TUBES)] = Field(description=f"a list of 1 to {MAX_TUBES} tubes")
+    actuation: Actuation = Field(description="its fields, indented below it")
+    tracker: Tracker = Field(description="its fields, indented below it")
+    uncertainty: Uncertainty = Field(description="its fields, indented below it")
+    effects: dict[str, dict[str, float | list[float]]] = Field(
+        default_factory=dict, description="the name of each effect with its parameters, indented below it"
+    )
+    history: list[dict[str, Any]] = Field(default_factory=list, description="a list of what was changed, oldest first")
+
+    _source: Any = PrivateAttr(None)  # what robot_file loaded it from: lines for warnings, layout for saving
+
+    @property
+    def n_tubes(self) -> int:
+        return len(self.tubes)
+
+    @property
+    def standard(self) -> "Robot":
+        """The same without its effects beyond the standard model."""
+        return self.model_copy(update={"effects": {}})
+
+    @property
+    def gravity_vector(self) -> Array:
+        """Gravity (3,) [m/s^2], base frame; zero where the file does not know it."""
+        return np.array(self.gravity or (0.0, 0.0, 0.0))
+
+    def joints_of_table(self, beta: Array, alpha: Array) -> tuple[Array, Array]:
+        """The joints beta [m], alpha [rad] (M, N) of this robot where a table holds those of its controller.
+
+        What a correction puts in front of the plate by less than AT_PLATE is at the plate.
+        """
+        beta = beta + self.actuation.translation_correction
+        beta = np.where((beta > 0) & (beta < AT_PLATE), 0.0, beta)
+        return beta, alpha + self.actuation.rotation_correction
+
+    def core_parameters(self) -> dict[str, Array]:
+        """What the compiled model needs, in SI units: one array (N,) a tube property, and gravity (3,).
+
+        `bending_stiffness` is 0 where it follows from Young's modulus and the diameters.
+        """
+        names = (
+            "youngs_modulus",
+            "poisson_ratio",
+            "inner_diameter",
+            "outer_diameter",
+            "length",
+            "curved_length",
+            "curvature",
+        )
+        parameters = {name: np.array([float(getattr(tube, name)) for tube in self.tubes]) for name in names}
+        parameters["density"] = np.array([tube.density_kg_m3 or 0.0 for tube in self.tubes])
+        parameters["bending_stiffness"] = np.array([tube.bending_stiffness_Nm2 or 0.0 for tube in self.tubes])
+        return parameters | {"gravity": self.gravity_vector}

@@ -1,0 +1,196 @@
+"""Writes a changed robot file: the comments, order and layout of the old one, the new values, and a ledger.
+
+The ledger, `history`, holds an entry a change: when, by which command, from which measurements, what each value was and
+is, and how large the error was. Old values are never lost.
+"""
+
+import hashlib
+import io
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.util import load_yaml_guess_indent
+
+from ctcr.errors import InputError, Problem, file_fault
+from ctcr.robot import robot_file
+from ctcr.robot.checks import path_text
+from ctcr.robot.description import Robot
+from ctcr.robot.yaml_document import FieldPath
+from ctcr.show.output import atomic_writer
+
+LINE_WIDTH = 1000  # a row of the ledger stays one line
+_RECORDED = {"home_translation_mm": "recorded_home_translation_mm", "home_rotation_deg": "recorded_home_rotation_deg"}
+_RECORDED_NOTE = "of the controller that recorded the tables; remove once it uses the homes above"
+
+
+@dataclass(frozen=True)
+class Change:
+    """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), and its new
+    value in the unit of that field; `deviation` is the standard deviation of the new value, where known."""
+
+    path: FieldPath
+    unit: str
+    new: float
+    deviation: float | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the ledger keeps beside the values. `figures`: plain numbers with the unit in the name, such as `rms_mm`."""
+
+    command: str
+    sources: Sequence[str | Path] = ()
+    figures: Mapping[str, Any] = field(default_factory=dict)
+    note: str = ""
+
+
+def write(
+    robot: Robot,
+    target: str | Path,
+    changes: Sequence[Change],
+    entry: Entry,
+    *,
+    effects: Mapping[str, Mapping[str, Any]] | None = None,
+    in_place: bool = False,
+) -> Robot:
+    """Writes `robot`, as it was loaded, with the changes and one more entry of the ledger; returns what was written.
+
+    `effects` replaces that section; None leaves it. New homes leave the old ones as the recorded ones, so that tables
+    keep their meaning. Raises InputError where the target is the file the robot came from and not `in_place`, where the
+    new values make no possible robot, and where a source or the target cannot be used; nothing is written then.
+    """
+    source = robot._source
+    if source and not in_place and os.path.realpath(target) == os.path.realpath(source.file):
+        raise InputError(Problem("is the input: give another name to -o, or --in-place to change it", str(target)))
+    yaml, document = _document(robot)
+    rows = [_apply(document, change) for change in changes]
+    if effects is not None:
+        _set_effects(document, effects)
+    document.setdefault("history", CommentedSeq()).append(_ledger_entry(entry, rows))
+    text = io.StringIO()
+    yaml.dump(document, text)
+    updated = _checked(text.getvalue(), str(target))
+    with atomic_writer(target) as file:
+        file.write(text.getvalue())
+    return updated
+
+
+def sha256(path: str | Path) -> str:
+    """The fingerprint of a file, in hexadecimal."""
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+
+
+def _document(robot: Robot) -> tuple[YAML, CommentedMap]:
+    """The robot's document with its layout, and a writer that keeps the layout."""
+    yaml = YAML(typ="rt", pure=True)
+    yaml.preserve_quotes = True
+    yaml.width = LINE_WIDTH
+    if robot._source is None:
+        text = io.StringIO()
+        yaml.dump(robot.model_dump(exclude_unset=True), text)
+        return yaml, yaml.load(text.getvalue())
+    _, indent, offset = load_yaml_guess_indent(robot._source.text)
+    if indent is not None:
+        yaml.indent(mapping=2, sequence=indent, offset=offset or 0)
+    return yaml, yaml.load(robot._source.text)
+
+
+def _apply(document: CommentedMap, change: Change) -> CommentedMap:
+    """Sets one value; returns its row of the ledger."""
+    *parents, last = change.path
+    place = document
+    for step in parents:
+        place = place[step]
+    old, new = place.get(last) if isinstance(place, dict) else place[last], _shortest(change.new)
+    if change.path[0] == "actuation" and change.path[1] in _RECORDED:
+        _keep_recorded(document["actuation"], change.path[1])
+    place[last] = new
+    row = {"field": path_text(change.path), "unit": change.unit, "old": _plain(old), "new": new}
+    if change.deviation is not None:
+        row["sd"] = _shortest(change.deviation, 3)
+    return _one_line(row)
+
+
+def _keep_recorded(actuation: CommentedMap, key: str) -> None:
+    kept = _RECORDED[key]
+    if actuation.get(kept) is not None:
+        return
+    values = CommentedSeq(_plain(value) for value in actuation[key])
+    values.fa.set_flow_style()
+    actuation.insert(list(actuation).index(key) + 1, kept, values, comment=_RECORDED_NOTE)
+
+
+def _set_effects(document: CommentedMap, effects: Mapping[str, Mapping[str, Any]]) -> None:
+    if not effects:
+        document.pop("effects", None)
+        return
+    section = _tidy(effects)
+    if "effects" in document or "history" not in document:
+        document["effects"] = section
+    else:
+        document.insert(list(document).index("history"), "effects", section)
+
+
+def _ledger_entry(entry: Entry, rows: list[CommentedMap]) -> CommentedMap:
+    made = CommentedMap(date=date.today().isoformat(), command=entry.command)
+    if entry.sources:
+        made["sources"] = [_one_line({"file": Path(path).name, "sha256": sha256(path)}) for path in entry.sources]
+    if rows:
+        made["changes"] = rows
+    if entry.figures:
+        made["figures"] = _tidy(entry.figures)
+        made["figures"].fa.set_block_style()
+    if entry.note:
+        made["note"] = entry.note
+    return made
+
+
+def _checked(text: str, target: str) -> Robot:
+    try:
+        return robot_file.parse(text.encode(), target)
+    except InputError as error:
+        problems = [
+            Problem(f"the new value {problem.message}", target, field=problem.field) for problem in error.problems
+        ]
+        raise InputError(problems, error.omitted) from None
+
+
+def _tidy(value: Any) -> Any:
+    """What the file shows of a mapping: numbers not longer than they mean, lists on one line."""
+    if isinstance(value, Mapping):
+        made = CommentedMap({str(key): _tidy(each) for key, each in value.items()})
+        if made and all(isinstance(each, int | float) for each in made.values()):
+            made.fa.set_flow_style()
+        return made
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        made = CommentedSeq(_tidy(each) for each in value)
+        made.fa.set_flow_style()
+        return made
+    return _shortest(value) if isinstance(value, float) else value
+
+
+def _one_line(row: dict[str, Any]) -> CommentedMap:
+    made = CommentedMap(row)
+    made.fa.set_flow_style()
+    return made
+
+
+def _plain(value: Any) -> Any:
+    """A scalar of the document without its layout."""
+    return float(value) if isinstance(value, float) else value
+
+
+def _shortest(value: float, digits: int = 8) -> float:
+    return float(f"{value:.{digits}g}")

@@ -1,0 +1,124 @@
+"""Reads and writes robot.yaml.
+
+`load` reports every error of a file at once, `warnings` what looks wrong; `save` keeps the comments and the layout of
+the file that the robot came from.
+"""
+
+import io
+from collections.abc import Collection
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+
+from ctcr.errors import InputError, Problem, did_you_mean, file_fault
+from ctcr.robot import checks, yaml_document
+from ctcr.robot.description import Robot
+from ctcr.robot.yaml_document import YamlDocument
+from ctcr.show.output import atomic_writer
+
+MAX_BYTES = 1 << 20  # a robot file is a few kB: anything bigger is something else, often the table
+
+
+class _Source(NamedTuple):
+    file: str
+    text: str
+    document: YamlDocument
+
+
+def load(path: str | Path) -> Robot:
+    """The robot described by a file. Raises InputError with all the faults of the file."""
+    try:
+        with open(path, "rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+    return parse(content, str(path))
+
+
+def parse(content: bytes, file: str = "robot.yaml") -> Robot:
+    """The robot described by the content of a file; `file` is its name in errors."""
+    text = _text(content, file)
+    document = yaml_document.parse(text, file)
+    if not isinstance(document.data, dict):
+        hint = " (is this the table of measurements?)" if "," in text.partition("\n")[0] else ""
+        raise InputError(Problem(f"does not describe a robot: no fields such as name, tubes, tracker{hint}", file))
+    try:
+        robot, errors = Robot.model_validate(document.data), []
+    except ValidationError as error:
+        robot, errors = None, error.errors(include_url=False)
+    faults = checks.faults(document.data, errors) + _unknown_effects(document.data)
+    if robot is None or faults:
+        raise InputError(checks.problems(faults, file, document.line))
+    robot._source = _Source(file, text, document)
+    return robot
+
+
+def warnings(robot: Robot) -> list[Problem]:
+    """What is possible but looks wrong, with unit and place."""
+    source = robot._source
+    line_of = source.document.line if source else lambda path: None
+    return checks.problems(list(checks.doubts(robot)), source.file if source else None, line_of)
+
+
+def save(robot: Robot, path: str | Path) -> None:
+    """Writes a robot; where it was loaded from a file, only the values that changed differ from that file."""
+    yaml = YAML(typ="rt", pure=True)
+    yaml.preserve_quotes = True
+    values = robot.model_dump(exclude_unset=True)
+    document = _updated(yaml.load(robot._source.text), values) if robot._source else values
+    text = io.StringIO()
+    yaml.dump(document, text)
+    with atomic_writer(path) as file:
+        file.write(text.getvalue())
+
+
+def known_effects() -> Collection[str] | None:
+    """Ids of the effects that a file may hold; None where there is no catalogue, and any id passes."""
+    try:
+        return import_module("ctcr.effects.catalogue").known_effects()
+    except ModuleNotFoundError:
+        return None
+
+
+def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
+    effects = data.get("effects")
+    known = known_effects() if isinstance(effects, dict) and effects else None
+    if known is None:
+        return []
+    found = []
+    for name in effects:
+        if name not in known:
+            meant = did_you_mean(str(name), known)
+            hint = f": did you mean {meant}?" if meant else ": `ctcr effects` lists those there are"
+            found.append((("effects", name), f"unknown effect{hint}"))
+    return found
+
+
+def _text(content: bytes, file: str) -> str:
+    if len(content) > MAX_BYTES:
+        raise InputError(Problem("is over 1 MB: this is not a robot description", file))
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(Problem("is not text in UTF-8", file)) from None
+    if not text.strip():
+        raise InputError(Problem("is empty", file))
+    return text
+
+
+def _updated(old: Any, new: Any) -> Any:
+    """`old`, a parsed document with its layout, with the values of `new`."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [key for key in old if key not in new]:
+            del old[key]
+        for key, value in new.items():
+            old[key] = _updated(old[key], value) if key in old else value
+        return old
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for i, value in enumerate(new):
+            old[i] = _updated(old[i], value)
+        return old
+    return old if old == new else new

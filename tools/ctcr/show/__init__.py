@@ -1,0 +1,1 @@
+"""What people see and programs read: terminal output, JSON, figures, HTML pages."""

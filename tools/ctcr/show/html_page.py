@@ -1,0 +1,89 @@
+"""Parts of a report: one HTML page that needs nothing else, no network and no other file."""
+
+import html
+from collections.abc import Iterable, Sequence
+from datetime import date
+from importlib.resources import files
+from typing import Any
+
+from plotly.offline import get_plotlyjs
+
+from ctcr.show.style import draw
+
+
+def short(value: float) -> str:
+    """An error as people say it: 1.36, 0.93, 0.10, 0.061."""
+    return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
+
+
+def page(
+    title: str, sections: Iterable[str], footer: str, command: str, drawing: str | None = None, reload_s: int = 0
+) -> str:
+    """The whole HTML text.
+
+    title     plain text
+    sections  HTML; empty ones are left out
+    footer    plain text: what the page is made from; `command` is the one that made it
+    drawing   JSON of a 3-D view, which one of the sections has the element `view` for
+    reload_s  the browser loads the page anew so often; 0: never
+    """
+    title = html.escape(title)
+    reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
+    style = (files("ctcr.show") / "html_page.css").read_text(encoding="utf-8")
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"{reload}"
+        f"<title>{title}</title><style>{style}</style></head><body>"
+        + "\n".join(filter(None, sections))
+        + f"<footer>{html.escape(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"
+        + (_drawn(drawing) if drawing is not None else "")
+        + "</body></html>\n"
+    )
+
+
+def _drawn(drawing: str) -> str:
+    text = drawing.replace("</", "<\\/")
+    return (
+        f"<script>{get_plotlyjs()}</script>"
+        f"<script>const drawing = {text};\n"
+        'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
+    )
+
+
+def cards(numbers: Iterable[tuple[str, str, str]]) -> str:
+    """Large numbers side by side: (kind, value, what it is)."""
+    return (
+        '<div class="numbers">'
+        + "".join(
+            f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
+            for kind, value, text in numbers
+        )
+        + "</div>"
+    )
+
+
+def bullets(lines: Iterable[str]) -> str:
+    return '<ul class="limits">' + "".join(f"<li>{html.escape(line)}</li>" for line in lines) + "</ul>"
+
+
+def figure(plot: Any, subject: Any, width: float, height: float, caption: str, wide: bool = False) -> str:
+    """A picture of `subject` with its caption; empty where there is nothing to draw."""
+    drawn = draw(plot, subject, width, height)
+    kind = ' class="wide"' if wide else ""
+    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
+
+
+def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int) -> str:
+    """The first columns are text, the others numbers."""
+
+    def cell(tag: str, index: int, value: str) -> str:
+        kind = ' class="text"' if index < text_columns else ""
+        return f"<{tag}{kind}>{html.escape(value)}</{tag}>"
+
+    head = "".join(cell("th", i, name) for i, name in enumerate(columns))
+    body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><caption>{html.escape(caption)}</caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+    )

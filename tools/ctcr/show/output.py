@@ -1,0 +1,136 @@
+"""What a command gives back: files that are whole or absent, JSON, tables, progress."""
+
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from rich import box
+from rich.console import Console
+from rich.progress import Progress as Bar
+from rich.table import Table
+
+from ctcr.errors import InputError, Problem, file_fault
+
+PROGRESS_AFTER_S = 1.0
+
+
+@contextmanager
+def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
+    """A file to write; it appears under its name when the block ends well, and leaves nothing behind when not.
+
+    Raises InputError where the folder cannot be written or the disk is full.
+    """
+    target = Path(os.path.realpath(path))  # a link stays a link
+    mode = {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": "\n"}
+    if target.is_dir():
+        raise InputError(Problem("cannot write it: it is a folder", str(path)))
+    special = target.exists() and not target.is_file()  # /dev/null and the like are written, never replaced
+    temporary = None
+    try:
+        if special:
+            with open(target, **mode) as file:
+                yield file
+            return
+        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        with open(handle, **mode) as file:
+            yield file
+        os.chmod(temporary, _usual_permissions())
+        os.replace(temporary, target)
+        temporary = None
+    except OSError as error:
+        raise file_fault(error, path, "write") from None
+    finally:
+        if temporary:
+            Path(temporary).unlink(missing_ok=True)
+
+
+def write_json(data: Any, target: str) -> None:
+    """Writes `data` as JSON to a file, or to standard output for "-"; see `plain` for what may be in it."""
+    text = json.dumps(plain(data), indent=2, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with atomic_writer(target) as file:
+        file.write(text)
+
+
+def plain(data: Any) -> Any:
+    """The same content in what JSON can hold: numpy becomes lists and scalars, what is not finite becomes null."""
+    if isinstance(data, dict):
+        return {str(key): plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [plain(value) for value in data]
+    if hasattr(data, "tolist"):
+        return plain(data.tolist())
+    if isinstance(data, float) and not abs(data) < float("inf"):
+        return None
+    return data
+
+
+def console(json_target: str | None = None):
+    """A rich console for human readers; it leaves standard output alone when that carries JSON."""
+    return Console(stderr=json_target == "-", highlight=False, soft_wrap=True)
+
+
+def listed(items: Sequence[Any], most: int) -> str:
+    """The first of them, and dots where there are more."""
+    return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
+
+
+def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()):
+    """A rich table: the first columns, or those of `text`, are text, the others numbers.
+
+    On a narrow terminal text goes on in the next line between words, so that numbers and names are not cut.
+    """
+    made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for i, column in enumerate(columns):
+        is_text = i in text if text else i < text_columns
+        cells = [row[i].strip() for row in rows]
+        folds = is_text and any(" " in cell for cell in cells)
+        longest = max((len(word) for cell in cells for word in cell.split()), default=0)
+        made.add_column(
+            column, justify="left" if is_text else "right", no_wrap=not folds, min_width=longest if folds else None
+        )
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+class Progress:
+    """A progress bar on standard error, shown only on a terminal and only once the work has taken a second."""
+
+    def __init__(self, task: str, total: float):
+        self.task, self.total, self.done = task, total, 0.0
+        self._start, self._bar = time.monotonic(), None
+
+    def __enter__(self) -> "Progress":
+        return self
+
+    def __exit__(self, *_) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def advance(self, amount: float) -> None:
+        self.done += amount
+        if self._bar is None and time.monotonic() - self._start > PROGRESS_AFTER_S and sys.stderr.isatty():
+            self._show()
+        if self._bar:
+            self._bar.update(self._id, completed=self.done)
+
+    def _show(self) -> None:
+        self._bar = Bar(console=Console(stderr=True), transient=True)
+        self._id = self._bar.add_task(self.task, total=self.total)
+        self._bar.start()
+
+
+def _usual_permissions() -> int:
+    """What a new file gets: temporary files are private, results are not."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

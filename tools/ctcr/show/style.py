@@ -1,0 +1,46 @@
+"""How figures look: one colour means one thing in all of them."""
+
+import io
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+
+ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
+AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
+INK = "#1c2733"
+
+STYLE = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"],
+    "font.size": 10,
+    "axes.edgecolor": "#8794a0",
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "savefig.dpi": 150,
+    "axes.grid": True,
+    "grid.color": "#e7ebef",
+    "axes.axisbelow": True,
+    "svg.hashsalt": "ctcr",
+}
+
+
+def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:
+    """SVG text of a picture, or None when there is nothing to draw."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        if plot(figure, subject) is False:
+            return None
+        target = io.StringIO()
+        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+    text = target.getvalue()
+    return text[text.index("<svg") :]

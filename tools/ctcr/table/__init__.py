@@ -1,0 +1,1 @@
+"""Tables of measurements and how they are read."""

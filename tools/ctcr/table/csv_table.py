@@ -1,0 +1,209 @@
+"""A comma-separated table of numbers, read in blocks with the exact row of every fault.
+
+Rows are numbered as a spreadsheet shows them: the header is row 1. An empty field reads as NaN.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.errors import InputError, Problem, file_fault, shown
+
+BLOCK_BYTES = 4 << 20
+MAX_HEADER_BYTES = 1 << 16
+SHOWN_PER_KIND = 3  # rows shown of each kind of fault; the others are counted
+SHOWN = 20
+
+_NUMBER_BYTES = b"0123456789+-.eE, "
+_NUMBER = re.compile(r" *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *")
+
+
+@dataclass
+class Faults:
+    """Faults of a table by kind; a fault of a million rows stays three lines and a count."""
+
+    file: str
+    _kinds: dict[tuple[str, str], tuple[int, list[Problem]]] = field(default_factory=dict)
+
+    def add(self, row: int, column: str | None, message: str, kind: str | None = None, count: int = 1) -> None:
+        """`count` faults of one kind (told by `kind`, else by the message), the first of them in `row`."""
+        key = (column or "", kind or message)
+        total, examples = self._kinds.get(key, (0, []))
+        if len(examples) < SHOWN_PER_KIND:
+            examples = [*examples, Problem(message, self.file, row, column, line_name="row")]
+        self._kinds[key] = (total + count, examples)
+
+    def where(
+        self, bad: NDArray[np.bool_], rows: NDArray[np.int64], column: str, kind: str, say: Callable[[int], str]
+    ) -> None:
+        """A fault of a kind in each row `rows[i]` where `bad[i]`; `say(i)` is its message."""
+        found = np.flatnonzero(bad)
+        for i in found[:SHOWN_PER_KIND]:
+            self.add(int(rows[i]), column, say(i), kind)
+        if len(found) > SHOWN_PER_KIND:
+            self.add(int(rows[found[-1]]), column, "", kind, len(found) - SHOWN_PER_KIND)
+
+    @property
+    def total(self) -> int:
+        return sum(total for total, _ in self._kinds.values())
+
+    def problems(self) -> list[Problem]:
+        """The first faults of each kind, in the order of the rows."""
+        found = [problem for _, examples in self._kinds.values() for problem in examples]
+        return sorted(found, key=lambda problem: problem.line)[:SHOWN]
+
+    def raise_any(self) -> None:
+        if self._kinds:
+            found = self.problems()
+            raise InputError(found, omitted=self.total - len(found))
+
+
+@dataclass(frozen=True)
+class NumberTable:
+    """A table whose header has been read. Rows are the bytes from `start` to `end`, `n_rows` of them."""
+
+    path: Path
+    columns: tuple[str, ...]
+    n_rows: int
+    start: int
+    end: int
+
+    def blocks(self, faults: Faults) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], int]]:
+        """Blocks of rows: (row numbers, numbers (rows, columns), bytes read). Unreadable rows go to `faults`."""
+        row = 2
+        with open(self.path, "rb") as file:
+            file.seek(self.start)
+            while (left := self.end - file.tell()) > 0:
+                raw = file.read(min(BLOCK_BYTES, left))
+                raw += file.readline(self.end - file.tell())
+                lines = raw.replace(b"\r\n", b"\n").removesuffix(b"\n").split(b"\n")
+                rows = np.arange(row, row + len(lines))
+                numbers = _numbers(lines, len(self.columns))
+                if numbers is None:
+                    readable = [_is_readable(line, self.columns, row + i, faults) for i, line in enumerate(lines)]
+                    numbers = _numbers(
+                        [line for line, good in zip(lines, readable, strict=True) if good], len(self.columns)
+                    )
+                    rows = rows[readable]
+                yield rows, numbers, len(raw)
+                row += len(lines)
+
+
+def read_columns(path: str | Path, columns: Sequence[str]) -> NDArray[np.float64]:
+    """The numbers (M, columns) of a table that has just these columns. Raises InputError with its faults."""
+    table, faults = open_table(path), Faults(str(path))
+    if table.columns != tuple(columns):
+        text = f"holds other columns than {','.join(columns)}"
+        raise InputError(Problem(text, str(path), 1, line_name="row"))
+    numbers = np.vstack([block for _, block, _ in table.blocks(faults)])
+    faults.raise_any()
+    return numbers
+
+
+def open_table(path: str | Path) -> NumberTable:
+    """Reads the header and counts the rows. Raises InputError where the file is no table of text."""
+    try:
+        with open(path, "rb") as file:
+            header = file.readline(MAX_HEADER_BYTES)
+            columns = _columns(header, str(path))
+            start = file.tell()
+            end = _end_of_content(file, start)
+            n_rows = _count_lines(file, start, end)
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+    if n_rows == 0:
+        raise InputError(Problem("has no rows below the header", str(path)))
+    return NumberTable(Path(path), columns, n_rows, start, end)
+
+
+def _columns(header: bytes, file: str) -> tuple[str, ...]:
+    try:
+        text = header.decode("utf-8-sig").strip()
+    except UnicodeDecodeError:
+        text = "\0"
+    names = tuple(name.strip() for name in text.split(","))
+    fault = None
+    if header.startswith((b"\xff\xfe", b"\xfe\xff")):
+        fault = "is text in UTF-16: save it as UTF-8"
+    elif header.startswith(b"PK"):
+        fault = "is a spreadsheet, not text: save it as CSV"
+    elif any(ord(letter) < 32 and letter not in "\t\r" for letter in text):
+        fault = "is not text"
+    elif not text:
+        fault = "is empty" if not header else "has an empty first row: it must name the columns"
+    elif "\r" in text:
+        fault = "ends its lines with CR alone: save it with LF or CR LF"
+    elif len(header) == MAX_HEADER_BYTES:
+        fault = "has a first row without end: this is not a table"
+    elif len(names) == 1 and len(re.split("[;\t]", text)) > 1:
+        fault = "separates its columns by semicolons or tabs: use commas, and points for decimals"
+    elif all(_NUMBER.fullmatch(name) for name in names):
+        fault = "has no header: its first row must name the columns"
+    if fault:
+        raise InputError(Problem(fault, file))
+    return names
+
+
+def _end_of_content(file: BinaryIO, start: int) -> int:
+    """Where the last row that is not blank ends."""
+    position = file.seek(0, 2)
+    while position > start:
+        step = min(BLOCK_BYTES, position - start)
+        file.seek(position - step)
+        if content := file.read(step).rstrip(b"\r\n"):
+            return position - step + len(content)
+        position -= step
+    return start
+
+
+def _count_lines(file: BinaryIO, start: int, end: int) -> int:
+    file.seek(start)
+    lines = 1 if end > start else 0
+    while block := file.read(min(BLOCK_BYTES, end - file.tell())):
+        lines += block.count(b"\n")
+    return lines
+
+
+def _numbers(lines: list[bytes], n_columns: int) -> NDArray[np.float64] | None:
+    """The numbers (lines, columns), or None where a line is faulty: speed first, `_is_readable` finds out which."""
+    if any(line.count(b",") != n_columns - 1 for line in lines):
+        return None
+    text = b",".join(lines)
+    if text.translate(None, _NUMBER_BYTES):
+        return None
+    text = b"," + text + b","
+    while b",," in text:
+        text = text.replace(b",,", b",nan,")
+    try:
+        numbers = map(float, text[1:-1].decode("ascii").split(","))
+        return np.fromiter(numbers, float, count=len(lines) * n_columns).reshape(len(lines), n_columns)
+    except ValueError:
+        return None
+
+
+def _is_readable(line: bytes, columns: tuple[str, ...], row: int, faults: Faults) -> bool:
+    """Whether `_numbers` can read the line; `faults` learns why not."""
+    fields = line.decode("utf-8", "replace").split(",")
+    if not line.strip():
+        faults.add(row, None, "is empty")
+        return False
+    if len(fields) != len(columns):
+        faults.add(row, None, f"has {len(fields)} fields: the header has {len(columns)}", "fields")
+        return False
+    wrong = [
+        (column, text) for column, text in zip(columns, fields, strict=True) if text and not _NUMBER.fullmatch(text)
+    ]
+    for column, text in wrong:
+        faults.add(row, column, f"{shown(text)} is not a number{_hint(text)}", "number")
+    return not wrong
+
+
+def _hint(text: str) -> str:
+    if text.strip(" \"'").lower() in ("nan", "na", "n/a", "none", "null", "-", ""):
+        return ": leave the field empty where nothing was measured"
+    return ": write it without quotes" if '"' in text else ""
