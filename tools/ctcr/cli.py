@@ -11,10 +11,10 @@ from ctcr import commands
 
 
 class LazyGroup(click.Group):
-    """Finds its subcommands in `ctcr.commands`: a new file there is a new command."""
+    """Finds its subcommands in `ctcr.commands`: a new file there is a new command; `options` is what they share."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return sorted(module.name for module in pkgutil.iter_modules(commands.__path__))
+        return sorted({module.name for module in pkgutil.iter_modules(commands.__path__)} - {"options"})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):

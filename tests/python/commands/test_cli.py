@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ctcr import cli, frames
 from ctcr.robot import robot_file
+from ctcr.robot.table_ii import table_ii
 from ctcr.table import measurements
 
 ROOT = Path(__file__).parents[3]
@@ -151,17 +152,15 @@ def test_bench_counts_what_it_solved(run, monkeypatch):
 def test_bench_joints_are_within_reach():
     from ctcr.commands import bench
 
-    lengths = np.array([tube.length for tube in bench.table_ii().tubes])
-    beta, alpha = bench.random_joints(bench.table_ii(), 500, np.random.default_rng(2))
+    lengths = np.array([tube.length for tube in table_ii().tubes])
+    beta, alpha = bench.random_joints(table_ii(), 500, np.random.default_rng(2))
     tips = beta + lengths
     assert (np.diff(beta, axis=1) >= 0).all() and (beta <= 0).all() and alpha.shape == beta.shape
     assert (np.diff(tips, axis=1) <= 0).all() and (tips >= 0).all()
 
 
 def test_the_built_in_robot_is_the_example():
-    from ctcr.commands import bench
-
-    assert bench.table_ii().tubes == robot_file.load(ROBOT).tubes
+    assert table_ii().tubes == robot_file.load(ROBOT).tubes
 
 
 def test_faulty_input_writes_nothing_and_tells_row_field_and_unit(run, tmp_path, table):
