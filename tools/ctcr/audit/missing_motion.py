@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from ctcr import settings
 from ctcr.robot.description import Robot
 from ctcr.show.output import listed
 from ctcr.table.joint_space import joint_places
@@ -17,12 +18,6 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-LONG = 1.5  # a step that is as many times longer, in joints or in time, than the run's others may hide a way round
-SAME_JOINTS = 0.01  # of the usual step
-SAME_SIDE = 0.5  # cosine between two steps
-STRAIGHT_ON = 0.9
-VISIBLE = 4.0  # times the noise of their difference, from which two visits differ
-DOUBT = 0.01  # significance of saying so
 SHOWN = 6
 
 
@@ -41,10 +36,10 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     noise = np.sqrt(6) * 1e-3 * jitter
     loop = p[other] - p[same]
     size = np.sum(loop**2, axis=1)
-    visible = (np.sqrt(size) > VISIBLE * noise) & np.isfinite(p[here]).all(axis=1)
+    visible = (np.sqrt(size) > settings.VISITS_DIFFER * noise) & np.isfinite(p[here]).all(axis=1)
     part = np.sum((p[here] - p[same]) * loop, axis=1)[visible] / size[visible]
     agree = int(np.sum(part > 0.5))
-    if not visible.any() or binomtest(agree, len(part), alternative="greater").pvalue > DOUBT:
+    if not visible.any() or binomtest(agree, len(part), alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     rows = listed(measurements.row[here], SHOWN)
@@ -69,12 +64,12 @@ def _returns(m: Measurements) -> list[tuple[int, int, int, int]]:
             continue
         usual = np.median(length[length > 0])
         towards = step / np.maximum(length, 1e-12)[:, None]
-        long = (length > LONG * usual) | (pause > LONG * np.median(pause))
+        long = (length > settings.LONG_STEP * usual) | (pause > settings.LONG_STEP * np.median(pause))
         for n in np.flatnonzero(long & (length > 0)) + 1:
-            near = np.linalg.norm(q[rows[1:n]] - q[rows[n]], axis=1) < SAME_JOINTS * usual
+            near = np.linalg.norm(q[rows[1:n]] - q[rows[n]], axis=1) < settings.SAME_JOINTS * usual
             visits = np.flatnonzero(near) + 1
             cosine = towards[visits - 1] @ towards[n - 1]
-            same, other = visits[cosine > SAME_SIDE], visits[cosine < -SAME_SIDE]
+            same, other = visits[cosine > settings.SAME_SIDE], visits[cosine < -settings.SAME_SIDE]
             if len(same) and len(other):
                 found.append((rows[n], rows[same[-1]], rows[other[-1]], rows[_turn(towards, other[-1])]))
     return found
@@ -83,7 +78,7 @@ def _returns(m: Measurements) -> list[tuple[int, int, int, int]]:
 def _turn(towards: Array, visit: int) -> int:
     """Where the straight way to a visit begins."""
     start = visit - 1
-    while start > 0 and towards[start - 1] @ towards[visit - 1] > STRAIGHT_ON:
+    while start > 0 and towards[start - 1] @ towards[visit - 1] > settings.STRAIGHT_ON:
         start -= 1
     return start
 

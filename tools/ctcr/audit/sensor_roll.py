@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctcr import settings
 from ctcr.frames import base_to_tracker, conjugate, product
 from ctcr.model import parameters
 from ctcr.model.model import Model
@@ -12,7 +13,6 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 NAME = "tracker.sensor_roll"
-ONE_ROLL = 0.8  # mean length of the rolls' unit vectors, from which on one roll describes all readings
 
 
 def usable(robot: Robot, measurements: Measurements) -> tuple[Robot, Measurements, list[str]]:
@@ -27,7 +27,7 @@ def usable(robot: Robot, measurements: Measurements) -> tuple[Robot, Measurement
         return _with(robot, None), measurements, []
     rolls = np.exp(1j * _rolls(robot, measurements))
     mean = rolls[np.isfinite(rolls)].mean() if np.isfinite(rolls).any() else 0.0
-    if abs(mean) < ONE_ROLL:
+    if abs(mean) < settings.ONE_ROLL:
         said = "the sensor's roll is unknown and differs from reading to reading: orientations are not used"
         return robot, replace(measurements, quaternion=None), [said]
     roll = float(np.degrees(np.angle(mean)))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show.output import listed
@@ -13,9 +14,6 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-FARTHER = 2.0  # than the tip moves by the model, both to the reading before and to that after,
-BACK = 0.5  # ... with these so near each other, of the leap
-VISIBLE = 10.0  # times the noise of a difference
 SHOWN = 6
 
 
@@ -32,8 +30,8 @@ def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, li
     rows = listed(measurements.row[spikes], SHOWN)
     what = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
     said = (
-        f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {FARTHER:g} times as "
-        "far as the joints and the load move the tip: spikes of the tracker, left out of all fits and errors"
+        f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {settings.SPIKE_LEAP:g} "
+        "times as far as the joints and the load move the tip: spikes of the tracker, left out of all fits and errors"
     )
     poses = {name: getattr(measurements, name) for name in ("position", "quaternion")}
     return replace(
@@ -58,9 +56,9 @@ def leaps(robot: Robot, measurements: Measurements) -> Array:
     found = (
         goes_on
         & (run[:-2] == run[2:])
-        & (leaped > FARTHER * moved)  # NaN, where the model has no solution, says nothing
-        & (leaped > VISIBLE * np.sqrt(6) * 1e-3 * jitter)
-        & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < BACK * leaped)
+        & (leaped > settings.SPIKE_LEAP * moved)  # NaN, where the model has no solution, says nothing
+        & (leaped > settings.SPIKE_VISIBLE * np.sqrt(6) * 1e-3 * jitter)
+        & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < settings.SPIKE_RETURN * leaped)
     )
     leap[read[1:-1][found]] = leaped[found]
     return leap
