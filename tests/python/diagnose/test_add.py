@@ -7,8 +7,8 @@ import ctcr
 import numpy as np
 import pytest
 from ctcr.diagnose import add, fitted_effects
-from ctcr.diagnose.split import locked_rows
 from ctcr.effects import catalogue
+from ctcr.fit.folds import held_out_rows
 from ctcr.model import effect_model, recording, simulation
 from ctcr.robot import robot_file
 from ctcr.show import output
@@ -38,7 +38,7 @@ def test_a_hidden_effect_is_found(robot, plan, given, hidden):
     rms = added.rms("rms_mm")
     assert list(rms) == ["nominal", "calibrated", identity, "noise_floor"]
     assert rms[identity] < 0.7 * rms["calibrated"]
-    locked = np.unique(made.run[locked_rows(robot, made)])
+    locked = np.unique(made.run[held_out_rows(robot, made)])
     assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
 
 

@@ -7,17 +7,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import add, decision, diagnose
 from ctcr.diagnose import race as racing
 from ctcr.diagnose.analysis import _beyond_judging
-from ctcr.diagnose.coverage import Coverage
 from ctcr.diagnose.engine import Linear
 from ctcr.diagnose.far_off import come_together, far_off
 from ctcr.diagnose.leftover import Leftover
-from ctcr.diagnose.split import OPEN, groups, locked_rows
 from ctcr.diagnose.verdict import judge
 from ctcr.effects import catalogue
-from ctcr.fit import joint
+from ctcr.fit import folds
+from ctcr.fit.coverage import Coverage
+from ctcr.fit.folds import groups, held_out_rows
 from ctcr.model import parameters, recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import robot_file
@@ -212,7 +213,7 @@ def test_linear_gain_is_the_evidence_of_a_linear_model():
 
 def test_rows_are_locked_by_run(robot):
     table = measured_session(robot)
-    locked = locked_rows(robot, table)
+    locked = held_out_rows(robot, table)
     assert 0.2 <= locked.mean() <= 0.3
     for run in np.unique(table.run):
         assert np.ptp(locked[table.run == run].astype(int)) == 0
@@ -223,7 +224,7 @@ def test_rows_are_locked_by_run(robot):
 def test_what_is_locked_follows_no_plan_that_alternates(robot):
     table = measured_session(robot, runs=16)
     for turn in range(4):
-        runs = np.unique(table.run[locked_rows(robot, table, turn)])
+        runs = np.unique(table.run[held_out_rows(robot, table, turn)])
         assert len(runs) == 4
         for period in (2, 4):
             assert len(set(runs % period)) > 1, (turn, period)
@@ -241,14 +242,14 @@ def with_one_odd_run(robot, odd):
 def test_a_run_that_goes_where_no_other_went_judges_nothing(robot):
     odd = np.unique(session(robot, np.random.default_rng(0), runs=12).run)[2]
     table = with_one_odd_run(robot, odd)
-    coverage = Coverage(robot, table, groups(table))
-    assert coverage.left_open([odd])[0] > 100 * OPEN
-    locked = locked_rows(robot, table)
+    coverage = Coverage(robot, table, folds.measured_rows(table), groups(table))
+    assert coverage.undetermined([odd])[0] > 100 * settings.MOST_UNDETERMINED
+    locked = held_out_rows(robot, table)
     assert not locked[table.run == odd].any() and len(np.unique(table.run[locked])) == 3
-    assert coverage.left_open(np.unique(table.run[locked])).max() <= OPEN
+    assert coverage.undetermined(np.unique(table.run[locked])).max() <= settings.MOST_UNDETERMINED
     # What was read has no say.
     moved = np.random.default_rng(1).normal(size=(len(table), 3))
-    np.testing.assert_array_equal(locked, locked_rows(robot, dataclasses.replace(table, position=moved)))
+    np.testing.assert_array_equal(locked, held_out_rows(robot, dataclasses.replace(table, position=moved)))
 
 
 @pytest.mark.parametrize(
@@ -281,7 +282,7 @@ def test_what_is_left_open_is_the_variance_of_a_prediction(robot):
         found = np.linalg.solve(A.T @ A + np.eye(len(names)), A.T @ (A @ truth + error))
         missed = slopes[~fitted][:, :3] @ (sd * (found - truth))
         seen.append(np.mean(np.sum(missed**2, axis=1)))
-    open_ = Coverage(robot, table, groups(table)).left_open([7])[0]
+    open_ = Coverage(robot, table, folds.measured_rows(table), groups(table)).undetermined([7])[0]
     part = np.mean(seen) / (3 * noise.position_jitter**2) / open_
     assert 0.6 < part < 1.15, part  # open_ is the worst of three lengths of the curves
 
@@ -291,10 +292,10 @@ def test_what_is_locked_holds_poses(robot):
     table = measured_session(robot)
     for part in (table, dataclasses.replace(table, run=np.zeros_like(table.run))):
         for turn in range(4):
-            seen = ~locked_rows(robot, part, turn)
+            seen = ~held_out_rows(robot, part, turn)
             blind = dataclasses.replace(part, position=np.where(seen[:, None], part.position, np.nan))
             for again in range(4):
-                assert (locked_rows(robot, blind, again) & seen).any(), (turn, again)
+                assert (held_out_rows(robot, blind, again) & seen).any(), (turn, again)
 
 
 @pytest.mark.parametrize(("scores", "kept"), [([40.0, 33.0, 15.0], [0, 1]), ([-9.0, -3.0], [1])])
@@ -302,7 +303,7 @@ def test_of_many_rows_the_best_candidate_is_always_refitted(monkeypatch, scores,
     """Also where a few rows alone do not speak for it."""
     entries = [dataclasses.replace(blank, refit=score) for score in scores]
     monkeypatch.setattr(racing, "refitted", lambda engine, base, tried, fixed, progress: tried)
-    monkeypatch.setattr(joint, "few_of", lambda rows: rows)
+    monkeypatch.setattr(folds, "few_of", lambda rows: rows)
     engine = ManyRows(np.ones(4, bool))
     before = SimpleNamespace(names=[], values=[], noise=None, weights=None, inflation=None)
     found = racing._in_reach(engine, before, entries, {}, lambda _: None)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ctcr.diagnose import diagnose, jump
 from ctcr.diagnose.candidates import Candidate
-from ctcr.diagnose.split import groups, locked_rows
+from ctcr.fit.folds import groups, held_out_rows
 from ctcr.model import recording
 from ctcr.robot import robot_file
 from hidden_sessions import measured, measured_session, session
@@ -28,7 +28,7 @@ def test_a_frame_that_jumps_within_a_run_is_followed_to_the_row(robot, when):
     table = measured(robot, np.random.default_rng(7), hidden, fixed={jump.WHEN: when})
     at = np.searchsorted(recording.session_part(table), when)
     run = table.run[at]
-    assert table.run[at - 1] == run and locked_rows(robot, table)[at] == (when == 0.30)
+    assert table.run[at - 1] == run and held_out_rows(robot, table)[at] == (when == 0.30)
     result = diagnose(robot, table)
     assert [a.ids for a in result.accepted] == [["frame_jump"]]
     assert result.verdict.word == "identified"

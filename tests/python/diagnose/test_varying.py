@@ -8,7 +8,7 @@ import pytest
 from ctcr.compare.sample import take_sample
 from ctcr.diagnose import diagnose, other_runs, race, report, terminal, varying
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.split import locked_rows
+from ctcr.fit.folds import held_out_rows
 from ctcr.model import effect_model, simulation
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import robot_file
@@ -47,7 +47,7 @@ def readings_of(robot, plan, alpha, seed=3):
 def looked_at(robot, readings):
     """A calibration of three quarters of the runs, and what would have to vary."""
     noise = noise_of_readings(robot, readings)
-    engine = Engine(robot, readings, noise, ~locked_rows(robot, readings, 0))
+    engine = Engine(robot, readings, noise, ~held_out_rows(robot, readings, 0))
     fit = race.baseline(engine, [], {}, lambda _: None)
     return (
         engine,

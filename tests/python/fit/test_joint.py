@@ -5,6 +5,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.frames import base_to_tracker, product, quaternion_from_rotation_vector
@@ -363,7 +364,7 @@ def test_many_rows_are_fitted_as_few_are(monkeypatch):
     nominal = robot()
     readings = table(nominal, rows=200)
     at_once = joint.fit(nominal, readings, noise=NOISE)
-    monkeypatch.setattr(joint, "FEW_ROWS", 50)
+    monkeypatch.setattr(settings, "FEW_ROWS", 50)
     from_a_part = joint.fit(nominal, readings, noise=NOISE)
     assert from_a_part.starts and from_a_part.evaluations < at_once.evaluations
     np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)

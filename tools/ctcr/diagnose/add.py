@@ -16,10 +16,9 @@ from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import begin, likeliest, screen
-from ctcr.diagnose.split import locked_rows
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, did_you_mean
-from ctcr.fit import joint, one_sided
+from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
 from ctcr.model import fields
 from ctcr.model import parameters as free_parameters
@@ -98,7 +97,7 @@ def add(
     fixed = dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     before = robot_before(robot, ids)
-    held, fitted = locked_rows(before, readings), [*before.effects]
+    held, fitted = folds.held_out_rows(before, readings), [*before.effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, free, fixed)
         now, nominal = stage.values(), stage.nominal(fitted)
@@ -231,7 +230,7 @@ class _Fitter:
 
     def __init__(self, robot: Robot, readings: Measurements, free: Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.fixed = robot, fixed
-        measured = joint.measured_rows(readings)
+        measured = folds.measured_rows(readings)
         if not measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
         self.engine = Engine(robot, readings, noise_of_readings(robot, readings), measured, free=free)

@@ -17,10 +17,9 @@ from ctcr.diagnose.far_off import alone, far_off, in_words
 from ctcr.diagnose.leftover import Leftover, leftover_of
 from ctcr.diagnose.prediction import predictive
 from ctcr.diagnose.race import Progress, Round
-from ctcr.diagnose.split import groups, locked_rows
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.effects import catalogue
-from ctcr.fit import joint, one_sided
+from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
@@ -77,7 +76,7 @@ class Diagnosis:
     @property
     def judged(self) -> NDArray[np.bool_]:
         """Locked rows that hold a reading, but for those that are off alone."""
-        return self.locked & ~self.glitches & joint.measured_rows(self.measurements)
+        return self.locked & ~self.glitches & folds.measured_rows(self.measurements)
 
     @property
     def rms_mm(self) -> dict[str, float]:
@@ -144,12 +143,12 @@ def diagnose(
     began = perf_counter()
     measurements, notices = prepared(robot, measurements)
     for turn in range(TURNS):
-        locked = locked_rows(robot, measurements, turn)
+        locked = folds.held_out_rows(robot, measurements, turn)
         result = _of_these(robot, measurements, locked, progress, threads)
         beyond = _beyond_judging(result)
         if beyond:
             result.rest()
-            locked = locked_rows(robot, measurements, turn, beyond)
+            locked = folds.held_out_rows(robot, measurements, turn, beyond)
             again = _of_these(robot, measurements, locked, progress, threads)
             if again.accepted or not result.accepted:  # else the runs that showed it are those locked now
                 result = again
@@ -184,7 +183,7 @@ def _of_these(
 
 def _beyond_judging(result: Diagnosis) -> set[int]:
     """Locked groups that the fitted ones turned out to leave open: what they would show is not known by any model."""
-    fit, group = result.with_effects, groups(result.measurements)
+    fit, group = result.with_effects, folds.groups(result.measurements)
     expected = fit.expected_square[:, 0]
     usual = np.nanmean(expected[~result.locked])
     beyond = {k for k in np.unique(group[result.locked]) if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
@@ -214,7 +213,7 @@ def _diagnose(
     rounds: list[Round] = []
     accepted: list[Accepted] = []
     before, start, settled = {}, {}, False
-    few = joint.few_of(engine.fitted)
+    few = folds.few_of(engine.fitted)
     if few is not None:
         progress("a part of the readings first")
         part = replace(engine, rows=few, tolerance=joint.COARSE)

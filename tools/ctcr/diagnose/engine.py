@@ -10,7 +10,7 @@ from scipy.linalg import cho_solve
 
 from ctcr import _core
 from ctcr.effects import catalogue
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
 from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -93,7 +93,7 @@ class Engine:
     def __post_init__(self) -> None:
         self.places = joint.places_of(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
-        self.measured = joint.measured_rows(self.measurements)
+        self.measured = folds.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
 
     @property
@@ -220,7 +220,7 @@ class Engine:
 
     def thinned(self, fit: joint.Fit, least: int = SLOPES) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
-        few = joint.few_of(self.fitted, least)
+        few = folds.few_of(self.fitted, least)
         if few is None:
             return self, fit
         weights = fit.weights * few[:, None] * (np.sum(self.fitted) / np.sum(few))

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.diagnose import split
 from ctcr.diagnose.engine import Engine
+from ctcr.fit import folds
 from ctcr.fit.joint import Fit
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def explained(engine: Engine, before: Fit, after: Fit) -> dict[str, float]:
     """Share of the excess of positions that `after` explains, of each run that was not fitted, by what it is called.
     Not of those that noise explains under `before`."""
     table = engine.measurements
-    group, shares = split.groups(table), {}
+    group, shares = folds.groups(table), {}
     for k in np.unique(group[~engine.rows]):
         rows = (group == k) & ~engine.rows & engine.measured
         excess = excess_of(engine, after, rows, positions_alone=True)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.diagnose import split
+from ctcr import settings
 from ctcr.diagnose.engine import OUTLIER, Engine, values_of
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
 
 Array = NDArray[np.float64]
 
@@ -20,10 +20,10 @@ SOUND = 1.05  # inflation of the noise up to which it does
 
 def held_out(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
     """Mean square position errors [mm^2] of runs, each left out with a few others, of the model linearised at a fit."""
-    group = split.groups(engine.measurements)
+    group = folds.groups(engine.measurements)
     plain, squares = fit.weights[:, 0] > OUTLIER, []
-    for fold in range(split.FOLDS):
-        out = engine.rows & (group % split.FOLDS == fold)
+    for fold in range(settings.FOLDS):
+        out = engine.rows & (group % settings.FOLDS == fold)
         if not out.any():
             continue
         inflation = fit.inflation if noise is None else None  # another noise has its own

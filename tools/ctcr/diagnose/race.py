@@ -14,7 +14,7 @@ from ctcr.diagnose.prediction import predicts_better
 from ctcr.diagnose.round import Entry, Round
 from ctcr.effects import catalogue
 from ctcr.errors import InputError
-from ctcr.fit import joint, one_sided
+from ctcr.fit import folds, joint, one_sided
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -196,7 +196,7 @@ def _in_reach(
     engine: Engine, before: joint.Fit, chosen: list[Entry], fixed: dict[str, float], progress: Progress
 ) -> list[Entry]:
     """Those that a refit to a few of many rows does not leave far behind the best, with where that ended."""
-    few = joint.few_of(engine.fitted)
+    few = folds.few_of(engine.fitted)
     if few is None or len(chosen) < 2:
         return chosen
     small = replace(engine, rows=few)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.diagnose import split
 from ctcr.diagnose.engine import Engine, Gain, Linear, laplace
+from ctcr.fit import folds
 from ctcr.fit.joint import Fit
 
 Array = NDArray[np.float64]
@@ -151,7 +151,7 @@ def _delay(fit: Fit) -> float:
 
 def _stretches(engine: Engine) -> NDArray[np.int64]:
     """The stretch of each row (M,), numbered from 0."""
-    group = split.groups(engine.measurements)
+    group = folds.groups(engine.measurements)
     stretch, count = np.zeros(len(group), np.int64), 0
     for k in np.unique(group):
         rows = np.flatnonzero(group == k)

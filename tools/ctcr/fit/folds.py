@@ -1,8 +1,10 @@
-"""Parts of a table that are left out in turn: whole runs, or places in joint space where there are few runs.
+"""Which rows of a table are fitted and which are held out to judge the fit.
 
-A place holds every pass through it, so that nothing leaks from one pass to its return. Rows are never split singly.
+Rows are never split singly: neighbours on a path share their error. What is kept together are runs, or where there are
+too few of them, blocks of time, or regions of joint space with every pass through them.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -10,21 +12,45 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ctcr import settings
 from ctcr.compare import blocks
 from ctcr.compare.motion import follow
 from ctcr.errors import InputError, Problem
+from ctcr.fit.coverage import Coverage
+from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-FEWEST_RUNS = 4
+Mask = NDArray[np.bool_]
+Labels = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Split:
-    """`part` (M,) of each row, 0 .. parts - 1; `kind`: what was kept together, runs or places."""
+    """`part` (M,) of each row, 0 .. parts - 1; `kind`: what was kept together, runs or places (of joint space)."""
 
     kind: str
-    part: NDArray[np.int64]
+    part: Labels
     parts: int
+
+
+def measured_rows(measurements: Measurements) -> Mask:
+    """Rows that hold a position or an orientation (M,)."""
+    found = np.zeros(len(measurements), bool)
+    for values in (measurements.position, measurements.quaternion):
+        if values is not None:
+            found |= np.isfinite(values).all(axis=1)
+    return found
+
+
+def few_of(rows: Mask, least: int | None = None) -> Mask | None:
+    """At least `least` (default: FEW_ROWS) of many rows (M,), evenly spread; None of fewer than twice as many."""
+    chosen = np.flatnonzero(rows)
+    every = len(chosen) // (least or settings.FEW_ROWS)
+    if every < 2:
+        return None
+    few = np.zeros_like(rows)
+    few[chosen[::every]] = True
+    return few
 
 
 def parts_of(readings: Measurements, lever: float, parts: int) -> Split | None:
@@ -33,9 +59,9 @@ def parts_of(readings: Measurements, lever: float, parts: int) -> Split | None:
     `lever` [m]: the tip's usual distance from the insertion axis, which makes rotations comparable with translations.
     """
     runs, index = np.unique(readings.run, return_inverse=True)
-    if len(runs) >= max(FEWEST_RUNS, parts):
+    if len(runs) >= max(settings.FEWEST_RUNS, parts):
         return Split("runs", index % parts, parts)
-    cell = _places(readings, lever)
+    cell = _regions(readings, lever)
     return Split("places", cell % parts, parts) if cell.max() + 1 >= 2 * parts else None
 
 
@@ -44,13 +70,52 @@ def runs_left_out(readings: Measurements, count: int) -> Split:
     runs, index = np.unique(readings.run, return_inverse=True)
     if count >= len(runs):
         text = f"--hold-out {count} needs more than {count} runs: the table has {len(runs)}"
-        hint = "; leave it out, and places in joint space are held out" if len(runs) < FEWEST_RUNS else ""
+        hint = "; leave it out, and places in joint space are held out" if len(runs) < settings.FEWEST_RUNS else ""
         raise InputError(Problem(text + hint))
     chosen = ((np.arange(count) + 0.5) * len(runs) / count).astype(int)
     return Split("runs", np.isin(index, chosen).astype(np.int64), 2)
 
 
-def _places(readings: Measurements, lever: float) -> NDArray[np.int64]:
+def groups(measurements: Measurements) -> Labels:
+    """The group of each row (M,), numbered from 0 in the order of measuring: its run, or a block of time where there
+    are too few runs. Rows and runs without a pose do not count: each group holds something measured."""
+    measured = measured_rows(measurements)
+    runs, first = np.unique(measurements.run[measured], return_index=True)
+    if len(runs) >= settings.FEWEST_RUNS:
+        order = {run: i for i, run in enumerate(runs[np.argsort(first)])}
+        return np.array([order.get(run, 0) for run in measurements.run])
+    return np.maximum(np.cumsum(measured) - 1, 0) * settings.TIME_BLOCKS // max(np.sum(measured), 1)
+
+
+def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitted: Collection[int] = ()) -> Mask:
+    """One of every four groups (M,); `turn` 0 to 3 says which. The groups `fitted` are never held out.
+
+    A held-out group that goes where no other one went cannot judge a model: the others do not determine what it shows.
+    It is exchanged for one that they cover. Joints, loads and the model decide that, not poses.
+    """
+    group, measured = groups(measurements), measured_rows(measurements)
+    few, known, folds = few_of(measured), np.unique(group), settings.FOLDS
+    first = np.array(settings.HELD_OUT_ORDER)[known // folds % len(settings.HELD_OUT_ORDER)]
+    held_out = known[known % folds == (first + turn) % folds].tolist()
+    coverage = Coverage(robot, measurements, measured if few is None else few, group)
+    for _ in range(settings.EXCHANGES if held_out else 0):
+        left = coverage.undetermined(held_out)
+        left[np.isin(sorted(held_out), list(fitted))] = np.inf
+        if left.max() <= settings.MOST_UNDETERMINED:
+            break
+        rest = sorted(held_out)
+        rest.pop(int(np.argmax(left)))
+        others = [k for k in known if k not in held_out and k not in fitted]
+        worst = {k: coverage.undetermined([*rest, k]).max() for k in others}
+        best = min(worst, key=worst.get, default=None)
+        if best is None or worst[best] >= left.max():
+            break
+        held_out = [*rest, best]
+    return np.isin(group, held_out)
+
+
+def _regions(readings: Measurements, lever: float) -> Labels:
+    """The region of joint space of each row (M,), numbered from 0."""
     motion = follow(readings.t, readings.run, readings.beta, readings.alpha, lever)
     one_run = np.zeros_like(readings.run)
     rows, label, _ = blocks.split(SimpleNamespace(row=readings.row, run=one_run, motion=motion))

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ctcr import _core
 from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
-from ctcr.fit import messages, one_sided
+from ctcr.fit import folds, messages, one_sided
 from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model import parameters, recording, user_recording
@@ -27,7 +27,6 @@ from ctcr.table.measurements import Measurements
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FEW_ROWS = 300  # a fit of so many comes first where there are twice as many or more
 COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
 WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
 WINDINGS = 10  # and at most so often
@@ -111,7 +110,7 @@ def fit(
     mean, width, low, high = parameters.priors(robot, names, sd)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    rows, places = measured_rows(measurements) & chosen, places_of(robot, measurements)
+    rows, places = folds.measured_rows(measurements) & chosen, places_of(robot, measurements)
     warnings = [*said, *messages.doubts(measurements, rows)]
     steps = steps or recording.steps_for(robot, measurements, noise)
     table = user_recording.recording_of(robot, measurements, names, steps=steps, threads=threads)
@@ -163,7 +162,7 @@ def _with_frame(
     frame = np.array([name.startswith("tracker.") for name in names])
     if not frame.any() or frame.all() or not rows.any():
         return start
-    few = few_of(rows)
+    few = folds.few_of(rows)
     table.activate((rows if few is None else few).tolist())
 
     def predict(x: Array, derivatives: bool) -> tuple[Array, Array]:
@@ -196,7 +195,7 @@ def identify_rows(
     options["weights"] = weights
     if weights is not None:
         rows = rows & (weights > 0).any(axis=1)
-    few = few_of(rows) if few_first else None
+    few = folds.few_of(rows) if few_first else None
     if few is None:
         table.activate(rows.tolist())
         return identify_with(table, *arguments, start=start, starts=starts, **options)
@@ -205,17 +204,6 @@ def identify_rows(
     table.activate(rows.tolist())
     fitted = identify_with(table, *arguments, start=first.values, starts=1, **options)
     return replace(fitted, starts=first.starts)
-
-
-def few_of(rows: Mask, least: int | None = None) -> Mask | None:
-    """At least so many (FEW_ROWS) of many rows (M,), evenly spread; None where they are few."""
-    chosen = np.flatnonzero(rows)
-    every = len(chosen) // (least or FEW_ROWS)
-    if every < 2:
-        return None
-    few = np.zeros_like(rows)
-    few[chosen[::every]] = True
-    return few
 
 
 def identify_with(
@@ -381,12 +369,3 @@ def likeliest_field(fit: Fit, low: Array, high: Array, places: Array) -> Noise:
         for part in FIELDS[1:]
     ]
     return max([fit, *others], key=lambda tried: tried.log_evidence).noise
-
-
-def measured_rows(measurements: Measurements) -> Mask:
-    """Rows that hold a position or an orientation (M,)."""
-    found = np.zeros(len(measurements), bool)
-    for values in (measurements.position, measurements.quaternion):
-        if values is not None:
-            found |= np.isfinite(values).all(axis=1)
-    return found

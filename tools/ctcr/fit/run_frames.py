@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ctcr.errors import InputError, Problem
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
 from ctcr.frames import conjugate, product, quaternion_from_rotation_vector
 from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
@@ -105,7 +105,7 @@ def fit_with_frames(
     for _ in range(ALIGNMENT_STEPS):
         framed.align(priors[0])
     rows = rows & framed.solvable(priors[0])
-    few, fit = joint.few_of(rows), None
+    few, fit = folds.few_of(rows), None
     # Twice, as within a fit the frames act linearly.
     for chosen in (rows if few is None else few, rows):
         framed.activate(chosen.tolist())
