@@ -1,7 +1,6 @@
 """The diagnosis as one HTML page that needs nothing else: verdict first."""
 
 import html
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from ctcr.diagnose import figures
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.show import html_page
+from ctcr.show import scene as show
 from ctcr.show.html_page import cards, figure, short, table
 from ctcr.show.output import atomic_writer
 
@@ -178,34 +178,14 @@ def scene(d: "Diagnosis") -> str:
     """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
     measured = d.measurements.position
     rows = np.flatnonzero(np.isfinite(d.calibrated.residual[:, :3]).all(axis=1))
-    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ARROWS)).astype(int))]
+    rows = rows[show.evenly(len(rows), MOST_ARROWS)]
     tips = 1e3 * measured[rows]
     size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
     factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
-    data = [_trace(tips, "measured", {"mode": "markers", "marker": {"size": 2, "color": "#6b7785"}})]
+    marker = {"size": 2, "color": "#6b7785"}
+    data = [show.trace(tips, "measured", hoverinfo="name", mode="markers", marker=marker)]
     for fit, colour, name in figures.fits_shown(d):
-        lines = np.full((3 * len(rows), 3), np.nan)
-        lines[0::3], lines[1::3] = tips, tips - factor * 1e3 * fit.residual[rows, :3]
-        style = {"mode": "lines", "line": {"width": 4, "color": colour}, "connectgaps": False}
-        data.append(_trace(lines, f"error, {name}, × {factor:g}", style))
-    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
-    layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "paper_bgcolor": "#ffffff",
-        "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
-        "legend": {"orientation": "h", "y": 0, "x": 0, "itemsizing": "constant"},
-        "scene": {
-            "aspectmode": "data",
-            "camera": {"eye": {"x": 1.4, "y": 1.4, "z": 0.8}},
-            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
-        },
-    }
-    return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
-
-
-def _trace(points: np.ndarray, name: str, style: dict) -> dict:
-    columns = {
-        axis: [round(float(v), 3) if np.isfinite(v) else None for v in column]
-        for axis, column in zip("xyz", points.T, strict=True)
-    }
-    return {"type": "scatter3d", "name": name, "hoverinfo": "name", **columns, **style}
+        lines = show.shafts(tips, tips - factor * 1e3 * fit.residual[rows, :3])
+        style = {"mode": "lines", "hoverinfo": "name", "line": {"width": 4, "color": colour}, "connectgaps": False}
+        data.append(show.trace(lines, f"error, {name}, × {factor:g}", **style))
+    return show.view(data)

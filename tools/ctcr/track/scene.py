@@ -1,15 +1,14 @@
-"""The 3-D view of a scenario: the wanted path, the tip's, and the obstacle, as the JSON that plotly.js draws."""
-
-import json
+"""The 3-D view of a scenario: the wanted path, the tip's, and the obstacle."""
 
 import numpy as np
 
-from ctcr.compare.scene import MEASURED, PLATE
+from ctcr.show import scene as show
+from ctcr.show.style import INK, OUT
 from ctcr.track.runs import Run
 from ctcr.track.scenario import Scenario
 
 MOST_POINTS = 3000
-COLOURS = (MEASURED, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
+COLOURS = (OUT, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
 
 
 def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -> str:
@@ -22,43 +21,14 @@ def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -
             data.append(_line(1e3 * run.tip, name + failed, colour, 4, "solid"))
     if scenario.obstacle:
         data.append(_ball(np.array(scenario.obstacle.centre_mm), scenario.obstacle.radius_mm))
-    data.append(
-        {
-            "type": "scatter3d",
-            "mode": "markers",
-            "name": "front plate",
-            "x": [0],
-            "y": [0],
-            "z": [0],
-            "visible": "legendonly",
-            "marker": {"size": 6, "symbol": "diamond", "color": PLATE},
-        }
-    )
-    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
-    layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "paper_bgcolor": "#ffffff",
-        "font": {"family": "system-ui, sans-serif", "color": "#1c2733"},
-        "legend": {"orientation": "h", "y": 0, "x": 0},
-        "scene": {
-            "aspectmode": "data",
-            "camera": {"eye": {"x": 1.4, "y": -1.62, "z": 0.86}},
-            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
-        },
-    }
-    return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
+    plate = {"mode": "markers", "visible": "legendonly", "marker": {"size": 6, "symbol": "diamond", "color": INK}}
+    data.append(show.trace(np.zeros((1, 3)), "front plate", **plate))
+    return show.view(data, eye=(1.4, -1.62, 0.86), legend={"orientation": "h", "y": 0, "x": 0})
 
 
 def _line(points: np.ndarray, name: str, colour: str, width: int, dash: str) -> dict:
     shown = points[:: max(1, len(points) // MOST_POINTS)]
-    return {
-        "type": "scatter3d",
-        "mode": "lines",
-        "name": name,
-        "hoverinfo": "name",
-        **{axis: np.round(shown[:, k], 3).tolist() for k, axis in enumerate("xyz")},
-        "line": {"color": colour, "width": width, "dash": dash},
-    }
+    return show.trace(shown, name, mode="lines", hoverinfo="name", line={"color": colour, "width": width, "dash": dash})
 
 
 def _ball(centre: np.ndarray, radius: float) -> dict:
