@@ -1,11 +1,13 @@
 """The commands: what they print and write, one clear error, nothing half written. The model here is a stand-in."""
 
+import inspect
 import json
 import subprocess
 import sys
 import types
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 from ctcr import cli, frames
@@ -228,3 +230,21 @@ def test_help_names_every_command_and_loads_nothing_heavy():
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert all(f"\n  {name} " in out for name in ("bench", "info", "predict", "shape"))
     assert out.splitlines()[-1] == "[]"
+
+
+def commands(group=cli.cli, path=()):
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        found = group.get_command(context, name)
+        yield from commands(found, (*path, name)) if isinstance(found, click.Group) else [((*path, name), found)]
+
+
+@pytest.mark.parametrize("command", [pytest.param(found, id=" ".join(path)) for path, found in commands()])
+def test_options_meet_the_function(command):
+    """Every option and argument of a command is a parameter of its function; shared ones arrive as `out`."""
+    function = command.callback
+    given = {parameter.name for parameter in command.params if parameter.expose_value}
+    if hasattr(function, "__wrapped__"):
+        given = given - {"json_target", "report"} | {"out"}
+        function = function.__wrapped__
+    inspect.signature(function).bind(**dict.fromkeys(given))

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from ctcr.model.model import Model
 from ctcr.reproduce import control, influence, model
-from ctcr.reproduce.claim import Claim
-from ctcr.reproduce.robot import paper_robot, random_design, random_rows
+from ctcr.reproduce.paper import Claim, paper_robot, random_design, random_rows
 from ctcr.sensitivity.ranges import all_varied
+from ctcr.track.result import errors_mm
 from ctcr.track.runs import run_once, system_values
 from ctcr.track.scenario import shipped
-from ctcr.track.summary import errors_mm
 
 
 def test_a_claim_has_a_ratio_where_the_paper_is_not_zero():

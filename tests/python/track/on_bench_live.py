@@ -18,8 +18,8 @@ from ctcr.cli import cli
 from ctcr.robot import robot_file
 from ctcr.table import measurements
 from ctcr.track.live import track
+from ctcr.track.result import errors_mm
 from ctcr.track.runs import run_all
-from ctcr.track.summary import errors_mm
 from ruamel.yaml import YAML
 from simulated_bench import HOMES, ROOT, T_REF, ctcr, mended_bench
 

@@ -11,8 +11,8 @@ from ctcr.errors import InputError
 from ctcr.robot import robot_file
 from ctcr.track import scenario as scenario_file
 from ctcr.track.reach import Room, least_distance
+from ctcr.track.result import figures
 from ctcr.track.runs import run_all, run_once, system_values
-from ctcr.track.summary import figures
 
 ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "examples/robots/table2.yaml"

@@ -1,7 +1,7 @@
 """What a calibration procedure found, and how it is given back: table, JSON, robot file."""
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite, nan
 from pathlib import Path
@@ -23,7 +23,7 @@ class Row:
     name: str
     unit: str
     value: float
-    deviation: float = nan
+    sd: float = nan
     old: float = nan
 
 
@@ -50,11 +50,12 @@ class Outcome:
     picture: Picture | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        values = [
-            {"name": row.name, "unit": row.unit, "value": row.value, "sd": row.deviation, "old": row.old}
-            for row in self.rows
-        ]
-        return {"values": values, "figures": self.figures, "notices": self.notices, **self.details}
+        return {
+            "values": [vars(row) for row in self.rows],
+            "figures": self.figures,
+            "notices": self.notices,
+            **self.details,
+        }
 
 
 def computed(procedure: Callable, file: str, **arguments):
@@ -65,38 +66,21 @@ def computed(procedure: Callable, file: str, **arguments):
         raise InputError(Problem(str(error), file)) from None
 
 
-def check_target(robot, target: str | None, in_place: bool) -> str | None:
+def check_target(robot, target: str | None, in_place: bool, needed: bool = False) -> str | None:
     """The robot file to write, if any. Raises InputError where that asks for the impossible, before any work."""
     if in_place and target:
         raise InputError(Problem("give either -o or --in-place"))
     if (in_place or target) and robot is None:
         raise InputError(Problem("give --robot: the robot file whose values are to be updated"))
+    if needed and not (in_place or target):
+        raise InputError(Problem("give -o: the robot file to write"))
     return robot._source.file if in_place else target
 
 
-def deliver(
-    outcome: Outcome,
-    robot,
-    command: str,
-    sources: Sequence[str],
-    target: str | None,
-    in_place: bool,
-    json_target: str | None,
-    report: str | None,
-) -> None:
-    """Writes what was asked for, the files first, and prints the table."""
-    if target:
-        entry = Entry(command, sources, outcome.figures, " ".join(outcome.notices))
-        ledger.write(robot, target, outcome.changes, entry, in_place=in_place)
-    if report:
-        write_report(outcome, report, command, " and ".join(map(str, sources)), robot)
-    if json_target:
-        output.write_json(outcome.as_dict(), json_target)
-    console = output.console(json_target)
-    show(console, outcome)
-    for name, file in (("Report", report), ("Robot file", target)):
-        if file:
-            console.print(f"{name}: {file}", markup=False)
+def write_robot(outcome: Outcome, robot, target: str, command: str, source: str, in_place: bool) -> None:
+    """Writes the robot file with the changes, and an entry of its ledger."""
+    entry = Entry(command, [source], outcome.figures, " ".join(outcome.notices))
+    ledger.write(robot, target, outcome.changes, entry, in_place=in_place)
 
 
 def show(console, outcome: Outcome) -> None:
@@ -108,17 +92,12 @@ def show(console, outcome: Outcome) -> None:
 def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
     """Columns and rows of the table; the first two columns are text."""
     with_old = any(isfinite(row.old) for row in outcome.rows)
-    columns = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"]
-    return columns, [
-        [
-            row.name,
-            row.unit,
-            *([number(row.old, row.deviation)] if with_old else []),
-            number(row.value, row.deviation),
-            deviation(row.deviation),
-        ]
-        for row in outcome.rows
-    ]
+    columns, rows = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"], []
+    for row in outcome.rows:
+        values = [row.old, row.value] if with_old else [row.value]
+        shown = [number(value, row.sd) for value in values]
+        rows.append([row.name, row.unit, *shown, deviation(row.sd)])
+    return columns, rows
 
 
 def number(value: float, deviation: float = nan) -> str:
@@ -140,14 +119,8 @@ def digits(deviation: float) -> int:
     return max(0, 1 - int(f"{deviation:.1e}".partition("e")[2]))
 
 
-def write_report(outcome: Outcome, target: str | Path, command: str, source: str, robot=None) -> None:
-    """Write the report; source says what was measured. Raises InputError when the file cannot be written."""
-    with atomic_writer(target) as file:
-        file.write(page(outcome, command, source, robot))
-
-
-def page(outcome: Outcome, command: str, source: str, robot=None) -> str:
-    """The whole HTML text."""
+def write(outcome: Outcome, target: str | Path, source: str, command: str, robot=None) -> None:
+    """Writes the report; source says what was measured. Raises InputError where the file cannot be written."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
     sections = [f"<h1>{html.escape(title)}</h1>"]
     if outcome.notices:
@@ -156,4 +129,5 @@ def page(outcome: Outcome, command: str, source: str, robot=None) -> str:
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))
     sections.append(table("Found, with one standard deviation", *cells(outcome), 2))
-    return html_page.page(title, sections, source, command)
+    with atomic_writer(target) as file:
+        file.write(html_page.page(title, sections, source, command))

@@ -75,7 +75,7 @@ def cantilever(
         path, unit, row = (
             ("bending_stiffness_Nm2", "N m^2", rows[1]) if given_EI else ("youngs_modulus_GPa", "GPa", rows[0])
         )
-        changes.append(Change(("tubes", tube - 1, path), unit, row.value, row.deviation))
+        changes.append(Change(("tubes", tube - 1, path), unit, row.value, row.sd))
     details = {
         "rows": [
             {"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
@@ -139,7 +139,7 @@ def curvature(
     changes = []
     if described is not None:
         for key, row in (("curvature_per_m", rows[0]), ("curved_length_mm", rows[1])):
-            changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.deviation))
+            changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.sd))
     notices = [notice.text for notice in fit.notices] + left_out("", [int(table.row[i]) for i in fit.outliers])
     details = {"correlation": fit.correlation, "junction": fit.junction, "tip": fit.tip, "points_unit": unit}
     ends = (np.asarray(fit.junction), np.asarray(fit.tip))

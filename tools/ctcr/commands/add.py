@@ -2,76 +2,62 @@
 
 import click
 
+from ctcr.commands.options import effects_option, free_option, json_option, robot_argument, robot_file_options
+
 
 @click.command(name="add")
-@click.argument("robot")
+@robot_argument
 @click.argument("names", nargs=-1, metavar="[EFFECT..]")
-@click.option(
-    "--diagnosis", metavar="FILE.json", help="Add what ctcr diagnose --json found, in the form in which it was found."
-)
+@click.option("--diagnosis", metavar="FILE.json", help="Add the effects that `ctcr diagnose --json FILE.json` found.")
 @click.option("--fit", "measurements", metavar="MEASUREMENTS", help="Fit the effects to this table.")
 @click.option(
     "--set",
     "given",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Give a parameter its value (SI) instead of fitting it: friction.coefficient.1=0.02.",
+    help="Fix a parameter instead of fitting it, SI units: friction.coefficient.1=0.02. May be repeated.",
 )
-@click.option(
-    "--free",
-    default="standard",
-    show_default=True,
-    metavar="NAMES",
-    help="What is fitted together with the effects, as in ctcr calibrate fit.",
-)
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects.")
-@click.option("-o", "--output", "target", metavar="NEW", help="The robot file to write.")
-@click.option("--in-place", is_flag=True, help="Change the robot file itself.")
-@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-def command(robot, names, diagnosis, measurements, given, free, own, target, in_place, json_target) -> None:
-    """Add physical effects to ROBOT (see ctcr effects), so that every command uses them.
+@free_option
+@effects_option
+@robot_file_options
+@json_option
+def command(robot, names, diagnosis, measurements, given, free, target, in_place, out) -> None:
+    """Add physical effects to the file ROBOT, so that every command uses them. `ctcr effects` lists them.
 
-    With --fit they are fitted together with the calibration; the error is judged on runs that the fit has not seen.
-    Without, they have the values of --set, and else change nothing. The old values stay in the file's history.
+    With --fit the effects are fitted together with the parameters of --free. Every fourth run is held out and judges
+    the error; the values written come from a fit to all runs. Without --fit the effects take the values of --set, and
+    otherwise their neutral ones, which change nothing. The history of the file keeps the old values.
+
+    Example: ctcr add robot.yaml friction --fit measurements.csv -o new.yaml
     """
     from ctcr.calibrate import outcome
     from ctcr.diagnose import add
-    from ctcr.effects import catalogue, user_effects
+    from ctcr.effects import catalogue
     from ctcr.effects.settings import diagnosed, settings
     from ctcr.errors import InputError, Problem
     from ctcr.robot import robot_file
-    from ctcr.show import output
     from ctcr.table import measurements as table
 
-    user_effects.load_all(own)
     loaded = robot_file.load(robot)
-    target = outcome.check_target(loaded, target, in_place)
-    if not target:
-        raise InputError(Problem("give -o: the robot file to write"))
+    target = outcome.check_target(loaded, target, in_place, needed=True)
     found, held, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})
     ids = list(dict.fromkeys(catalogue.get(name, loaded.n_tubes).id for name in [*names, *found]))
     if not ids:
-        raise InputError(
-            Problem("nothing was found to add", diagnosis) if diagnosis else Problem("name an effect: see ctcr effects")
-        )
+        text = "nothing was found to add" if diagnosis else "name an effect: see ctcr effects"
+        raise InputError(Problem(text, diagnosis))
     fixed = held | settings(given, loaded, ids)
-    console = output.console(json_target)
     if not measurements:
         after = add.with_values(loaded, ids, fixed)
         add.write_values(loaded, after, ids, target, in_place)
-        console.print(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}", markup=False)
-        if json_target:
-            output.write_json({"effects": after.effects}, json_target)
+        out.write_json({"effects": after.effects})
+        out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
     readings = table.load(measurements, loaded.n_tubes)
     added = add.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
     add.write_added(loaded, added, target, measurements, in_place)
-    if json_target:
-        output.write_json(_as_data(added), json_target)
-    _report(console, loaded, added)
-    for warning in readings.warnings:
-        console.print(f"{warning}", markup=False)
-    console.print(f"Robot file: {target}", markup=False)
+    out.write_json(_as_data(added))
+    _show(out, loaded, added)
+    out.say(*readings.warnings, f"Robot file: {target}")
 
 
 def _as_data(added) -> dict:
@@ -88,20 +74,18 @@ def _as_data(added) -> dict:
     }
 
 
-def _report(console, robot, added) -> None:
+def _show(out, robot, added) -> None:
     from math import isfinite
 
     from ctcr.diagnose import fitted_effects
-    from ctcr.show.output import table
 
     fitted = ((name, found["value"], found["sd"]) for name, found in added.parameters().items())
-    fitted_effects.show(console, robot.n_tubes, fitted)
-    on = f"what the fit has not seen ({added.held_out})" if added.held_out else "the rows that were fitted"
-    with_angle = isfinite(added.stages[0].rms_deg)
+    fitted_effects.show(out.console, robot.n_tubes, fitted)
+    units = ["mm", "deg"] if isfinite(added.stages[0].rms_deg) else ["mm"]
     rows = [
-        [stage.name.replace("_", " "), f"{stage.rms_mm:.3f}", *([f"{stage.rms_deg:.3f}"] if with_angle else [])]
+        [stage.name.replace("_", " "), *(f"{getattr(stage, f'rms_{unit}'):.3f}" for unit in units)]
         for stage in added.stages
     ]
-    console.print(table(f"Error on {on}, RMS", ["", "mm", *(["deg"] if with_angle else [])], rows))
-    for notice in added.notices:
-        console.print(f"  • {notice}", markup=False)
+    on = f"held-out data ({added.held_out})" if added.held_out else "the rows that were fitted"
+    out.table(f"Error on {on}, RMS", ["", *units], rows)
+    out.say(*(f"  • {notice}" for notice in added.notices))

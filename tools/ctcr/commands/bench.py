@@ -5,23 +5,26 @@ import time
 
 import click
 
+from ctcr.commands.options import json_option
+
 ROWS = 20_000
 REPEATS = 5
 
 
 @click.command(name="bench")
 @click.argument("robot", required=False)
-@click.option("--json", "json_target", metavar="FILE", help="Write the table as JSON; - for standard output.")
-def command(robot: str | None, json_target: str | None) -> None:
+@json_option
+def command(robot: str | None, out) -> None:
     """Time the model on random joints of ROBOT (default: the robot of the paper's Table II).
 
-    The times hold for this machine at this moment: absolute times mean nothing across machines. The benchmark of
-    the library itself, with instruction counts and the rival, is `tools/dev bench`.
+    The times hold for this machine at this moment: absolute times mean nothing across machines. The benchmark of the
+    library itself, with instruction counts and the rival, is `tools/dev bench`.
+
+    Example: ctcr bench robot.yaml
     """
     from ctcr.model.model import Model
     from ctcr.robot import robot_file
     from ctcr.robot.table_ii import table_ii
-    from ctcr.show import output
 
     loaded = robot_file.load(robot) if robot else table_ii()
     model = Model(loaded)
@@ -31,8 +34,7 @@ def command(robot: str | None, json_target: str | None) -> None:
         for derivatives in (False, True)
         for threads in dict.fromkeys((1, os.cpu_count() or 1))
     ]
-    if json_target:
-        output.write_json({"robot": loaded.name, "rows": ROWS, "results": results}, json_target)
+    out.write_json({"robot": loaded.name, "rows": ROWS, "results": results})
     rows = [
         [
             result["load"],
@@ -45,9 +47,8 @@ def command(robot: str | None, json_target: str | None) -> None:
         for result in results
     ]
     columns = ["load", "result", "threads", "configurations/s", "per thread", "solved %"]
-    console = output.console(json_target)
-    console.print(output.table(f"{loaded.name}: {ROWS} random configurations from a cold start", columns, rows, 2))
-    console.print("Best of 5. Absolute times mean nothing across machines.")
+    out.table(f"{loaded.name}: {ROWS} random configurations from a cold start", columns, rows, 2)
+    out.say("Best of 5. Absolute times mean nothing across machines.")
 
 
 def _timed(model, robot, load: str, derivatives: bool, threads: int) -> dict:

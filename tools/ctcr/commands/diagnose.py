@@ -2,50 +2,41 @@
 
 import click
 
+from ctcr.commands.options import (
+    effects_option,
+    load,
+    measurements_argument,
+    output_options,
+    robot_argument,
+    threads_option,
+)
+
 
 @click.command(name="diagnose")
-@click.argument("robot")
-@click.argument("measurements")
-@click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
-@click.option("--json", "json_target", metavar="FILE", help="Write the verdict as JSON; - for standard output.")
-@click.option(
-    "--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that may be missing too."
-)
-@click.option("--threads", type=click.IntRange(0), default=0, help="Threads; 0: all cores.")
-def command(robot: str, measurements: str, report: str | None, json_target: str | None, own, threads: int) -> None:
-    """Find out which physical effect the model of ROBOT lacks to explain MEASUREMENTS.
+@robot_argument
+@measurements_argument
+@output_options
+@effects_option
+@threads_option
+def command(robot: str, measurements: str, threads: int, out) -> None:
+    """Find out which physical effect the model of ROBOT lacks to explain the poses in MEASUREMENTS.
 
-    Calibrates first, then fits every effect of the catalogue together with the calibration, accepts one at a time, and
-    checks the result on runs that no fit saw. Says so when nothing is missing, when the data cannot tell effects apart,
-    and when the cause is in no catalogue.
+    Calibrates first. Then fits every effect of the catalogue (`ctcr effects`) together with the calibration, accepts
+    one at a time, and checks the result on held-out runs. The verdict also says when nothing is missing, when the data
+    cannot tell effects apart, and when no effect of the catalogue explains the error.
+
+    Example: ctcr diagnose robot.yaml measurements.csv --json diagnosis.json --report diagnosis.html
     """
     from ctcr.diagnose import diagnose, terminal
-    from ctcr.robot import robot_file
-    from ctcr.show import output
-    from ctcr.table import measurements as table
 
-    if own:
-        from ctcr.effects import user_effects
-
-        user_effects.load_all(own)
-    loaded = robot_file.load(robot)
-    readings = table.load(measurements, loaded.n_tubes)
-    console = output.console(json_target)
+    loaded, readings = load(robot, measurements)
     with terminal.progress() as say:
         result = diagnose(loaded, readings, progress=say, threads=threads)
-    if report:
-        from ctcr.diagnose import report as page
-
-        page.write(result, report, f"{measurements} diagnosed with the model of {robot}")
-    if json_target:
-        output.write_json(result.as_json(), json_target)
-    terminal.show(console, result)
-    for warning in readings.warnings:
-        console.print(f"{warning}", markup=False)
+    out.write_report("diagnose.report", result, f"{measurements} diagnosed with the model of {robot}")
+    out.write_json(result.as_json())
+    terminal.show(out.console, result)
+    out.say(*readings.warnings)
     if result.accepted and not result.verdict.names_no_cause:
-        found = "FILE" if json_target in (None, "-") else json_target
-        way = f"ctcr add {robot} --diagnosis {found} --fit {measurements} -o NEW.yaml"
-        hint = " (FILE: that of --json)" if found == "FILE" else ""
-        console.print(f"To add: {way}{hint}", markup=False, soft_wrap=True)
-    if report:
-        console.print(f"Report: {report}", markup=False)
+        known = out.json_target not in (None, "-")
+        way = f"ctcr add {robot} --diagnosis {out.json_target if known else 'FILE'} --fit {measurements} -o NEW.yaml"
+        out.console.print(f"To add: {way}{'' if known else ' (FILE: that of --json)'}", markup=False, soft_wrap=True)

@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.commands.options import effects_option, json_option
+
 _NEEDS = {
     "order": "rows in the order measured",
     "time": "times",
@@ -13,26 +15,30 @@ _NEEDS = {
 
 @click.command(name="effects")
 @click.argument("name", required=False)
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="Show the effects of this file too.")
+@effects_option
 @click.option(
     "--tubes", type=click.IntRange(1, 4), default=3, show_default=True, help="Tubes of the robot, for full names."
 )
-@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-def command(name: str | None, own: tuple[str, ...], tubes: int, json_target: str | None) -> None:
-    """List the physical effects that can be added to a robot, or tell everything about the effect NAME."""
-    from ctcr.effects import catalogue, user_effects
-    from ctcr.show import output
+@json_option
+def command(name: str | None, tubes: int, out) -> None:
+    """List the physical effects that a robot may have beyond the standard model, or describe the effect NAME.
 
-    user_effects.load_all(own)
+    The description says how the effect shows in measurements, what to measure to see it, and its parameters with their
+    units, standard deviations and bounds.
+
+    Example: ctcr effects friction
+    """
+    from ctcr.effects import catalogue
+
     shown = [catalogue.get(name, tubes)] if name else list(catalogue.all_effects(tubes).values())
-    if json_target:
-        data = [_as_data(effect) for effect in shown]
-        output.write_json(data[0] if name else {"effects": data}, json_target)
-        if json_target == "-":
-            return
-    console = output.console()
+    data = [_as_data(effect) for effect in shown]
+    out.write_json(data[0] if name else {"effects": data})
+    if out.json_target == "-":
+        return
+    console = out.console
+    console.soft_wrap = False
     if name:
-        _tell(console, shown[0])
+        _describe(console, shown[0])
     else:
         _list(console, shown)
 
@@ -41,27 +47,19 @@ def _list(console, shown) -> None:
     from ctcr.show.output import table
 
     rows = [
-        [
-            effect.id,
-            effect.title,
-            ", ".join(need for need in _NEEDS if need in effect.needs),
-            "\n".join(effect.look_alikes),
-        ]
-        for effect in shown
+        [e.id, e.title, ", ".join(need for need in _NEEDS if need in e.needs), "\n".join(e.look_alikes)] for e in shown
     ]
-    columns = ["id", "what it is", "the data need", "looks like"]
-    console.soft_wrap = False
+    columns = ["id", "name", "the data need", "looks like"]
     console.print(table(f"{len(shown)} physical effects", columns, rows, 4))
-    console.print("ctcr effects ID tells how one looks in the data and what to measure to see it.")
+    console.print("ctcr effects ID describes how an effect shows in the data and what to measure to see it.")
 
 
-def _tell(console, effect) -> None:
+def _describe(console, effect) -> None:
     from rich.table import Table
 
     from ctcr.show.output import table
 
     needs = ", ".join(_NEEDS[need] for need in _NEEDS if need in effect.needs) or "nothing special"
-    console.soft_wrap = False
     console.print(f"[bold]{effect.title}[/bold]  ({effect.id})\n")
     facts = Table.grid(padding=(0, 2))
     facts.add_column(style="bold", no_wrap=True)
@@ -114,29 +112,23 @@ def _interval(limits: tuple[float, float]) -> str:
     return f"{low:.3g} to {high:.3g}"
 
 
+# JSON keys and the members that they show.
+_EFFECT = ("id", "title", "physics", "signature", "measure", "needs", "look_alikes", "reference")
+_PARAMETER = {
+    "name": "name",
+    "full_names": "full_names",
+    "unit": "unit",
+    "kind": "kind",
+    "neutral": "neutral",
+    "sd": "sigma",
+    "usual": "soft",
+    "possible": "hard",
+    "per_tube": "per_tube",
+    "meaning": "meaning",
+}
+
+
 def _as_data(effect) -> dict:
-    return {
-        "id": effect.id,
-        "title": effect.title,
-        "physics": effect.physics,
-        "signature": effect.signature,
-        "measure": effect.measure,
-        "needs": sorted(effect.needs),
-        "look_alikes": effect.look_alikes,
-        "reference": effect.reference,
-        "parameters": [
-            {
-                "name": p.name,
-                "full_names": p.full_names,
-                "unit": p.unit,
-                "kind": p.kind,
-                "neutral": p.neutral,
-                "sd": p.sigma,
-                "usual": p.soft,
-                "possible": p.hard,
-                "per_tube": p.per_tube,
-                "meaning": p.meaning,
-            }
-            for p in effect.parameters
-        ],
-    }
+    parameters = [{key: getattr(p, member) for key, member in _PARAMETER.items()} for p in effect.parameters]
+    data = {key: getattr(effect, key) for key in _EFFECT}
+    return data | {"needs": sorted(effect.needs), "parameters": parameters}

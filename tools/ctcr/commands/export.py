@@ -2,18 +2,21 @@
 
 import click
 
+from ctcr.commands.options import Output
+
 
 @click.command(name="export")
 @click.argument("folder")
 @click.option("-o", "--output", "target", required=True, metavar="FILE.mcap", help="The file to write.")
 def command(folder, target) -> None:
-    """Write the recording in FOLDER, of ctcr record or ctcr track --live, as MCAP.
+    """Write the recording in FOLDER, which ctcr record or ctcr track --live made, as MCAP.
 
-    Joints, measurements and, of a controlled robot, references are channels of JSON messages, a message a row.
+    The channels /joints, /measurements and, for a controlled robot, /reference hold one JSON message a row, with the
+    columns of the recording; the names of the columns carry their units. Needs the package mcap.
+
+    Example: ctcr export recording -o recording.mcap
     """
-    from ctcr.show import output
     from ctcr.track.mcap_file import write_mcap
 
     counts = write_mcap(folder, target)
-    rows = [[channel, str(count)] for channel, count in counts.items()]
-    output.console().print(output.table(target, ["channel", "messages"], rows))
+    Output().table(target, ["channel", "messages"], [[channel, str(count)] for channel, count in counts.items()])

@@ -1,28 +1,26 @@
-"""`ctcr history`: what was changed in a robot file, when, from which data, and what it brought."""
+"""`ctcr history`: what was changed in a robot file, when, from which data, and how the error fell."""
 
 import click
 
+from ctcr.commands.options import effects_option, output_options, robot_argument
+
 
 @click.command(name="history")
-@click.argument("robot")
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that it has.")
-@click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
-@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-def command(robot: str, own: tuple[str, ...], report: str | None, json_target: str | None) -> None:
-    """Show the ledger of ROBOT: what was calibrated and added, and how the error fell on data that no fit had seen."""
-    from ctcr.effects import user_effects
-    from ctcr.robot import history, robot_file
-    from ctcr.show import output
+@robot_argument
+@effects_option
+@output_options
+def command(robot: str, out) -> None:
+    """Show the ledger of the file ROBOT: each calibration and added effect, with date, data and error.
 
-    user_effects.load_all(own)
+    Errors are those on held-out runs where there were any, in mm RMS.
+
+    Example: ctcr history robot.yaml --report history.html
+    """
+    from ctcr.robot import history, robot_file
+
     loaded = robot_file.load(robot)
     entries, stages = history.entries(loaded), history.waterfall(loaded)
-    if report:
-        history.write_report(loaded, report, robot)
-    if json_target:
-        data = {"entries": loaded.history, "waterfall": [vars(stage) for stage in stages]}
-        output.write_json(data, json_target)
-    console = output.console(json_target)
-    history.show(console, loaded, entries, stages)
-    if report:
-        console.print(f"Report: {report}", markup=False)
+    if out.report:
+        history.write_report(loaded, out.report, robot)
+    out.write_json({"entries": loaded.history, "waterfall": [vars(stage) for stage in stages]})
+    history.show(out.console, loaded, entries, stages)

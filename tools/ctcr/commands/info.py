@@ -4,26 +4,32 @@ from math import degrees
 
 import click
 
+from ctcr.commands.options import json_option, robot_argument
+
 
 @click.command(name="info")
-@click.argument("robot")
-@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-def command(robot: str, json_target: str | None) -> None:
-    """Show what the file ROBOT says, the stiffnesses that follow, and what looks wrong."""
+@robot_argument
+@json_option
+def command(robot: str, out) -> None:
+    """Show the values of the file ROBOT, the stiffnesses that follow from them, and what looks wrong.
+
+    Example: ctcr info robot.yaml
+    """
     from ctcr.robot import robot_file
-    from ctcr.show import output
 
     loaded = robot_file.load(robot)
     doubts = robot_file.warnings(loaded)
-    if json_target:
-        output.write_json(_as_data(loaded, doubts), json_target)
-    if json_target == "-":
+    out.write_json(_as_data(loaded, doubts))
+    if out.json_target == "-":
         return
-    console = output.console()
-    console.print(f"[bold]{loaded.name}[/bold]: {loaded.n_tubes} tubes, innermost first")
-    console.print(output.table("Tubes", *_tube_rows(loaded), text_columns=2))
-    console.print(output.table("Sensor and frame", ["", "value", "unit"], _bench_rows(loaded)))
-    _print_doubts(console, doubts)
+    out.console.print(f"[bold]{loaded.name}[/bold]: {loaded.n_tubes} tubes, innermost first")
+    out.table("Tubes", *_tube_rows(loaded), 2)
+    out.table("Sensor and frame", ["", "value", "unit"], _bench_rows(loaded))
+    if doubts:
+        out.console.print("[bold yellow]What looks wrong[/bold yellow]")
+        out.say(*(f"  {doubt}" for doubt in doubts))
+    else:
+        out.say("Nothing looks wrong.")
 
 
 def _tube_rows(robot) -> tuple[list[str], list[list[str]]]:
@@ -76,26 +82,15 @@ def _bench_rows(robot) -> list[list[str]]:
     ]
 
 
-def _print_doubts(console, doubts) -> None:
-    if not doubts:
-        console.print("Nothing looks wrong.")
-        return
-    console.print("[bold yellow]What looks wrong[/bold yellow]")
-    for doubt in doubts:
-        console.print(f"  {doubt}", markup=False)
-
-
 def _as_data(robot, doubts) -> dict:
-    derived = ("bending_stiffness", "torsional_stiffness", "mass_per_length", "straightened_strain")
-    units = ("N_m2", "N_m2", "kg_per_m", "1")
+    derived = {
+        "bending_stiffness_N_m2": "bending_stiffness",
+        "torsional_stiffness_N_m2": "torsional_stiffness",
+        "mass_per_length_kg_per_m": "mass_per_length",
+        "straightened_strain": "straightened_strain",
+    }
     return {
         "robot": robot.model_dump(exclude_unset=True),
-        "derived": [
-            {
-                f"{name}_{unit}".removesuffix("_1"): getattr(tube, name) or None
-                for name, unit in zip(derived, units, strict=True)
-            }
-            for tube in robot.tubes
-        ],
+        "derived": [{key: getattr(tube, name) or None for key, name in derived.items()} for tube in robot.tubes],
         "looks_wrong": [{"field": doubt.field, "line": doubt.line, "message": doubt.message} for doubt in doubts],
     }

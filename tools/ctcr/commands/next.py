@@ -2,59 +2,64 @@
 
 import click
 
+from ctcr.commands.options import (
+    effects_option,
+    json_option,
+    load,
+    measurements_argument,
+    robot_argument,
+    threads_option,
+)
+
 
 @click.command(name="next")
-@click.argument("robot")
-@click.argument("measurements")
+@robot_argument
+@measurements_argument
 @click.option("--runs", type=click.IntRange(1, 100), default=4, show_default=True, help="Runs to propose.")
 @click.option(
-    "--masses", default="0,10,20", show_default=True, metavar="GRAMS", help="Masses that can be hung at the tip."
+    "--masses", default="0,10,20", show_default=True, metavar="GRAMS", help="Masses that can be hung at the tip [g]."
 )
 @click.option("-o", "--output", "target", metavar="PLAN", help="Write the runs as a table that the robot can run.")
-@click.option("--json", "json_target", metavar="FILE", help="Write it as JSON; - for standard output.")
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects.")
-@click.option("--threads", type=click.IntRange(0), default=0, help="Threads; 0: all cores.")
-def command(robot, measurements, runs, masses, target, json_target, own, threads) -> None:
-    """Propose the runs that best tell apart what MEASUREMENTS leave open about ROBOT.
+@json_option
+@effects_option
+@threads_option
+def command(robot, measurements, runs, masses, target, threads, out) -> None:
+    """Propose the runs that best discriminate between the effects that MEASUREMENTS leave open about ROBOT.
 
-    Diagnoses first. Each run goes out and back through the same stops under one load, within the joints measured so
-    far. Says so when nothing is open, and when no run can decide.
+    Diagnoses first. Each run goes out and back through the same stops under one load, within the range of the joints
+    measured so far; the runs with the largest expected log evidence come first. Says so when nothing is open, and when
+    no run can decide.
+
+    Example: ctcr next robot.yaml measurements.csv --runs 4 --masses 0,20 -o plan.csv
     """
     from ctcr import plan
     from ctcr.diagnose import diagnose, terminal
-    from ctcr.effects import user_effects
     from ctcr.model import simulation
-    from ctcr.robot import robot_file
-    from ctcr.show import output
-    from ctcr.table import measurements as table
 
-    user_effects.load_all(own)
-    grams = _masses(masses)
-    loaded = robot_file.load(robot)
-    readings = table.load(measurements, loaded.n_tubes)
-    console = output.console(json_target)
+    kilograms = _masses(masses)
+    loaded, readings = load(robot, measurements)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
         say("looking for the runs that decide")
-        proposal = plan.propose(diagnosis, runs, tuple(1e-3 * gram for gram in grams))
-    if proposal.plan is not None and target:
+        proposal = plan.propose(diagnosis, runs, kilograms)
+    writes = proposal.plan is not None and target
+    if writes:
         simulation.write(proposal.plan, target, loaded.n_tubes)
-    if json_target:
-        output.write_json(
-            {
-                "rivals": [rival.id for rival in proposal.rivals],
-                "log_evidence": {"now": proposal.now if proposal.rivals else None, "expected": proposal.gain},
-                "decides": proposal.decides,
-                "runs": [{"beta_m": r.beta, "alpha_rad": r.alpha, "mass_kg": r.mass} for r in proposal.runs],
-            },
-            json_target,
-        )
-    _show(console, loaded.n_tubes, diagnosis.verdict.word.replace("_", " "), proposal)
-    if proposal.plan is not None and target:
-        console.print(f"Plan: {target}", markup=False)
+    out.write_json(
+        {
+            "rivals": [rival.id for rival in proposal.rivals],
+            "log_evidence": {"now": proposal.now if proposal.rivals else None, "expected": proposal.gain},
+            "decides": proposal.decides,
+            "runs": [{"beta_m": r.beta, "alpha_rad": r.alpha, "mass_kg": r.mass} for r in proposal.runs],
+        }
+    )
+    _show(out, loaded.n_tubes, diagnosis.verdict.word.replace("_", " "), proposal)
+    if writes:
+        out.say(f"Plan: {target}")
 
 
-def _masses(text: str) -> list[float]:
+def _masses(text: str) -> tuple[float, ...]:
+    """Masses [kg] of a text in g."""
     from ctcr.errors import InputError, Problem
 
     try:
@@ -63,25 +68,22 @@ def _masses(text: str) -> list[float]:
         grams = [-1.0]
     if not all(0 <= gram < 1000 for gram in grams):
         raise InputError(Problem(f"--masses {text}: give grams from 0 to 1000, separated by commas, as 0,10,20"))
-    return grams
+    return tuple(1e-3 * gram for gram in grams)
 
 
-def _show(console, n_tubes: int, verdict: str, proposal) -> None:
+def _show(out, n_tubes: int, verdict: str, proposal) -> None:
     from ctcr.plan.proposal import instead
-    from ctcr.show import output
 
     if len(proposal.rivals) < 2:
-        console.print(f"Nothing is open between effects: the verdict on these measurements is {verdict}.")
+        out.say(f"Nothing is open between effects: the verdict on these measurements is {verdict}.")
         return
-    console.print(f"Open: {' or '.join(rival.id for rival in proposal.rivals)}.", markup=False)
+    out.say(f"Open: {' or '.join(rival.id for rival in proposal.rivals)}.")
     rows = [
         [str(i), f"{1e3 * run.mass:g}", f"{gain:.1f}"]
         for i, (run, gain) in enumerate(zip(proposal.runs, proposal.gain, strict=True), start=1)
     ]
     title = f"Runs, best first; log evidence between the nearest two now: {proposal.now:.1f}"
-    console.print(output.table(title, ["run", "mass at the tip, g", "expected log evidence with it"], rows))
-    if proposal.decides:
-        return
-    console.print("No run within the measured joints and these loads can decide. Measure instead:")
-    for identity, advice in instead(proposal, n_tubes).items():
-        console.print(f"  {identity}: {advice}", markup=False)
+    out.table(title, ["run", "mass at the tip, g", "expected log evidence with it"], rows)
+    if not proposal.decides:
+        out.say("No run within the measured joints and these loads can decide. Measure instead:")
+        out.say(*(f"  {identity}: {advice}" for identity, advice in instead(proposal, n_tubes).items()))

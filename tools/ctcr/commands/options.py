@@ -1,7 +1,159 @@
-"""Options that the commands of the bench share."""
+"""What commands share: arguments, options, loading, and `Output`, which gives a result back.
+
+Each option exists once, as a decorator. Heavy imports are late: `ctcr --help` loads this file.
+"""
+
+from functools import cached_property, wraps
+from importlib import import_module
 
 import click
 
+robot_argument = click.argument("robot")
+measurements_argument = click.argument("measurements")
 folder_option = click.option(
-    "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); one of this user's."
+    "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
 )
+steps_option = click.option(
+    "--steps",
+    type=click.IntRange(1, 1000),
+    default=4,
+    show_default=True,
+    help="Integration steps per segment; more are more accurate and slower.",
+)
+threads_option = click.option(
+    "--threads", type=click.IntRange(0), default=0, show_default=True, help="Threads; 0: one per core."
+)
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=1,
+    show_default=True,
+    help="Seed of the random numbers: the same seed gives the same result.",
+)
+noise_option = click.option(
+    "--noise",
+    type=click.Choice(["none", "jitter", "realistic"]),
+    default="jitter",
+    show_default=True,
+    help="jitter: white noise as the robot file states; realistic: also the tracker's smooth field error and outliers.",
+)
+hide_option = click.option(
+    "--hide",
+    "hidden",
+    multiple=True,
+    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
+    help="Give the simulated robot an effect that ROBOT lacks; SI units (`ctcr effects EFFECT`). May be repeated.",
+)
+free_option = click.option(
+    "--free",
+    default="standard",
+    show_default=True,
+    metavar="NAMES",
+    help="Parameters to fit, separated by commas, such as tubes.*.youngs_modulus,tracker.frame; standard: the paper's.",
+)
+
+
+def robot_file_options(function):
+    """-o and --in-place, as `target` and `in_place`: the robot file to write."""
+    in_place = click.option("--in-place", is_flag=True, help="Change the robot file itself.")
+    return click.option("-o", "--output", "target", metavar="NEW", help="Write the changed robot file.")(
+        in_place(function)
+    )
+
+
+def _load_effects(context, parameter, files) -> None:
+    if files:
+        from ctcr.effects import user_effects
+
+        user_effects.load_all(files)
+
+
+# Eager: the robot file may name these effects.
+effects_option = click.option(
+    "--effects",
+    multiple=True,
+    metavar="FILE.py",
+    is_eager=True,
+    expose_value=False,
+    callback=_load_effects,
+    help="Python file with effects of your own, which then count as those of the catalogue. May be repeated.",
+)
+
+
+def load(robot: str, table: str):
+    """The robot of a file, and a table of measurements or a plan for it."""
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
+
+    loaded = robot_file.load(robot)
+    return loaded, measurements.load(table, loaded.n_tubes)
+
+
+def with_effects(robot, given):
+    """The robot with the effects of texts such as friction.coefficient=0.02."""
+    from ctcr.diagnose import add
+    from ctcr.effects.settings import settings
+
+    values = settings(given, robot)
+    return add.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
+
+
+class Output:
+    """Gives a result back: as text, with --json as numbers, with --report as a page."""
+
+    def __init__(self, json_target: str | None = None, report: str | None = None):
+        self.json_target, self.report = json_target, report
+
+    @cached_property
+    def console(self):
+        """A rich console: standard output, or standard error where that carries the JSON."""
+        from ctcr.show import output
+
+        return output.console(self.json_target)
+
+    def say(self, *lines) -> None:
+        """Prints each line as it is."""
+        for line in lines:
+            self.console.print(str(line), markup=False)
+
+    def table(self, title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1) -> None:
+        """Prints a table; the first columns are text, the others numbers."""
+        from ctcr.show import output
+
+        self.console.print(output.table(title, columns, rows, text_columns))
+
+    def write_json(self, data) -> None:
+        """Where --json asks for it."""
+        if self.json_target:
+            from ctcr.show import output
+
+            output.write_json(data, self.json_target)
+
+    def write_report(self, module: str, result, source: str, **details) -> None:
+        """Where --report asks for it: the page of the module, below ctcr; `source` says what it is made from."""
+        if self.report:
+            import_module(f"ctcr.{module}").write(result, self.report, source, **details)
+
+
+def _gives_output(*options):
+    """A decorator: adds the options and passes what they ask for as `out`."""
+
+    def decorate(function):
+        @wraps(function)
+        def command(*args, json_target, report=None, **others):
+            out = Output(json_target, report)
+            code = function(*args, out=out, **others)
+            if report:
+                out.say(f"Report: {report}")
+            return code
+
+        for option in options:
+            command = option(command)
+        return command
+
+    return decorate
+
+
+_json = click.option("--json", "json_target", metavar="FILE", help="Write the result as JSON; - for standard output.")
+_report = click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
+json_option, output_options = _gives_output(_json), _gives_output(_json, _report)

@@ -2,6 +2,8 @@
 
 import click
 
+from ctcr.commands.options import json_option, robot_argument, steps_option
+
 SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometres
 
 
@@ -18,103 +20,95 @@ class Numbers(click.ParamType):
 
 
 @click.command(name="shape")
-@click.argument("robot")
+@robot_argument
 @click.option("--beta", type=Numbers(), help="Grasped points [m], <= 0, innermost tube first.")
 @click.option("--beta-mm", type=Numbers(), help="The same in mm.")
 @click.option("--alpha", type=Numbers(), help="Base angles [rad], innermost tube first.")
 @click.option("--alpha-deg", type=Numbers(), help="The same in degrees.")
 @click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("-o", "--output", "picture", metavar="FILE.png", help="Draw the robot.")
-@click.option(
-    "--steps", type=click.IntRange(1, 1000), default=4, show_default=True, help="Integration steps per segment."
-)
-@click.option(
-    "--json", "json_target", metavar="FILE", help="Write it, with the samples, as JSON; - for standard output."
-)
-def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, json_target) -> None:
-    """Solve ROBOT at one set of joints: --beta and --alpha, one value a tube.
+@steps_option
+@json_option
+def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) -> None:
+    """Solve ROBOT at one set of joints, one value a tube: shape, pose of the tip, and how near it is to snapping.
+
+    The JSON holds samples of the backbone [m] in the base frame. Effects that depend on how the joints were reached
+    are left out.
 
     Example: ctcr shape robot.yaml --beta-mm -330,-240,-165 --alpha-deg 50,-40,-60 -o robot.png
     """
     import numpy as np
 
     from ctcr.errors import InputError, Problem
+    from ctcr.frames import matrix_from_quaternion
+    from ctcr.model import effect_model
     from ctcr.model.model import Model, status_text
     from ctcr.robot import robot_file
-    from ctcr.show import output
 
     loaded = robot_file.load(robot)
-    beta = _joints("beta", beta, "beta-mm", beta_mm, 1e-3, loaded.n_tubes)
-    alpha = _joints("alpha", alpha, "alpha-deg", alpha_deg, np.pi / 180, loaded.n_tubes)
-    force = _finite("force", np.array(force), 3)
-    used, left_out = _without_path(loaded) if loaded.effects else (loaded, [])
-    model = Model(used, steps=steps)
-    tip = model.predict(beta[None], alpha[None], force[None])
+    beta = _joints("beta", {"beta": (beta, 1.0), "beta-mm": (beta_mm, 1e-3)}, loaded.n_tubes)
+    alpha = _joints("alpha", {"alpha": (alpha, 1.0), "alpha-deg": (alpha_deg, np.pi / 180)}, loaded.n_tubes)
+    force = _finite("force", force, 3)
+    with_history = effect_model.of_the_path(loaded) if loaded.effects else []
+    kept = {name: given for name, given in loaded.effects.items() if name not in with_history}
+    tip = Model(loaded.model_copy(update={"effects": kept}), steps=steps).predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
-    standard = Model(loaded.model_copy(update={"effects": {}}), steps=steps) if loaded.effects else model
-    shape = standard.shape(beta, alpha, force, points=SAMPLES)
+    shape = Model(loaded.standard, steps=steps).shape(beta, alpha, force, points=SAMPLES)
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
+    rotation = matrix_from_quaternion(shape.quaternion)
     if picture:
-        from ctcr.frames import matrix_from_quaternion
         from ctcr.show.pictures import draw_robot
 
-        draw_robot(
-            picture,
-            loaded,
-            shape.arc_length,
-            shape.position,
-            matrix_from_quaternion(shape.quaternion),
-            ends,
-            force,
-            _title(beta, alpha),
-        )
-    data = _as_data(loaded, shape, tip, ends)
-    if json_target:
-        output.write_json(data, json_target)
-    console = output.console(json_target)
-    _report(console, loaded, data, picture)
-    if loaded.effects:
-        _tell_effects(console, tip.position[0], used, left_out)
+        title = f"beta = {_listed(1e3 * beta, 1)} mm\nalpha = {_listed(np.degrees(alpha), 0)} deg"
+        draw_robot(picture, loaded, shape.arc_length, shape.position, rotation, ends, force, title)
+    tips = np.column_stack([np.interp(ends, shape.arc_length, axis) for axis in shape.position.T])
+    out.write_json(
+        {
+            "robot": loaded.name,
+            "tip": {
+                "position_m": tip.position[0],
+                "quaternion_wxyz": tip.quaternion[0],
+                "direction": rotation[-1][:, 2],
+            },
+            "tubes": [{"tip_arc_length_m": s, "tip_position_m": x} for s, x in zip(ends, tips, strict=True)],
+            "stability": tip.stability[0],
+            "samples": {"arc_length_m": shape.arc_length, "position_m": shape.position},
+        }
+    )
+    out.console.print(f"[bold]{loaded.name}[/bold], base frame")
+    rows = [
+        [f"tube {i}", f"{1e3 * s:.2f}", *(f"{1e3 * x:.3f}" for x in position)]
+        for i, (s, position) in enumerate(zip(ends, tips, strict=True), start=1)
+    ]
+    out.table("Where the tubes end", ["", "out [mm]", "x [mm]", "y [mm]", "z [mm]"], rows)
+    out.say("tip direction  " + _listed(rotation[-1][:, 2], 5))
+    out.say("tip quaternion " + _listed(tip.quaternion[0], 5) + "  (w, x, y, z)")
+    if np.isfinite(tip.stability[0]):  # not known with effects
+        out.say(f"stability      {tip.stability[0]:.3g}  (0: about to snap)")
+    if picture:
+        out.say(f"picture: {picture}")
+    if acting := [name for name in kept if name not in effect_model.OF_THE_TRACKER]:
+        sensor = f"With {', '.join(acting)} the sensor is at {_listed(1e3 * tip.position[0], 3)} mm"
+        out.say(f"{sensor}; the shape is that of the standard model.")
+    if with_history:
+        out.say(f"Left out, as it depends on how the joints were reached: {', '.join(with_history)}")
 
 
-def _without_path(robot):
-    """The robot without the effects that depend on how its joints were reached, and their names."""
-    from ctcr.model import effect_model
-
-    left_out = effect_model.of_the_path(robot)
-    kept = {name: given for name, given in robot.effects.items() if name not in left_out}
-    return robot.model_copy(update={"effects": kept}), left_out
-
-
-def _tell_effects(console, tip, robot, left_out: list[str]) -> None:
-    from ctcr.model.effect_model import OF_THE_TRACKER
-
-    acting = [name for name in robot.effects if name not in OF_THE_TRACKER]
-    if acting:
-        place = ", ".join(f"{1e3 * x:.3f}" for x in tip)
-        text = f"With {', '.join(acting)} the sensor is at {place} mm; the shape is that of the standard model."
-        console.print(text, markup=False)
-    if left_out:
-        text = f"Left out, as it depends on how the joints were reached: {', '.join(left_out)}"
-        console.print(text, markup=False)
-
-
-def _joints(name: str, values, other: str, other_values, factor: float, n_tubes: int):
-    """Joints in SI units, from the option that was given."""
-    import numpy as np
-
+def _joints(name: str, given: dict, n_tubes: int):
+    """Joints (N,) in SI units, of the one option that was given; `given` {option: (numbers, their unit)}."""
     from ctcr.errors import InputError, Problem
     from ctcr.table.measurements import QUANTITIES
 
-    if (values is None) == (other_values is None):
-        raise InputError(Problem(f"give either --{name} or --{other}: {n_tubes} numbers, innermost tube first"))
-    used = f"--{name}" if other_values is None else f"--{other}"
-    joints = _finite(used.lstrip("-"), np.array(values if other_values is None else other_values), n_tubes)
-    joints = joints if other_values is None else factor * joints
-    strange = [value for value in joints if abs(value) > QUANTITIES[name].usual[1]]
-    if strange:
-        raise InputError(Problem(QUANTITIES[name].doubt(strange[0]), field=used))
+    found = [(option, values, unit) for option, (values, unit) in given.items() if values is not None]
+    if len(found) != 1:
+        text = f"give either --{' or --'.join(given)}: {n_tubes} numbers, innermost tube first"
+        raise InputError(Problem(text))
+    option, values, unit = found[0]
+    joints = unit * _finite(option, values, n_tubes)
+    for value in joints:
+        if abs(value) > QUANTITIES[name].usual[1]:
+            raise InputError(Problem(QUANTITIES[name].doubt(value), field=f"--{option}"))
     return joints
 
 
@@ -125,52 +119,8 @@ def _finite(option: str, values, count: int):
 
     if len(values) != count or not np.isfinite(values).all():
         raise InputError(Problem(f"needs {count} finite numbers, separated by commas", field=f"--{option}"))
-    return values
+    return np.array(values)
 
 
-def _title(beta, alpha) -> str:
-    import numpy as np
-
-    return (
-        "beta = " + ", ".join(f"{1e3 * value:.1f}" for value in beta) + " mm\n"
-        "alpha = " + ", ".join(f"{value:.0f}" for value in np.degrees(alpha)) + " deg"
-    )
-
-
-def _as_data(robot, shape, tip, ends) -> dict:
-    import numpy as np
-
-    from ctcr.frames import matrix_from_quaternion
-
-    def at(s: float) -> list[float]:
-        return [float(np.interp(s, shape.arc_length, shape.position[:, k])) for k in range(3)]
-
-    return {
-        "robot": robot.name,
-        "tip": {
-            "position_m": tip.position[0],
-            "quaternion_wxyz": tip.quaternion[0],
-            "direction": matrix_from_quaternion(shape.quaternion[-1])[:, 2],
-        },
-        "tubes": [{"tip_arc_length_m": end, "tip_position_m": at(end)} for end in ends],
-        "stability": tip.stability[0],
-        "samples": {"arc_length_m": shape.arc_length, "position_m": shape.position},
-    }
-
-
-def _report(console, robot, data: dict, picture: str | None) -> None:
-    from ctcr.show.output import table
-
-    rows = [
-        [f"tube {i + 1}", f"{1e3 * tube['tip_arc_length_m']:.2f}", *(f"{1e3 * x:.3f}" for x in tube["tip_position_m"])]
-        for i, tube in enumerate(data["tubes"])
-    ]
-    console.print(f"[bold]{robot.name}[/bold], base frame")
-    console.print(table("Where the tubes end", ["", "out [mm]", "x [mm]", "y [mm]", "z [mm]"], rows))
-    tip = data["tip"]
-    console.print("tip direction  " + ", ".join(f"{x:.5f}" for x in tip["direction"]))
-    console.print("tip quaternion " + ", ".join(f"{x:.5f}" for x in tip["quaternion_wxyz"]) + "  (w, x, y, z)")
-    if data["stability"] == data["stability"]:  # not known with effects
-        console.print(f"stability      {data['stability']:.3g}  (0: about to snap)")
-    if picture:
-        console.print(f"picture: {picture}", markup=False)
+def _listed(values, digits: int) -> str:
+    return ", ".join(f"{value:.{digits}f}" for value in values)

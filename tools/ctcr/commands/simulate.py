@@ -2,52 +2,43 @@
 
 import click
 
+from ctcr.commands.options import (
+    Output,
+    effects_option,
+    hide_option,
+    load,
+    noise_option,
+    robot_argument,
+    seed_option,
+    with_effects,
+)
+
 
 @click.command(name="simulate")
-@click.argument("robot")
+@robot_argument
 @click.argument("plan")
-@click.option(
-    "--hide",
-    "hidden",
-    multiple=True,
-    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
-    help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
-)
-@click.option(
-    "--noise",
-    type=click.Choice(["none", "jitter", "realistic"]),
-    default="jitter",
-    show_default=True,
-    help="jitter: of the robot file; realistic: with the smooth error of the tracker's field and outliers too.",
-)
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Another one: other noise.")
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects.")
+@hide_option
+@noise_option
+@seed_option
+@effects_option
 @click.option("-o", "--output", "target", required=True, metavar="MEASUREMENTS", help="The table to write.")
-def command(robot, plan, hidden, noise, seed, own, target) -> None:
-    """Write what the tracker would read if ROBOT moved through the joints of PLAN, in their order.
+def command(robot, plan, hidden, noise, seed, target) -> None:
+    """Write the poses that the tracker would read if ROBOT moved through the joints of PLAN, in their order.
 
-    PLAN is a table as measurements are, poses not needed. The readings come from the same model that later explains
-    them, so they serve to plan measurements and to learn the tools, never to prove the model right.
+    PLAN is a table with the columns of a table of measurements (beta1_m, alpha1_rad, fx_N, ...); it needs no poses.
+    The readings come from the same model that later explains them. They serve to plan measurements and to learn the
+    tools, and cannot show that the model is right.
+
+    Example: ctcr simulate robot.yaml plan.csv --hide friction.coefficient=0.02 -o measurements.csv
     """
     import numpy as np
 
-    from ctcr.diagnose import add
-    from ctcr.effects import user_effects
-    from ctcr.effects.settings import settings
     from ctcr.model import simulation
-    from ctcr.robot import robot_file
-    from ctcr.show import output
-    from ctcr.table import measurements
 
-    user_effects.load_all(own)
-    loaded = robot_file.load(robot)
-    values = settings(hidden, loaded)
-    names = list(dict.fromkeys(name.split(".")[1] for name in values))
-    table = measurements.load(plan, loaded.n_tubes)
-    made = simulation.simulate(add.with_values(loaded, names, values), table, noise, seed)
+    loaded, table = load(robot, plan)
+    made = simulation.simulate(with_effects(loaded, hidden), table, noise, seed)
     simulation.write(made, target, loaded.n_tubes)
-    console = output.console()
-    unsolved = int(np.isnan(made.position).any(axis=1).sum())
-    console.print(f"{len(made) - unsolved} readings, noise: {noise}, seed {seed}: {target}", markup=False)
+    out, unsolved = Output(), int(np.isnan(made.position).any(axis=1).sum())
+    out.say(f"{len(made) - unsolved} readings, noise: {noise}, seed {seed}: {target}")
     if unsolved:
-        console.print(f"{unsolved} rows have no pose: the model has no solution there", markup=False)
+        out.say(f"{unsolved} rows have no pose: the model has no solution there")

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctcr.reproduce.claim import Claim
-from ctcr.reproduce.robot import paper_robot
+from ctcr.reproduce.paper import Claim, paper_robot
 from ctcr.track.reach import least_distance
-from ctcr.track.runs import Run, run_all
+from ctcr.track.result import Run, errors_mm, figures
+from ctcr.track.runs import run_all
 from ctcr.track.scenario import shipped
-from ctcr.track.summary import errors_mm, figures
 
 PLACES = "the paper does not say where its cube, its limits and its gains are"
 

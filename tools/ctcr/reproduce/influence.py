@@ -3,8 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from ctcr.reproduce.claim import Claim
-from ctcr.reproduce.robot import paper_robot
+from ctcr.reproduce.paper import Claim, paper_robot
 from ctcr.sensitivity import closed_loop, open_loop
 from ctcr.sensitivity.ranges import Varied, all_varied
 from ctcr.track.scenario import Scenario, shipped

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.model.model import Model
-from ctcr.reproduce.claim import Claim
-from ctcr.reproduce.robot import paper_robot, random_design, random_rows
+from ctcr.reproduce.paper import Claim, paper_robot, random_design, random_rows
 
 Array = NDArray[np.float64]
 

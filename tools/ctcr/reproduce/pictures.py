@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from ctcr.reproduce.control import Scenarios
 from ctcr.show.style import AXES, ERROR, INK
-from ctcr.track.summary import errors_mm
+from ctcr.track.result import errors_mm
 
 
 def integration(figure: Figure, errors: dict[str, np.ndarray]) -> None:

@@ -3,10 +3,9 @@
 from pathlib import Path
 
 from ctcr.reproduce import pictures
-from ctcr.reproduce.claim import COLUMNS, Claim
 from ctcr.reproduce.control import Scenarios
 from ctcr.reproduce.influence import SLOW_FEEDBACK, Influence
-from ctcr.reproduce.robot import paper_robot
+from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
 from ctcr.sensitivity import figures as sensitivity_figures
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table

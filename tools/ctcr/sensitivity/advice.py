@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import hypot
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Advice:
 def advise(
     influence_mm: Mapping[str, float], accuracy_mm: float, base_mm: float = 0.0, independent: bool = False
 ) -> Advice:
-    """Calibrates the most influential parameters until what the others cause stays within the accuracy.
+    """Calibrates the most influential parameters until the error that the others cause is within the accuracy.
 
     base_mm      the error with true parameters, to which influences add
     independent  influences add as independent errors do, squared; otherwise all at once, as in the worst case
@@ -55,3 +56,18 @@ def grouped(names: Iterable[str]) -> str:
         return f" of tubes {', '.join(first)} and {last}" if first else f" of tube {last}"
 
     return ", ".join(kind + (of(found) if found[0] else "") for kind, found in tubes.items())
+
+
+def advices(found: dict[str, Any], accuracy: float) -> dict[str, Advice]:
+    """The advice of each study.
+
+    Open loop: errors that 95 % of the configurations stay below, independent of each other. Closed loop: the worst
+    case, as in the paper.
+    """
+    given = {}
+    if study := found.get("open_loop"):
+        given["open_loop"] = advise({one.name: one.p95 for one in study.influences}, accuracy, independent=True)
+    if study := found.get("closed_loop"):
+        increase = {curve.varied.name: curve.worst_maximum for curve in study.curves}
+        given["closed_loop"] = advise(increase, accuracy, study.nominal_maximum)
+    return given

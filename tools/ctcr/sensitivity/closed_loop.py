@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from ctcr import _core
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
-from ctcr.model import parameters as free_parameters
+from ctcr.model import parameters
 from ctcr.robot.description import Robot
-from ctcr.sensitivity.progress_file import ProgressFile
 from ctcr.sensitivity.ranges import Varied
-from ctcr.sensitivity.work import workers
+from ctcr.sensitivity.work import ProgressFile, workers
+from ctcr.track.result import errors_mm
 from ctcr.track.runs import check, run_once
 from ctcr.track.scenario import Scenario
 
@@ -39,9 +39,13 @@ class Curve:
         return _worst(self.mean)
 
 
+def _worst(increase: Array) -> float:
+    return max(float(np.max(increase)), 0.0) if np.isfinite(increase).all() else np.inf
+
+
 @dataclass(frozen=True)
 class ClosedLoop:
-    """The study. `cumulated_*` is the worst case: every parameter adds its largest increase."""
+    """The study; errors [mm]. `cumulated_*` is the worst case: every parameter adds its largest increase."""
 
     nominal_mean: float
     nominal_maximum: float
@@ -58,7 +62,7 @@ class ClosedLoop:
 
 @dataclass(frozen=True)
 class Job:
-    """One controller in all weights of the scenario, once each with the same noise."""
+    """One controller with all weights of the scenario, one run each with the same noise."""
 
     scenario: str  # as JSON
     controller: Array
@@ -69,14 +73,11 @@ class Job:
 def work(job: Job) -> tuple[float, float]:
     """Mean and largest error [mm]; NaN where a run failed."""
     scenario = Scenario.model_validate_json(job.scenario)
-
-    def values(parameters: Array) -> _core.SystemValues:
-        return _core.SystemValues(parameters=parameters, effects=job.effects)
-
-    runs = [run_once(scenario, values(job.controller), values(job.plant), mass) for mass in scenario.load.mass_g]
+    controller, plant = (_core.SystemValues(parameters=x, effects=job.effects) for x in (job.controller, job.plant))
+    runs = [run_once(scenario, controller, plant, mass) for mass in scenario.load.mass_g]
     if any(not run.started or run.status != "ok" for run in runs):
         return np.nan, np.nan
-    error = 1e3 * np.concatenate([run.counted for run in runs])
+    error = errors_mm(runs)
     return float(error.mean()), float(error.max())
 
 
@@ -90,13 +91,15 @@ def study(
     keep: str | None = None,
     advance: Callable[[float], None] = lambda amount: None,
 ) -> ClosedLoop:
-    """The study at `points` places over each range, uneven so that the nominal robot is among them."""
+    """The study at `points` values over each range.
+
+    `keep` and `dask` as in the open loop; `advance` is called with the number of controllers done.
+    """
     check(scenario, robot, robot)
-    fractions = np.linspace(-1, 1, points)
-    nominal = free_parameters.values(robot)
+    fractions, nominal = np.linspace(-1, 1, points), parameters.values(robot)
     cases = [nominal] + [one.at(fraction) for one in varied for fraction in fractions]
-    text, own = scenario.model_dump_json(), catalogue.values(robot)
-    jobs = [Job(text, case, nominal, own) for case in cases]
+    text, effects = scenario.model_dump_json(), catalogue.values(robot)
+    jobs = [Job(text, case, nominal, effects) for case in cases]
     settings = {"study": "closed loop", "scenario": text, "cases": [case.tolist() for case in cases]}
     kept = ProgressFile(keep, settings)
     found = kept.load() or []
@@ -109,11 +112,7 @@ def study(
             advance(1)
     kept.save(found)
     if not np.isfinite(found[0]).all():
-        raise InputError(Problem("even the controller that knows the robot fails in this scenario: `ctcr track` tells"))
-    mean, maximum = (np.array([one[k] for one in found[1:]]).reshape(len(varied), points) for k in (0, 1))
-    curves = [Curve(one, fractions, mean[k] - found[0][0], maximum[k] - found[0][1]) for k, one in enumerate(varied)]
-    return ClosedLoop(found[0][0], found[0][1], curves)
-
-
-def _worst(increase: Array) -> float:
-    return max(float(np.max(increase)), 0.0) if np.isfinite(increase).all() else np.inf
+        raise InputError(Problem("even the controller that knows the robot fails in this scenario: see `ctcr track`"))
+    increase = (np.array(found[1:]) - found[0]).reshape(len(varied), points, 2)
+    curves = [Curve(one, fractions, *errors.T) for one, errors in zip(varied, increase, strict=True)]
+    return ClosedLoop(*found[0], curves)

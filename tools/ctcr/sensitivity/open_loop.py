@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from ctcr import _core
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
-from ctcr.sensitivity.progress_file import ProgressFile
 from ctcr.sensitivity.ranges import Varied, together
-from ctcr.sensitivity.work import workers
+from ctcr.sensitivity.work import ProgressFile, workers
 
 Array = NDArray[np.float64]
 
@@ -24,7 +23,7 @@ EDGES_MM = 1e3 * np.geomspace(1e-7, 1.0, 241)  # of the histogram's bins
 
 @dataclass
 class Totals:
-    """What has been seen so far: a column for each end of each parameter, the last for all together."""
+    """Sums over the configurations so far: a column for each end of each parameter, the last for all together."""
 
     count: Array
     unsolved: Array
@@ -41,7 +40,7 @@ class Totals:
         return cls(*(np.zeros(columns) for _ in range(5)), np.zeros((columns, len(EDGES_MM) - 1)))
 
     def add(self, part: dict[str, Any]) -> None:
-        """Takes the result of the next job; in their order, so that sums do not depend on who did them."""
+        """Adds the result of the next job, in their order: the sums then do not depend on the worker."""
         for name in ("count", "unsolved", "sum", "sum_of_squares"):
             for row in part[name]:
                 setattr(self, name, getattr(self, name) + row)
@@ -101,21 +100,11 @@ class Job:
 
 def work(job: Job) -> dict[str, Any]:
     """Runs one job."""
-    start = time.thread_time() if job.threads == 1 else time.process_time()
     clock = time.thread_time if job.threads == 1 else time.process_time
-    result = _core.sensitivity(
-        job.tubes,
-        nominal=_core.SystemValues(parameters=job.nominal, effects=np.empty(0)),
-        varied=job.varied,
-        low=job.low,
-        high=job.high,
-        most_force=job.most_force,
-        seed=job.seed,
-        first_block=job.first_block,
-        blocks=job.blocks,
-        configurations=job.configurations,
-        threads=job.threads,
-    )
+    start = clock()
+    options = {name: value for name, value in vars(job).items() if name not in ("tubes", "nominal")}
+    nominal = _core.SystemValues(parameters=job.nominal, effects=np.empty(0))
+    result = _core.sensitivity(job.tubes, nominal=nominal, **options)
     names = ("count", "unsolved", "sum", "sum_of_squares", "maximum", "histogram", "evaluations")
     return {name: getattr(result, name) for name in names} | {"seconds": clock() - start}
 
@@ -133,8 +122,8 @@ def study(
 ) -> OpenLoop:
     """The study over random configurations with tip forces up to `most_force` [N].
 
-    `keep` names a file of progress: an interrupted study with the same options goes on from there. The result does not
-    depend on `dask` nor on the number of cores.
+    `keep` names a file of progress: an interrupted study with the same options resumes from there. `dask` is the
+    address of a scheduler. The result depends neither on `dask` nor on the number of cores.
     """
     ends = np.array([one.at(fraction) for one in varied for fraction in (-1.0, 1.0)])
     low, high = together(robot, varied)
@@ -160,7 +149,7 @@ def study(
             totals.add(part)
             kept.save(totals.as_state())
             advance(job.blocks * job.configurations)
-    return _told(varied, configurations, totals)
+    return _summary(varied, configurations, totals)
 
 
 def _pieces(configurations: int):
@@ -172,20 +161,14 @@ def _pieces(configurations: int):
         yield whole, 1, rest
 
 
-def _told(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:
+def _summary(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:
     def influence(name: str, columns: slice) -> Influence:
-        count, histogram = t.count[columns].sum(), t.histogram[columns].sum(axis=0)
+        count, unsolved = t.count[columns].sum(), int(t.unsolved[columns].sum())
         if not count:
-            return Influence(name, np.nan, np.nan, np.nan, int(t.unsolved[columns].sum()))
-        place = int(np.searchsorted(np.cumsum(histogram), 0.95 * count))
-        p95 = min(EDGES_MM[place + 1], 1e3 * t.maximum[columns].max())
-        return Influence(
-            name,
-            1e3 * t.sum[columns].sum() / count,
-            p95,
-            1e3 * t.maximum[columns].max(),
-            int(t.unsolved[columns].sum()),
-        )
+            return Influence(name, np.nan, np.nan, np.nan, unsolved)
+        mean, largest = 1e3 * t.sum[columns].sum() / count, 1e3 * t.maximum[columns].max()
+        upper_bin = int(np.searchsorted(np.cumsum(t.histogram[columns].sum(axis=0)), 0.95 * count))
+        return Influence(name, mean, min(EDGES_MM[upper_bin + 1], largest), largest, unsolved)
 
     each = [influence(one.name, slice(2 * k, 2 * k + 2)) for k, one in enumerate(varied)]
     all_at_once = influence("all together", slice(2 * len(varied), None))

@@ -1,13 +1,19 @@
-"""Jobs in order, on this machine or on a cluster. Only seeds, ranges and one robot's parameters travel."""
+"""Long studies: jobs in order, on this machine or on a cluster, and their progress in a file.
 
+Only seeds, ranges and the parameters of one robot travel.
+"""
+
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
-from ctcr.errors import InputError, Problem
+from ctcr.errors import InputError, Problem, file_fault
+from ctcr.show.output import atomic_writer
 
 Map = Callable[[Callable, Iterable], Iterator]
 
@@ -22,23 +28,25 @@ def workers(address: str | None, threads: int | None = None) -> Iterator[Map]:
         count = threads or os.cpu_count() or 1
         with ThreadPoolExecutor(count) as pool:
             try:
-                yield lambda function, jobs: _in_order(pool.submit, function, jobs, 2 * count, lambda f: f.result())
+                yield lambda function, jobs: _in_order(pool.submit, function, jobs, 2 * count)
             finally:
-                pool.shutdown(cancel_futures=True)  # an interruption does not wait for what has not begun
+                pool.shutdown(cancel_futures=True)  # an interruption does not wait for jobs that have not begun
         return
     client = _client(address)
+
+    def submit(function: Callable, job: Any):
+        return client.submit(function, job, pure=False)
+
     try:
         width = 2 * max(sum(client.nthreads().values()), 1)
-        yield lambda function, jobs: _in_order(
-            lambda f, job: client.submit(f, job, pure=False), function, jobs, width, lambda f: f.result()
-        )
+        yield lambda function, jobs: _in_order(submit, function, jobs, width)
     finally:
         client.close()
 
 
 def _client(address: str) -> Any:
     try:
-        from distributed import Client
+        from distributed import Client  # late: an optional package
     except ModuleNotFoundError:
         text = "--dask needs the package distributed: pip install distributed"
         raise InputError(Problem(text)) from None
@@ -49,9 +57,37 @@ def _client(address: str) -> Any:
         raise InputError(Problem(f"no dask scheduler answers at {address}: {reason}")) from None
 
 
-def _in_order(submit: Callable, function: Callable, jobs: Iterable, width: int, result: Callable) -> Iterator:
-    waiting, rest = [], iter(jobs)
+def _in_order(submit: Callable, function: Callable, jobs: Iterable, width: int) -> Iterator:
+    rest = iter(jobs)
     waiting = [submit(function, job) for job in islice(rest, width)]
     while waiting:
-        yield result(waiting.pop(0))
+        yield waiting.pop(0).result()
         waiting += [submit(function, job) for job in islice(rest, 1)]
+
+
+class ProgressFile:
+    """The last state of a study; `settings` must be the same when it is resumed. Without a path nothing is kept."""
+
+    def __init__(self, path: str | Path | None, settings: dict[str, Any]):
+        self.path, self.settings = path, json.loads(json.dumps(settings))
+
+    def load(self) -> Any:
+        """The state, or None where there is none yet. Raises InputError where it belongs to another study."""
+        if self.path is None or not Path(self.path).exists():
+            return None
+        try:
+            kept = json.loads(Path(self.path).read_text(encoding="utf-8"))
+            settings, state = kept["settings"], kept["state"]
+        except OSError as error:
+            raise file_fault(error, self.path, "read") from None
+        except (ValueError, KeyError, TypeError):
+            raise InputError(Problem("is not the progress of a sensitivity study", str(self.path))) from None
+        if settings != self.settings:
+            text = "belongs to a study with another robot or other options: delete it, or name another file"
+            raise InputError(Problem(text, str(self.path)))
+        return state
+
+    def save(self, state: Any) -> None:
+        if self.path is not None:
+            with atomic_writer(self.path) as file:
+                json.dump({"settings": self.settings, "state": state}, file)

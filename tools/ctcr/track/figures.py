@@ -5,9 +5,8 @@ from matplotlib.figure import Figure
 
 from ctcr.robot.description import Robot
 from ctcr.show.style import AXES, ERROR, FAINT
-from ctcr.track.runs import Run
+from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
-from ctcr.track.summary import by_mass, errors_mm
 
 
 def boxes(figure: Figure, runs: list[Run]) -> bool | None:

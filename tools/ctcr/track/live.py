@@ -24,7 +24,8 @@ from ctcr.show.output import Progress
 from ctcr.track import scenario as scenario_file
 from ctcr.track.bench_robot import BenchRobot
 from ctcr.track.recording import COLUMNS, CONTROL, finished, runs_of, tips_at
-from ctcr.track.runs import Run, check, run_once, system_values
+from ctcr.track.result import Run
+from ctcr.track.runs import check, run_once, system_values
 from ctcr.track.scenario import Scenario
 
 PATIENCE_S = 2.0

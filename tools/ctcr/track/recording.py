@@ -8,7 +8,7 @@ from ctcr.frames import tracker_to_base
 from ctcr.robot.description import Robot
 from ctcr.table import measurements
 from ctcr.table.csv_table import read_columns
-from ctcr.track.runs import Run, beside_obstacle
+from ctcr.track.result import Run, beside_obstacle
 from ctcr.track.scenario import TASKS, Scenario
 
 Array = NDArray[np.float64]

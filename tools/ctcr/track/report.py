@@ -8,50 +8,39 @@ from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
 from ctcr.show.output import atomic_writer
 from ctcr.track import figures
-from ctcr.track.runs import FAILED, FAR, Run
+from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
 from ctcr.track.scene import scene
-from ctcr.track.summary import COLUMNS, by_mass, rows, summary
 
 
 def write(
-    runs: list[Run], scenario: Scenario, robot: Robot, target: str | Path, source: str, measured: bool = False
+    runs: list[Run], target: str | Path, source: str, scenario: Scenario, robot: Robot, measured: bool = False
 ) -> None:
-    """Writes the page; source says what was run. Raises InputError where the file cannot be written.
+    """Writes the page; `source` says what was run. Raises InputError where the file cannot be written.
 
-    `measured`: tips are those that a tracker read.
+    `measured`: tips are tracker readings.
     """
-    with atomic_writer(target) as file:
-        file.write(page(runs, scenario, robot, source, measured))
-
-
-def page(runs: list[Run], scenario: Scenario, robot: Robot, source: str, measured: bool = False) -> str:
-    """The whole HTML text."""
     numbers = summary(runs)
-    worst = [_worst(group) for group in by_mass(runs).values()]
+    drawn = [worst([run for run in group if run.started] or group) for group in by_mass(runs).values()]
     sections = [
         _opening(numbers, scenario),
         '<h2>The path</h2><div id="view"></div>'
         f'<p class="soft">The tip {"as measured" if measured else "without noise"}, the worst run of each weight. '
         "Drag to turn, scroll to zoom.</p>",
         _errors(runs, numbers, scenario, measured),
-        *(_one(run, scenario, robot) for run in _shown(worst)),
+        *(_one(run, scenario, robot) for run in _shown(drawn)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
-    return html_page.page(title, sections, source, "ctcr track", scene(worst, scenario))
+    with atomic_writer(target) as file:
+        file.write(html_page.page(title, sections, source, "ctcr track", scene(drawn, scenario)))
 
 
-def _worst(group: list[Run]) -> Run:
-    return max(group, key=lambda run: (run.failed, run.counted.max() if run.started else 0))
-
-
-def _shown(worst: list[Run]) -> list[Run]:
-    """The first weight, the last that did what it was told, and the first that did not."""
-    started = [run for run in worst if run.started]
+def _shown(runs: list[Run]) -> list[Run]:
+    """The first weight, the last whose path was followed, and the first whose path was not."""
+    started = [run for run in runs if run.started]
     good = [run for run in started if not run.failed]
     bad = [run for run in started if run.failed]
-    chosen = {id(run): run for run in (*started[:1], *good[-1:], *bad[:1])}
-    return list(chosen.values())
+    return list({id(run): run for run in (*started[:1], *good[-1:], *bad[:1])}.values())
 
 
 def _opening(numbers: dict, scenario: Scenario) -> str:
@@ -59,18 +48,16 @@ def _opening(numbers: dict, scenario: Scenario) -> str:
     failed = [weight for weight, f in numbers.items() if f["failed"]]
     shown = []
     if done:
-        shown += [
-            ("good", f"{max(f['mean_mm'] for f in done):.3f} mm", "largest mean error of a weight that did not fail"),
-            ("good", f"{max(f['max_mm'] for f in done):.2f} mm", "largest error of all these"),
-        ]
+        mean, largest = (max(f[name] for f in done) for name in ("mean_mm", "max_mm"))
+        shown.append(("good", f"{mean:.3f} mm", "largest mean error of a weight that did not fail"))
+        shown.append(("good", f"{largest:.2f} mm", "largest error of all these"))
     if scenario.obstacle:
         clearance = min(f["obstacle_mm"] for f in numbers.values())
         shown.append(("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle"))
     shown.append(("error" if failed else "good", str(len(failed)), f"weights failed, of {len(numbers)}"))
     lead = f"<p class='lead'>{html.escape(scenario.about)}</p>" if scenario.about else ""
-    return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}" + bullets(
-        f"{weight}: {f['verdict']}" for weight, f in numbers.items()
-    )
+    verdicts = bullets(f"{weight}: {f['verdict']}" for weight, f in numbers.items())
+    return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}{verdicts}"
 
 
 def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) -> str:
@@ -78,25 +65,20 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) 
         "Distance between the tip and its reference; boxes are quartiles, whiskers reach to all values, diamonds are "
         f"means. Left out: references nearer than {1e3 * FAR:g} mm to the obstacle, where the tip has to deviate."
     )
-    told = figure(figures.boxes, runs, 8.5, 3.8, text, wide=True)
+    drawn = figure(figures.boxes, runs, 8.5, 3.8, text, wide=True)
     columns = ["weight", *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS)]
     noise = "as measured, with noise" if measured else f"noise {scenario.noise_mm:g} mm a reading and axis"
     note = (
         f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
         f"Runs a weight: {scenario.repetitions}; {noise}.</p>"
     )
-    return f"<h2>Tracking errors</h2>{told}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
+    return f"<h2>Tracking errors</h2>{drawn}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
 
 
 def _one(run: Run, scenario: Scenario, robot: Robot) -> str:
-    drawn = figure(
-        figures.actuators,
-        (run, robot, scenario),
-        10.4,
-        3.6,
-        "Grasped ends and angles of the tubes, with their limits; red: held at a limit.",
-        wide=True,
-    )
-    gave = figure(figures.tasks, (run, scenario), 10.4, 3.8, "The error, and when each task gave way.", wide=True)
+    text = "Grasped ends and angles of the tubes, with their limits; red: held at a limit."
+    joints = figure(figures.actuators, (run, robot, scenario), 10.4, 3.6, text, wide=True)
+    text = "The error, and when each task gave way."
+    tasks = figure(figures.tasks, (run, scenario), 10.4, 3.8, text, wide=True)
     heading = html.escape(f"{run.mass_g:g} g, run {run.repetition}: {run.verdict()}")
-    return f"<h2>{heading}</h2>{drawn}{gave}"
+    return f"<h2>{heading}</h2>{joints}{tasks}"

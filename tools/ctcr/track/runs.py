@@ -1,9 +1,9 @@
-"""Runs a scenario: every weight, every repetition, over all cores."""
+"""Runs a scenario in closed loop: one run on a simulated robot or a device, or every weight and repetition."""
 
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,98 +13,29 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
-from ctcr.track.device import Device
-from ctcr.track.scenario import TASKS, Scenario, radians
+from ctcr.track.result import FAR, UNSETTLED, Run, beside_obstacle, limit_in_words
+from ctcr.track.scenario import TASKS, Scenario
 
 Array = NDArray[np.float64]
 
-FAR = 10e-3  # [m] from the surface of the obstacle: what is nearer to it is left out of the error, as it must deviate
-FAILED = 1e-3  # [m] error beyond which a run has failed
-UNSETTLED = 1e-3  # [m]
 
+class Device(Protocol):
+    """A robot as a controller sees it: the interface of include/ctcr/control/device.hpp, for devices in Python.
 
-@dataclass(frozen=True)
-class Run:
-    """One run; rows are control periods. Positions [m], base frame of the plant."""
+    The methods are called once a period, in this order. What a method raises ends the run and is raised by it.
+    """
 
-    mass_g: float
-    repetition: int
-    status: str
-    settled: float  # distance to the start of the path when it begins [m]
-    time: Array  # (R,) [s]
-    joints: Array  # (R, 2N) beta [m], alpha [rad]
-    tip: Array  # (R, 3) without noise
-    wanted: Array  # (R, 3)
-    shortfall: Array  # (R, tasks): above 1 the task gave way
-    held: NDArray[np.int32]  # (R, 4) bits of base gaps, tip gaps, travel; speed
-    force: Array  # (R, 3) [N] that the controller reckoned with
-    stability: Array  # (R,)
-    far: NDArray[np.bool_]  # (R,) whether the reference is far from the obstacle
-    clearance: float  # least distance between tip and obstacle [m]; infinite: there is none
+    def measure(self) -> tuple[Array, Array, Array]:
+        """Motor angles (2N,) [rad] from home, position (3,) [m] and rotation (3, 3) of the sensor, tracker frame.
 
-    @property
-    def started(self) -> bool:
-        return self.settled <= UNSETTLED and len(self.time) > 0
+        Sets the pace: returns when the next period starts.
+        """
 
-    @property
-    def error(self) -> Array:
-        """Distance between tip and reference (R,) [m]."""
-        return np.linalg.norm(self.tip - self.wanted, axis=1)
+    def record(self, so_far, row: int) -> None:
+        """Row `row` of the result, a LoopResult, is complete; not called while the robot settles at the start."""
 
-    @property
-    def counted(self) -> Array:
-        """Errors where the reference is far from the obstacle [m]."""
-        return self.error[self.far]
-
-    @property
-    def at_limit(self) -> NDArray[np.bool_]:
-        """(R,) whether a position limit held the step."""
-        return (self.held[:, :3] > 0).any(axis=1)
-
-    @property
-    def failed(self) -> bool:
-        """Whether the robot did not do what it was told."""
-        if not self.started or self.status != "ok" or self.clearance < 0:
-            return True
-        return bool((self.counted > FAILED).any())
-
-    def limits_in_words(self) -> list[str]:
-        """Which position limits held it, first ones first, with the time."""
-        n, said = self.joints.shape[1] // 2, {}
-        for row in np.flatnonzero(self.at_limit):
-            for kind in range(3):
-                for tube in range(n):
-                    if self.held[row, kind] >> tube & 1:
-                        said.setdefault((kind, tube), self.time[row])
-        return [f"{_limit(kind, tube, n)} (from {time:.1f} s)" for (kind, tube), time in said.items()]
-
-    def given_way(self) -> dict[str, float]:
-        """Share of the time in which each task gave way, where it did [0..1]."""
-        share = (self.shortfall > 1).mean(axis=0) if len(self.time) else np.zeros(len(TASKS))
-        return {name: float(part) for name, part in zip(TASKS, share, strict=True) if part > 0}
-
-    def verdict(self) -> str:
-        """In words: what became of it."""
-        if not self.started:
-            return f"failed: the start of the path is not reached, the tip stays {1e3 * self.settled:.1f} mm away"
-        if self.status != "ok":
-            return f"failed at {self.time[-1]:.1f} s: {self.status}"
-        if self.clearance < 0:
-            return f"failed: the tip is {-1e3 * self.clearance:.2f} mm inside the obstacle"
-        limits = "; ".join(self.limits_in_words())
-        if self.failed:
-            row = int(np.argmax(np.where(self.far, self.error, 0)))
-            way = f"the tip is off by up to {1e3 * self.error[row]:.1f} mm (at {self.time[row]:.1f} s)"
-            return f"failed: {limits or 'tracking gave way to the other tasks'}; {way}"
-        return f"done, held at limits: {limits}" if limits else "done"
-
-
-def _limit(kind: int, tube: int, n: int) -> str:
-    if kind == 2:
-        return f"travel of tube {tube + 1}"
-    where = ("base", "tip")[kind]
-    beside = f"that of tube {tube + 2}" if tube + 1 < n else "the front plate"
-    return f"{where} of tube {tube + 1} against {beside}"
+    def move(self, velocity: Array, period: float) -> None:
+        """Velocities (2N,) of the motors [rad/s] for one period [s]."""
 
 
 def system_values(robot: Robot, steps: int = 1) -> _core.SystemValues:
@@ -122,7 +53,7 @@ def run_once(
 ) -> Run:
     """One run, on a simulated plant or a device. `seed` is that of the noise. Raises what the device raises.
 
-    `reading_age` [s]: how much older the tracker's readings are than the joints; the model makes up for it.
+    `reading_age` [s]: how much older the tracker's readings are than the joints; the model compensates for it.
     """
     s, tasks, limits, obstacle = scenario, scenario.tasks, scenario.limits, scenario.obstacle
     n = len(s.start.beta_mm)
@@ -170,7 +101,7 @@ def run_once(
         period=1 / s.rate_Hz,
         settle=s.start.settle_s,
         beta=1e-3 * np.array(s.start.beta_mm),
-        alpha=radians(s.start.alpha_deg),
+        alpha=np.radians(s.start.alpha_deg),
         force=s.force(mass_g),
         tip_force=s.load.controller,
         noise_position=1e-3 * s.noise_mm,
@@ -178,30 +109,9 @@ def run_once(
         seed=seed,
         reading_age=reading_age,
     )
-    return Run(
-        mass_g,
-        seed,
-        result.status,
-        result.settled,
-        result.time,
-        result.joints,
-        result.tip,
-        result.wanted,
-        result.shortfall,
-        result.held,
-        result.force,
-        result.stability,
-        *beside_obstacle(s, result.tip, result.wanted),
-    )
-
-
-def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[NDArray[np.bool_], float]:
-    """Run.far and Run.clearance."""
-    if not scenario.obstacle:
-        return np.ones(len(wanted), bool), np.inf
-    centre, radius = 1e-3 * np.array(scenario.obstacle.centre_mm), 1e-3 * scenario.obstacle.radius_mm
-    clearance = float(np.linalg.norm(tip - centre, axis=1).min()) - radius if len(tip) else np.inf
-    return np.linalg.norm(wanted - centre, axis=1) > radius + FAR, clearance
+    names = ("status", "settled", "time", "joints", "tip", "wanted", "shortfall", "held", "force", "stability")
+    found = {name: getattr(result, name) for name in names}
+    return Run(mass_g, seed, *found.values(), *beside_obstacle(s, result.tip, result.wanted))
 
 
 def run_all(
@@ -241,7 +151,7 @@ def _remedy(scenario: Scenario) -> str:
 
 
 def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:
-    """Raises InputError for what robot, plant and scenario are not made for."""
+    """Raises InputError where robot, plant and scenario do not fit together, or limits exclude the start."""
     problems = []
     for kind, one in (("robot", robot), ("plant", plant)):
         if one.n_tubes != len(scenario.start.beta_mm):
@@ -250,24 +160,25 @@ def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:
         if one.tracker.sensor_on_tube != 1:
             text = f"the sensor of the {kind} is on tube {one.tracker.sensor_on_tube}: control needs it on tube 1"
             problems.append(Problem(text, field="tracker.sensor_on_tube"))
-    if not problems:
-        problems = _excluded(scenario, robot)
+    problems = problems or [
+        scenario.problem(f"the limits exclude the start: {text}", "start", "beta_mm")
+        for text in _violated(scenario, robot)
+    ]
     if problems:
         raise InputError(problems)
 
 
-def _excluded(scenario: Scenario, robot: Robot) -> list[Problem]:
-    beta = np.array(scenario.start.beta_mm)
+def _violated(scenario: Scenario, robot: Robot):
+    """The limits that the start violates, in words."""
+    beta, limits = np.array(scenario.start.beta_mm), scenario.limits
     tips = np.array([tube.length_mm for tube in robot.tubes]) + beta
-    found, n = [], robot.n_tubes
-    for kind, (name, least) in enumerate((("base", scenario.limits.base_gap_mm), ("tip", scenario.limits.tip_gap_mm))):
-        gaps = -np.diff(np.append(tips, 0)) if kind else np.diff(np.append(beta, 0))
+    base_gaps, tip_gaps = np.diff(np.append(beta, 0)), -np.diff(np.append(tips, 0))
+    for kind, (name, gaps) in enumerate({"base_gap_mm": base_gaps, "tip_gap_mm": tip_gaps}.items()):
+        least = getattr(limits, name)
         for tube in np.flatnonzero(gaps < least):
-            text = f"{_limit(kind, tube, n)}: {gaps[tube]:g} mm, but limits.{name}_gap_mm asks for {least:g} mm"
-            found.append(scenario.problem(f"the limits exclude the start: {text}", "start", "beta_mm"))
-    for low, high in ((scenario.limits.beta_low_mm, scenario.limits.beta_high_mm),):
-        for tube in range(n):
-            if (low and beta[tube] < low[tube]) or (high and beta[tube] > high[tube]):
-                text = f"the limits exclude the start: travel of tube {tube + 1} does not reach {beta[tube]:g} mm"
-                found.append(scenario.problem(text, "start", "beta_mm"))
-    return found
+            where = limit_in_words(kind, tube, robot.n_tubes)
+            yield f"{where}: {gaps[tube]:g} mm, but limits.{name} asks for {least:g} mm"
+    for tube, x in enumerate(beta):
+        low, high = limits.beta_low_mm, limits.beta_high_mm
+        if (low and x < low[tube]) or (high and x > high[tube]):
+            yield f"travel of tube {tube + 1} does not reach {x:g} mm"

@@ -6,7 +6,6 @@ them elsewhere. Defaults of the tasks are the paper's (Boyer et al., Section IV)
 """
 
 from importlib.resources import files
-from math import pi
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -263,8 +262,3 @@ def _unusual(s: Scenario):
                 if quantity and isinstance(number, float | int) and not quantity.is_usual(number):
                     yield ((name, field) if name else (field,)), quantity.doubt(number)
                     break
-
-
-def radians(degrees: list[float]) -> Array:
-    """[rad]"""
-    return pi / 180 * np.array(degrees)

@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr.show import scene as show
 from ctcr.show.style import INK, OUT
-from ctcr.track.runs import Run
+from ctcr.track.result import Run
 from ctcr.track.scenario import Scenario
 
 MOST_POINTS = 3000
