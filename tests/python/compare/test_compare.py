@@ -1,4 +1,4 @@
-"""`ctcr compare` finds what was planted, says nothing where nothing was, and counts what it left out."""
+"""`ctcr compare` finds planted errors, finds none in noise, and counts the rows that it left out."""
 
 import json
 
@@ -7,8 +7,7 @@ import pytest
 from compare_bench import JITTER_MM, bench, outward, stop_and_go, stream, tips
 from ctcr.compare import compare
 from ctcr.compare.analysis import LEVEL
-from ctcr.compare.limits import limits
-from ctcr.compare.summary import differs, findings, headline, is_noise, quiet
+from ctcr.compare.summary import differs, findings, headline, is_noise, limits, quiet
 from ctcr.errors import InputError
 from ctcr.frames import product, quaternion_from_rotation_vector
 from ctcr.show import output
@@ -18,8 +17,11 @@ def constant(vector_mm):
     return lambda joints, t, run: np.tile(np.array(vector_mm) * 1e-3, (len(run), 1))
 
 
-def test_noise_alone_gives_findings_no_more_often_than_stated(monkeypatch):
-    """At 5 % a table, 7 or more alarms in 40 tables come once in 300 times; in every other one, runs share joints."""
+def test_false_alarms(monkeypatch):
+    """Noise alone gives a finding in 5 % of tables.
+
+    7 or more of 40 come once in 300 times; in every other table the runs share joints.
+    """
     monkeypatch.setattr("ctcr.compare.dependence.TRIALS", 399)
     alarms = 0
     for seed in range(40):
@@ -30,16 +32,18 @@ def test_noise_alone_gives_findings_no_more_often_than_stated(monkeypatch):
     assert alarms <= 6
 
 
-def test_noise_alone_is_called_noise():
+def test_noise():
+    """An error of noise alone is called noise, and has no hysteresis."""
     random = np.random.default_rng(1)
     result = compare(*bench(random, stop_and_go(random)))
     assert is_noise(result)
     assert "nothing to explain" in headline(result)
-    assert any("Out and return agree" in text for text in quiet(result))
+    assert any("There is no hysteresis" in text for text in quiet(result))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_constant_offset_is_found_with_its_size(seed):
+def test_offset(seed):
+    """A constant offset is found with its size, and nothing else is."""
     random = np.random.default_rng(seed)
     vector = random.normal(0, 0.5, 3)
     result = compare(*bench(random, stop_and_go(random), constant(vector), turn=(0, 0, 0)))
@@ -58,7 +62,8 @@ def test_a_constant_offset_is_found_with_its_size(seed):
         ("length2", lambda q, t, run: 0.1 * np.column_stack([0 * t, q[:, 1] + 0.08, 0 * t])),
     ],
 )
-def test_a_dependence_is_ranked_first(name, error):
+def test_dependence(name, error):
+    """The planted dependence is ranked first, with its size and significance."""
     random = np.random.default_rng(5)
     path = stop_and_go(random, runs=14)
     result = compare(*bench(random, path, error))
@@ -66,7 +71,7 @@ def test_a_dependence_is_ranked_first(name, error):
     best = next(found for found in result.ranking.alone if found.name == name)
     planted = error(path[0], path[2], path[1])
     variance = np.mean(np.sum((planted - planted.mean(axis=0)) ** 2, axis=1))
-    # The tip's place follows the joints: what it predicts as well may come first by a hair.
+    # The tip's position follows the joints: a quantity of it may predict as well and come first by a hair.
     assert best.share > first.share - 0.01
     assert best.p_value <= LEVEL
     assert 0.8 < best.share <= 1
@@ -74,7 +79,8 @@ def test_a_dependence_is_ranked_first(name, error):
     assert result.ranking.chosen[0].name == first.name
 
 
-def test_two_dependences_are_found_one_after_the_other():
+def test_two_dependences():
+    """The weaker dependence is found in the residual of the stronger one."""
     random = np.random.default_rng(6)
 
     def error(q, t, run):
@@ -87,8 +93,8 @@ def test_two_dependences_are_found_one_after_the_other():
     assert result.ranking.explained > 0.85
 
 
-def test_joints_that_move_alike_are_called_indistinct():
-    """The second angle stands still, so the difference of the angles is the first angle."""
+def test_indistinct():
+    """While the second angle stands still, the data do not distinguish the first angle from the difference."""
     random = np.random.default_rng(7)
     joints, run, t = stop_and_go(random, runs=12)
     joints[:, 3] = 0.4
@@ -100,7 +106,8 @@ def test_joints_that_move_alike_are_called_indistinct():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_direction_dependent_offset_sets_the_floor(seed):
+def test_hysteresis(seed):
+    """An offset that depends on the direction is found; half of it is the floor of a model without history."""
     random = np.random.default_rng(seed)
     path = stop_and_go(random)
     vector = random.normal(0, 0.3, 3)
@@ -111,10 +118,11 @@ def test_a_direction_dependent_offset_sets_the_floor(seed):
     assert d.p_against_same <= LEVEL
     assert d.typical_rms_mm == pytest.approx(d.rms_mm, rel=0.4)
     assert d.floor_mm == pytest.approx(np.hypot(size, JITTER_MM * np.sqrt(1.5)), rel=0.05)
-    assert any("Out and return differ" in item.text for item in findings(result))
+    assert any("There is hysteresis" in item.text for item in findings(result))
 
 
-def test_outliers_are_not_taken_for_history():
+def test_outliers():
+    """Three outliers are counted, and are no hysteresis."""
     random = np.random.default_rng(4)
     robot, readings, prediction = bench(random, stop_and_go(random))
     readings.position[[31, 77, 140]] += 0.003
@@ -125,8 +133,8 @@ def test_outliers_are_not_taken_for_history():
     assert any("Pairs far beyond that: 3" in text for text in quiet(result))
 
 
-def test_history_that_spoils_same_direction_visits_is_told_too():
-    """Every visit errs by itself, far beyond the jitter: it is no matter of direction, and it is not called noise."""
+def test_poor_repeatability():
+    """Every visit errs by itself, far beyond the jitter: that is not called noise."""
     random = np.random.default_rng(8)
     result = compare(*bench(random, stop_and_go(random), noise_mm=0.6))
     assert result.direction.p_against_same > LEVEL
@@ -136,7 +144,8 @@ def test_history_that_spoils_same_direction_visits_is_told_too():
 
 
 @pytest.mark.parametrize("delay", [0.12, -0.05])
-def test_a_delay_is_measured(delay):
+def test_delay(delay):
+    """A planted delay is measured within its uncertainty and explains the hysteresis."""
     random = np.random.default_rng(9)
     path = stream(random)
 
@@ -149,10 +158,11 @@ def test_a_delay_is_measured(delay):
     assert abs(d.delay_s - delay) < max(4 * d.delay_uncertainty_s, 0.02 * abs(delay))
     assert d.rms_without_delay_mm < 0.2 * d.rms_mm
     assert result.ranking.chosen[0].name == "lag"
-    assert any(f"a delay of {d.delay_s:.3f}" in item.text for item in findings(result))
+    assert any(f"A delay of {d.delay_s:.3f}" in item.text for item in findings(result))
 
 
-def test_runs_off_at_the_same_joints_are_noticed():
+def test_run_offsets():
+    """Offsets of runs are found, and dependences are examined without them."""
     random = np.random.default_rng(10)
     offsets = random.normal(0, 2e-3, (10, 3))
     planted = bench(random, stop_and_go(random, shared=True), lambda q, t, run: offsets[run])
@@ -168,16 +178,17 @@ def off_in_two_runs(q, t, run):
     return np.isin(run, (3, 7))[:, None] * np.array([0.0, 0.04, 0.0]) + 1e-4 * np.cos(q[:, [0, 1, 2]])
 
 
-def test_outlying_runs_are_named():
+def test_outlying_runs():
+    """Two runs far from the others are named with their distance."""
     random = np.random.default_rng(11)
     result = compare(*bench(random, stop_and_go(random, runs=12, shared=True), off_in_two_runs))
     assert result.run_offsets.outlying == (3, 7)
     assert result.run_offsets.outlying_mm == pytest.approx(40, rel=0.02)
-    assert any("runs 3, 7 lie about 40.0 mm" in item.text for item in findings(result))
+    assert any("The runs 3, 7 lie about 40.0 mm" in item.text for item in findings(result))
 
 
-def test_runs_whose_joints_no_other_run_came_near_are_not_called_off():
-    """The same error in runs of their own region may as well belong to their joints."""
+def test_runs_in_their_own_region():
+    """An error of runs that no other run came near may belong to their joints."""
     random = np.random.default_rng(11)
     joints, run, t = stop_and_go(random, runs=12, shared=True)
     joints[np.isin(run, (3, 7)), 2] += 100.0
@@ -185,7 +196,8 @@ def test_runs_whose_joints_no_other_run_came_near_are_not_called_off():
     assert result.run_offsets.outlying == ()
 
 
-def test_a_grossly_turned_frame_is_named_and_taken_out():
+def test_gross_frame():
+    """A tracker frame that is rotated by 90 degrees is named and fitted."""
     random = np.random.default_rng(12)
     robot, readings, prediction = bench(random, stop_and_go(random), turn=(0, 0, 0))
     x, y, z = readings.position.T
@@ -199,7 +211,8 @@ def test_a_grossly_turned_frame_is_named_and_taken_out():
 
 
 @pytest.mark.parametrize("roll", ["known", "unknown"])
-def test_orientation_error_counts_the_roll_only_where_it_is_known(roll):
+def test_orientation(roll):
+    """Of a planted rotation, the roll counts only where the roll of the sensor is known."""
     random = np.random.default_rng(13)
     path = stop_and_go(random)
     robot, readings, prediction = bench(random, path, roll=roll)
@@ -216,7 +229,8 @@ def test_orientation_error_counts_the_roll_only_where_it_is_known(roll):
     assert result.angle_kind == ("orientation" if roll == "known" else "tip direction")
 
 
-def test_rows_that_cannot_be_compared_are_listed():
+def test_rows_left_out():
+    """Rows that are not measured or not solved are listed; a table of nothing else is refused."""
     random = np.random.default_rng(14)
     robot, readings, prediction = bench(random, stop_and_go(random))
     readings.position[[3, 20]] = np.nan
@@ -232,7 +246,8 @@ def test_rows_that_cannot_be_compared_are_listed():
         compare(robot, readings, prediction)
 
 
-def test_a_handful_of_readings_is_compared_without_claims():
+def test_few_readings():
+    """A handful of readings has an error but no finding."""
     random = np.random.default_rng(15)
     joints, run, t = stop_and_go(random, runs=1, stops=9)
     for count in (1, 2, 5):
@@ -244,7 +259,8 @@ def test_a_handful_of_readings_is_compared_without_claims():
         json.dumps(output.plain(result.as_dict()), allow_nan=False)
 
 
-def test_the_order_of_error_sizes_and_runs_holds():
+def test_spread():
+    """mean <= RMS <= maximum, and the runs add up to the whole."""
     random = np.random.default_rng(16)
     result = compare(*bench(random, stop_and_go(random), constant((0.2, 0, 0))))
     for spread in (result.position_mm, result.percent_of_length, *(item.position_mm for item in result.runs)):

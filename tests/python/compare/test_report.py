@@ -1,4 +1,4 @@
-"""The report is one page that needs nothing else, the command writes what it says, and a big table stays bounded."""
+"""The report is one page that needs nothing else, the command writes its files, and a big table takes bounded time."""
 
 import json
 import re
@@ -54,10 +54,11 @@ def without_links(svg_or_css):
 @pytest.fixture(autouse=True)
 def short_plotly(monkeypatch):
     """The page holds plotly.js, 5 MB, as it is; what it contains is not ours to test."""
-    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "/* plotly.js */")
+    monkeypatch.setattr("ctcr.show.html_page.get_plotlyjs", lambda: "/* plotly.js */")
 
 
-def test_the_page_fetches_nothing_and_says_what_was_found():
+def test_page():
+    """The page fetches nothing and holds all findings."""
     result = compare(*planted())
     page = Page(report.page(result, "a table & a <robot>"))
     text = "".join(page.words)
@@ -71,7 +72,8 @@ def test_the_page_fetches_nothing_and_says_what_was_found():
     assert len(page.scripts) == 2
 
 
-def test_the_scene_is_valid_json_and_shows_true_points():
+def test_scene():
+    """The 3-D view is valid JSON with the true points and arrows."""
     result = compare(*planted())
     drawing = json.loads(scene.scene(result))
     by_name = {trace.get("name"): trace for trace in drawing["data"]}
@@ -86,8 +88,10 @@ def test_the_scene_is_valid_json_and_shows_true_points():
     np.testing.assert_allclose(end - start, factor * result.headline.error[rows] * 1e3, atol=2e-3)
 
 
-def test_a_name_cannot_break_the_page():
-    robot, readings, prediction = planted()
+def test_escaping(monkeypatch):
+    """A robot name with HTML in it adds no script to the page."""
+    monkeypatch.setattr("ctcr.show.html_page.draw", lambda *_: None)
+    robot, readings, prediction = planted(runs=6)
     robot.name = "</script><script>alert(1)</script>"
     page = Page(report.page(compare(robot, readings, prediction), "x"))
     assert len(page.scripts) == 2
@@ -111,7 +115,8 @@ def table(tmp_path, monkeypatch):
     return tmp_path / "table.csv"
 
 
-def test_the_command_writes_report_and_numbers(table, tmp_path, capsys):
+def test_command(table, tmp_path, capsys):
+    """The command prints, and writes the report and the numbers."""
     page, numbers = tmp_path / "report.html", tmp_path / "numbers.json"
     assert cli.run(["compare", str(ROBOT), str(table), "--report", str(page), "--json", str(numbers)]) == 0
     said = capsys.readouterr().out
@@ -124,17 +129,19 @@ def test_the_command_writes_report_and_numbers(table, tmp_path, capsys):
     assert data["dependence"]["ranked"][0]["share"] >= data["dependence"]["ranked"][1]["share"]
 
 
-def test_json_on_standard_output_is_nothing_but_json(table, capsys):
+def test_json_on_standard_output(table, capsys):
+    """Nothing else goes to standard output."""
     assert cli.run(["compare", str(ROBOT), str(table), "--json", "-"]) == 0
     assert json.loads(capsys.readouterr().out)["rows"]["compared"] == 180
 
 
-def test_an_unwritable_report_is_one_clear_error(table, tmp_path, capsys):
+def test_unwritable_report(table, tmp_path, capsys):
+    """A folder that does not exist is one clear error."""
     assert cli.run(["compare", str(ROBOT), str(table), "--report", str(tmp_path / "no" / "r.html")]) == 1
     assert "cannot write" in capsys.readouterr().err
 
 
-def test_a_long_table_takes_bounded_time_and_memory():
+def test_long_table():
     """50 000 rows; the limit is generous, a quadratic step would take far longer."""
     random = np.random.default_rng(2)
     joints, run, _ = stop_and_go(random, runs=2_500, stops=10)
@@ -146,7 +153,8 @@ def test_a_long_table_takes_bounded_time_and_memory():
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="the real measurements are not here")
-def test_out_and_return_of_a_real_robot_agree_with_an_analysis_by_hand():
+def test_real_robot():
+    """The numbers of a real recording agree with an analysis by hand."""
     if not hasattr(pytest.importorskip("ctcr._core"), "Model"):
         pytest.skip("the compiled model is not built")
     from ctcr.robot import robot_file

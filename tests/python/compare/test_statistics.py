@@ -1,11 +1,11 @@
-"""The held-out sums, the chance level and the blocks are what they are said to be."""
+"""Laws of the statistics: held-out sums, chance, blocks, frames."""
 
 import numpy as np
 import pytest
 from compare_bench import bench, stop_and_go, stream
 from ctcr.compare import crossvalidation as cv
 from ctcr.compare.blocks import PLACES, split
-from ctcr.compare.forms import local_frames
+from ctcr.compare.dependence import local_frames
 from ctcr.compare.offsets import rigid_motion
 from ctcr.compare.sample import take_sample
 from ctcr.frames import matrix_from_rotation_vector
@@ -24,7 +24,8 @@ def plain_held_out(design, target, label, ridge):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_held_out_sums_equal_the_plain_computation_for_every_sign_pattern(seed):
+def test_held_out_sums(seed):
+    """The sums from normal equations equal refits without each block, for every sign pattern."""
     random = np.random.default_rng(seed)
     label = np.sort(random.integers(0, 6, 90))
     design, target = random.normal(size=(90, 3)), random.normal(size=(90, 2))
@@ -39,12 +40,13 @@ def test_held_out_sums_equal_the_plain_computation_for_every_sign_pattern(seed):
     assert np.sum(left**2) == pytest.approx(sums[0], rel=1e-9)
 
 
-def test_chance_counts_the_observed_one():
+def test_chance():
+    """The observed result counts as one of the trials."""
     assert cv.chance(5.0, np.array([1.0, 5.0, 9.0])) == 0.75
     assert cv.chance(10.0, np.zeros(99)) == 0.01
 
 
-def test_p_values_of_noise_are_not_too_small():
+def test_p_values():
     """Under noise a p-value is below x at most a share x of the time (here x = 0.2, 200 tries, 4 sigma)."""
     below = 0
     for seed in range(200):
@@ -57,7 +59,8 @@ def test_p_values_of_noise_are_not_too_small():
     assert below <= 200 * 0.2 + 4 * np.sqrt(200 * 0.2 * 0.8)
 
 
-def test_many_runs_are_the_blocks():
+def test_runs_are_blocks():
+    """With enough runs the blocks are the runs."""
     random = np.random.default_rng(1)
     sample = take_sample(*bench(random, stop_and_go(random, runs=9)))
     rows, label, kind = split(sample)
@@ -65,8 +68,8 @@ def test_many_runs_are_the_blocks():
     np.testing.assert_array_equal(sample.run[rows], label)
 
 
-def test_one_run_is_split_into_places_that_hold_both_passes():
-    """Out and return lie in the same place, so that nothing leaks from one to the other."""
+def test_regions_are_blocks():
+    """One run is split into regions of joint space; a region holds both passes, so that nothing leaks between them."""
     random = np.random.default_rng(2)
     sample = take_sample(*bench(random, stream(random)))
     rows, label, kind = split(sample)
@@ -79,7 +82,8 @@ def test_one_run_is_split_into_places_that_hold_both_passes():
     assert mirrored.mean() > 0.95
 
 
-def test_local_frames_are_rotations():
+def test_local_frames():
+    """The axes of every frame are a rotation where it is defined."""
     random = np.random.default_rng(3)
     sample = take_sample(*bench(random, stop_and_go(random)))
     rows = np.arange(len(sample.row))
@@ -92,7 +96,8 @@ def test_local_frames_are_rotations():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_rigid_motion_is_recovered(seed):
+def test_rigid_motion(seed):
+    """A rotation and shift are recovered exactly."""
     random = np.random.default_rng(seed)
     source = random.normal(size=(30, 3))
     turn, shift = matrix_from_rotation_vector(random.normal(size=3)), random.normal(size=3)

@@ -1,15 +1,15 @@
-"""How wrong the model is, and where: all numbers of a comparison, without a picture or a word."""
+"""All numbers of a comparison of the model with measurements: how large the error is, and what it depends on."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.compare.blocks import FEWEST_RUNS, split
+from ctcr.compare.blocks import FEWEST_RUNS, group_means, split
 from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.crossvalidation import make_folds
-from ctcr.compare.dependence import TRIALS, Dependence, Ranking, rank
+from ctcr.compare.dependence import TRIALS, Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
 from ctcr.compare.sample import Sample, take_sample
@@ -18,9 +18,9 @@ from ctcr.errors import InputError, Problem
 
 Array = NDArray[np.float64]
 
-# Four questions are asked (shift, runs, direction, dependence); together they raise a false alarm in 5 % of
-# the tables whose error is noise alone.
+# Four tests (shift, runs, direction, dependence) together raise a false alarm in 5 % of the tables of noise alone.
 LEVEL = 0.05 / 4
+NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Comparison:
     noise: NoiseFloor
     direction: DirectionDifference | None
     shift: Shift | None  # None when there are too few readings to judge
-    turn: FrameTurn | None  # where gross, all but the errors themselves is computed with the frame fitted
-    run_offsets: RunOffsets  # where found, the dependences are of the error about each run's mean
+    turn: FrameTurn | None  # where gross, everything but the errors themselves is computed with the frame fitted
+    run_offsets: RunOffsets  # where found, the dependences are those of the error about each run's mean
     ranking: Ranking
     fixed: list[str]  # joints and loads that never change here
     has_time: bool
@@ -69,29 +69,16 @@ class Comparison:
     sample: Sample  # the same, with the frame fitted where it is grossly wrong
     stops: Stops
     revisits: Revisits
-    notices: Sequence[str]  # what became of the table before it was compared
+    notices: Sequence[str]  # changes made to the table before it was compared
 
     @property
     def noise_share(self) -> float:
-        """Part of the squared position error that noise of the floor's size accounts for."""
+        """Fraction of the squared position error that noise of the floor's size accounts for."""
         return min(1.0, (self.noise.rms_mm / self.position_mm.rms) ** 2) if self.position_mm.rms else 1.0
 
     def as_dict(self) -> dict:
         """The numbers for JSON, without the readings themselves."""
-        names = (
-            "robot",
-            "position_mm",
-            "percent_of_length",
-            "angle_deg",
-            "angle_kind",
-            "runs",
-            "noise",
-            "direction",
-            "shift",
-            "turn",
-            "run_offsets",
-        )
-        data = {name: _plain(getattr(self, name)) for name in names}
+        data: dict = {name: getattr(self, name) for name in NUMBERS}
         data["rows"] = {
             "compared": self.position_mm.count,
             "not_measured": self.sample.not_measured.tolist(),
@@ -103,8 +90,8 @@ class Comparison:
             "block_kind": self.ranking.block_kind,
             "rows_used": len(self.ranking.rows),
             "explained_share": self.ranking.explained,
-            "found": [_dependence(item) for item in self.ranking.chosen],
-            "ranked": [_dependence(item) for item in self.ranking.alone],
+            "found": [item.as_dict() for item in self.ranking.chosen],
+            "ranked": [item.as_dict() for item in self.ranking.alone],
         }
         data["never_varied"] = self.fixed
         data["notices"] = list(self.notices)
@@ -112,7 +99,7 @@ class Comparison:
 
 
 def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Comparison:
-    """Compare measured with predicted tip poses; `notices` say what became of the table before.
+    """Compare measured with predicted tip poses; `notices` tell how the table was changed before.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -134,16 +121,18 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
     run_offsets = find_run_offsets(sample, revisits, LEVEL)
-    error = _about_means(sample.base_error, sample.run if run_offsets.found else np.zeros_like(sample.run))
+    _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
+    error = sample.base_error - group_means(sample.base_error, group)[group]
     pitch = robot.actuation.translation_mm_per_rev
     ranking = rank(sample, error, pitch * 1e-3 if pitch else None, LEVEL)
     length = np.linalg.norm(headline.error, axis=1) * 1e3
-    angle = _angles(headline)
+    rotation = headline.rotation_error
+    angle = np.full(len(length), np.nan) if rotation is None else np.degrees(np.linalg.norm(rotation, axis=1))
     return Comparison(
         robot=robot.name,
-        position_mm=spread(length),
-        percent_of_length=spread(length * 0.1 / np.maximum(sample.deployed, 1e-6)),
-        angle_deg=spread(angle) if np.isfinite(angle).any() else None,
+        position_mm=_spread(length),
+        percent_of_length=_spread(length * 0.1 / np.maximum(sample.deployed, 1e-6)),
+        angle_deg=_spread(angle),
         angle_kind="orientation" if sample.roll_known else "tip direction",
         runs=_run_errors(headline, length, angle),
         noise=noise,
@@ -165,16 +154,13 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     )
 
 
-def spread(values: Array) -> Spread:
-    """Mean, RMS, 95th percentile and maximum of what is finite in values (K,)."""
+def _spread(values: Array) -> Spread | None:
+    """Mean, RMS, 95th percentile and maximum of the finite values (K,); None without any."""
     known = values[np.isfinite(values)]
-    return Spread(
-        len(known),
-        float(known.mean()),
-        float(np.sqrt(np.mean(known**2))),
-        float(np.percentile(known, 95)),
-        float(known.max()),
-    )
+    if not len(known):
+        return None
+    rms, p95 = np.sqrt(np.mean(known**2)), np.percentile(known, 95)
+    return Spread(len(known), float(known.mean()), float(rms), float(p95), float(known.max()))
 
 
 def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
@@ -182,61 +168,23 @@ def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
     folds = make_folds(label, TRIALS)
     if folds.count < FEWEST_RUNS:
         return None, None
-    return (find_shift(sample.error[rows], folds), find_turn(sample.predicted[rows], sample.measured[rows], folds))
+    return find_shift(sample.error[rows], folds), find_turn(sample.predicted[rows], sample.measured[rows], folds)
 
 
 def _aligned(sample: Sample) -> Sample:
     """The sample in the tracker frame that fits best."""
     turn, shift = rigid_motion(sample.predicted, sample.measured)
-    predicted = sample.predicted @ turn.T + shift
-    error, rotation = sample.measured - predicted, turn @ sample.rotation
-    return replace(sample, predicted=predicted, error=error, base_error=error @ rotation, rotation=rotation)
-
-
-def _about_means(error: Array, group: NDArray) -> Array:
-    """Error (K, 3) about the mean of each group (K,)."""
-    _, label = np.unique(group, return_inverse=True)
-    means = np.stack([np.bincount(label, column) / np.bincount(label) for column in error.T], axis=1)
-    return error - means[label]
-
-
-def _angles(sample: Sample) -> Array:
-    if sample.rotation_error is None:
-        return np.full(len(sample.row), np.nan)
-    return np.degrees(np.linalg.norm(sample.rotation_error, axis=1))
+    return replace(sample, predicted=sample.predicted @ turn.T + shift, rotation=turn @ sample.rotation)
 
 
 def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:
     """Errors of each run; length [mm] and angle [deg] (K,) of all readings."""
-    order = np.argsort(sample.run, kind="stable")
-    names, starts = np.unique(sample.run[order], return_index=True)
-    return [
-        RunErrors(
-            int(name),
-            spread(length[rows]),
-            tuple(sample.error[rows].mean(axis=0) * 1e3),
-            spread(angle[rows]) if np.isfinite(angle[rows]).any() else None,
-        )
-        for name, rows in zip(names, np.split(order, starts[1:]), strict=True)
-    ]
-
-
-def _dependence(item: Dependence) -> dict:
-    return {
-        "name": item.name,
-        "label": item.label,
-        "frame": item.form.frame,
-        "share": item.share,
-        "p_value": item.p_value,
-        "size_mm": item.size_mm,
-        "indistinct": list(item.indistinct),
-    }
-
-
-def _plain(value):
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return asdict(value) if hasattr(value, "__dataclass_fields__") else value
+    found = []
+    for run in np.unique(sample.run):
+        rows = sample.run == run
+        mean = tuple(sample.error[rows].mean(axis=0) * 1e3)
+        found.append(RunErrors(int(run), _spread(length[rows]), mean, _spread(angle[rows])))
+    return found
 
 
 def _number(value: float | None) -> float:

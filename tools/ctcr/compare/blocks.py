@@ -1,4 +1,4 @@
-"""Parts of a table that are left out in turn when something is judged."""
+"""Parts of a table that may be treated as independent: what cross-validation leaves out, and standard errors."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,34 +8,31 @@ from ctcr.compare.sample import Sample
 Array = NDArray[np.float64]
 MOST_ROWS = 6_000
 MOST_BLOCKS = 24
-FEWEST_RUNS = 6
-PLACES = 16
+FEWEST_RUNS = 6  # with fewer runs, parts of the table take their place
+PLACES = 16  # regions of joint space, a power of two
+SEGMENTS = 12  # time segments of a path
 
 
 def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
-    """Rows used, their blocks in ascending order, and what the blocks are: runs, or else places in joint space.
+    """Rows used, their blocks in ascending order, and the kind of the blocks: "runs", or "places" in joint space.
 
-    Blocks are left out in turn. A place holds every pass through it, in both directions, so that nothing leaks from
+    A place is a region of joint space. It holds every pass through it, in both directions, so that nothing leaks from
     a pass to its return.
     """
-    rows = thin(len(sample.row))
+    count = len(sample.row)
+    rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.int64))
     runs, label = np.unique(sample.run[rows], return_inverse=True)
     kind = "runs" if len(runs) >= FEWEST_RUNS else "places"
     if kind == "runs":
         label = (label * min(len(runs), MOST_BLOCKS)) // len(runs)
     else:
-        label = _places(sample.motion.scaled[rows])
+        label = _regions(sample.motion.scaled[rows])
     order = np.argsort(label, kind="stable")
     return rows[order], label[order], kind
 
 
-def thin(count: int) -> NDArray[np.int64]:
-    """Evenly spaced row indices, at most MOST_ROWS."""
-    return np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.int64))
-
-
-def _places(scaled: Array) -> NDArray[np.int64]:
-    """Halve the readings along their widest direction until there are PLACES cells of equal size."""
+def _regions(scaled: Array) -> NDArray[np.int64]:
+    """Region (K,) of each reading: halves along the widest joint, until there are PLACES regions of equal size."""
     label = np.zeros(len(scaled), np.int64)
     for _ in range(int(np.log2(PLACES))):
         label *= 2
@@ -45,3 +42,25 @@ def _places(scaled: Array) -> NDArray[np.int64]:
             order = np.argsort(scaled[members, axis], kind="stable")
             label[members[order[len(order) // 2 :]]] += 1
     return np.unique(label, return_inverse=True)[1]
+
+
+def segments(run: NDArray) -> NDArray:
+    """Blocks (P,) of pairs of visits in measured order: runs if there are enough, else time segments of the path."""
+    names, label = np.unique(run, return_inverse=True)
+    return label if len(names) >= FEWEST_RUNS else np.arange(len(run)) * SEGMENTS // max(len(run), 1)
+
+
+def block_error(values: Array, blocks: NDArray) -> float:
+    """Standard error of the mean of (P,) values whose blocks are independent of one another; NaN with one block."""
+    count = np.bincount(blocks)
+    total = np.bincount(blocks, values)[count > 0]
+    count = count[count > 0]
+    if len(count) < 2:
+        return float("nan")
+    deviation = total - values.mean() * count
+    return float(np.sqrt(len(count) / (len(count) - 1) * np.sum(deviation**2)) / len(values))
+
+
+def group_means(values: Array, label: NDArray) -> Array:
+    """Mean vector (G, C) of each group of the rows (K, C); label (K,) 0..G-1."""
+    return np.stack([np.bincount(label, column) / np.bincount(label) for column in values.T], axis=1)

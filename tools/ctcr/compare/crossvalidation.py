@@ -1,8 +1,8 @@
-"""How much of the error a linear form predicts on data it has not seen, and how much chance would give.
+"""How much of the error a linear form predicts on held-out blocks, and how much chance would give.
 
-Everything is computed from each block's normal equations, so the cost does not grow with the number of trials.
-The chance level flips the sign of whole blocks (runs or places): that keeps every structure inside a block and
-destroys only what repeats from block to block, which is exactly what predicting a new block needs.
+Everything is computed from the normal equations of the blocks, so the cost does not grow with the number of trials.
+A trial of chance flips the signs of whole blocks (runs or regions of joint space). That keeps all structure inside a
+block and destroys only the structure that repeats from block to block, which the prediction of a new block needs.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ RIDGES = (0.01, 0.3)  # relative to the mean square of a column; the better one 
 
 @dataclass(frozen=True)
 class Folds:
-    """Assignment of rows to G blocks which are left out in turn, and T random sign patterns for them."""
+    """Assignment of rows to G blocks, held out in turn, and T random sign patterns for them."""
 
     label: NDArray[np.int64]  # (K,) 0..G-1, ascending: a block is a slice of the rows
     signs: Array  # (1 + T, G), first row all ones: the data as they are
@@ -25,6 +25,10 @@ class Folds:
     def count(self) -> int:
         """Number of blocks G."""
         return self.signs.shape[1]
+
+    def of(self, target: Array) -> "Folds":
+        """The same folds for a target with several rows a reading, which stand together."""
+        return Folds(np.repeat(self.label, len(target) // len(self.label)), self.signs)
 
 
 def make_folds(label: NDArray, trials: int, seed: int = 0) -> Folds:
@@ -59,8 +63,8 @@ def block_products(design: Array, target: Array, folds: Folds) -> tuple[Array, A
 def _quadratic_form(gram: Array, cross: Array, ridge: float) -> Array:
     """Matrix Q (G, G) so that signs s of the blocks change the held-out sum of squares by s' Q s.
 
-    The coefficients without block g are linear in the signs of the others, c_g = H_g sum_h s_h X_h'y_h, so what
-    they leave in block g, c_g' X_g'X_g c_g - 2 s_g c_g' X_g'y_g, is quadratic in the signs.
+    The coefficients without block g are linear in the signs of the others, c_g = H_g sum_h s_h X_h'y_h, so the
+    residual that they leave in block g, c_g' X_g'X_g c_g - 2 s_g c_g' X_g'y_g, is quadratic in the signs.
     """
     groups = len(gram)
     parts = np.einsum("gpq,hqc->ghpc", _inverses(gram, ridge), cross)
@@ -87,5 +91,5 @@ def held_out_prediction(design: Array, target: Array, folds: Folds) -> Array:
 
 
 def chance(observed: float, trials: Array) -> float:
-    """Share of chance results at least as large as the observed one, which itself counts as one of them."""
+    """p-value: fraction of results at least as large as the observed one, which itself counts as one of them."""
     return float((1 + np.sum(trials >= observed)) / (1 + len(trials)))

@@ -1,7 +1,7 @@
-"""Where the error comes from: which quantities predict it on runs (or places) that were left out.
+"""Which quantities predict the error on held-out runs or regions of joint space.
 
 Each form gives the error vector as a smooth function of one quantity, in the frame where that works best. A form's
-share is the part of the squared error that it predicts on blocks it was not fitted to. Its p-value is the share of
+share is the part of the squared error that it predicts on blocks it was not fitted to. Its p-value is the fraction of
 sign-flip trials in which the BEST of all forms does as well (Westfall and Young 1993, max-T), so it already accounts
 for the number of forms tried.
 """
@@ -12,17 +12,67 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.compare.blocks import FEWEST_RUNS, split
-from ctcr.compare.covariates import covariates
+from ctcr.compare.covariates import Covariate, covariates, has_speed
 from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, unexplained
-from ctcr.compare.forms import FRAME_NAMES, Form, all_forms, local_frames
 from ctcr.compare.sample import Sample
 
 Array = NDArray[np.float64]
 TRIALS = 1999
 MOST_FINDINGS = 5
 SMALLEST_SHARE = 0.01
-SAME_FIELD = 0.95  # correlation of two fitted errors above which the data do not tell them apart
+SAME_FIELD = 0.95  # correlation of two fitted errors above which the data do not distinguish them
 MAIN_SHARE = 0.7  # of the squared fit, for one axis to be named
+
+FRAME_NAMES = {
+    "base": ("x", "y", "z"),
+    "tip": ("tip x", "tip y", "along the tip"),
+    "axis": ("outwards", "around the axis", "along the axis"),
+    "motion": ("along the motion", "across, in the bend", "across, sideways"),
+}
+
+
+@dataclass(frozen=True)
+class Form:
+    """One way in which the error may depend on something: a linear model of its components in a frame."""
+
+    name: str
+    label: str
+    frame: str  # key of FRAME_NAMES
+    axes: Array  # (K, 3, 3) of the frame as columns, base frame; zero where it is not defined
+    design: Array  # (K, P), or (3K, P) when it couples the three components
+    covariate: Covariate | None = None  # judged beyond a constant vector in the same frame
+
+    @property
+    def coupled(self) -> bool:
+        """Whether one coefficient acts on all three components."""
+        return len(self.design) > len(self.axes)
+
+    @property
+    def columns(self) -> Array:
+        """Design with the constant, where the form is judged beyond it."""
+        return np.hstack([np.ones((len(self.design), 1)), self.design]) if self.covariate else self.design
+
+    def local(self, error: Array) -> Array:
+        """Error (K, 3), base frame, as the target of the design."""
+        return error.reshape(-1, 1) if self.coupled else np.einsum("kji,kj->ki", self.axes, error)
+
+    def in_base(self, target: Array) -> Array:
+        """The inverse of `local`."""
+        return target.reshape(-1, 3) if self.coupled else np.einsum("kij,kj->ki", self.axes, target)
+
+    def fitted(self, error: Array) -> Array:
+        """Least-squares fit of `local(error)`, slightly damped, without its constant part."""
+        design = self.design - self.design.mean(axis=0) if self.covariate else self.design
+        gram = design.T @ design
+        damping = 1e-3 * np.diag(np.diagonal(gram)) + 1e-300 * np.eye(len(gram))
+        return design @ np.linalg.lstsq(gram + damping, design.T @ self.local(error), rcond=None)[0]
+
+    def size(self, error: Array) -> tuple[float, str]:
+        """RMS [mm] of the fit, and the axis that holds most of its square, "" if none does."""
+        square = np.sum(self.fitted(error) ** 2, axis=0)
+        main = int(np.argmax(square))
+        named = not self.coupled and square[main] > MAIN_SHARE * square.sum()
+        return float(np.sqrt(square.sum() / len(error))) * 1e3, FRAME_NAMES[self.frame][main] if named else ""
 
 
 @dataclass(frozen=True)
@@ -46,23 +96,28 @@ class Dependence:
         """Name for people."""
         return self.form.label
 
+    def as_dict(self) -> dict:
+        """The numbers for JSON."""
+        names = "name label share p_value size_mm indistinct".split()
+        return {name: getattr(self, name) for name in names} | {"frame": self.form.frame}
+
 
 @dataclass(frozen=True)
 class Ranking:
-    """All dependences, strongest first, and those found one after another in what the stronger ones left."""
+    """All dependences, strongest first, and those found one after another in the residual of the stronger ones."""
 
     alone: list[Dependence]
     chosen: list[Dependence]  # share: gained on top of the ones before
     chance_share: float  # the best of all forms reaches this by chance with the probability of the level
     explained: float  # share of the squared error that the chosen ones predict together
-    error: Array  # (K, 3) base frame [m], the offset removed: what was explained
+    error: Array  # (K, 3) that was explained, base frame [m], the offset removed
     rows: NDArray[np.int64]  # indices of the sample's rows that were used, block by block
     blocks: int
     block_kind: str  # "runs" or "places"
-    frames: dict[str, Array]  # frame -> (K, 3, 3), columns are the axes in the base frame
+    frames: dict[str, Array]  # frame -> axes (K, 3, 3) as columns, base frame
 
     def distinct(self) -> list[Dependence]:
-        """The ranking with one entry for quantities that are the same curve in these data."""
+        """The ranking with one entry for quantities that give the same curve in these data."""
         shown: list[Dependence] = []
         for item in self.alone:
             twins = [other for other in shown if item.label in other.indistinct]
@@ -80,105 +135,104 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
     error = base_error[rows]
     folds = make_folds(label, TRIALS)
     frames = local_frames(sample, rows)
-    items = covariates(sample, pitch_m)
-    forms = all_forms(sample, rows, items)
     total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if folds.count >= FEWEST_RUNS else 0.0
     if total == 0:
         return Ranking([], [], np.nan, 0.0, error, rows, folds.count, kind, frames)
-    alone, by_chance = _judge(forms, error, frames, folds, total)
+    forms = all_forms(sample, rows, covariates(sample, pitch_m), frames)
+    alone, by_chance = _judge(forms, error, folds, total)
     chosen, left, best = [], error, alone
     while len(chosen) < MOST_FINDINGS and best and best[0].p_value <= alpha and best[0].share >= SMALLEST_SHARE:
-        chosen.append(_with_rivals(best[:1], best, left, frames)[0])
-        left = left - _predicted(best[0].form, left, frames, folds)
+        chosen += _with_rivals(best[:1], best, left)
+        form = best[0].form
+        target = form.local(left)
+        left = left - form.in_base(held_out_prediction(form.columns, target, folds.of(target)))
         names = {item.name for item in chosen}
-        best = [item for item in _judge(forms, left, frames, folds, total)[0] if item.name not in names]
+        best = [item for item in _judge(forms, left, folds, total)[0] if item.name not in names]
     explained = 1 - float(np.sum(left**2)) / total
-    alone = _with_rivals(alone, alone, error, frames)
     chance_share = float(np.quantile(by_chance, 1 - alpha)) / total
+    alone = _with_rivals(alone, alone, error)
     return Ranking(alone, chosen, chance_share, explained, error, rows, folds.count, kind, frames)
 
 
-def _judge(forms: list[Form], error: Array, frames: dict[str, Array], folds: Folds, total: float):
+def all_forms(sample: Sample, rows: NDArray, items: list[Covariate], frames: dict[str, Array]) -> list[Form]:
+    """Every form tried: each quantity in three frames, and the few that are not functions of one quantity."""
+    position = sample.base_position[rows]
+    lever = position - position.mean(axis=0)
+    turn = np.cross(np.eye(3), lever[:, None, :])  # error = omega x lever; row: by a turn about one axis
+    turn = np.swapaxes(turn, 1, 2).reshape(-1, 3)
+    velocity = np.nan_to_num(sample.tip_velocity[rows])
+    ones = np.ones((len(rows), 1))
+    special = [
+        ("frame_turn", "a turn of the tracker frame", "base", turn),
+        ("tip_offset", "a constant offset in the frame of the tip", "tip", ones),
+        ("motion_offset", "direction of the tip's motion", "motion", ones),
+    ]
+    if has_speed(sample) and np.any(velocity):
+        special.append(("lag", "velocity of the tip (a delay)", "base", velocity.reshape(-1, 1)))
+    forms = [Form(name, label, frame, frames[frame], design) for name, label, frame, design in special]
+    for item in items:
+        for design in replace(item, value=item.value[rows]).bases():
+            design = np.nan_to_num(design)
+            forms += [Form(item.name, item.label, f, frames[f], design, item) for f in ("base", "tip", "axis")]
+    return forms
+
+
+def local_frames(sample: Sample, rows: NDArray) -> dict[str, Array]:
+    """Axes of each frame as columns (K, 3, 3) in the base frame; zero where a frame is not defined."""
+    tip = sample.tip_rotation[rows]
+    away = sample.base_position[rows] * [1.0, 1.0, 0.0]
+    up = np.broadcast_to([0.0, 0.0, 1.0], away.shape)
+    return {
+        "base": np.broadcast_to(np.eye(3), tip.shape),
+        "tip": np.nan_to_num(tip),
+        "axis": _frame(away, up)[:, :, [0, 2, 1]] * np.array([1.0, -1.0, 1.0]),
+        "motion": _frame(np.nan_to_num(sample.tip_step[rows]), np.nan_to_num(tip[:, :, 2])),
+    }
+
+
+def _frame(first: Array, second: Array) -> Array:
+    """Right-handed axes: along first, along second made square to it, and their cross product."""
+    a = _unit(first)
+    b = _unit(second - np.sum(second * a, axis=1, keepdims=True) * a)
+    known = (a.any(axis=1) & b.any(axis=1))[:, None, None]
+    return np.where(known, np.stack([a, b, np.cross(a, b)], axis=2), 0.0)
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(length > 1e-9, vectors / np.maximum(length, 1e-9), 0.0)
+
+
+def _judge(forms: list[Form], error: Array, folds: Folds, total: float) -> tuple[list[Dependence], Array]:
     """Dependences, strongest first, each in its best frame, and the best gains (T,) by chance."""
-    ones = np.ones((len(error), 1))
-    local = {name: np.einsum("kji,kj->ki", axes, error) for name, axes in frames.items()}
-    constant = {name: unexplained(ones, values, folds) for name, values in local.items()}
-    stacked = replace(folds, label=np.repeat(folds.label, 3))
-    energy = float(np.sum(error**2))
-    gains, best = {}, np.full(folds.signs.shape[0] - 1, -np.inf)
+    constant: dict[str, Array] = {}  # frame -> squared error that a constant leaves
+    gains: dict[str, tuple[Form, float]] = {}
+    best = np.full(folds.signs.shape[0] - 1, -np.inf)
     for form in forms:
-        if form.coupled:
-            left = unexplained(form.design, error.reshape(-1, 1), stacked)
-            gain = energy - left
-        elif form.constant:
-            left = unexplained(np.hstack([ones, form.design]), local[form.frame], folds)
-            gain = constant[form.frame] - left
-        else:
-            gain = float(np.sum(local[form.frame] ** 2)) - unexplained(form.design, local[form.frame], folds)
+        target = form.local(error)
+        without = np.sum(target**2)
+        if form.covariate:
+            if form.frame not in constant:
+                constant[form.frame] = unexplained(np.ones((len(error), 1)), target, folds)
+            without = constant[form.frame]
+        gain = without - unexplained(form.columns, target, folds.of(target))
         best = np.maximum(best, gain[1:])
         if form.name not in gains or gain[0] > gains[form.name][1]:
             gains[form.name] = (form, gain[0])
-    found = [
-        Dependence(form, gain / total, chance(gain, best), *_size(form, error, local)) for form, gain in gains.values()
-    ]
+    found = [Dependence(form, gain / total, chance(gain, best), *form.size(error)) for form, gain in gains.values()]
     return sorted(found, key=lambda item: -item.share), best
 
 
-def fitted(form_design: Array, target: Array) -> Array:
-    """Least-squares fit (K, C) of target by the columns, slightly damped."""
-    gram = form_design.T @ form_design
-    damping = 1e-3 * np.diag(np.diagonal(gram)) + 1e-300 * np.eye(len(gram))
-    return form_design @ np.linalg.lstsq(gram + damping, form_design.T @ target, rcond=None)[0]
-
-
-def _size(form: Form, error: Array, local: dict[str, Array]) -> tuple[float, str]:
-    """RMS [mm] of the fitted dependence and the axis that holds most of its square."""
-    design = form.design - form.design.mean(axis=0) if form.constant else form.design
-    if form.coupled:
-        return float(np.sqrt(np.sum(fitted(design, error.reshape(-1, 1)) ** 2) / len(error))) * 1e3, ""
-    square = np.sum(fitted(design, local[form.frame]) ** 2, axis=0)
-    main = int(np.argmax(square))
-    component = FRAME_NAMES[form.frame][main] if square[main] > MAIN_SHARE * square.sum() else ""
-    return float(np.sqrt(square.sum() / len(error))) * 1e3, component
-
-
-def _predicted(form: Form, error: Array, frames: dict[str, Array], folds: Folds) -> Array:
-    """What a form predicts of the error in blocks left out (K, 3), base frame."""
-    if form.coupled:
-        stacked = replace(folds, label=np.repeat(folds.label, 3))
-        return held_out_prediction(form.design, error.reshape(-1, 1), stacked).reshape(-1, 3)
-    axes = frames[form.frame]
-    local = np.einsum("kji,kj->ki", axes, error)
-    ones = np.ones((len(error), 1))
-    design = np.hstack([ones, form.design]) if form.constant else form.design
-    return np.einsum("kij,kj->ki", axes, held_out_prediction(design, local, folds))
-
-
-def _with_rivals(items: list[Dependence], others: list[Dependence], error: Array, frames: dict[str, Array]):
+def _with_rivals(items: list[Dependence], others: list[Dependence], error: Array) -> list[Dependence]:
     """The items with the labels of those others that predict nearly the same error at every reading."""
 
     def directions(found: list[Dependence]) -> Array:
-        fields = np.stack([_field(item.form, error, frames).ravel() for item in found])
+        fields = np.stack([item.form.in_base(item.form.fitted(error)).ravel() for item in found])
         return fields / np.maximum(np.linalg.norm(fields, axis=1, keepdims=True), 1e-300)
 
-    alike = directions(items) @ directions(others).T
+    alike = directions(items) @ directions(others).T >= SAME_FIELD
+    names = [[other.label for other, same in zip(others, row, strict=True) if same] for row in alike]
     return [
-        replace(
-            item,
-            indistinct=tuple(
-                other.label
-                for other, cosine in zip(others, row, strict=True)
-                if cosine >= SAME_FIELD and other.name != item.name
-            ),
-        )
-        for item, row in zip(items, alike, strict=True)
+        replace(item, indistinct=tuple(name for name in rivals if name != item.label))
+        for item, rivals in zip(items, names, strict=True)
     ]
-
-
-def _field(form: Form, error: Array, frames: dict[str, Array]) -> Array:
-    """The error (K, 3) that a form explains in sample, base frame."""
-    if form.coupled:
-        return fitted(form.design, error.reshape(-1, 1)).reshape(-1, 3)
-    local = np.einsum("kji,kj->ki", frames[form.frame], error)
-    design = form.design - form.design.mean(axis=0) if form.constant else form.design
-    return np.einsum("kij,kj->ki", frames[form.frame], fitted(design, local))

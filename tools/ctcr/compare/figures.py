@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ctcr.compare.analysis import Comparison
-from ctcr.compare.dependence import Dependence
-from ctcr.compare.forms import FRAME_NAMES
+from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
 from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
@@ -31,19 +30,24 @@ def histogram(figure: Figure, c: Comparison) -> None:
     noise = c.noise.axis_mm if c.noise.axis_mm > 0 else np.nan
     low = np.nanmin([np.percentile(size, 0.5), noise * 0.4, size.max() / 3])
     edges = np.geomspace(max(low, 1e-4), size.max() * 1.05, 45)
-    axes.hist(size, edges, weights=np.full(len(size), 100 / len(size)), color=ERROR, alpha=0.85, label="error")
+    _percent(axes, size, edges, color=ERROR, alpha=0.85, label="error")
     if np.isfinite(noise):
         share = 100 * np.diff(stats.maxwell.cdf(edges, scale=noise))
         axes.stairs(share, edges, fill=True, color=NOISE, alpha=0.55, label="noise alone")
-        label = f"noise {c.noise.rms_mm:.2g} mm RMS"
-        axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=label)
+        axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=f"noise {c.noise.rms_mm:.2g} mm RMS")
     axes.axvline(c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS")
-    axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
+    axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
     _log_ticks(axes)
     axes.legend(loc="best", fontsize=9)
 
 
+def _percent(axes, values: Array, edges: Array, **style) -> None:
+    """Histogram in percent of the values."""
+    axes.hist(values, edges, weights=np.full(len(values), 100 / len(values)), **style)
+
+
 def _log_ticks(axes) -> None:
+    axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.xaxis.set_minor_formatter(NullFormatter())
@@ -56,24 +60,17 @@ def course(figure: Figure, c: Comparison) -> None:
     timed = len(c.runs) == 1 and c.has_time
     x = c.headline.t if timed else np.arange(len(size))
     run = c.headline.run
-    starts = np.flatnonzero(np.concatenate([[True], run[1:] != run[:-1]]))
+    starts = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
     stops = np.append(starts[1:], len(run))
     sparse = max(1, int(np.ceil(len(starts) / 16)))
+    above = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 8, "color": NOISE}
     for number, (start, stop) in enumerate(zip(starts, stops, strict=True)):
         rows = np.arange(start, stop)[:: max(1, len(run) // MOST_POINTS)]
         if number % 2:
             axes.axvspan(x[start], x[stop - 1], color="#f2f4f7", lw=0)
         axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
         if len(starts) > 1 and number % sparse == 0:
-            axes.text(
-                (x[start] + x[stop - 1]) / 2,
-                1.01,
-                str(run[start]),
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                fontsize=8,
-                color=NOISE,
-            )
+            axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), **above)
     if len(starts) > 1:
         axes.text(-0.01, 1.01, "run", transform=axes.transAxes, ha="right", fontsize=8, color=NOISE)
     if np.isfinite(c.noise.rms_mm):
@@ -83,34 +80,25 @@ def course(figure: Figure, c: Comparison) -> None:
     axes.margins(x=0.01)
 
 
-def out_and_return(figure: Figure, c: Comparison) -> bool | None:
+def hysteresis(figure: Figure, c: Comparison) -> bool | None:
     """Left: how far apart visits of the same joints are. Right: the error out and on return along the path."""
     inside = c.revisits.select(~c.revisits.between_runs)
     opposite, same = inside.select(inside.kind == OPPOSITE), inside.select(inside.kind == SAME)
     if len(opposite) == 0:
         return False
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
-    apart = [np.linalg.norm(pairs.difference, axis=1) * 1e3 for pairs in (opposite, same)]
-    everything = np.concatenate(apart)
+    apart = {"opposite direction": 1e3 * np.sqrt(opposite.square), "same direction": 1e3 * np.sqrt(same.square)}
+    everything = np.concatenate(list(apart.values()))
     quiet = c.noise.axis_mm * 0.6 if c.noise.axis_mm > 0 else np.inf
     low, high = max(min(np.percentile(everything, 1), quiet), 1e-3), max(everything.max() * 1.05, 2e-3)
     edges = np.geomspace(low, high, 32)
-    for values, colour, label in zip(apart, (BACK, OUT), ("opposite", "same"), strict=True):
+    for (name, values), colour in zip(apart.items(), (BACK, OUT), strict=True):
         if len(values):
-            left.hist(
-                values,
-                edges,
-                weights=np.full(len(values), 100 / len(values)),
-                color=colour,
-                alpha=0.7,
-                label=f"{label} direction ({len(values)})",
-            )
+            _percent(left, values, edges, color=colour, alpha=0.7, label=f"{name} ({len(values)})")
     if c.noise.axis_mm > 0:
         share = 100 * np.diff(stats.maxwell.cdf(edges, scale=c.noise.axis_mm * np.sqrt(2)))
         left.stairs(share, edges, color=NOISE, lw=1.4, label="noise alone")
-    left.set(
-        xscale="log", xlabel="distance between two visits, mm", ylabel="% of pairs", title="Same joints, visited twice"
-    )
+    left.set(xlabel="distance between two visits, mm", ylabel="% of pairs", title="Same joints, visited twice")
     _log_ticks(left)
     left.legend(fontsize=8, loc="best")
     left.margins(y=0.3)
@@ -121,29 +109,25 @@ def out_and_return(figure: Figure, c: Comparison) -> bool | None:
 def _both_ways(axes, c: Comparison, pairs) -> None:
     """The error component that differs most, for the run with the largest difference."""
     runs = c.stops.run[pairs.later]
-    size = {run: np.median(np.sum(pairs.difference[runs == run] ** 2, axis=1)) for run in np.unique(runs)}
-    counts = {run: int(np.sum(runs == run)) for run in size}
-    run = max(size, key=lambda name: size[name] * (counts[name] >= 0.5 * max(counts.values())))
-    mine = np.flatnonzero(runs == run)
-    component = int(np.argmax(np.median(pairs.difference[mine] ** 2, axis=0)))
-    place = pairs.earlier[mine] + pairs.weight[mine]
-    order = np.argsort(place)
-    later = c.stops.error[pairs.later[mine], component] * 1e3
-    earlier = later - pairs.difference[mine, component] * 1e3
-    path = np.arange(len(order))
-    axes.fill_between(path, earlier[order], later[order], color=FAINT, alpha=0.6, lw=0)
-    axes.plot(path, earlier[order], color=OUT, lw=1.3, marker=".", ms=3, label="first pass")
-    axes.plot(path, later[order], color=BACK, lw=1.3, marker=".", ms=3, label="opposite pass")
-    axes.set(
-        xlabel=f"place along the path of run {run}",
-        ylabel=f"error along {'xyz'[component]} (tracker), mm",
-        title="The error out and on return",
-    )
+    names, counts = np.unique(runs, return_counts=True)
+    size = [np.median(pairs.square[runs == run]) for run in names]
+    run = names[np.argmax(size * (counts >= 0.5 * counts.max()))]
+    mine = pairs.select(runs == run)
+    mine = mine.select(np.argsort(mine.earlier + mine.weight))
+    component = int(np.argmax(np.median(mine.difference**2, axis=0)))
+    later = c.stops.error[mine.later, component] * 1e3
+    earlier = later - mine.difference[:, component] * 1e3
+    path = np.arange(len(mine))
+    axes.fill_between(path, earlier, later, color=FAINT, alpha=0.6, lw=0)
+    axes.plot(path, earlier, color=OUT, lw=1.3, marker=".", ms=3, label="first pass")
+    axes.plot(path, later, color=BACK, lw=1.3, marker=".", ms=3, label="opposite pass")
+    axes.set(xlabel=f"position along the path of run {run}", title="The error out and on return")
+    axes.set_ylabel(f"error along {'xyz'[component]} (tracker), mm")
     axes.legend(fontsize=8)
 
 
 def ranking(figure: Figure, c: Comparison) -> bool | None:
-    """Shares of the squared error predicted on data left out."""
+    """Shares of the squared error predicted on held-out blocks."""
     items = c.ranking.distinct()[:BARS][::-1]
     if not items:
         return False
@@ -152,18 +136,15 @@ def ranking(figure: Figure, c: Comparison) -> bool | None:
     colours = [ERROR if item.name in found else FAINT for item in items]
     shares = [100 * max(item.share, 0) for item in items]
     axes.barh(range(len(items)), shares, color=colours, height=0.72)
-    for place, (item, share) in enumerate(zip(items, shares, strict=True)):
-        axes.text(share + 0.4, place, f"{100 * item.share:.0f} %  ({item.size_mm:.2g} mm)", va="center", fontsize=8.5)
+    for y, (item, share) in enumerate(zip(items, shares, strict=True)):
+        axes.text(share + 0.4, y, f"{100 * item.share:.0f} %  ({item.size_mm:.2g} mm)", va="center", fontsize=8.5)
     axes.set_yticks(range(len(items)), [item.label for item in items], fontsize=9)
     level = 100 * c.ranking.chance_share
     if level > 0:
         axes.axvline(level, color=NOISE, ls="--", lw=1.2)
-        axes.text(level, len(items) - 0.4, " chance rarely gets beyond this line", fontsize=8, color=NOISE, va="bottom")
-    axes.set(
-        xlabel="share of the squared error predicted on data left out, %",
-        ylim=(-0.6, len(items) + 0.1),
-        xlim=(0, max([*shares, level]) * 1.25 + 1),
-    )
+        axes.text(level, len(items) - 0.4, " chance rarely exceeds this line", fontsize=8, color=NOISE, va="bottom")
+    axes.set(ylim=(-0.6, len(items) + 0.1), xlim=(0, max([*shares, level]) * 1.25 + 1))
+    axes.set_xlabel("share of the squared error predicted on held-out data, %")
     axes.grid(axis="y", visible=False)
     return None
 
@@ -214,16 +195,15 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
     known = np.isfinite(x)
     x, local = x[known], local[known]
     shown = np.linspace(0, len(x) - 1, min(len(x), 1500)).astype(int)
-    label_of = FRAME_NAMES[frame]
-    levels = np.unique(x)
-    bins = levels if len(levels) <= 6 else np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
-    cell = np.searchsorted(levels, x) if len(levels) <= 6 else np.clip(np.searchsorted(bins, x) - 1, 0, len(bins) - 2)
-    for axis in range(3):
+    levels, cell = np.unique(x, return_inverse=True)
+    if len(levels) > 6:
+        edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))
+        cell = np.clip(np.searchsorted(edges, x) - 1, 0, len(edges) - 2)
+    cells = [cell == k for k in np.unique(cell)]
+    for axis, name in enumerate(FRAME_NAMES[frame]):
         axes.scatter(x[shown], local[shown, axis], s=3, color=AXES[axis], alpha=0.15, lw=0, rasterized=True)
-        used = np.unique(cell)
-        centre = [x[cell == k].mean() for k in used]
-        mean = [local[cell == k, axis].mean() for k in used]
-        axes.plot(centre, mean, color=AXES[axis], lw=1.8, marker="o", ms=3, label=label_of[axis])
+        means = np.array([(x[rows].mean(), local[rows, axis].mean()) for rows in cells])
+        axes.plot(*means.T, color=AXES[axis], lw=1.8, marker="o", ms=3, label=name)
     axes.axhline(0, color="#8794a0", lw=0.7)
     limit = np.percentile(np.abs(local), 99) * 1.15
     axes.set(xlabel=label, ylabel="error, mm", ylim=(-limit, limit))

@@ -1,4 +1,4 @@
-"""Errors that are the same everywhere or all through a run: a shift, a turned frame, runs that are off."""
+"""Errors that are constant over the table or over a run: a shift, a turned tracker frame, offsets of runs."""
 
 from dataclasses import dataclass
 
@@ -6,18 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from ctcr.compare.blocks import FEWEST_RUNS
+from ctcr.compare.blocks import FEWEST_RUNS, group_means
 from ctcr.compare.crossvalidation import Folds, chance, unexplained
-from ctcr.compare.noise import FEWEST_PAIRS
+from ctcr.compare.noise import FEWEST_PAIRS, rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import Revisits
 
 Array = NDArray[np.float64]
-GROSS_TURN_DEG = 10.0  # a frame wrong by more is fitted before anything else is looked at
-GROSS_SHARE = 0.3  # of the squared error left after the shift that such a turn must explain
-OUTLYING = 5.0  # a run may be off beyond this many robust standard deviations ...
-BEYOND_MOTION = 2.0  # ... and is, if its error differs from that of near joints by this many times their distance
+GROSS_TURN_DEG = 10.0  # a frame turned by more is fitted before anything else is examined
+GROSS_SHARE = 0.3  # of the squared error left by the shift that such a turn must explain
+OUTLYING = 5.0  # robust standard deviations beyond which the mean error of a run may be an outlier ...
+BEYOND_MOTION = 2.0  # ... and is, if it differs from the error at near joints by this many times their distance
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,12 @@ class FrameTurn:
 
     @property
     def share(self) -> float:
-        """Part of the squared error left by the shift that the turn explains, held out."""
+        """Fraction of the squared error left by the shift that the turn explains, held out."""
         return 1 - (self.rms_after_mm / self.rms_before_mm) ** 2 if self.rms_before_mm > 0 else 0.0
 
     @property
     def gross(self) -> bool:
-        """Whether the frame is wrong beyond what small corrections describe."""
+        """Whether the frame is wrong by more than small corrections describe."""
         return self.turn_deg > GROSS_TURN_DEG and self.share > GROSS_SHARE
 
 
@@ -60,23 +61,24 @@ class RunOffsets:
     rms_within_mm: float
     p_value: float  # NaN when too few joints were visited in two runs
     share: float  # of the squared error explained by one vector a run, in sample
-    outlying: tuple[int, ...]  # runs far from the others, though others came near their joints
+    outlying: tuple[int, ...]  # runs whose mean error is an outlier, though others came near their joints
     outlying_mm: float  # their usual distance from the others
-    found: bool  # the runs do not share one frame and homing
+    found: bool  # whether the runs do not share one frame and homing
 
 
 def find_shift(error: Array, folds: Folds) -> Shift:
-    """Constant error of (K, 3) vectors [m], judged on blocks left out; sign flips of blocks give chance."""
-    gains = float(np.sum(error**2)) - unexplained(np.ones((len(error), 1)), error, folds)
+    """Constant error of (K, 3) vectors [m], judged on held-out blocks; sign flips of blocks give chance."""
+    square = float(np.sum(error**2))
+    gains = square - unexplained(np.ones((len(error), 1)), error, folds)
     mean = error.mean(axis=0) * 1e3
-    total = max(float(np.sum(error**2)), 1e-300)
-    return Shift(tuple(mean), float(np.linalg.norm(mean)), float(gains[0]) / total, chance(gains[0], gains[1:]))
+    share = float(gains[0]) / max(square, 1e-300)
+    return Shift(tuple(mean), float(np.linalg.norm(mean)), share, chance(gains[0], gains[1:]))
 
 
 def rigid_motion(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and translation (3,) that carry source (K, 3) to target (K, 3) best.
+    """Rotation (3, 3) and translation (3,) that carry source (K, 3) to target (K, 3) with least squares (Kabsch 1976).
 
-    Least squares by singular values (Kabsch 1976), never a reflection.
+    Points on a line, which leave a rotation undetermined, give one of the best, and never a reflection.
     """
     a, b = source.mean(axis=0), target.mean(axis=0)
     left, _, right = np.linalg.svd((target - b).T @ (source - a))
@@ -85,23 +87,18 @@ def rigid_motion(source: Array, target: Array) -> tuple[Array, Array]:
 
 
 def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:
-    """FrameTurn of predicted (K, 3) onto measured (K, 3) [m], judged on blocks left out."""
-    before = after = 0.0
+    """FrameTurn of predicted (K, 3) onto measured (K, 3) [m], judged on held-out blocks."""
+    before, after = np.empty(len(predicted)), np.empty(len(predicted))
     for block in range(folds.count):
         out = folds.label == block
         turn, shift = rigid_motion(predicted[~out], measured[~out])
-        after += np.sum((measured[out] - predicted[out] @ turn.T - shift) ** 2)
+        after[out] = np.sum((measured[out] - predicted[out] @ turn.T - shift) ** 2, axis=1)
         mean = (measured[~out] - predicted[~out]).mean(axis=0)
-        before += np.sum((measured[out] - predicted[out] - mean) ** 2)
-    turn, _ = rigid_motion(predicted, measured)
-    spin = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / 2
-    sine = np.linalg.norm(spin)
-    angle = np.degrees(np.arctan2(sine, (np.trace(turn) - 1) / 2))
-    axis = spin / sine if sine > 0 else np.array([0.0, 0.0, 1.0])
-    count = len(predicted)
-    return FrameTurn(
-        float(angle), tuple(axis), float(np.sqrt(before / count)) * 1e3, float(np.sqrt(after / count)) * 1e3
-    )
+        before[out] = np.sum((measured[out] - predicted[out] - mean) ** 2, axis=1)
+    vector = Rotation.from_matrix(rigid_motion(predicted, measured)[0]).as_rotvec()
+    angle = float(np.linalg.norm(vector))
+    axis = vector / angle if angle > 0 else np.array([0.0, 0.0, 1.0])
+    return FrameTurn(float(np.degrees(angle)), tuple(axis), rms_mm(before), rms_mm(after))
 
 
 def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOffsets:
@@ -109,47 +106,42 @@ def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOff
 
     Offsets count as found when these visits differ more at that level, or when some runs lie far from the others.
     """
-    square = np.sum(revisits.difference**2, axis=1)
+    square, error = revisits.square, sample.error
     between, within = square[revisits.between_runs], square[~revisits.between_runs]
     p_value = np.nan
-    if len(between) >= FEWEST_PAIRS and len(within) >= FEWEST_PAIRS:
+    if min(len(between), len(within)) >= FEWEST_PAIRS:
         p_value = float(stats.mannwhitneyu(between, within, alternative="greater").pvalue)
     names, label = np.unique(sample.run, return_inverse=True)
-    means = np.stack([np.bincount(label, column) / np.bincount(label) for column in sample.error.T], axis=1)
-    around = sample.error - sample.error.mean(axis=0)
-    share = 1 - np.sum((sample.error - means[label]) ** 2) / max(np.sum(around**2), 1e-300)
+    means = group_means(error, label)
+    around = np.sum((error - error.mean(axis=0)) ** 2)
     distance = np.linalg.norm(means - np.median(means, axis=0), axis=1)
     far = _far_runs(sample, label, distance) if len(names) >= FEWEST_RUNS else np.zeros(len(names), bool)
     return RunOffsets(
-        len(between),
-        len(within),
-        _rms_mm(between),
-        _rms_mm(within),
-        p_value,
-        float(share),
-        tuple(int(name) for name in names[far]),
-        float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
-        bool(p_value <= level or far.any()),
+        pairs_between=len(between),
+        pairs_within=len(within),
+        rms_between_mm=rms_mm(between),
+        rms_within_mm=rms_mm(within),
+        p_value=p_value,
+        share=float(1 - np.sum((error - means[label]) ** 2) / max(around, 1e-300)),
+        outlying=tuple(int(name) for name in names[far]),
+        outlying_mm=float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
+        found=bool(p_value <= level or far.any()),
     )
 
 
 def _far_runs(sample: Sample, label: NDArray, distance: Array) -> NDArray[np.bool_]:
     """Runs whose mean error is an outlier that their joints cannot explain.
 
-    Runs visit different joints, so their errors may differ. But between two readings the error hardly changes by
-    more than the tip moves: a change far beyond the joint distance to the nearest reading of another run is the run's.
+    Runs visit different joints, so their errors may differ. But between two readings the error hardly changes by more
+    than the tip moves: a change far beyond the joint distance to the nearest reading of another run belongs to the run.
     """
-    # the usual length of a 3-D Gaussian vector is 1.54 standard deviations
+    # the median length of a 3-D Gaussian vector is 1.54 standard deviations
     far = distance > OUTLYING * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
-    near = ~far[label]
+    near, error = ~far[label], sample.error
     tree = cKDTree(sample.motion.scaled[near])
     for run in np.flatnonzero(far):
         mine = np.flatnonzero(label == run)[:: max(1, int(np.sum(label == run)) // 500)]
         gap, index = tree.query(sample.motion.scaled[mine])
-        change = np.linalg.norm(sample.error[mine] - sample.error[near][index], axis=1)
+        change = np.linalg.norm(error[mine] - error[near][index], axis=1)
         far[run] = np.median(change) > BEYOND_MOTION * np.median(gap)
     return far
-
-
-def _rms_mm(square: Array) -> float:
-    return float(np.sqrt(square.mean())) * 1e3 if len(square) else float("nan")

@@ -1,18 +1,18 @@
 """The comparison as one HTML page that needs nothing else: no network, no other file."""
 
 import html
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ctcr.compare import figures, terminal
 from ctcr.compare.analysis import Comparison
-from ctcr.compare.limits import limits
 from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
-from ctcr.compare.summary import findings, headline, quiet
+from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import atomic_writer, listed
+from ctcr.show.output import atomic_writer
 
 
 def write(c: Comparison, target: str | Path, source: str) -> None:
@@ -24,7 +24,7 @@ def write(c: Comparison, target: str | Path, source: str) -> None:
 def page(c: Comparison, source: str) -> str:
     """The whole HTML text."""
     title = f"Model and measurement: {c.robot}"
-    sections = [_opening(c, title), _findings(c), _view(c), _sizes(c), _directions(c), _dependences(c), _tables(c)]
+    sections = [_opening(c, title), _findings(c), _view(c), _figures(c), _tables(c)]
     return html_page.page(title, sections, source, "ctcr compare", scene(c))
 
 
@@ -41,7 +41,7 @@ def _opening(c: Comparison, title: str) -> str:
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
         numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
     if d:
-        numbers.append(("back", f"{d.rms_mm:.3g} mm", f"out against return, RMS over {d.pairs} pairs of visits"))
+        numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {d.pairs} pairs of visits"))
     return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
 
 
@@ -57,16 +57,8 @@ def _findings(c: Comparison) -> str:
         if items
         else "<p>No finding beyond noise.</p>"
     )
-    text = f"<h2>What was found</h2>{found}"
-    for title, lines in (
-        ("", quiet(c)),
-        ("What these data cannot say", limits(c)),
-        ("What became of the table first", c.notices),
-    ):
-        if lines:
-            heading = f"<h2>{title}</h2>" if title else ""
-            text += heading + bullets(lines)
-    return text
+    lists = "".join(f"<h2>{title}</h2>{bullets(lines)}" for title, lines in terminal.remarks(c) if lines)
+    return f"<h2>Findings</h2>{found}{lists}"
 
 
 def _view(c: Comparison) -> str:
@@ -81,60 +73,46 @@ def _view(c: Comparison) -> str:
     )
 
 
-def _sizes(c: Comparison) -> str:
-    left = figure(figures.histogram, c, 5.2, 3.4, "How large the errors are, against noise alone (logarithmic axis).")
-    right = figure(figures.course, c, 5.2, 3.4, "The error in the order measured.")
-    return f'<h2>How large, and when</h2><div class="pair">{left}{right}</div>'
-
-
-def _directions(c: Comparison) -> str:
-    drawn = figure(
-        figures.out_and_return,
-        c,
-        10.4,
-        3.6,
-        "Visits of the same joints. The errors of two visits are compared, so that small differences of the joints "
-        "do not count.",
-        wide=True,
+def _figures(c: Comparison) -> str:
+    wide = partial(figure, subject=c, width=10.4, wide=True)
+    half = partial(figure, subject=c, width=5.2, height=3.4)
+    sizes = half(figures.histogram, caption="Sizes of the errors against noise alone (logarithmic axis).")
+    course = half(figures.course, caption="The error in the order measured.")
+    hysteresis = wide(
+        figures.hysteresis,
+        height=3.6,
+        caption="Visits of the same joints. The errors of two visits are compared, so that small differences of the "
+        "joints do not count.",
     )
-    return f"<h2>Out and return</h2>{drawn}" if drawn else ""
-
-
-def _dependences(c: Comparison) -> str:
-    bars = figure(
+    bars = wide(
         figures.ranking,
-        c,
-        10.4,
-        4.6,
-        f"How much of the squared error (its constant part removed) each quantity predicts on "
-        f"{c.ranking.block_kind} that were left out. Red: findings, the later ones in what the stronger ones left. "
-        f"The best of all quantities gets beyond the dashed line by chance in 1 of 80 tables.",
-        wide=True,
+        height=4.6,
+        caption=f"Share of the squared error (its constant part removed) that each quantity predicts on "
+        f"{held_out(c)}. Red: findings, each judged on the residual of the stronger ones. The best of all quantities "
+        f"exceeds the dashed line by chance in 1 of 80 tables.",
     )
-    if not bars:
-        return ""
-    panels = figure(
+    panels = wide(
         figures.strongest,
-        c,
-        10.4,
-        6.4,
-        "The error against the strongest quantities, in the frame where each predicts best: readings (points) and "
-        "means of equal groups (lines). An asterisk marks a finding.",
-        wide=True,
+        height=6.4,
+        caption="The error against the strongest quantities, in the frame where each predicts best: readings (points) "
+        "and means of equal groups (lines). An asterisk marks a finding.",
     )
-    return f"<h2>Where the error comes from</h2>{bars}{panels}"
+    return (
+        f'<h2>Size and course of the error</h2><div class="pair">{sizes}{course}</div>'
+        + (f"<h2>Hysteresis</h2>{hysteresis}" if hysteresis else "")
+        + (f"<h2>What the error depends on</h2>{bars}{panels}" if bars else "")
+    )
 
 
 def _tables(c: Comparison) -> str:
-    parts = [
-        table("Error, measured minus predicted", ["", "unit", *terminal.COLUMNS], terminal.error_rows(c), 2),
-        table("Repeatability, mm", terminal.REPEAT_COLUMNS, terminal.repeat_rows(c), 1),
-        table("By run, mm; mean error vector in the tracker frame", terminal.RUN_COLUMNS, terminal.run_rows(c), 0),
-        table(terminal.ranking_title(c), terminal.RANKING_COLUMNS, terminal.ranking_rows(c), 2)
-        if c.ranking.alone
-        else "",
-    ]
-    for what, rows in (("not measured", c.sample.not_measured), ("not solved", c.sample.not_solved)):
-        if len(rows):
-            parts.append(f"<p>{len(rows)} rows {what}: {listed(rows, 200)}</p>")
-    return "<h2>Numbers</h2>" + "".join(parts)
+    ranking = terminal.ranking_rows(c)
+    return "".join(
+        [
+            "<h2>Numbers</h2>",
+            table("Error, measured minus predicted", terminal.COLUMNS, terminal.error_rows(c), 2),
+            table("Repeatability, mm", terminal.REPEAT_COLUMNS, terminal.repeat_rows(c), 1),
+            table("By run, mm; mean error vector in the tracker frame", terminal.RUN_COLUMNS, terminal.run_rows(c), 0),
+            table(terminal.ranking_title(c), terminal.RANKING_COLUMNS, ranking, 2) if ranking else "",
+            *(f"<p>{line}</p>" for line in terminal.left_out(c, 200)),
+        ]
+    )

@@ -1,6 +1,6 @@
-"""What a comparison found, in plain words: findings with numbers and units.
+"""A comparison in sentences: the size of the error, findings with numbers and units, and the limits of the data.
 
-Findings describe the error. They name what kind of cause would look like it, never which one it is.
+Findings describe the error and name possible causes, never the cause.
 """
 
 from collections.abc import Iterator
@@ -14,23 +14,23 @@ from ctcr.compare.noise import NOTABLE, DirectionDifference
 from ctcr.show.wording import join, mm, most, percent, probability
 
 MOST = 6
-CLEAR_DELAY = 0.2  # share of the squared out/return difference that a delay must explain to be mentioned
+CLEAR_DELAY = 0.2  # share of the squared hysteresis that a delay must explain to be mentioned
 
-LOOKS_LIKE = {
-    "frame_turn": "A tracker frame registered with a small turn looks like this.",
-    "tip_offset": "A sensor that sits elsewhere than modelled, or a wrong precurvature of its tube, looks like this.",
-    "motion_offset": "Friction, play and delay look like this.",
-    "lag": "Poses logged later than the joints, or a tip that follows late, look like this.",
-    "alpha": "A wrong angle offset, precurvature or stiffness ratio looks like this.",
-    "length": "A wrong length, curved length, stiffness or insertion scale looks like this.",
-    "direction": "Friction and play look like this.",
-    "speed": "A delay or friction that grows with speed looks like this.",
-    "tip_speed": "A delay or friction that grows with speed looks like this.",
-    "force": "A wrong stiffness, or something compliant that the model takes as rigid, looks like this.",
-    "place": "A turned tracker frame, a distorted tracker field or wrong precurvatures look like this.",
-    "screw": "A periodic error of a drive screw looks like this.",
-    "time": "Drift, creep or temperature look like this.",
-    "order": "Drift, creep or temperature look like this.",
+CAUSES = {  # by how the name of a dependence begins
+    "frame_turn": "a small rotation error of the registered tracker frame",
+    "tip_offset": "a sensor mounted elsewhere than modelled, or a wrong precurvature of its tube",
+    "motion_offset": "friction, play or delay",
+    "lag": "poses logged later than the joints, or a tip that follows late",
+    "alpha": "a wrong angle offset, precurvature or stiffness ratio",
+    "length": "a wrong length, curved length, stiffness or insertion scale",
+    "direction": "friction or play",
+    "speed": "a delay, or friction that grows with speed",
+    "tip_speed": "a delay, or friction that grows with speed",
+    "force": "a wrong stiffness, or compliance that the model takes as rigid",
+    "place": "a rotated tracker frame, a distorted tracker field or wrong precurvatures",
+    "screw": "a periodic error of a drive screw",
+    "time": "drift, creep or temperature",
+    "order": "drift, creep or temperature",
 }
 
 
@@ -43,29 +43,27 @@ class Finding:
 
 
 def headline(c: Comparison) -> str:
-    """The size of the error in one sentence."""
+    """The size of the error in one sentence, and how much of it is noise in another."""
     p, length, noise = c.position_mm, c.percent_of_length, c.noise
     text = (
-        f"The model is wrong by {mm(p.rms)} RMS (mean {mm(p.mean)}, 95 % below {mm(p.p95)}, at most "
-        f"{mm(p.maximum)}) or {length.rms:.2g} % of the deployed length, over {p.count} readings. "
+        f"The model is wrong by {mm(p.rms)} RMS (mean {mm(p.mean)}, 95 % below {mm(p.p95)}, at most {mm(p.maximum)}) "
+        f"or {length.rms:.2g} % of the deployed length, over {p.count} readings. "
     )
     if is_noise(c):
-        return text + f"That is what noise of {mm(noise.rms_mm)} RMS gives: there is nothing to explain."
+        return text + f"Noise alone gives {mm(noise.rms_mm)} RMS: there is nothing to explain."
     if not np.isfinite(noise.rms_mm):
         return text + "The noise of a reading is not known."
-    size, left = f"{mm(noise.rms_mm)} RMS ({_source(c)})", most(1 - c.noise_share)
-    if beyond_stated(c):
+    source = "scatter at rest" if noise.source == "rest" else "as stated"
+    if noise.source == "revisits":
+        source = f"{noise.pairs} revisits from the same direction, ± {noise.uncertainty_mm * np.sqrt(3):.2g} mm"
+    size, left = f"{mm(noise.rms_mm)} RMS ({source})", most(1 - c.noise_share)
+    if noise.source == "revisits" and noise.axis_mm > NOTABLE * noise.stated_axis_mm:
         stated = mm(noise.stated_axis_mm * 3**0.5)
         return text + (
             f"The tracker's stated scatter is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
-            f"error is beyond even that."
+            f"error exceeds even that."
         )
     return text + f"Noise is {size}, so {left} of the squared error is not noise."
-
-
-def beyond_stated(c: Comparison) -> bool:
-    """Whether readings repeat far worse than the tracker's stated jitter."""
-    return c.noise.source == "revisits" and bool(c.noise.axis_mm > NOTABLE * c.noise.stated_axis_mm)
 
 
 def is_noise(c: Comparison) -> bool:
@@ -80,102 +78,77 @@ def findings(c: Comparison) -> list[Finding]:
     return sorted(_all(c), key=lambda item: -item.share)[:MOST]
 
 
-def quiet(c: Comparison) -> list[str]:
-    """Questions that the data answer with no, and hints too weak to be findings."""
-    said = []
-    d = c.direction
-    if d and not differs(d):
-        like = (
-            f"as same-direction visits do ({mm(d.same_rms_mm)})"
-            if np.isfinite(d.p_against_same)
-            else f"no more than noise ({mm(d.quiet_rms_mm)})"
-        )
-        text = (
-            f"Out and return agree: visits of the same joints from opposite directions typically lie "
-            f"{mm(d.typical_rms_mm)} RMS apart ({d.pairs} pairs), {like}."
-        )
-        if d.outliers:
-            text += f" Pairs far beyond that: {d.outliers}, at most {mm(d.maximum_mm)} apart. Outliers look like this."
-        said.append(text)
-    if c.shift and c.shift.p_value > LEVEL:
-        said.append(
-            f"No constant offset stands out (mean error {mm(c.shift.size_mm)}, p = {probability(c.shift.p_value)})."
-        )
-    if c.ranking.alone and not c.ranking.chosen and not is_noise(c):
-        best = c.ranking.alone[0]
-        said.append(
-            f"No single quantity predicts the error well on {c.ranking.block_kind} left out. The strongest hint is the "
-            f"{best.label}: {percent(best.share)} of the squared error, which chance reaches in "
-            f"{100 * best.p_value:.2g} % of cases."
-        )
-    return said
+def held_out(c: Comparison) -> str:
+    """The blocks on which dependences are judged."""
+    return "held-out runs" if c.ranking.block_kind == "runs" else "held-out regions of joint space"
 
 
 def _all(c: Comparison) -> Iterator[Finding]:
+    shifted = c.shift if c.shift and c.shift.p_value <= LEVEL else None
     if c.turn and c.turn.gross:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
         yield Finding(
-            f"The tracker frame in the robot file is grossly wrong: turned by {c.turn.turn_deg:.0f} degrees about "
+            f"The tracker frame in the robot file is grossly wrong: rotated by {c.turn.turn_deg:.0f} degrees about "
             f"({axis}) and shifted, it leaves {mm(c.turn.rms_after_mm)} RMS instead of {mm(c.turn.rms_before_mm)} "
-            f"(held out). Everything below is computed in the frame that fits.",
+            f"(held out). All that follows is computed in the fitted frame.",
             1.0,
         )
-    elif c.shift and c.shift.p_value <= LEVEL and c.shift.share > 0:
-        x, y, z = c.shift.vector_mm
+    elif shifted and shifted.share > 0:
+        x, y, z = shifted.vector_mm
         yield Finding(
-            f"A constant offset of {mm(c.shift.size_mm)} (x {x:+.2f}, y {y:+.2f}, z {z:+.2f} mm in the tracker "
-            f"frame) explains {percent(c.shift.share)} of the squared error. A tracker frame registered with a "
-            f"shift looks like this.",
-            c.shift.share,
+            f"A constant offset of {mm(shifted.size_mm)} (x {x:+.2f}, y {y:+.2f}, z {z:+.2f} mm in the tracker frame) "
+            f"explains {percent(shifted.share)} of the squared error. Possible cause: a shift of the registered "
+            f"tracker frame.",
+            shifted.share,
         )
     if c.run_offsets.found:
         yield Finding(_run_text(c), c.run_offsets.share)
     if c.direction and differs(c.direction):
-        yield Finding(_direction_text(c), (c.direction.floor_mm / c.position_mm.rms) ** 2)
-    before = 1.0 - (c.shift.share if c.shift and c.shift.p_value <= LEVEL else 0.0)
+        yield Finding(_hysteresis_text(c, c.direction), (c.direction.floor_mm / c.position_mm.rms) ** 2)
+    before = 1.0 - (shifted.share if shifted else 0.0)
     for item in c.ranking.chosen:
         yield Finding(_dependence_text(item, c), item.share * before)
 
 
 def _run_text(c: Comparison) -> str:
     r = c.run_offsets
-    text = "The runs do not share one frame or homing: "
+    text = "The runs do not share one frame or homing. "
     if r.p_value <= LEVEL:
         text += (
-            f"the same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs, but "
+            f"The same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs, but "
             f"{mm(r.rms_within_mm)} inside one run. "
         )
     if r.outlying:
         names = ", ".join(map(str, r.outlying[:8])) + (" and others" if len(r.outlying) > 8 else "")
-        text += f"runs {names} lie about {mm(r.outlying_mm)} from the others. "
+        text += f"The runs {names} lie about {mm(r.outlying_mm)} from the others. "
     return text + (
-        f"One offset for each run explains {percent(r.share)} of the squared error about its mean; the "
-        f"dependences are examined with it removed."
+        f"One offset for each run explains {percent(r.share)} of the squared error about its mean; dependences are "
+        f"examined without it."
     )
 
 
-def _direction_text(c: Comparison) -> str:
-    d = c.direction
-    text = (
-        f"Out and return differ by {mm(d.rms_mm)} RMS (at most {mm(d.maximum_mm)}) at the same joints, over "
-        f"{d.pairs} pairs: no model without history or delay can be better than {mm(d.floor_mm)} RMS there."
-    )
+def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
     if np.isfinite(d.p_against_same) and d.p_against_same > LEVEL:
         return (
             f"The same joints do not give the same pose again: visits from opposite directions differ by "
             f"{mm(d.rms_mm)} RMS ({d.pairs} pairs), visits from the same direction by {mm(d.same_rms_mm)} "
             f"({c.noise.pairs} pairs), where the tracker's scatter gives {mm(d.quiet_rms_mm)}. No model without "
-            f"history can be better than about {mm(d.floor_mm)} RMS there. Friction, play, drift and creep look "
-            f"like this."
+            f"history can be better than about {mm(d.floor_mm)} RMS there. Possible causes: friction, play, drift or "
+            f"creep."
         )
-    if c.has_speed and clear_delay(c):
-        text += (
-            f" {percent(1 - (d.rms_without_delay_mm / d.rms_mm) ** 2)} of this squared difference is what a delay of "
-            f"{d.delay_s:.3f} ± {d.delay_uncertainty_s:.3f} s between joints and poses would do; with it taken out, "
-            f"{mm(d.rms_without_delay_mm)} RMS remain, a floor of {mm(d.rms_without_delay_mm / 2)}."
+    text = (
+        f"There is hysteresis: visits of the same joints from opposite directions differ by {mm(d.rms_mm)} RMS (at "
+        f"most {mm(d.maximum_mm)}), over {d.pairs} pairs. No model without history or delay can be better than "
+        f"{mm(d.floor_mm)} RMS there."
+    )
+    share = 1 - (d.rms_without_delay_mm / d.rms_mm) ** 2
+    if c.has_speed and abs(d.delay_s) > 3 * d.delay_uncertainty_s and share > CLEAR_DELAY:
+        return text + (
+            f" A delay of {d.delay_s:.3f} ± {d.delay_uncertainty_s:.3f} s between joints and poses explains "
+            f"{percent(share)} of this squared difference; without it {mm(d.rms_without_delay_mm)} RMS remain, a floor "
+            f"of {mm(d.rms_without_delay_mm / 2)}."
         )
-        return text
-    return text + " Friction, play and delay look like this."
+    return text + " Possible causes: friction, play or delay."
 
 
 def differs(d: DirectionDifference) -> bool:
@@ -183,41 +156,99 @@ def differs(d: DirectionDifference) -> bool:
     return bool(d.p_against_same <= LEVEL / 2 or d.p_against_quiet <= LEVEL / 2)
 
 
-def clear_delay(c: Comparison) -> bool:
-    """Whether a delay accounts for a good part of the difference between out and return."""
-    d = c.direction
-    return bool(
-        d
-        and np.isfinite(d.delay_s)
-        and abs(d.delay_s) > 3 * d.delay_uncertainty_s
-        and 1 - (d.rms_without_delay_mm / d.rms_mm) ** 2 > CLEAR_DELAY
-    )
-
-
 def _dependence_text(item: Dependence, c: Comparison) -> str:
-    first = item is c.ranking.chosen[0]
-    where = f", mostly {_axis(item)}" if item.component else ""
+    where = item.component
+    if where and not where.startswith(("along", "across", "outwards", "around")):
+        where = f"along {where}" + (" of the base frame" if item.form.frame == "base" else "")
     verb, name = "depends on" if item.form.covariate else "follows", item.label.removeprefix("a ")
-    text = f"The error {verb} the {name}"
-    text += (
-        f": {mm(item.size_mm)} RMS{where}, {percent(item.share)} of the squared error about its offset on "
-        f"{c.ranking.block_kind} left out" + (". " if first else ", beyond what is said of stronger ones. ")
+    text = (
+        f"The error {verb} the {name}: {mm(item.size_mm)} RMS{f', mostly {where}' if where else ''}, "
+        f"{percent(item.share)} of the squared error about its offset on {held_out(c)}"
+        + (". " if item is c.ranking.chosen[0] else ", in addition to the stronger dependences. ")
     )
     if item.indistinct:
         names = [name.removeprefix("a ") for name in item.indistinct[:3]]
-        text += f"These data cannot tell it from the {join(names)}. "
-    key = next((name for name in (item.name, *LOOKS_LIKE) if item.name.startswith(name) and name in LOOKS_LIKE), "")
-    return (text + LOOKS_LIKE.get(key, "")).strip()
+        text += f"These data do not distinguish it from the {join(names)}. "
+    cause = next((CAUSES[start] for start in CAUSES if item.name.startswith(start)), "")
+    return (text + (f"Possible cause: {cause}." if cause else "")).strip()
 
 
-def _axis(item: Dependence) -> str:
-    if item.form.frame == "base":
-        return f"along {item.component} of the base frame"
-    return f"along {item.component}" if item.component.startswith("tip") else item.component
+def quiet(c: Comparison) -> list[str]:
+    """Questions that the data answer with no, and hints too weak to be findings."""
+    found = []
+    d = c.direction
+    if d and not differs(d):
+        like = f"no more than noise ({mm(d.quiet_rms_mm)})"
+        if np.isfinite(d.p_against_same):
+            like = f"like visits from the same direction ({mm(d.same_rms_mm)})"
+        text = (
+            f"There is no hysteresis: visits of the same joints from opposite directions typically lie "
+            f"{mm(d.typical_rms_mm)} RMS apart ({d.pairs} pairs), {like}."
+        )
+        if d.outliers:
+            text += f" Pairs far beyond that: {d.outliers}, at most {mm(d.maximum_mm)} apart. Possible cause: outliers."
+        found.append(text)
+    if c.shift and c.shift.p_value > LEVEL:
+        size, p = mm(c.shift.size_mm), probability(c.shift.p_value)
+        found.append(f"There is no significant constant offset (mean error {size}, p = {p}).")
+    if c.ranking.alone and not c.ranking.chosen and not is_noise(c):
+        best = c.ranking.alone[0]
+        found.append(
+            f"No single quantity predicts the error well on {held_out(c)}. The strongest hint is the {best.label}: "
+            f"{percent(best.share)} of the squared error, which chance reaches in {100 * best.p_value:.2g} % of cases."
+        )
+    return found
 
 
-def _source(c: Comparison) -> str:
+def limits(c: Comparison) -> list[str]:
+    """Questions that these data cannot answer."""
+    return [*_noise_limits(c), *_design_limits(c)]
+
+
+def _noise_limits(c: Comparison) -> Iterator[str]:
     n = c.noise
-    if n.source == "revisits":
-        return f"{n.pairs} revisits from the same direction, ± {n.uncertainty_mm * np.sqrt(3):.2g} mm"
-    return "scatter at rest" if n.source == "rest" else "as stated"
+    if n.source == "rest":
+        yield (
+            f"No joints were visited twice from the same direction: the noise ({n.axis_mm:.3f} mm per axis) is the "
+            f"scatter at rest. It misses repeatability, drift and the tracker's field error."
+        )
+    elif n.source == "stated":
+        yield (
+            "Too few joints were visited twice from the same direction, and too few readings were taken at rest: the "
+            "noise is the jitter stated in the robot file. It misses repeatability, drift and the field error."
+        )
+    if c.accuracy_95_mm > 0:
+        yield (
+            f"The noise floor does not include the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
+            f"which is the same at every visit of a position."
+        )
+    if c.direction is None:
+        yield "No joints were visited from opposite directions: hysteresis and delay cannot be examined."
+
+
+def _design_limits(c: Comparison) -> Iterator[str]:
+    if len(c.runs) == 1:
+        yield "There is one run: the findings are not tested on another run."
+    if c.fixed:
+        yield f"Never varied here, so their influence is unknown: {join(c.fixed)}."
+    if not c.has_time:
+        yield "There are no times: speeds, delay and drift cannot be examined."
+    elif not c.has_speed:
+        yield "The readings are far apart in time (stops): a delay cannot be seen."
+    if c.angle_deg is None:
+        yield "No orientation was measured."
+    elif c.angle_kind != "orientation":
+        yield "The sensor's roll is unknown: only the direction of the tip is compared, not its roll."
+    if not c.ranking.alone:
+        yield (
+            f"The readings fall into {c.ranking.blocks} independent parts, too few to judge a constant offset or "
+            f"dependences."
+        )
+    if len(c.ranking.rows) < len(c.sample.row):
+        yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."
+    r = c.run_offsets
+    if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not is_noise(c):
+        yield (
+            "No joints were visited in two runs: an offset that belongs to a run (frame, homing, drift) cannot be "
+            "separated from an error that belongs to the joints of that run."
+        )

@@ -1,12 +1,13 @@
-"""Revisits: places of the joint path that were passed more than once, from which direction, and how far apart
-the errors are there. Works for stops repeated exactly and for streams, where a pass never hits the same joints.
+"""Revisits: joints that were passed more than once, from which direction, and how far apart the errors are there.
+
+Works for stops repeated exactly and for streams, where a pass never hits the same joints.
 
 A reading is matched with the nearest point of an earlier pass over the (piecewise straight) joint path, and the
 earlier error is interpolated along that path. Comparing errors instead of tip positions removes, to first order
 in the model, what the small joint difference itself does to the tip.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,11 @@ Array = NDArray[np.float64]
 SAME, OPPOSITE, MIXED = 1, -1, 0
 
 REST = 20e-6  # rows within this scaled joint distance [m] of one another are one stop
-STEP_SHARE = 0.25  # the two passes may miss each other by this share of the usual joint step ...
+STEP_SHARE = 0.25  # two passes may miss each other by this part of the usual joint step ...
 TOLERANCE = (0.1e-3, 0.5e-3)  # ... inside these bounds [m]
 LONGEST_LINK = 3.0  # errors are interpolated over steps of at most this many usual steps ...
-LONGEST_LINK_SHARE = 0.2  # ... and this share of the lever arm (about 0.2 rad of rotation)
-MOST_CANDIDATES = 4_000_000
+LONGEST_LINK_SHARE = 0.2  # ... and this part of the lever arm (about 0.2 rad of rotation)
+MOST_CANDIDATES = 4_000_000  # pairs of neighbours; beyond, only every so many visits are looked up
 
 
 @dataclass(frozen=True)
@@ -50,22 +51,20 @@ class Revisits:
     difference: Array  # (P, 3) later error minus earlier error, tracker frame [m]
     miss: Array  # (P,) scaled joint distance between the two [m]
     noise_factor: Array  # (P,) variance of the difference in units of one reading's variance
-    tolerance: float  # [m] largest miss accepted
-    complete: bool  # False when only every so many visits were looked up
+
+    @property
+    def square(self) -> Array:
+        """Squared length of the differences (P,) [m^2]."""
+        return np.sum(self.difference**2, axis=1)
+
+    @property
+    def end(self) -> NDArray[np.int64]:
+        """Visit index (P,) at the end of the earlier step; the start where the visit itself was hit."""
+        return self.earlier + (self.weight > 0)
 
     def select(self, mask: NDArray) -> "Revisits":
         """Some of the pairs."""
-        arrays = (
-            self.later,
-            self.earlier,
-            self.weight,
-            self.kind,
-            self.between_runs,
-            self.difference,
-            self.miss,
-            self.noise_factor,
-        )
-        return Revisits(*(array[mask] for array in arrays), self.tolerance, self.complete)
+        return Revisits(*(getattr(self, field.name)[mask] for field in fields(self)))
 
     def __len__(self) -> int:
         return len(self.later)
@@ -73,31 +72,24 @@ class Revisits:
 
 def find_stops(sample: Sample) -> Stops:
     """Join the rows of one run that stay within REST of the first of them."""
-    scaled, run = sample.motion.scaled, sample.run
-    moved = np.concatenate([[True], np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * REST])
-    first, anchor, anchor_run = [], None, None
-    for index in range(len(run)):
-        here = scaled[index]
-        if anchor is not None and run[index] == anchor_run:
-            if not moved[index] or np.abs(here - anchor).max() <= REST:
-                continue
-        first.append(index)
-        anchor, anchor_run = here, run[index]
+    scaled, run, error = sample.motion.scaled, sample.run, sample.error
+    moved = np.append(True, np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * REST)
+    first: list[int] = []
+    for i in range(len(run)):
+        same_run = first and run[i] == run[first[-1]]
+        if not (same_run and (not moved[i] or np.abs(scaled[i] - scaled[first[-1]]).max() <= REST)):
+            first.append(i)
     start = np.array(first, dtype=np.int64)
     size = np.diff(np.append(start, len(run)))
-    mean = _segment_mean(sample.error, start, size)
-    square = _segment_mean(sample.error**2, start, size)
+
+    def mean(values: Array) -> Array:
+        return np.add.reduceat(values, start, axis=0) / size[:, None] if len(start) else values[:0]
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        variance = (square - mean**2).mean(axis=1) * size / (size - 1)
+        variance = (mean(error**2) - mean(error) ** 2).mean(axis=1) * size / (size - 1)
     variance[size < 3] = np.nan
-    last = start + size - 1
-    return Stops(
-        start, size, run[start], _segment_mean(scaled, start, size), sample.motion.direction[last], mean, variance
-    )
-
-
-def _segment_mean(values: Array, start: NDArray, size: NDArray) -> Array:
-    return np.add.reduceat(values, start, axis=0) / size[:, None] if len(start) else values[:0]
+    direction = sample.motion.direction[start + size - 1]
+    return Stops(start, size, run[start], mean(scaled), direction, mean(error), variance)
 
 
 def find_revisits(stops: Stops, lever: float) -> Revisits:
@@ -113,15 +105,14 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
     usable = linked & (length <= min(LONGEST_LINK * usual, LONGEST_LINK_SHARE * lever))
     reach = float(np.hypot(tolerance, 0.5 * length[usable].max(initial=0.0)))
 
-    later, vertex, complete = _neighbours(stops.scaled, reach)
+    later, vertex = _neighbours(stops.scaled, reach)
     order = np.lexsort((vertex, later))
     later, vertex = later[order], vertex[order]
-    opens = np.ones(len(later), bool)
-    opens[1:] = (np.diff(later) != 0) | (np.diff(vertex) > 1) | (stops.run[vertex[1:]] != stops.run[vertex[:-1]])
-    which_pass = np.cumsum(opens) - 1
-    own = np.zeros(len(opens) and which_pass[-1] + 1, bool)
+    opens = (np.diff(later) != 0) | (np.diff(vertex) > 1) | (np.diff(stops.run[vertex]) != 0)
+    which_pass = np.append(0, np.cumsum(opens))
+    own = np.zeros(which_pass[-1] + 1, bool)  # passes that hold the later visit itself
     own[which_pass[vertex == later]] = True
-    use = ~own[which_pass] & (vertex < later) if len(later) else np.zeros(0, bool)
+    use = ~own[which_pass] & (vertex < later)
     later, vertex, which_pass = later[use], vertex[use], which_pass[use]
 
     miss, start, weight = _nearest_point(stops.scaled, link, length, usable, later, vertex)
@@ -130,10 +121,10 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
     best = best[miss[best] <= tolerance]
     later, start, weight, miss = later[best], start[best], weight[best], miss[best]
     order = np.argsort(later, kind="stable")
-    return _pairs(stops, later[order], start[order], weight[order], miss[order], tolerance, complete)
+    return _pairs(stops, later[order], start[order], weight[order], miss[order])
 
 
-def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray, bool]:
+def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray]:
     """Index pairs (visit, neighbour) within reach, the visit itself included; thinned when there are too many."""
     tree = cKDTree(scaled)
     probe = np.linspace(0, len(scaled) - 1, min(len(scaled), 500)).astype(int)
@@ -143,7 +134,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray, bool]:
     found = tree.query_ball_point(scaled[queries], reach)
     sizes = np.fromiter(map(len, found), np.int64, len(found))
     flat = np.concatenate([np.asarray(item, np.int64) for item in found])
-    return np.repeat(queries, sizes), flat, stride == 1
+    return np.repeat(queries, sizes), flat
 
 
 def _nearest_point(scaled: Array, link: Array, length: Array, usable: NDArray, later: NDArray, vertex: NDArray):
@@ -163,7 +154,7 @@ def _nearest_point(scaled: Array, link: Array, length: Array, usable: NDArray, l
     return best_miss, best_start, best_weight
 
 
-def _pairs(stops: Stops, later, start, weight, miss, tolerance: float, complete: bool) -> Revisits:
+def _pairs(stops: Stops, later, start, weight, miss) -> Revisits:
     end = np.minimum(start + (weight > 0), len(stops.run) - 1)
     agree = stops.direction[later].astype(int) * stops.direction[end]
     some = (agree != 0).any(axis=1)
@@ -173,6 +164,4 @@ def _pairs(stops: Stops, later, start, weight, miss, tolerance: float, complete:
     w = weight[:, None]
     difference = stops.error[later] - (1 - w) * stops.error[start] - w * stops.error[end]
     factor = 1 / stops.size[later] + (1 - weight) ** 2 / stops.size[start] + weight**2 / stops.size[end]
-    return Revisits(
-        later, start, weight, kind, stops.run[later] != stops.run[start], difference, miss, factor, tolerance, complete
-    )
+    return Revisits(later, start, weight, kind, stops.run[later] != stops.run[start], difference, miss, factor)

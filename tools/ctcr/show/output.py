@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -61,7 +62,9 @@ def write_json(data: Any, target: str) -> None:
 
 
 def plain(data: Any) -> Any:
-    """The same content in what JSON can hold: numpy becomes lists and scalars, what is not finite becomes null."""
+    """`data` as JSON types: dataclasses become objects, arrays lists, numbers that are not finite null."""
+    if is_dataclass(data):
+        data = asdict(data)
     if isinstance(data, dict):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
