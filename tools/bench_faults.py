@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 from ctcr.bench.devices import emergency_stop
+from ctcr.bench.shared.control import request
 from ctcr.bench.simulators import aurora, ethercat
-from ctcr.bench.simulators.control import request
 from ctcr.robot import robot_file
 
 ROOT = Path(__file__).parents[1]

@@ -8,16 +8,15 @@ import time
 
 import numpy as np
 import pytest
-from ctcr.bench.devices import bus_lock, emergency_stop, homing
+from ctcr.bench.devices import bus_process, emergency_stop, homing
 from ctcr.bench.devices.bus import Bus
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.health import health_of
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import SimulatedPerson
-from ctcr.bench.devices.private_folder import private_folder
+from ctcr.bench.shared.control import request
+from ctcr.bench.shared.folder import MASTER, private_folder
 from ctcr.bench.simulators import ethercat
-from ctcr.bench.simulators.control import request
-from ctcr.bench.simulators.network import MASTER
 from simulated_bench import ctcr
 
 ROBOT = os.environ["ROBOT_FILE"]
@@ -86,7 +85,7 @@ def test_interrupted_move(robot, bench, folder):
 
 
 def test_one_program_at_a_time(robot, bench, folder, monkeypatch):
-    monkeypatch.setattr(bus_lock, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(bus_process, "LOCK_S", 0.2)
     with Motors(bench, robot, folder) as motors:
         motors.connect()
         tracker, *_, bus = health_of(bench, folder)

@@ -26,7 +26,7 @@ def test_nobody_else_can_talk_to_the_devices():
     """Control sockets lie in a folder for this user alone; nothing listens on the network, not even on loopback."""
     folder = mended_bench()
     robot, bench = robot_file.load(os.environ["ROBOT_FILE"]), bench_file.load(os.environ["BENCH_FILE"])
-    with Motors(bench, robot, folder) as motors, Tracker(bench, folder) as tracker:
+    with Motors(bench, robot, folder) as motors, Tracker(bench, folder, 1.0) as tracker:
         motors.connect()
         tracker.connect()
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700 and folder.stat().st_uid == os.getuid()

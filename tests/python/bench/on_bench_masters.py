@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from ctcr.bench.simulators.network import MASTER
+from ctcr.bench.shared.folder import MASTER
 from simulated_bench import mended_bench
 
 SAFEOP, OP = 4, 8  # states of a terminal

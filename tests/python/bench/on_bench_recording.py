@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.bench.devices.motors import Motors
-from ctcr.bench.devices.transmission import joints_of_turns
-from ctcr.bench.simulators.control import request
+from ctcr.bench.shared.control import request
+from ctcr.bench.shared.transmission import joints_of_turns
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table import measurements
@@ -108,7 +108,7 @@ def test_killed_recorder(tmp_path, folder):
         assert max(request(folder, "ethercat", {})["states"][1:]) < OP
     done = record(path, target)
     assert done.returncode == 0, done.stderr
-    assert "going on after" in done.stdout and table.read_bytes().startswith(kept)
+    assert "resuming after" in done.stdout and table.read_bytes().startswith(kept)
     read, wanted = measurements.load(table, 3), measurements.load(path, 3)
     assert len(read) == len(wanted) and (np.diff(read.t) > 0).all()
     np.testing.assert_allclose(read.alpha, wanted.alpha, atol=3e-3)
@@ -140,4 +140,4 @@ def test_blind_tracker_stops_the_recording(tmp_path, robot, bench, folder):
     request(folder, "aurora", {"faults": {"out_of_volume": True}})
     done = record(plan(tmp_path / "plan.csv", 2), tmp_path / "out", "--patience", 0.5)
     assert done.returncode == 1
-    assert "outside of the tracker's volume for 0.5 s" in done.stderr and "it goes on" in done.stderr
+    assert "outside of the tracker's volume for 0.5 s" in done.stderr and "it resumes" in done.stderr

@@ -7,16 +7,16 @@ import time
 import numpy as np
 import pytest
 from ctcr import cli
-from ctcr.bench.devices import ndi_protocol as ndi
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.ndi_replies import Garbled, parse_bx, parse_tx
-from ctcr.bench.devices.private_folder import private_folder
-from ctcr.bench.devices.transmission import joints_of_turns, turns_of_joints
+from ctcr.bench.shared import ndi
+from ctcr.bench.shared.control import request
+from ctcr.bench.shared.folder import private_folder
+from ctcr.bench.shared.ndi import Garbled, parse_bx, parse_tx
+from ctcr.bench.shared.shared_record import shared_motors
+from ctcr.bench.shared.transmission import joints_of_turns, turns_of_joints
 from ctcr.bench.simulators.aurora import FAULTS
 from ctcr.bench.simulators.aurora_device import AuroraDevice, Sight
-from ctcr.bench.simulators.control import request
-from ctcr.bench.simulators.faults import Faults, Scenario
-from ctcr.bench.simulators.motors import shared_motors
+from ctcr.bench.simulators.simulator import checked, load_scenario
 from ctcr.errors import InputError
 from ctcr.frames import angle_between, base_to_tracker
 from ctcr.model.model import Model
@@ -76,7 +76,7 @@ def test_replies_come_back_as_they_were_sent(seed):
     quaternion /= np.linalg.norm(quaternion)
     position = rng.uniform(-0.5, 0.5, 3)
     sights = {0x0A: Sight((position, quaternion), bool(rng.integers(2))), 0x0B: Sight(None)}
-    device = tracking_device(lambda handle, frame: sights[handle])
+    device = tracking_device(lambda handle: sights[handle])
     text, binary = device.answer(b"TX 0801"), device.answer(b"BX 0801")
     assert text[-5:] == b"%04X\r" % ndi.crc16(text[:-5])
     for readings, precision in ((parse_tx(text[:-5])[0], 6e-6), (parse_bx(binary[6:-2])[0], 1e-7)):
@@ -90,7 +90,7 @@ def test_replies_come_back_as_they_were_sent(seed):
 
 
 def test_damaged_replies_are_garbled():
-    device = tracking_device(lambda handle, frame: Sight((np.zeros(3), np.array([1.0, 0, 0, 0]))))
+    device = tracking_device(lambda handle: Sight((np.zeros(3), np.array([1.0, 0, 0, 0]))))
     text, body = device.answer(b"TX 0801")[:-5], device.answer(b"BX 0801")[6:-2]
     for cut in range(1, len(text) - 4, 7):
         with pytest.raises(Garbled):
@@ -119,7 +119,7 @@ def test_damaged_replies_are_garbled():
     ],
 )
 def test_refusals(before, command, code):
-    device = AuroraDevice(lambda handle, frame: Sight(None))
+    device = AuroraDevice(lambda handle: Sight(None))
     for earlier in before:
         device.answer(earlier)
     assert device.answer(command) == ndi.framed(b"ERROR%02X" % code)
@@ -295,26 +295,19 @@ def test_scikit_surgerynditracker(port, folder):
 
 
 def test_faults_are_checked_together():
-    faults = Faults(FAULTS)
     with pytest.raises(InputError) as caught:
-        faults.set({"mising": 0.5, "hang": 3, "garbage": "x", "missing": 0.5})
+        checked({"mising": 0.5, "hang": 3, "garbage": "x", "missing": 0.5}, FAULTS)
     assert len(caught.value.problems) == 3 and "did you mean missing?" in str(caught.value)
-    assert faults.missing == 0.0
-    faults.set({"missing": 0.5})
-    faults.set({"missing": None})
-    assert faults.as_dict() == FAULTS
+    assert checked({"missing": 0.5, "hang": None}, FAULTS) == {"missing": 0.5, "hang": False}
 
 
 def test_scenario(tmp_path):
     path = tmp_path / "scenario.yaml"
     path.write_text("- {at_s: 2, hang: true}\n- {at_s: 1, missing: 0.3}\n- {at_s: 3, hang: null}\n")
-    scenario = Scenario.load(path, Faults(FAULTS))
-    assert list(scenario.due(0.5)) == []
-    assert list(scenario.due(2.5)) == [{"missing": 0.3}, {"hang": True}]
-    assert list(scenario.due(9)) == [{"hang": None}]
+    assert load_scenario(path, FAULTS) == [(1.0, {"missing": 0.3}), (2.0, {"hang": True}), (3.0, {"hang": None})]
     path.write_text("- {at_s: 2, hung: true}\n- {missing: 0.3}\n")
     with pytest.raises(InputError) as caught:
-        Scenario.load(path, Faults(FAULTS))
+        load_scenario(path, FAULTS)
     assert [problem.line for problem in caught.value.problems] == [1, 2]
 
 

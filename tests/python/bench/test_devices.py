@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import cli
-from ctcr.bench.devices import bench_file, emergency_stop, ethercat_codes
+from ctcr.bench.devices import bench_file, emergency_stop
 from ctcr.bench.devices.axis_control import SLACK_M, AxisControl
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
-from ctcr.bench.devices.lateness import Lateness
 from ctcr.bench.devices.motion import StraightMove, VelocityMove
-from ctcr.bench.devices.real_time import BUS, TRACKER, real_time
-from ctcr.bench.devices.shared_record import SharedRecord
+from ctcr.bench.shared import ethercat
+from ctcr.bench.shared.real_time import BUS, TRACKER, Lateness, real_time
+from ctcr.bench.shared.shared_record import SharedRecord
 from ctcr.diagnose import add
 from ctcr.errors import InputError
 from ctcr.model import simulation
@@ -106,7 +106,7 @@ def test_velocity_move_rests_where_it_says():
     move = VelocityMove(np.zeros(2), np.zeros(2), [0.5, -1.0], np.array([2.0, 1.0]), valid_s=1.0)
     while move._left > 0:
         move.advance(1e-4)
-    rest = move.resting_place()
+    rest = move.rest()
     while not move.is_finished:
         place, _ = move.advance(1e-4)
     np.testing.assert_allclose(place, rest, atol=1e-3)
@@ -223,11 +223,8 @@ def test_stop_stays_until_it_is_released(tmp_path, capfd):
 
 
 def test_codes_in_words():
-    assert "watchdog" in ethercat_codes.status_text(0x1B)[0]
-    assert ethercat_codes.state_name(0x14) == "SAFEOP with an error"
-    for code in (*ethercat_codes.DIAGNOSES,):
-        assert all(ethercat_codes.diagnosis_text(code))
-    assert "manual" in ethercat_codes.status_text(0xFFFF)[1]
+    assert ethercat.state_name(0x14) == "SAFEOP with an error" and ethercat.state_name(0) == "state 0x0"
+    assert all(map(all, (*ethercat.STATUS_CODES.values(), *ethercat.DIAGNOSES.values())))
 
 
 # ---- between processes

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from ctcr.bench.devices.process_image import ProcessImage, signed
+from ctcr.bench.shared.ethercat import ProcessImage, signed
 from ctcr.bench.simulators.object_dictionary import Entry, ObjectDictionary, ServiceDataServer
 from ctcr.bench.simulators.segment import Segment
 from ctcr.bench.simulators.slave_controller import SlaveController

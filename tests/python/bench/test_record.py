@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ctcr import cli
 from ctcr.bench.devices import bench_file
-from ctcr.bench.devices.person import PersonPresent
+from ctcr.bench.devices.person import Person
 from ctcr.bench.record.display import picture
 from ctcr.bench.record.live_page import LivePage
 from ctcr.bench.record.plan import Approach, steps_of
@@ -160,7 +160,7 @@ def test_forbidden_rows_are_said_before_anything_moves(tmp_path, capfd):
 def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
     answers = io.StringIO("\n\n12.5\n")
     monkeypatch.setattr("sys.stdin", answers)
-    person = PersonPresent()
+    person = Person()
     person.hang(np.array([0.0, -0.0980665, 0.0]))
     person.hang(np.zeros(3))
     assert person.deployed(1) == pytest.approx(12.5e-3)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr.bench.devices import tracker_process
-from ctcr.bench.devices.ndi_replies import ToolReading
 from ctcr.bench.devices.tracker_process import PERIOD_S, FrameClock, TrackedFrame
+from ctcr.bench.shared.ndi import ToolReading
 
 SEEN = TrackedFrame(
     12.25, ToolReading(10, (0.1, -0.2, 0.3), (0.5, 0.5, -0.5, 0.5), 0.25, 0x1F, 4_000_000_000), 3, 1.5e-4

@@ -103,9 +103,9 @@ def running(*command):
 def mended_bench() -> Path:
     """The folder of the bench on which this program runs, with every fault of the simulators mended."""
     from ctcr.bench.devices import emergency_stop
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.control import request
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import aurora, ethercat
-    from ctcr.bench.simulators.control import request
 
     folder = private_folder()
     request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})

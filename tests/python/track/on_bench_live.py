@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from ctcr.bench.devices import bench_file, emergency_stop
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.motors import Motors
-from ctcr.bench.simulators.control import request
+from ctcr.bench.shared.control import request
 from ctcr.cli import cli
 from ctcr.robot import robot_file
 from ctcr.table import measurements

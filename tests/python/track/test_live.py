@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.person import PersonPresent
+from ctcr.bench.devices.person import Person
 from ctcr.bench.record.row_file import RowFile
 from ctcr.calibrate import tables
 from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table
@@ -188,7 +188,7 @@ def test_a_tube_that_cannot_be_retracted_is_told_before_anything_moves(robot, be
 
 def test_a_person_is_told_what_to_fasten_and_to_touch(monkeypatch, capfd):
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
-    person = PersonPresent()
+    person = Person()
     person.fasten(1)
     person.fasten(None)
     person.touch("B", np.array([0.06, -0.04, -0.02]))
@@ -216,14 +216,14 @@ def test_names_of_points_may_hold_commas(tmp_path):
 
 
 class Seen:
-    """A sight of a sensor that moves as a function of the frame's number."""
+    """A tracker of a sensor that moves as a function of the frame's number."""
 
     patience_s = 0.1
 
     def __init__(self, place):
         self._place, self.count = place, 0
 
-    def forget(self):
+    def discard(self):
         pass
 
     def seen(self):

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person
-from ctcr.bench.devices.sight import Sight
 from ctcr.bench.devices.tracker import Tracker
-from ctcr.bench.devices.transmission import turns_of_joints
 from ctcr.bench.record.row_file import RowFile
+from ctcr.bench.shared.transmission import turns_of_joints
 from ctcr.calibrate.still_reading import StillReading, still_reading
 from ctcr.calibrate.tables import Table
 from ctcr.errors import InputError, Problem
@@ -59,10 +58,10 @@ def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles)
     """
     with (
         closing(RowFile(Path(path), ROTATION_COLUMNS)) as rows,
-        Tracker(desk.bench, desk.place) as tracker,
+        Tracker(desk.bench, desk.place, PATIENCE_S) as tracker,
         Motors(desk.bench, robot, desk.place, one_by_one=True) as motors,
     ):
-        turner = _Turner(robot, motors, Sight(tracker, PATIENCE_S), desk.person, circles)
+        turner = _Turner(robot, motors, tracker, desk.person, circles)
         turner.check()
         turner.check_last(rows)
         done, angles = divmod(rows.groups, len(turner.jobs))
@@ -91,13 +90,13 @@ def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds
     section = desk.bench.tracker
     probe = section.model_copy(update={"tool": section.probe or section.tool})
     bench = desk.bench.model_copy(update={"tracker": probe})
-    with closing(RowFile(Path(path), POINT_COLUMNS)) as rows, Tracker(bench, desk.place) as tracker:
+    with closing(RowFile(Path(path), POINT_COLUMNS)) as rows, Tracker(bench, desk.place, PATIENCE_S) as tracker:
         left = touches[rows.groups :]
         if left:
             tracker.connect()
         for name, where in left:
             desk.person.touch(name, where)
-            reading = still_reading(Sight(tracker, PATIENCE_S), frames, STILL_M)
+            reading = still_reading(tracker, frames, STILL_M)
             rows.append([[name, *1e3 * where, *_fields(reading)]])
             x, y, z = 1e3 * reading.position
             desk.say(f"{name}: {x:.2f}, {y:.2f}, {z:.2f} mm, scatter {1e3 * reading.scatter:.3f} mm")
@@ -108,8 +107,8 @@ def _fields(reading: StillReading) -> list[float]:
 
 
 class _Turner:
-    def __init__(self, robot: Robot, motors: Motors, sight: Sight, person: Person, circles: Circles):
-        self._robot, self._motors, self._sight, self._person = robot, motors, sight, person
+    def __init__(self, robot: Robot, motors: Motors, tracker: Tracker, person: Person, circles: Circles):
+        self._robot, self._motors, self._tracker, self._person = robot, motors, tracker, person
         self._circles, self._limits = circles, motors.settings.axes.limits
         self.jobs = self._jobs()
         self._worn: int | None = None  # the tube with the sensor on it
@@ -180,7 +179,7 @@ class _Turner:
                 self._go(self._alone(tube, angle - sign * RUN_UP))
             before = sign
             self._go(self._alone(tube, angle))
-            reading = still_reading(self._sight, self._circles.frames, STILL_M)
+            reading = still_reading(self._tracker, self._circles.frames, STILL_M)
             motor = self._motor_deg(tube, self._motors.joints)
             rows.append([[str(tube + 1), motor, sign, *_fields(reading)]])
         self._go(self._alone(tube))

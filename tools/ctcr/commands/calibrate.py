@@ -44,7 +44,7 @@ def _live(function):
 
 def _desk(bench, folder, out):
     from ctcr.bench.devices import bench_file, person
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.calibrate.live import Desk
 
     if not bench:

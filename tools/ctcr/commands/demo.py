@@ -28,7 +28,7 @@ def bench(target, short, folder) -> int:
     Each step is a command, shown as you would type it, which meets the robot through the protocols of tracker and
     motors. Some minutes; writes report.html.
     """
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated
     from ctcr.bench.simulators.robot import SimulatedRobot
     from ctcr.demo import bench_story

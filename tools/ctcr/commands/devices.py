@@ -13,7 +13,7 @@ def command(bench_path: str, folder: str | None, json_target: str | None) -> int
     """Show which devices of a bench answer, their versions, and what is wrong with them. Nothing moves."""
     from ctcr.bench.devices import bench_file, emergency_stop
     from ctcr.bench.devices.health import health_of
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.show import output
 
     place = private_folder(folder)

@@ -23,7 +23,7 @@ def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> Non
 
     from ctcr.bench.devices import bench_file, homing, person
     from ctcr.bench.devices.motors import Motors
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import robot_file
     from ctcr.show import output
 

@@ -54,80 +54,57 @@ def command(
     Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
     first with `ctcr move --home`.
     """
-    from contextlib import nullcontext, suppress
+    from contextlib import nullcontext
     from dataclasses import asdict
 
     import numpy as np
 
-    from ctcr.bench.devices import bench_file, person
+    from ctcr.bench.devices import bench_file
     from ctcr.bench.devices.motors import Motors
-    from ctcr.bench.devices.private_folder import private_folder
-    from ctcr.bench.devices.real_time import CONTROLLER, real_time
-    from ctcr.bench.devices.sight import Sight
+    from ctcr.bench.devices.person import person_of
     from ctcr.bench.devices.tracker import Tracker
     from ctcr.bench.record.display import Display
     from ctcr.bench.record.folder import TABLE, Folder
     from ctcr.bench.record.live_page import LivePage
     from ctcr.bench.record.plan import Approach, steps_of
     from ctcr.bench.record.session import Options, Session
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.effects import user_effects
-    from ctcr.errors import InputError
     from ctcr.robot import robot_file
     from ctcr.show import output
     from ctcr.table import measurements
 
     user_effects.load_all(own)
     loaded, place, bench = robot_file.load(robot), private_folder(folder), bench_file.load(bench_path)
-    table = measurements.load(plan, loaded.n_tubes)
     way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
+    table = measurements.load(plan, loaded.n_tubes)
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
-    options = Options(dwell, readings, speed)
-    console = output.console(json_target)
-    recording = Folder(
-        target,
-        {"robot": robot, "plan": plan, "bench": bench_path},
-        asdict(options) | {"approach": asdict(way)},
-        loaded.n_tubes,
-        group=readings + way.has_way_point,
-    )
-    with Tracker(bench, place) as tracker, Motors(bench, loaded, place) as motors:
+    options, sources = Options(dwell, readings, speed), {"robot": robot, "plan": plan, "bench": bench_path}
+    settings, group = asdict(options) | {"approach": asdict(way)}, readings + way.has_way_point
+    console, person = output.console(json_target), person_of(bench, place)
+    recording = Folder(target, sources, settings, loaded.n_tubes, group)
+    with Tracker(bench, place, patience) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
         before = recording.rows.groups
         if before:
-            console.print(f"going on after {before} of {len(steps)} rows", markup=False)
+            console.print(f"resuming after {before} of {len(steps)} rows", markup=False)
         with Display() as display, LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live:
 
-            def shown(progress):
+            def show(progress):
                 display.show(progress)
                 if live:
                     live.show(progress)
 
-            who = _Paused(person.person_of(bench, place), display)
-            sight = Sight(tracker, patience)
-            session = Session(loaded, motors, sight, who, recording.rows, options, recording.clock, shown)
-            try:
-                with real_time(CONTROLLER):
-                    done = session.run(steps)
-            except BaseException as error:
-                with suppress(InputError):  # a full disk must not hide what ended it
-                    recording.note(motors, tracker, sight.lateness, str(error) or "interrupted")
-                raise
-            recording.note(motors, tracker, sight.lateness, "finished")
+            def hang(force):
+                with display.paused():
+                    person.hang(force)
+
+            session = Session(loaded, motors, tracker, recording.rows, options, recording.clock, hang, show)
+            with recording.sitting(motors, tracker):
+                done = session.run(steps)
     path = recording.path / TABLE
-    console.print(
-        f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}", markup=False
-    )
+    rms = f"RMS error against the model {done.rms_mm:.3f} mm"
+    console.print(f"{done.done - before} rows measured, {rms}: {path}", markup=False)
     if json_target:
         output.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)}, json_target)
-
-
-class _Paused:
-    """A person who is asked while the display rests."""
-
-    def __init__(self, person, display):
-        self._person, self._display = person, display
-
-    def hang(self, force) -> None:
-        with self._display.pause():
-            self._person.hang(force)

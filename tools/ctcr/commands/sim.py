@@ -49,9 +49,11 @@ def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
     The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
     """
     from ctcr.bench.simulators.aurora import AuroraSimulator
+    from ctcr.bench.simulators.bench import serve
 
     simulator = AuroraSimulator(_robot(robot, hidden, oracle, noise, seed), _folder(folder), scenario, seed)
-    _serve(simulator, f"tracker: {simulator.line.link}")
+    click.echo(f"tracker: {simulator.line.link}")
+    serve(simulator)
 
 
 @command.command(name="ethercat")
@@ -72,14 +74,17 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
     Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
     """
+    from ctcr.bench.shared.folder import BUS, MASTER
     from ctcr.bench.simulators import network
+    from ctcr.bench.simulators.bench import serve
     from ctcr.bench.simulators.ethercat import EthercatSimulator
 
     place = _folder(folder)
     if not interface:
         network.make_cable()
-    simulator = EthercatSimulator(interface or network.BUS, place, motors, variant, scenario, seed)
-    _serve(simulator, f"bus: drive it from {network.MASTER}" if not interface else f"bus on {interface}")
+    simulator = EthercatSimulator(interface or BUS, place, motors, variant, scenario, seed)
+    click.echo(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
+    serve(simulator)
 
 
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})
@@ -111,7 +116,7 @@ def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario,
 @folder_option
 def set_(device, settings, force, line_break, folder) -> None:
     """Switch faults of a running simulator on and off; without any, show them."""
-    from ctcr.bench.simulators.control import request
+    from ctcr.bench.shared.control import request
     from ctcr.robot import yaml_document
     from ctcr.show import output
 
@@ -140,19 +145,6 @@ def _run(program) -> int:
         raise InputError(Problem(f"{program[0]}: no such command")) from None
 
 
-def _serve(simulator, text) -> None:
-    import signal
-
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        click.echo(text)
-        simulator.run()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        simulator.close()
-
-
 def _robot(robot, hidden, oracle, noise, seed):
     import shlex
 
@@ -172,6 +164,6 @@ def _robot(robot, hidden, oracle, noise, seed):
 
 
 def _folder(folder):
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
 
     return private_folder(folder)

@@ -14,7 +14,7 @@ def command(release: bool, folder: str | None) -> None:
     This stops by software. The switch that cuts the motors' power is the emergency stop of the bench.
     """
     from ctcr.bench.devices import emergency_stop
-    from ctcr.bench.devices.private_folder import private_folder
+    from ctcr.bench.shared.folder import private_folder
 
     place = private_folder(folder)
     if not release:

@@ -1,13 +1,14 @@
 """YAML 1.2 read safely, with the line of every field."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from ctcr.errors import InputError, Problem
+from ctcr.errors import InputError, Problem, file_fault
 
 FieldPath = tuple[str | int, ...]
 
@@ -28,6 +29,16 @@ class YamlDocument:
                 break
             line = (key or node).start_mark.line + 1
         return line
+
+
+def load(path: str | Path) -> YamlDocument:
+    """The document of a file. Raises InputError where it cannot be read, or names the line that is no YAML."""
+    try:
+        return parse(Path(path).read_text(encoding="utf-8-sig"), str(path))
+    except OSError as error:
+        raise file_fault(error, path, "read") from None
+    except UnicodeDecodeError:
+        raise InputError(Problem("is not text in UTF-8", str(path))) from None
 
 
 def parse(text: str, file: str) -> YamlDocument:

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.motors import Motors
-from ctcr.bench.devices.sight import Sight, pose_of
-from ctcr.bench.devices.transmission import turns_of_joints
+from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.record.row_file import RowFile
+from ctcr.bench.shared.transmission import turns_of_joints
 from ctcr.frames import matrix_from_quaternion
 from ctcr.robot.description import Robot
 from ctcr.track.recording import control_row
@@ -26,12 +26,12 @@ class BenchRobot:
     """A ctcr.track.device.Device for one run, whose pace is that of the tracker.
 
     A tracker that does not see the sensor holds the path; the motors then rest. Raises DeviceFault where that lasts
-    longer than the patience of `sight`, where the tip strays, a limit of the bench is met, or anything stops.
+    longer than the patience of `tracker`, where the tip strays, a limit of the bench is met, or anything stops.
     """
 
     robot: Robot
     motors: Motors
-    sight: Sight
+    tracker: Tracker
     clock: Callable[[float], float]  # t_s of the rows from a time of `time.monotonic`
     measurements: RowFile
     control: RowFile
@@ -41,13 +41,11 @@ class BenchRobot:
     advance: Callable[[float], None]  # is told each period as a share of the run
 
     def measure(self) -> tuple[Array, Array, Array]:
-        frame = self.sight.seen()
-        state = self.motors.state
-        if state["stopped"]:
-            self.motors.wait()  # says why
-        if state["limited"]:
+        frame = self.tracker.seen()
+        self.motors.check()
+        if self.motors.state["limited"]:
             raise DeviceFault("joints", "a limit of the bench file ended the motion", "change the path or the start")
-        joints, pose = self.motors.joints, pose_of(frame)
+        joints, pose = self.motors.joints, frame.pose
         self._t = self.clock(frame.t)
         self.measurements.append([[self._t, self.run, *joints, *self.force, *pose]])
         return tau * turns_of_joints(self.robot, joints), pose[:3], matrix_from_quaternion(pose[3:])

@@ -1,7 +1,7 @@
 """A scenario on the bench: every weight and repetition, recorded as it happens; what was interrupted goes on."""
 
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +11,10 @@ from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person, person_of
-from ctcr.bench.devices.private_folder import private_folder
-from ctcr.bench.devices.real_time import CONTROLLER, real_time
-from ctcr.bench.devices.sight import RATE_HZ, Sight
-from ctcr.bench.devices.tracker import Tracker
+from ctcr.bench.devices.tracker import RATE_HZ, Tracker
 from ctcr.bench.record.folder import Folder
 from ctcr.bench.record.row_file import RowFile
+from ctcr.bench.shared.folder import private_folder
 from ctcr.errors import InputError, Problem
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
@@ -54,22 +52,14 @@ def track(
     loaded, devices = robot_file.load(robot), bench_file.load(bench)
     wanted = within(scenario_file.load(scenario, loaded.n_tubes), devices, loaded)
     check(wanted, loaded, loaded)
-    with Tracker(devices, place) as tracker, Motors(devices, loaded, place) as motors:
+    with Tracker(devices, place, patience_s) as tracker, Motors(devices, loaded, place) as motors:
         motors.connect()
         tracker.connect()
         folder = Folder(target, sources, {}, loaded.n_tubes, synced=False)
         age = 1e-3 * devices.tracker.reading_age_ms
-        tracking = _Tracking(loaded, wanted, motors, Sight(tracker, patience_s), folder, 1e-3 * most_error_mm, age)
-        try:
-            with real_time(CONTROLLER):
-                tracking.run(person_of(devices, place), said)
-        except BaseException as error:
-            with suppress(InputError):  # a full disk must not hide what ended it
-                folder.note(motors, tracker, tracking.sight.lateness, str(error) or "interrupted")
-            raise
-        finally:
-            tracking.close()
-        folder.note(motors, tracker, tracking.sight.lateness, "finished")
+        tracking = _Tracking(loaded, wanted, motors, tracker, folder, 1e-3 * most_error_mm, age)
+        with folder.sitting(motors, tracker), closing(tracking):
+            tracking.run(person_of(devices, place), said)
     return runs_of(folder, wanted, loaded, age), wanted
 
 
@@ -108,12 +98,12 @@ class _Tracking:
         robot: Robot,
         scenario: Scenario,
         motors: Motors,
-        sight: Sight,
+        tracker: Tracker,
         folder: Folder,
         most_error: float,
         reading_age: float,
     ):
-        self._robot, self._scenario, self._motors, self.sight = robot, scenario, motors, sight
+        self._robot, self._scenario, self._motors, self._tracker = robot, scenario, motors, tracker
         self._folder, self._most_error, self._reading_age = folder, most_error, reading_age
         self._control = RowFile(folder.path / CONTROL, COLUMNS, synced=False)
 
@@ -137,17 +127,17 @@ class _Tracking:
     def _one(self, mass: float, repetition: int) -> Run:
         motors, entries = self._motors, self._folder.about.setdefault("runs", [])
         motors.move(self._start())
-        motors.wait(self.sight.next)  # frames that nobody fetches would be missed
+        motors.wait(self._tracker.next)  # frames that nobody fetches would be missed
         entry = {"run": len(entries) + 1, "mass_g": mass, "repetition": repetition, "ended": "interrupted"}
         entries.append(entry)
         self._folder.save()  # rows of a run that is cut off keep their number
         values = system_values(self._robot)
-        self.sight.forget()
+        self._tracker.discard()
         with Progress(f"{mass:g} g, run {repetition}", 1.0) as progress:
             device = BenchRobot(
                 self._robot,
                 motors,
-                self.sight,
+                self._tracker,
                 self._folder.clock,
                 self._folder.rows,
                 self._control,
@@ -160,7 +150,7 @@ class _Tracking:
         if len(run.time):
             run = replace(run, tip=tips_at(run.time, run.time + self._reading_age, run.tip))
         motors.halt()
-        motors.wait(self.sight.next)
+        motors.wait(self._tracker.next)
         for rows in (self._folder.rows, self._control):
             rows.sync()
         entry |= {"ended": "finished", "status": run.status, "settled_m": run.settled}

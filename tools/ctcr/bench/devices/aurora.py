@@ -3,14 +3,18 @@
 import os
 import struct
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
-from ctcr.bench.devices import ndi_protocol as ndi
 from ctcr.bench.devices.fault import DeviceFault, needed
-from ctcr.bench.devices.ndi_replies import Garbled, ToolReading, parse_bx, parse_tx
+from ctcr.bench.shared import ndi
+from ctcr.bench.shared.ndi import Garbled, ToolReading
 
 RESET_S = 5.0  # from the break to the device's message
-PROBES_S = (0.2, 0.6)  # longest silences, in two rounds of looking for the baud rate
+PROBES_S = (0.2, 0.6)  # timeouts of the two rounds in which the baud rate is searched
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Tool:
 
 @dataclass(frozen=True)
 class Frame:
-    """What one TX or BX answered, and when it came in (`time.monotonic`)."""
+    """The reply to one TX or BX, and when it came in (`time.monotonic`)."""
 
     t: float  # [s]
     readings: list[ToolReading]
@@ -34,12 +38,12 @@ class Frame:
 class Aurora:
     """One tracker. `connect` before `read`; every method raises DeviceFault. Not real-time safe: it waits.
 
-    `replies` is BX (short, exact to 32 bits) or TX (text, rounded to 0.01 mm). After a fault, `connect` starts anew,
-    also where the cable was pulled in between.
+    After a fault, `connect` starts anew, also where the cable was pulled in between.
     """
 
     def __init__(self, port: str, baud: int = 115200, replies: str = "BX", answer_s: float = 1.0, tries: int = 3):
-        """`answer_s`: longest silence before an answer [s]; `tries`: of a command whose answer came damaged."""
+        """`replies`: BX (binary, exact to 32 bits) or TX (text, rounded to 0.01 mm); `answer_s`: timeout of
+        a reply [s]; `tries`: of a command whose reply came damaged."""
         self.port, self.baud, self.replies = port, baud, replies
         self._answer_s, self._tries = answer_s, tries
         self.version, self.tools = "", []
@@ -53,23 +57,20 @@ class Aurora:
         for left in reversed(range(self._tries)):
             damaged = self.damaged_answers
             try:
-                self._set_up()
+                self.close()
+                self._open()
+                self._reset()
+                self._set_baud()
+                self.version = self._ask("VER", "4")
+                self._find_tools()
+                self._ask("TSTART", "80")  # frame numbers start at 0
                 return
-            except DeviceFault:  # a command asked twice is refused where only the first answer was damaged
+            except DeviceFault:  # a command sent again is refused where only the first reply was damaged
                 if not left or self.damaged_answers == damaged:
                     raise
 
-    def _set_up(self) -> None:
-        self.close()
-        self._open()
-        self._reset()
-        self._set_baud()
-        self.version = self._ask("VER", "4")
-        self._find_tools()
-        self._ask("TSTART", "80")  # frame numbers start at 0
-
     def close(self) -> None:
-        """Lets go of the port; the device goes on tracking until the next reset."""
+        """Closes the port; the device goes on tracking until the next reset."""
         if self._line:
             self._line.close()
         self._line = None
@@ -80,21 +81,17 @@ class Aurora:
     def __exit__(self, *_) -> None:
         self.close()
 
-    # ---- frames
-
     def read(self) -> Frame:
         """The newest frame. Frames come at the tracker's rate: asked faster, the same frame number comes again."""
         options = f"{ndi.REPORT_OUT_OF_VOLUME | ndi.TRANSFORMS:04X}"
+        body, parse = (self._binary_reply, ndi.parse_bx) if self.replies == "BX" else (self._text_reply, ndi.parse_tx)
 
         def once() -> Frame:
             self._send(self.replies, options)
-            if self.replies == "BX":
-                body = self._binary_answer()
-                return Frame(time.monotonic(), *parse_bx(body))
-            text = self._text_answer()
-            return Frame(time.monotonic(), *parse_tx(text))
+            content = body()
+            return Frame(time.monotonic(), *parse(content))
 
-        return self._tried(once)
+        return self._retried(once)
 
     # ---- steps of the connection
 
@@ -102,13 +99,13 @@ class Aurora:
         serial = needed("pyserial", "serial", f"tracker {self.port}")
         try:
             self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s, exclusive=True)
-        except serial.SerialException as error:
+        except OSError as error:  # SerialException is one
             reason = os.strerror(error.errno) if error.errno else str(error)
             remedy = "is it plugged in and switched on, and is the user in the port's group (usually dialout)?"
             raise self._fault(f"cannot open the port ({reason.lower()})", remedy) from None
 
     def _reset(self) -> None:
-        """A break returns a device to 9600 baud from whatever it was told before.
+        """A break returns a device at any baud rate to 9600.
 
         A pseudo-terminal carries no break, so there the device is asked at each baud rate.
         """
@@ -120,21 +117,21 @@ class Aurora:
             if message == ndi.RESET_MESSAGE[:-1]:
                 self._ask("INIT", "")
                 return
-        for patience in PROBES_S:
+        for timeout in PROBES_S:
             for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
-                if self._answers_at(baud, patience):
+                if self._answers_at(baud, timeout):
                     return
         remedy = "switch it off and on; is this the tracker's port, and the cable whole?"
         raise self._fault("no answer at any baud rate", remedy)
 
-    def _answers_at(self, baud: int, patience: float) -> bool:
-        self._line.baudrate, self._line.timeout = baud, patience
+    def _answers_at(self, baud: int, timeout: float) -> bool:
+        self._line.baudrate, self._line.timeout = baud, timeout
         self._line.reset_input_buffer()
         try:
-            for name in ("TSTOP", "INIT"):  # a device left tracking would refuse what follows
+            for name in ("TSTOP", "INIT"):  # a device left tracking would refuse the commands that follow
                 self._send(name, "")
-                answer = self._until_return() + b"\r"
-            return answer == ndi.framed(b"OKAY")
+                reply = self._until_return() + b"\r"
+            return reply == ndi.framed(b"OKAY")
         except Garbled:
             return False
         finally:
@@ -146,7 +143,7 @@ class Aurora:
         if self.baud not in ndi.BAUD_CODES:
             raise self._fault(f"{self.baud} baud is none of its rates", f"use one of {sorted(ndi.BAUD_CODES)}")
         self._ask("COMM", f"{ndi.BAUD_CODES[self.baud]}0000")
-        time.sleep(0.1)  # the device answers at the old rate, then changes
+        time.sleep(0.1)  # the device replies at the old rate, then changes
         self._line.baudrate = self.baud
 
     def _find_tools(self) -> None:
@@ -168,23 +165,22 @@ class Aurora:
             text = self._ask("PHSR", kind)
             try:
                 return [int(text[2 + 5 * i : 4 + 5 * i], 16) for i in range(int(text[:2], 16))]
-            except ValueError:  # the late answer to an earlier command
+            except ValueError:  # the late reply to an earlier command
                 self.damaged_answers += 1
         raise self._fault("its answers belong to other commands", "connect again")
 
-    # ---- questions and answers
+    # ---- commands and replies
 
     def _ask(self, name: str, arguments: str) -> str:
-        """The text that answers a command."""
+        """The text that a command is answered with."""
 
         def once() -> str:
             self._send(name, arguments)
-            return self._text_answer().decode("latin-1")
+            return self._text_reply().decode("latin-1")
 
-        return self._tried(once)
+        return self._retried(once)
 
-    def _tried(self, once):
-        """The answer, asked again where it came damaged."""
+    def _retried(self, once: Callable[[], T]) -> T:
         for _ in range(self._tries):
             try:
                 return once()
@@ -197,29 +193,28 @@ class Aurora:
     def _send(self, name: str, arguments: str) -> None:
         self._guarded(lambda: self._line.write(ndi.framed(f"{name}:{arguments}".encode())))
 
-    def _text_answer(self) -> bytes:
+    def _text_reply(self) -> bytes:
         line = self._until_return()
         if not line:
             raise self._silence()
         return self._checked(line)
 
-    def _binary_answer(self) -> bytes:
+    def _binary_reply(self) -> bytes:
         start = self._exactly(2)
         if start == b"ER":  # refusals are text
             self._checked(start + self._until_return())
-        rest = self._exactly(4)
-        length = struct.unpack("<H", rest[:2])[0]
-        if struct.unpack("<H", start)[0] != ndi.BX_START or struct.unpack("<H", rest[2:])[0] != ndi.crc16(
-            start + rest[:2]
-        ):
-            raise Garbled("wrong head")
-        body = self._exactly(length + 2)
-        if struct.unpack("<H", body[-2:])[0] != ndi.crc16(body[:-2]):
+        head = start + self._exactly(4)
+        first, length, crc = struct.unpack("<3H", head)
+        if first != ndi.BX_START or crc != ndi.crc16(head[:4]):
+            raise Garbled("wrong header")
+        data = self._exactly(length + 2)
+        body, crc = data[:-2], data[-2:]
+        if struct.unpack("<H", crc)[0] != ndi.crc16(body):
             raise Garbled("wrong CRC")
-        return body[:-2]
+        return body
 
     def _checked(self, line: bytes) -> bytes:
-        """The text of a line whose CRC is right and that is no refusal."""
+        """The text of a line without its CRC. Raises Garbled where that is wrong, DeviceFault for a refusal."""
         text = line[:-4]
         if b"%04X" % ndi.crc16(text) != line[-4:]:
             raise Garbled("wrong CRC")
@@ -238,28 +233,26 @@ class Aurora:
         return data
 
     def _until_return(self) -> bytes:
-        """A line without its end; empty where none came in time."""
+        """A line without its end; empty after a timeout."""
         data = self._guarded(lambda: self._line.read_until(b"\r"))
         if data and not data.endswith(b"\r"):
             raise Garbled("cut short")
         return data[:-1]
 
     def _drain(self) -> None:
-        """Waits until the line is silent, so that the next answer starts at its start."""
+        """Waits until the line is silent, so that the next reply begins at its first byte."""
         end = time.monotonic() + self._answer_s
         while time.monotonic() < end and self._guarded(lambda: self._line.in_waiting):
             self._guarded(self._line.reset_input_buffer)
             time.sleep(0.02)
 
-    def _guarded(self, action):
-        """Runs what touches the port; raises DeviceFault where the port is gone."""
-        import serial
-
+    def _guarded(self, action: Callable[[], T]) -> T:
+        """The result of an action on the port. Raises DeviceFault where the port is gone."""
         if not self._line:
             raise self._fault("not connected", "connect first")
         try:
             return action()
-        except (serial.SerialException, OSError, TypeError) as error:  # TypeError: pyserial on a port closed meanwhile
+        except (OSError, TypeError) as error:  # SerialException is an OSError; TypeError: the port was closed meanwhile
             self.close()
             reason = str(error).split(":")[0]
             raise self._fault(f"the port is gone ({reason})", "plug the cable in and connect again") from None

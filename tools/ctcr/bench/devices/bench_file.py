@@ -1,4 +1,4 @@
-"""The bench file: which devices there are, where they are connected, and what the joints may do."""
+"""The bench file: the devices, where they are connected, limits and speeds of the joints."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,7 +10,8 @@ from pydantic import Field, ValidationError
 from ctcr.bench.devices.axis_control import AxisSettings
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.stepper_drive import DriveSettings
-from ctcr.errors import InputError, Problem, did_you_mean, file_fault
+from ctcr.bench.shared.folder import AURORA, MASTER
+from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot import yaml_document
 from ctcr.robot.description import MAX_TUBES, Robot, Section
 from ctcr.robot.units import Quantity
@@ -60,12 +61,26 @@ class Limits(Section):
 
 
 class Bench(Section):
-    """The whole file. `person` is who hangs weights and looks at the tubes."""
+    """The whole file. `person` hangs weights and looks at the tubes."""
 
     tracker: TrackerPort = Field(description="its fields, indented below it")
     motors: Motors = Field(description="its fields, indented below it")
     limits: Limits = Field(description="its fields, indented below it")
     person: Literal["present", "simulated"] = Field("present", description="present or simulated")
+
+    def port(self, folder: Path) -> str:
+        """Serial port of the tracker; that of the simulated one lies in the folder of the bench."""
+        return str(folder / AURORA) if self.tracker.port == SIMULATED else self.tracker.port
+
+    @property
+    def interface(self) -> str:
+        """Network interface of the bus."""
+        return MASTER if self.motors.interface == SIMULATED else self.motors.interface
+
+    @property
+    def positions(self) -> list[int]:
+        """Positions on the bus of the terminals, in the order of the joints."""
+        return [*self.motors.translation_terminals, *self.motors.rotation_terminals]
 
     @property
     def drive_settings(self) -> DriveSettings:
@@ -76,22 +91,20 @@ class Bench(Section):
         """Of this robot's joints. Raises InputError where the file is for another number of tubes."""
         n, motors, limits = robot.n_tubes, self.motors, self.limits
         counts = {
-            "motors.translation_terminals": motors.translation_terminals,
-            "motors.rotation_terminals": motors.rotation_terminals,
-            "limits.translation_mm": limits.translation_mm,
-            "limits.rotation_deg": limits.rotation_deg,
+            "motors.translation_terminals": len(motors.translation_terminals),
+            "motors.rotation_terminals": len(motors.rotation_terminals),
+            "limits.translation_mm": len(limits.translation_mm),
+            "limits.rotation_deg": len(limits.rotation_deg),
         }
-        wrong = [
-            Problem(f"has {len(value)} entries, the robot has {n} tubes", field=name)
-            for name, value in counts.items()
-            if len(value) != n
-        ]
+        wrong = {name: count for name, count in counts.items() if count != n}
         if wrong:
-            raise InputError(wrong)
+            raise InputError(
+                Problem(f"has {count} entries, the robot has {n} tubes", field=name) for name, count in wrong.items()
+            )
         return AxisSettings(
             speeds=np.repeat([1e-3 * motors.speed_mm_s, np.deg2rad(motors.speed_deg_s)], n),
             ramp_s=motors.ramp_s,
-            lag=np.repeat([1e-3 * motors.lag_mm, np.deg2rad(motors.lag_deg)], n),
+            following_error=np.repeat([1e-3 * motors.lag_mm, np.deg2rad(motors.lag_deg)], n),
             limits=JointLimits(
                 length=np.array([tube.length for tube in robot.tubes]),
                 travel=1e-3 * np.array(limits.translation_mm),
@@ -103,32 +116,26 @@ class Bench(Section):
 
 def load(path: str | Path) -> Bench:
     """The bench that a file describes. Raises InputError with all its faults."""
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
-    except UnicodeDecodeError:
-        raise InputError(Problem("is not text in UTF-8", str(path))) from None
-    document = yaml_document.parse(text, str(path))
+    document, file = yaml_document.load(path), str(path)
     if not isinstance(document.data, dict):
-        raise InputError(Problem("does not describe a bench: no fields tracker, motors, limits", str(path)))
+        raise InputError(Problem("does not describe a bench: no fields tracker, motors, limits", file))
     try:
         return Bench.model_validate(document.data)
     except ValidationError as error:
-        problems = [_problem(fault, str(path), document) for fault in error.errors(include_url=False)]
-        raise InputError(problems) from None
+        raise InputError(
+            Problem(_complaint(fault), file, document.line(fault["loc"]), ".".join(map(str, fault["loc"])))
+            for fault in error.errors(include_url=False)
+        ) from None
 
 
-def _problem(fault: dict, file: str, document: yaml_document.YamlDocument) -> Problem:
-    where = fault["loc"]
-    sections = {"tracker": TrackerPort, "motors": Motors, "limits": Limits}
-    section = sections.get(where[0], Bench) if len(where) > 1 else Bench
-    field = str(where[1] if len(where) > 1 else where[0])
-    name = ".".join(map(str, where))
+def _complaint(fault: dict) -> str:
+    """What pydantic found, and what the field needs."""
+    name, *inner = fault["loc"]
+    section, field = (Bench, name)
+    if inner:
+        section, field = {"tracker": TrackerPort, "motors": Motors, "limits": Limits}.get(name, Bench), inner[0]
     if fault["type"] == "extra_forbidden":
-        meant = did_you_mean(field, section.model_fields)
-        return Problem(
-            "unknown field" + (f": did you mean {meant}?" if meant else ""), file, document.line(where), name
-        )
+        meant = did_you_mean(str(field), section.model_fields)
+        return "unknown field" + (f": did you mean {meant}?" if meant else "")
     complaint = "is missing" if fault["type"] == "missing" else fault["msg"].lower()
-    return Problem(f"{complaint}: needs {section.expected(field)}", file, document.line(where), name)
+    return f"{complaint}: needs {section.expected(str(field))}"

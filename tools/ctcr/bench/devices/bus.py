@@ -1,11 +1,12 @@
-"""The EtherCAT bus with its stepper terminals: brought up, exchanged with every cycle, explained where it fails."""
+"""The EtherCAT bus with its stepper terminals: brought up, exchanged every cycle, its faults explained."""
 
 import time
 
 from ctcr.bench.devices.fault import DeviceFault, needed
 from ctcr.bench.devices.stepper_drive import DriveInputs, DriveSettings, StepperDrive
+from ctcr.bench.shared.ethercat import State
 
-RETURN_US = 20000  # patience with a frame during the bring-up, of which the default loses one in twenty under load
+BRING_UP_US = 20000  # timeout of a frame during the bring-up; pysoem's own loses one in twenty under load
 CYCLE_US = 2000  # and in a cycle
 STATE_US = 50000
 OP_S = 2.0  # longest way to OP
@@ -23,16 +24,17 @@ class Bus:
 
     def connect(self) -> None:
         """Finds the terminals, configures them and brings all to OP, motors off."""
+        self._soem = needed("pysoem", "pysoem", f"bus {self.interface}")
         try:
             self._bring_up()
-        except DeviceFault:  # a computer under load loses the answer of a mailbox now and then
+        except DeviceFault:  # under load the answer of a mailbox is lost now and then
             self._bring_up()
 
     def _bring_up(self) -> None:
-        pysoem = needed("pysoem", "pysoem", f"bus {self.interface}")
-        pysoem.settings.timeouts.ret = RETURN_US
+        soem = self._soem
+        soem.settings.timeouts.ret = BRING_UP_US
         self.close()
-        master = pysoem.Master()
+        master = soem.Master()
         try:
             master.open(self.interface)
         except ConnectionError:
@@ -47,10 +49,10 @@ class Bus:
             drive.slave.config_func = lambda _, drive=drive: drive.configure()
         try:
             master.config_map()
-        except pysoem.ConfigMapError as error:
+        except soem.ConfigMapError as error:
             what = f"cannot be configured ({error.error_list[0]})"
             raise self._fault(what, "switch the terminals off and on, then connect again") from None
-        if master.state_check(pysoem.SAFEOP_STATE, STATE_US) != pysoem.SAFEOP_STATE:
+        if master.state_check(State.SAFEOP, STATE_US) != State.SAFEOP:
             raise self._state_fault()
         self._to_op()
 
@@ -58,47 +60,42 @@ class Bus:
         """Motors off, terminals to INIT."""
         if not self._master:
             return
-        import pysoem
-
         if self.drives and all(drive.full_speed for drive in self.drives):
-            for drive in self.drives:
-                drive.command(enable=False, speed=0.0)
-            self._master.send_processdata()
-            self._master.receive_processdata(CYCLE_US)
-        self._master.state = pysoem.INIT_STATE
-        self._master.write_state()
+            self._motors_off()
+        self._request(State.INIT)
         self._master.close()
         self._master = None
 
     def exchange(self) -> list[DriveInputs] | None:
-        """One cycle with what the drives were commanded; None where the working counter was wrong."""
-        self._master.send_processdata()
-        if self._master.receive_processdata(CYCLE_US) != self._master.expected_wkc:
-            return None
-        return [drive.inputs() for drive in self.drives]
+        """One cycle with the drives' commands; None for a wrong working counter."""
+        return [drive.inputs() for drive in self.drives] if self._cycle() == self._master.expected_wkc else None
 
     def check_states(self) -> DeviceFault | None:
-        """Whether every terminal is in OP, asked anew: the working counter alone does not tell."""
-        import pysoem
+        """The fault of a terminal that is not in OP, read from all: a right working counter does not prove OP."""
+        return None if self._master.read_state() == State.OP else self._state_fault()
 
-        return None if self._master.read_state() == pysoem.OP_STATE else self._state_fault()
+    def _cycle(self) -> int:
+        """The working counter of one exchange."""
+        self._master.send_processdata()
+        return self._master.receive_processdata(CYCLE_US)
 
-    def _to_op(self) -> None:
-        import pysoem
-
-        master = self._master
+    def _motors_off(self) -> None:
         for drive in self.drives:
             drive.command(enable=False, speed=0.0)
-        master.send_processdata()
-        master.receive_processdata(CYCLE_US)
-        master.state = pysoem.OP_STATE
-        master.write_state()
+        self._cycle()
+
+    def _request(self, state: State) -> None:
+        self._master.state = state
+        self._master.write_state()
+
+    def _to_op(self) -> None:
+        self._motors_off()
+        self._request(State.OP)
         end = time.monotonic() + OP_S
         while time.monotonic() < end:
-            master.send_processdata()
-            master.receive_processdata(CYCLE_US)
-            if master.state_check(pysoem.OP_STATE, CYCLE_US) == pysoem.OP_STATE:
-                pysoem.settings.timeouts.ret = CYCLE_US  # from here on nothing may hold up the cycle for long
+            self._cycle()
+            if self._master.state_check(State.OP, CYCLE_US) == State.OP:
+                self._soem.settings.timeouts.ret = CYCLE_US  # from here on nothing may hold up the cycle for long
                 return
         raise self._state_fault()
 
@@ -106,17 +103,17 @@ class Bus:
         if position >= len(self.names):
             text = f"has {len(self.names)} devices, and none at position {position}"
             raise self._fault(text, "compare the terminals in the bench file with `ctcr devices`")
-        return StepperDrive(self._master.slaves[position], position, self._settings)
+        soem = self._soem
+        errors = (soem.SdoError, soem.MailboxError, soem.PacketError, soem.WkcError)
+        return StepperDrive(self._master.slaves[position], position, self._settings, errors)
 
     def _state_fault(self) -> DeviceFault:
-        import pysoem
-
         self._master.read_state()
         for drive in self.drives:
-            if drive.slave.state != pysoem.OP_STATE:
-                if drive.slave.state == pysoem.NONE_STATE:
-                    remedy = "check the plugs and the power supply from this terminal on, then connect again"
-                    return drive.fault("does not answer", remedy)
+            if drive.slave.state == 0:
+                remedy = "check the plugs and the power supply from this terminal on, then connect again"
+                return drive.fault("does not answer", remedy)
+            if drive.slave.state != State.OP:
                 return drive.state_fault()
         return self._fault("frames come back damaged or not at all", "check the cable, then connect again")
 

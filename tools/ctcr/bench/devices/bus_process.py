@@ -1,13 +1,17 @@
-"""The process that owns the bus: exchanges process data in a steady cycle and moves the joints as it is asked.
+"""The process that owns the bus: exchanges process data in a steady cycle and moves the joints on request.
 
-Python threads share one lock, and a tracker's client in a thread beside the bus held it up by 376 ms; so the bus has a
-process of its own. It is asked through a pipe, and tells its state in a shared record. When the other end of the pipe
-is gone it stops the motors and ends.
+Threads of one Python process share a lock, and a tracker's client in a thread beside the bus delayed a cycle by 376 ms;
+so the bus has a process of its own. Requests come through a pipe, its state is in a shared record. When the other end
+of the pipe closes, it stops the motors and ends.
 """
 
+import fcntl
 import gc
+import os
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -17,37 +21,24 @@ import numpy as np
 from ctcr.bench.devices import emergency_stop
 from ctcr.bench.devices.axis_control import AxisControl, AxisSettings
 from ctcr.bench.devices.bus import Bus
-from ctcr.bench.devices.bus_lock import BusLock
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.lateness import Lateness
-from ctcr.bench.devices.real_time import BUS, real_time
-from ctcr.bench.devices.shared_record import SharedRecord
-from ctcr.bench.devices.stepper_drive import DriveSettings
+from ctcr.bench.devices.stepper_drive import DriveInputs, DriveSettings
+from ctcr.bench.shared.real_time import BUS, Lateness, real_time
+from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
 
-HOME_COUNT = 1_000_000  # what the counters show at home; terminals count from 0 after power on, so that is not home
+HOME_COUNT = 1_000_000  # of the counters at home; terminals count from 0 after power on, so 0 would prove nothing
 HOME_RANGE = 500_000  # counts: more than any axis travels
-MOST_AXES = 8
-SILENCE_S = 0.06  # without a good frame, before it is a fault; the terminals themselves wait for 0.1 s
-STATE_CYCLES = 25  # between two looks at the terminals' states
+SILENCE_S = 0.06  # without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
+STATE_CYCLES = 25  # between two checks of the terminals' states
 READY_S = 0.5  # from enabling to ready
-STATE = np.dtype(
-    [
-        ("t", "f8"),
-        ("joints", "f8", MOST_AXES),
-        ("wanted", "f8", MOST_AXES),
-        ("counters", "i8", MOST_AXES),
-        ("done", "i8"),
-        ("moving", "?"),
-        ("homed", "?"),
-        ("limited", "?"),
-        ("stopped", "?"),
-        ("real_time", "?"),
-        ("cycles", "i8"),
-        ("bad_cycles", "i8"),
-        ("p99_late", "f8"),
-        ("worst_late", "f8"),
-    ]
-)
+LOCK_S = 3.0  # patience with a program that is just ending
+_FIELDS = {
+    "f8": ("t", "p99_late", "worst_late"),  # [s]
+    f"{MOST_AXES}f8": ("joints",),
+    "i8": ("done", "cycles", "bad_cycles"),  # done: number of the last request once its motion has ended
+    "?": ("moving", "homed", "limited", "stopped", "real_time"),
+}
+STATE = np.dtype([(name, kind) for kind, names in _FIELDS.items() for name in names])
 
 
 @dataclass(frozen=True)
@@ -64,29 +55,50 @@ class BusSettings:
 
 
 def state_record(folder: Path, writer: bool = False) -> SharedRecord:
-    """What the bus owner tells of itself every cycle."""
+    """STATE, written every cycle."""
     return SharedRecord(folder / "bus", STATE, writer)
 
 
+@contextmanager
+def bus_lock(folder: Path) -> Iterator[None]:
+    """One program at a time drives the bus: a second master would take over the terminals of the first.
+
+    Raises DeviceFault while another program holds it. A process that ends releases it.
+    """
+    handle = os.open(folder / "bus.lock", os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        end = time.monotonic() + LOCK_S
+        while True:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() > end:
+                    remedy = "wait until it has ended, or end it"
+                    raise DeviceFault("bus", "another program drives it", remedy) from None
+                time.sleep(0.05)
+        yield
+    finally:
+        os.close(handle)
+
+
 def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
-    """The process: says ("ready", names of devices) or ("fault", DeviceFault), then serves until the pipe closes."""
+    """The process: sends ("ready", names of devices) or ("fault", DeviceFault), then serves until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
-        with BusLock(folder), real_time(BUS) as granted:
+        with bus_lock(folder), real_time(BUS) as granted:
             try:
                 bus.connect()
                 owner = _Owner(settings, folder, pipe, bus, granted)
-                owner.tell(time.monotonic())
+                owner.publish(time.monotonic())
                 pipe.send(("ready", bus.names))
                 owner.serve()
             finally:
                 bus.close()
     except DeviceFault as fault:
-        try:
+        with suppress(OSError):
             pipe.send(("fault", fault))
-        except OSError:
-            pass
 
 
 class _Owner:
@@ -95,23 +107,20 @@ class _Owner:
         self._record = state_record(folder, writer=True)
         self._real_time, self._lateness = granted, Lateness()
         self._cycles = self._bad = 0
-        inputs = self._first_inputs()
-        self._counters = np.array([drive.counter for drive in inputs])
+        self._counters = np.array([drive.counter for drive in self._first_inputs()])
         homed = bool((np.abs(self._counters - HOME_COUNT) < HOME_RANGE).all())
         self._base = HOME_COUNT if homed else 0
         self._control = AxisControl(settings.axes, self._joints(), homed)
         self._enabled_at, self._new_counters = None, None
-        self._doubted = False  # the last look at the states found a fault
+        self._doubted = False  # the last check of the states found a fault
         self._number = 0  # of the last request
         self._open = True
 
-    def _first_inputs(self):
+    def _first_inputs(self) -> list[DriveInputs]:
         for _ in range(20):
             if inputs := self._bus.exchange():
                 return inputs
-        raise self._bus.check_states() or DeviceFault(
-            f"bus {self._settings.interface}", "frames come back damaged", "check the cable, then connect again"
-        )
+        raise self._bus.check_states() or self._frame_fault("frames come back damaged")
 
     def _joints(self) -> np.ndarray:
         turns = (self._counters - self._base) / self._settings.drive.encoder_counts
@@ -128,12 +137,12 @@ class _Owner:
                 time.sleep(wait)
             now = time.monotonic()
             self._lateness.add(now - due)
-            due = due + period if now < due + period else now + period  # what was missed is not made up for
+            due = due + period if now < due + period else now + period  # missed cycles are not made up for
             if self._cycle(now, min(now - last, 10 * period)):
                 last = now
             if control.fault:
                 emergency_stop.stop(self._folder, str(control.fault))
-            self.tell(now)
+            self.publish(now)
 
     def _cycle(self, now: float, dt: float) -> bool:
         """One exchange; whether it was good."""
@@ -146,7 +155,8 @@ class _Owner:
         if inputs is None:
             self._bad += 1
             if now - self._good_at > SILENCE_S and not control.fault:
-                control.stop(bus.check_states() or self._frames_lost())
+                lost = f"no frame came back whole for {1e3 * SILENCE_S:.0f} ms"
+                control.stop(bus.check_states() or self._frame_fault(lost))
             return False
         self._good_at = now
         self._counters = np.array([drive.counter for drive in inputs])
@@ -154,7 +164,7 @@ class _Owner:
             if not all(drive.counter_set for drive in inputs):
                 return True
             self._base, self._new_counters = HOME_COUNT, None
-            control.place(self._joints())
+            control.set_joints(self._joints())
         self._watch(now, inputs)
         speeds = control.cycle(dt, self._joints()) / self._settings.ratios
         enable = self._enabled_at is not None
@@ -162,7 +172,7 @@ class _Owner:
             drive.command(enable, speed if enable else 0.0)
         return True
 
-    def _watch(self, now: float, inputs) -> None:
+    def _watch(self, now: float, inputs: list[DriveInputs]) -> None:
         """Stops where a terminal reports an error or has left OP."""
         control, bus = self._control, self._bus
         if control.fault:
@@ -171,7 +181,7 @@ class _Owner:
             if said.error:
                 control.stop(drive.diagnosis())
             elif self._enabled_at and not said.ready and now - self._enabled_at > READY_S:
-                off = drive.fault("does not switch its motor on", "check the motor's cable and supply")
+                off = drive.fault("does not enable its motor", "check the motor's cable and supply")
                 control.stop(bus.check_states() or off)
         if self._cycles % STATE_CYCLES == 0:
             fault = bus.check_states()
@@ -179,8 +189,7 @@ class _Owner:
                 control.stop(fault)
             self._doubted = fault is not None
 
-    def _frames_lost(self) -> DeviceFault:
-        what = f"no frame came back whole for {1e3 * SILENCE_S:.0f} ms"
+    def _frame_fault(self, what: str) -> DeviceFault:
         return DeviceFault(f"bus {self._settings.interface}", what, "check the cables, then connect again")
 
     # ---- requests
@@ -195,25 +204,14 @@ class _Owner:
                     self._pipe.send(("ok", None))
                 except DeviceFault as fault:
                     self._pipe.send(("fault", fault))
-        except (EOFError, OSError):
-            self._open = False  # who asked is gone
-            self._control.halt()
+        except (EOFError, OSError):  # the client has gone
+            self._on_close()
 
-    def _enable(self) -> None:
+    def _on_motion(self, kind: str, *arguments) -> None:
+        """move, jog or velocity of AxisControl."""
+        getattr(self._control, kind)(*arguments)
         if self._enabled_at is None:
             self._enabled_at = time.monotonic()
-
-    def _on_move(self, target, speed: float) -> None:
-        self._control.move(target, speed)
-        self._enable()
-
-    def _on_jog(self, way, speed: float) -> None:
-        self._control.jog(way, speed)
-        self._enable()
-
-    def _on_velocity(self, speeds, valid_s: float) -> None:
-        self._control.velocity(speeds, valid_s)
-        self._enable()
 
     def _on_halt(self) -> None:
         self._control.halt()
@@ -232,22 +230,14 @@ class _Owner:
         self._open = False
         self._control.halt()
 
-    # ---- telling
-
-    def tell(self, now: float) -> None:
+    def publish(self, now: float) -> None:
         """Writes the state."""
-        control, axes = self._control, len(self._counters)
-
-        def padded(values):
-            return np.concatenate([values, np.zeros(MOST_AXES - axes)])
-
+        control = self._control
         if self._cycles % STATE_CYCLES == 0:
             self._p99 = self._lateness.quantile(0.99)
         self._record.write(
             t=now,
-            joints=padded(control.joints),
-            wanted=padded(control.wanted),
-            counters=padded(self._counters),
+            joints=control.joints,
             done=-1 if control.is_moving or self._new_counters else self._number,
             moving=control.is_moving,
             homed=control.homed,

@@ -1,6 +1,7 @@
-"""What a device reports, told so that the person at the bench can act."""
+"""The fault of a device, with its remedy for the person at the bench."""
 
 from importlib import import_module
+from types import ModuleType
 
 from ctcr.errors import InputError, Problem
 
@@ -16,8 +17,11 @@ class DeviceFault(InputError):
         return DeviceFault, (self.device, self.what, self.remedy, self.code)
 
 
-def needed(package: str, name: str, device: str):
-    """The module `name` of a package that only the bench needs. Raises DeviceFault where it is not installed."""
+def needed(package: str, name: str, device: str) -> ModuleType:
+    """The module `name` of an optional package: imported here and late, so that all of ctcr loads without it.
+
+    Raises DeviceFault with the install command where the package is missing.
+    """
     try:
         return import_module(name)
     except ModuleNotFoundError:

@@ -1,4 +1,4 @@
-"""Whether the devices of a bench answer, and what they say of themselves."""
+"""Whether the devices of a bench answer, with their versions or their faults."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -7,14 +7,13 @@ from pathlib import Path
 from ctcr.bench.devices.aurora import Aurora
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.bus import Bus
-from ctcr.bench.devices.bus_lock import BusLock
+from ctcr.bench.devices.bus_process import bus_lock
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.places import interface_of, port_of
 
 
 @dataclass(frozen=True)
 class Health:
-    """One device: what it says, or what is wrong and what to do."""
+    """One device and what it reports, or its fault and the remedy."""
 
     name: str
     place: str
@@ -24,47 +23,38 @@ class Health:
 
 def health_of(bench: Bench, folder: Path) -> list[Health]:
     """Connects to every device in turn; motors stay off."""
-    try:
-        with BusLock(folder):
-            bus = list(_bus(bench))
-    except DeviceFault as fault:
-        bus = [Health(fault.device, interface_of(bench), False, f"{fault.what}: {fault.remedy}")]
-    return [*_tracker(bench, folder), *bus]
+    found, port, interface = [], bench.port(folder), bench.interface
+    for name, place, devices in (("tracker", port, _tracker(bench, port)), ("", interface, _bus(bench, folder))):
+        try:
+            found += devices
+        except DeviceFault as fault:
+            found.append(Health(name or fault.device, place, False, f"{fault.what}: {fault.remedy}"))
+    return found
 
 
-def _tracker(bench: Bench, folder: Path) -> Iterator[Health]:
-    port = port_of(bench, folder)
-    try:
-        with Aurora(port, bench.tracker.baud, bench.tracker.replies) as aurora:
-            aurora.connect()
-            frame = aurora.read()
-            tag = next((line for line in aurora.version.splitlines() if "Freeze Tag" in line), aurora.version)
-            yield Health("tracker", port, True, tag.strip())
-            for tool, reading in zip(aurora.tools, frame.readings, strict=True):
-                seen = "not seen" if reading.position is None else "seen"
-                seen = "out of volume" if reading.out_of_volume else seen
-                text = f"{seen}, serial number {tool.serial_number}, part {tool.part_number}"
-                yield Health(f"tool {tool.handle:02X}", port, True, text)
-    except DeviceFault as fault:
-        yield Health("tracker", port, False, f"{fault.what}: {fault.remedy}")
+def _tracker(bench: Bench, port: str) -> Iterator[Health]:
+    with Aurora(port, bench.tracker.baud, bench.tracker.replies) as aurora:
+        aurora.connect()
+        frame = aurora.read()
+        tag = next((line for line in aurora.version.splitlines() if "Freeze Tag" in line), aurora.version)
+        yield Health("tracker", port, True, tag.strip())
+        for tool, reading in zip(aurora.tools, frame.readings, strict=True):
+            seen = "out of volume" if reading.out_of_volume else "seen" if reading.position else "not seen"
+            text = f"{seen}, serial number {tool.serial_number}, part {tool.part_number}"
+            yield Health(f"tool {tool.handle:02X}", port, True, text)
 
 
-def _bus(bench: Bench) -> Iterator[Health]:
-    interface, motors = interface_of(bench), bench.motors
-    bus = Bus(interface, [*motors.translation_terminals, *motors.rotation_terminals], bench.drive_settings)
-    try:
-        bus.connect()
-        inputs = bus.exchange()
-        used = {drive.position: (drive, said) for drive, said in zip(bus.drives, inputs or [], strict=False)}
-        for position, name in enumerate(bus.names):
-            where = f"{interface}, position {position}"
-            if position not in used:
-                yield Health(name, where, True, "answers")
-                continue
-            drive, said = used[position]
-            text = drive.diagnosis().what if said.error else f"counter {said.counter}"
-            yield Health(name, where, not said.error, text)
-    except DeviceFault as fault:
-        yield Health(fault.device, interface, False, f"{fault.what}: {fault.remedy}")
-    finally:
-        bus.close()
+def _bus(bench: Bench, folder: Path) -> Iterator[Health]:
+    bus = Bus(bench.interface, bench.positions, bench.drive_settings)
+    with bus_lock(folder):
+        try:
+            bus.connect()
+            inputs = bus.exchange()
+            used = {drive.position: (drive, said) for drive, said in zip(bus.drives, inputs or [], strict=False)}
+            for position, name in enumerate(bus.names):
+                drive, said = used.get(position, (None, None))
+                broken = said is not None and said.error
+                text = "answers" if said is None else drive.diagnosis().what if broken else f"counter {said.counter}"
+                yield Health(name, f"{bench.interface}, position {position}", not broken, text)
+        finally:
+            bus.close()

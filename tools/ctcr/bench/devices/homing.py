@@ -1,6 +1,6 @@
-"""Homing by flush retraction: where a tube's tip is flush with the plate, its length alone says where it is grasped.
+"""Homing by flush retraction: the length of a tube whose tip is flush with the plate tells where it is grasped.
 
-The procedure of the paper (section V.B) the other way round: there it measures lengths at a known home position.
+The procedure of the paper (section V.B) in reverse: there it measures lengths at a known home position.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from ctcr.bench.devices.axis_control import JOG_M
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person
-from ctcr.bench.devices.transmission import home_joints
+from ctcr.bench.shared.transmission import home_joints
 from ctcr.robot.description import Robot
 
 FLUSH_M = 5e-5  # nearer to the plate than anybody sees
@@ -19,10 +19,10 @@ MOST_STEPS = 200
 
 
 def home(motors: Motors, robot: Robot, person: Person, say: Callable[[str], None]) -> None:
-    """Retracts every tube until flush, then tells the motors where they are.
+    """Retracts every tube until flush, then sets the joints.
 
-    The outermost tube first; those inside it move along, so that the order of grasped points and of tips is kept all
-    the time. Rotations count as home where they stand: turn them to their marks before. Raises DeviceFault.
+    The outermost tube first; those inside it move along, which keeps the order of grasped points and of tips all the
+    time. Rotations count as home where they stand: turn them to their marks before. Raises DeviceFault.
     """
     n = robot.n_tubes
     moved = np.zeros(n)  # [m], since the start
@@ -44,5 +44,5 @@ def home(motors: Motors, robot: Robot, person: Person, say: Callable[[str], None
         flush[tube] = moved[tube]
     joints = home_joints(robot)
     lengths = np.array([tube.length for tube in robot.tubes])
-    joints[:n] = -lengths + (moved - flush)
+    joints[:n] = moved - flush - lengths
     motors.set_joints(joints)

@@ -1,4 +1,4 @@
-"""How joints get from here to there: straight moves and velocities, with ramps."""
+"""Motion profiles of the joints: straight moves and velocities, with ramps."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -7,18 +7,20 @@ Array = NDArray[np.float64]
 
 
 class StraightMove:
-    """All joints in one straight line of joint space, from rest to rest; the slowest joint sets the time."""
+    """All joints along one straight line of joint space, from rest to rest, with a trapezoidal velocity profile.
+
+    The joint that needs longest at its own speed sets the duration.
+    """
 
     def __init__(self, start: ArrayLike, end: ArrayLike, speeds: ArrayLike, ramp_s: float):
-        """`speeds` (K,) are the highest of each joint [1/s]; they are reached after `ramp_s`."""
+        """`speeds` (K,): highest of each joint [1/s], reached after `ramp_s`."""
         self._start, self._way = np.array(start, float), np.subtract(end, start)
-        needed = np.abs(self._way) / np.asarray(speeds, float)
-        self._cruise = float(needed.max())  # [s] at full speed
+        cruise = float((np.abs(self._way) / np.asarray(speeds, float)).max())  # [s] at full speed
         self._ramp = max(ramp_s, 1e-3)
-        if self._cruise < self._ramp:  # never at full speed: ramps alone, as steep
-            self._ramp = (self._cruise * self._ramp) ** 0.5
-        self.duration = self._cruise + ramp_s if self._cruise >= ramp_s else 2 * self._ramp
-        self._peak = 1 / (self.duration - self._ramp) if self._cruise else 0.0  # share of the way per second
+        if cruise < self._ramp:  # full speed is never reached: a triangle with the same acceleration
+            self._ramp = (cruise * self._ramp) ** 0.5
+        self.duration = cruise + ramp_s if cruise >= ramp_s else 2 * self._ramp
+        self._peak = 1 / (self.duration - self._ramp) if cruise else 0.0  # of the fraction of the way [1/s]
         self._t = 0.0
 
     @property
@@ -26,19 +28,18 @@ class StraightMove:
         return self._t >= self.duration
 
     def advance(self, dt: float) -> tuple[Array, Array]:
-        """Where the joints are to be after another `dt` [s], and how fast."""
+        """Setpoints of position and velocity after another `dt` [s]."""
         self._t = min(self._t + dt, self.duration)
-        if not self._cruise:
-            return self._start.copy(), 0 * self._way
-        t, ramp, peak = self._t, self._ramp, self._peak
-        left = self.duration - t
-        if t < ramp:
-            share, rate = 0.5 * peak * t * t / ramp, peak * t / ramp
+        t, left, ramp, peak = self._t, self.duration - self._t, self._ramp, self._peak
+        if not peak:
+            fraction, rate = 0.0, 0.0
+        elif t < ramp:
+            fraction, rate = 0.5 * peak * t * t / ramp, peak * t / ramp
         elif left < ramp:
-            share, rate = 1 - 0.5 * peak * left * left / ramp, peak * left / ramp
+            fraction, rate = 1 - 0.5 * peak * left * left / ramp, peak * left / ramp
         else:
-            share, rate = peak * (t - 0.5 * ramp), peak
-        return self._start + share * self._way, rate * self._way
+            fraction, rate = peak * (t - 0.5 * ramp), peak
+        return self._start + fraction * self._way, rate * self._way
 
 
 class VelocityMove:
@@ -65,6 +66,6 @@ class VelocityMove:
         self._speeds = self._speeds + change
         return self._joints, self._speeds
 
-    def resting_place(self) -> Array:
-        """Where the joints come to rest if they are stopped now."""
+    def rest(self) -> Array:
+        """Where the joints come to rest if they brake now."""
         return self._joints + self._speeds * np.abs(self._speeds) / (2 * self._most)

@@ -1,8 +1,9 @@
-"""The robot's joints as a program uses them: asks the process that owns the bus."""
+"""The robot's joints as a program uses them: a client of the process that owns the bus."""
 
 import multiprocessing
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ctcr.bench.devices import bus_process, emergency_stop
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.places import interface_of
-from ctcr.bench.devices.transmission import home_joints, transmission, turns_of_joints
+from ctcr.bench.shared.transmission import home_joints, transmission, turns_of_joints
 from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
@@ -24,20 +24,20 @@ POLL_S = 0.005
 
 
 class Motors:
-    """Starts the bus owner; ends it when closed. Methods raise DeviceFault; none is real-time safe."""
+    """Starts the bus process; ends it when closed. Methods raise DeviceFault; none is real-time safe."""
 
     def __init__(self, bench: Bench, robot: Robot, folder: Path, one_by_one: bool = False):
         """`one_by_one`: as in JointLimits."""
         self._robot, self._folder, self._number = robot, folder, 0
-        section, axes = bench.motors, bench.axis_settings(robot)
+        axes = bench.axis_settings(robot)
         self.settings = bus_process.BusSettings(
-            interface=interface_of(bench),
-            positions=[*section.translation_terminals, *section.rotation_terminals],
+            interface=bench.interface,
+            positions=bench.positions,
             drive=bench.drive_settings,
             axes=replace(axes, limits=replace(axes.limits, one_by_one=one_by_one)),
             ratios=transmission(robot),
             home=home_joints(robot),
-            period=1e-3 * section.period_ms,
+            period=1e-3 * bench.motors.period_ms,
         )
         self.names: list[str] = []
         self._pipe = self._process = None
@@ -46,8 +46,8 @@ class Motors:
         """Brings the bus up, motors off."""
         context = multiprocessing.get_context("spawn")  # a fork would keep the pipe open after this process has died
         self._pipe, other = context.Pipe()
-        target = bus_process.run
-        self._process = context.Process(target=target, args=(self.settings, self._folder, other), name="bus owner")
+        arguments = (self.settings, self._folder, other)
+        self._process = context.Process(target=bus_process.run, args=arguments, name="bus owner")
         self._process.start()
         other.close()
         self.names = self._answer(CONNECT_S)
@@ -56,10 +56,8 @@ class Motors:
     def close(self) -> None:
         """Stops the motors and lets go of the bus."""
         if self._process:
-            try:
+            with suppress(OSError):
                 self._pipe.send((0, "close", ()))
-            except OSError:
-                pass
             self._process.join(CONNECT_S)
             self._pipe.close()
         self._process = None
@@ -81,33 +79,36 @@ class Motors:
         return self.state["joints"][: len(self.settings.home)]
 
     def move(self, joints: ArrayLike, speed: float = 1.0) -> None:
-        """Starts a straight move of all joints (2N,) at a share of the highest speed."""
-        self._ask("move", np.array(joints, float), speed)
+        """Starts a straight move of all joints (2N,) at a fraction of the highest speed."""
+        self._ask("motion", "move", np.array(joints, float), speed)
 
     def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
         """Starts a short move without limits, for homing."""
-        self._ask("jog", np.array(way, float), speed)
+        self._ask("motion", "jog", np.array(way, float), speed)
 
     def velocity(self, speeds: ArrayLike, valid_s: float = 0.1) -> None:
-        """Joint speeds (2N,) for `valid_s`, or until new ones come."""
-        self._ask("velocity", np.array(speeds, float), valid_s)
+        """Joint speeds (2N,) for `valid_s`, or until the next request."""
+        self._ask("motion", "velocity", np.array(speeds, float), valid_s)
 
     def halt(self) -> None:
-        """To rest, softly."""
+        """Brakes to rest."""
         self._ask("halt")
 
     def set_joints(self, joints: ArrayLike) -> None:
-        """The robot stands at these joints (2N,) now: from here on places are known."""
+        """Homing: the robot stands at these joints (2N,) now."""
         self._ask("home", turns_of_joints(self._robot, joints))
         self.wait()
 
-    def wait(self, meanwhile: Callable[[], None] = lambda: time.sleep(POLL_S)) -> None:
-        """Until the last request is done. Raises DeviceFault where it is stopped on the way."""
+    def check(self) -> None:
+        """Raises DeviceFault where the motors are stopped."""
+        if self.state["stopped"]:
+            raise emergency_stop.stop_fault(self._folder)
+
+    def wait(self, meanwhile: Callable[[], object] = lambda: time.sleep(POLL_S)) -> None:
+        """Until the last request is done. Raises DeviceFault where the motors are stopped before."""
         while True:
-            state = self.state
-            if state["stopped"]:
-                raise emergency_stop.stop_fault(self._folder)
-            if state["done"] == self._number:
+            self.check()
+            if self.state["done"] == self._number:
                 return
             self._require_alive()
             meanwhile()

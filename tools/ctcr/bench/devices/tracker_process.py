@@ -1,4 +1,4 @@
-"""The process that reads the tracker: every frame once, to a pipe; connects again by itself after a fault."""
+"""The process that reads the tracker: sends every frame once through a pipe, reconnects by itself after a fault."""
 
 import math
 import signal
@@ -7,23 +7,24 @@ import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ctcr.bench.devices.aurora import Aurora
 from ctcr.bench.devices.bench_file import TrackerPort
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.ndi_protocol import system_troubles
-from ctcr.bench.devices.ndi_replies import ToolReading
-from ctcr.bench.devices.real_time import TRACKER, real_time
+from ctcr.bench.shared.ndi import RATE_HZ, SYSTEM_STATUS, ToolReading
+from ctcr.bench.shared.real_time import TRACKER, real_time
 
 AGAIN_S = 0.5  # from a fault to the next connection
-RATE_HZ = 40.0  # of the tracker
 PERIOD_S = 1 / RATE_HZ
-BACK_S = 0.0015  # a question that came too early is put later by
-AHEAD_S, FASTER = 1e-5, 1.03  # and each that did not earlier, by more from one to the next
+BACK_S = 0.0015  # a request that came too early delays the next one by this,
+AHEAD_S, FASTER = 1e-5, 1.03  # one that did not advances it by this, growing from one to the next
 
 
 @dataclass(frozen=True)
 class TrackedFrame:
-    """One frame of the sensor as it came in at `t` [s] (`time.monotonic`); `missed` frames lie before it.
+    """One frame of the sensor, received at `t` [s] (`time.monotonic`), `missed` frames after the last one.
 
     The reader woke up `late` [s] to ask for it.
     """
@@ -37,45 +38,52 @@ class TrackedFrame:
     MARK = b"F"  # no pickle begins so
 
     def packed(self) -> bytes:
-        """For the pipe: a pickle would take the control loop longer than the rest of the way."""
-        r, unseen = self.reading, (math.nan,)
-        pose = (*(r.position or 3 * unseen), *(r.quaternion or 4 * unseen))
+        """For the pipe: a pickle would take the control loop longer than the rest of the way. NaN stands for None."""
+        r, nan = self.reading, (math.nan,)
+        pose = (*(r.position or 3 * nan), *(r.quaternion or 4 * nan))
         error = math.nan if r.error is None else r.error
         return self.MARK + self.LAYOUT.pack(self.t, *pose, error, self.late, r.handle, r.status, r.frame, self.missed)
 
     @classmethod
     def unpacked(cls, data: bytes) -> "TrackedFrame":
         t, *pose, error, late, handle, status, frame, missed = cls.LAYOUT.unpack_from(data, len(cls.MARK))
-        position, quaternion = (None if math.isnan(part[0]) else part for part in (tuple(pose[:3]), tuple(pose[3:])))
+        position, quaternion = (None if math.isnan(part[0]) else tuple(part) for part in (pose[:3], pose[3:]))
         error = None if math.isnan(error) else error
         return cls(t, ToolReading(handle, position, quaternion, error, status, frame), missed, late)
 
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """Position [m] and unit quaternion, w >= 0, of a sensor that is seen (7,), tracker frame."""
+        quaternion = np.array(self.reading.quaternion)
+        quaternion *= (1 if quaternion[0] >= 0 else -1) / np.linalg.norm(quaternion)
+        return np.concatenate([self.reading.position, quaternion])
+
 
 class FrameClock:
-    """When to ask the tracker: just after it has a new frame, so that no reading is older than it must be.
+    """When to ask the tracker: just after it has a new frame, so that readings are as fresh as can be.
 
-    Each question comes a little earlier in the period than the one before, until one is too early.
+    Each request comes a little earlier in the period than the one before, until one is too early.
     """
 
     def __init__(self) -> None:
-        self.due = time.monotonic()  # [s] next question
+        self.due = time.monotonic()  # [s] next request
         self._ahead = AHEAD_S
 
     def wait(self) -> float:
-        """How late [s] it is then; what is overdue already is due now."""
+        """Sleeps until the next request is due; how late [s] it woke up. An overdue request is due now."""
         due = max(self.due, time.monotonic())
         time.sleep(max(0.0, due - time.monotonic()))
         return time.monotonic() - due
 
     def was_new(self) -> None:
-        """The question that was due brought a new frame."""
+        """The request brought a new frame."""
         self.due += PERIOD_S - self._ahead
         self._ahead *= FASTER
         while self.due < time.monotonic() - PERIOD_S:  # the computer was busy elsewhere
             self.due += PERIOD_S
 
     def was_early(self) -> None:
-        """It brought the frame before once more."""
+        """The request brought the last frame again."""
         self._ahead = AHEAD_S
         self.due += BACK_S
 
@@ -83,9 +91,8 @@ class FrameClock:
 def run(port: str, section: TrackerPort, pipe: Connection) -> None:
     """The process: sends ("connected", version), TrackedFrame and DeviceFault until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
-    aurora = Aurora(port, section.baud, section.replies)
-    try:
-        with real_time(TRACKER):
+    with Aurora(port, section.baud, section.replies) as aurora, real_time(TRACKER):
+        try:
             while not pipe.poll(0):
                 try:
                     aurora.connect()
@@ -94,10 +101,8 @@ def run(port: str, section: TrackerPort, pipe: Connection) -> None:
                 except DeviceFault as fault:
                     pipe.send(fault)
                     pipe.poll(AGAIN_S)
-    except (EOFError, OSError):
-        pass  # who listened is gone
-    finally:
-        aurora.close()
+        except (EOFError, OSError):
+            pass  # the client has gone
 
 
 def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
@@ -112,8 +117,9 @@ def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
             raise DeviceFault(f"tracker {aurora.port}", text, "change `tool` in the bench file")
         if frame.system_status != status:
             status = frame.system_status
-            for what, remedy in system_troubles(status):
-                pipe.send(DeviceFault(f"tracker {aurora.port}", what, remedy, status))
+            for bit, (what, remedy) in SYSTEM_STATUS.items():
+                if status & bit:
+                    pipe.send(DeviceFault(f"tracker {aurora.port}", what, remedy, status))
         if reading.frame == last:
             clock.was_early()
             continue

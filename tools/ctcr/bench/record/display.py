@@ -1,6 +1,7 @@
-"""The live picture of a recording on the terminal: how far it is, and the error against the model so far."""
+"""Progress of a recording on the terminal, with its error against the model so far."""
 
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isnan
 
@@ -20,8 +21,8 @@ class Display:
     """A progress bar and a bar for each of the last readings. Shows nothing where standard error is no terminal."""
 
     def __init__(self):
-        self._console = Console(stderr=True)
-        self._live = Live(console=self._console, auto_refresh=False) if self._console.is_terminal else None
+        console = Console(stderr=True)
+        self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
         self._next, self._start = 0.0, time.monotonic()
         self._first_done = None
 
@@ -34,16 +35,12 @@ class Display:
         if self._live:
             self._live.stop()
 
-    def pause(self):
-        """A block during which the terminal belongs to somebody else."""
-
-        @contextmanager
-        def paused():
-            self.__exit__()
-            yield
-            self.__enter__()
-
-        return paused()
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Leaves the terminal to somebody else."""
+        self.__exit__()
+        yield
+        self.__enter__()
 
     def show(self, progress: Progress) -> None:
         now = time.monotonic()
@@ -51,34 +48,30 @@ class Display:
             self._next = now + EVERY_S
             self._live.update(self._lines(progress, now), refresh=True)
 
-    def _lines(self, progress: Progress, now: float):
+    def _lines(self, progress: Progress, now: float) -> Group:
         if self._first_done is None:
             self._first_done = progress.done
         done = progress.done - self._first_done
         left = (now - self._start) / done * (progress.total - progress.done) if done else None
+        ends = "" if left is None else f"{left / 60:.0f} min left" if left > 90 else f"{left:.0f} s left"
         head = Table.grid(padding=(0, 2))
         bar = ProgressBar(total=progress.total, completed=progress.done, width=30)
-        ends = "" if left is None else f"{left / 60:.0f} min left" if left > 90 else f"{left:.0f} s left"
         head.add_row(f"{progress.done} of {progress.total} rows", bar, ends, progress.doing)
-        lines = [head]
+        lines, errors = [head], progress.errors_mm
         if not progress.seen:
             lines.append("[bold red]the tracker does not see the sensor[/bold red]: waiting for it")
-        if progress.errors_mm:
-            last = progress.errors_mm[-1]
-            lines.append(
-                f"error against the model: now {_mm(last)}, RMS {_mm(progress.rms_mm)}, "
-                f"worst {_mm(max((e for e in progress.errors_mm if not isnan(e)), default=last))}"
-            )
-            lines.append(f"{picture(progress.errors_mm)}  newest right, full height {_mm(_top(progress.errors_mm))}")
+        if errors:
+            worst = max((e for e in errors if not isnan(e)), default=errors[-1])
+            figures = f"now {_mm(errors[-1])}, RMS {_mm(progress.rms_mm)}, worst {_mm(worst)}"
+            lines.append(f"error against the model: {figures}")
+            lines.append(f"{picture(errors)}  newest right, full height {_mm(_top(errors))}")
         return Group(*lines)
 
 
 def picture(errors_mm: list[float]) -> str:
-    """The last errors as blocks; a gap where there is none."""
-    top = _top(errors_mm)
-    return "".join(
-        " " if isnan(e) else BLOCKS[min(len(BLOCKS) - 1, int(e / top * len(BLOCKS)))] for e in errors_mm[-WIDTH:]
-    )
+    """The last errors as blocks; a gap where one is not known."""
+    top, last = _top(errors_mm), len(BLOCKS) - 1
+    return "".join(" " if isnan(e) else BLOCKS[min(last, int(e / top * len(BLOCKS)))] for e in errors_mm[-WIDTH:])
 
 
 def _top(errors_mm: list[float]) -> float:

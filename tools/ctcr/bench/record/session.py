@@ -1,15 +1,14 @@
 """One recording: the plan is run on the devices, row by row, and every row is kept."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.bench.devices.motors import Motors
-from ctcr.bench.devices.person import Person
-from ctcr.bench.devices.sight import Sight, is_seen, pose_of
+from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.devices.tracker_process import TrackedFrame
 from ctcr.bench.record.plan import Step
 from ctcr.bench.record.row_file import RowFile
@@ -25,12 +24,12 @@ class Options:
 
     dwell_s: float = 0.5  # from rest to the first reading
     readings: int = 1  # of each row
-    speed: float = 1.0  # share of the highest
+    speed: float = 1.0  # fraction of the highest
 
 
 @dataclass
 class Progress:
-    """What a display needs; errors against the model, NaN where it has no solution."""
+    """For displays; errors against the model, NaN where it has no solution."""
 
     total: int
     done: int = 0
@@ -44,62 +43,56 @@ class Progress:
         return float(np.sqrt(np.mean(np.square(known)))) if known else float("nan")
 
 
+@dataclass
 class Session:
-    """Runs the steps that are not in the file yet. `shown` is called about 40 times a second."""
+    """Runs the steps that are not in the file yet. `show` is called about 40 times a second."""
 
-    def __init__(
-        self,
-        robot: Robot,
-        motors: Motors,
-        sight: Sight,
-        person: Person,
-        rows: RowFile,
-        options: Options,
-        clock: Callable[[], float],
-        shown: Callable[[Progress], None] = lambda progress: None,
-    ):
-        """`clock` gives t_s of the rows from a time of `time.monotonic`."""
-        self._robot, self._motors, self._sight, self._person = robot, motors, sight, person
-        self._rows, self._options, self._clock, self._shown = rows, options, clock, shown
-        self._model = MovingModel(robot)
-        self._force = np.full(3, np.nan)
+    robot: Robot
+    motors: Motors
+    tracker: Tracker
+    rows: RowFile
+    options: Options
+    clock: Callable[[float], float]  # t_s of the rows from a time of `time.monotonic`
+    hang: Callable[[Array], None]  # a weight, as Person.hang
+    show: Callable[[Progress], None] = lambda progress: None
 
     def run(self, steps: list[Step]) -> Progress:
         """Raises DeviceFault or InputError where it cannot go on; what has been measured is in the file."""
-        self.progress = Progress(len(steps), self._rows.groups)
-        if 0 < self._rows.groups < len(steps):
-            self._come_to(steps[self._rows.groups - 1])  # the path to the next row is that of the plan
-        for step in steps[self._rows.groups :]:
-            self._rows.append(self._measured(step))
+        self._model, self._force = MovingModel(self.robot), np.full(3, np.nan)
+        self.progress = Progress(len(steps), self.rows.groups)
+        if 0 < self.rows.groups < len(steps):
+            self._approach(steps[self.rows.groups - 1])  # the path to the next row is that of the plan
+        for step in steps[self.rows.groups :]:
+            self.rows.append(self._measured(step))
             self.progress.done += 1
-        self._motors.halt()
-        if steps and np.nan_to_num(self._force).any():  # whoever measures next begins without a weight
-            self._doing("weight")
-            self._person.hang(np.zeros(3))
+        self.motors.halt()
+        if steps and np.nan_to_num(self._force).any():  # the next recording begins without a weight
+            self._announce("weight")
+            self.hang(np.zeros(3))
         return self.progress
 
     def _measured(self, step: Step) -> list[Array]:
-        rows = self._come_to(step)
-        self._doing(f"row {step.row}: settling")
-        end = time.monotonic() + self._options.dwell_s
+        rows = self._approach(step)
+        self._announce(f"row {step.row}: settling")
+        end = time.monotonic() + self.options.dwell_s
         while time.monotonic() < end:
             self._follow()
-        self._doing(f"row {step.row}: reading")
+        self._announce(f"row {step.row}: reading")
         for frame in self._seen_frames(end):
-            pose = pose_of(frame)
+            pose = frame.pose
             rows.append(self._row(step, frame.t, pose))
             self.progress.errors_mm.append(1e3 * float(np.linalg.norm(pose[:3] - self._model.reading()[0])))
         return rows
 
-    def _come_to(self, step: Step) -> list[Array]:
-        """Moves there; the row of the way point, where there is one."""
+    def _approach(self, step: Step) -> list[Array]:
+        """Moves to the joints of a step; the row of its way point, where it has one."""
         if not np.array_equal(step.force, self._force):
             if np.isfinite(self._force).all() or step.force.any():
-                self._doing(f"row {step.row}: weight")
-                self._person.hang(step.force)
+                self._announce(f"row {step.row}: weight")
+                self.hang(step.force)
             self._force = step.force
         rows = []
-        self._doing(f"row {step.row}: moving")
+        self._announce(f"row {step.row}: moving")
         if step.way_point is not None:
             self._go(step.way_point)
             rows.append(self._row(step, time.monotonic(), np.full(7, np.nan)))
@@ -107,34 +100,33 @@ class Session:
         return rows
 
     def _go(self, joints: Array) -> None:
-        self._motors.move(joints, self._options.speed)
-        self._motors.wait(self._follow)
+        self.motors.move(joints, self.options.speed)
+        self.motors.wait(self._follow)
 
     def _row(self, step: Step, t: float, pose: Array) -> Array:
-        return np.concatenate([[self._clock(t), step.run], self._motors.joints, step.force, pose])
+        return np.concatenate([[self.clock(t), step.run], self.motors.joints, step.force, pose])
 
-    def _seen_frames(self, after: float):
-        """As many frames as a row needs, later than `after`, in which the tracker sees the sensor."""
-        count, patience = 0, time.monotonic() + self._sight.patience_s
-        while count < self._options.readings:
+    def _seen_frames(self, after: float) -> Iterator[TrackedFrame]:
+        """The first frames later than `after` in which the tracker sees the sensor, as many as a row has readings."""
+        count, patience = 0, time.monotonic() + self.tracker.patience_s
+        while count < self.options.readings:
             frame = self._follow()
-            if frame and frame.t > after and is_seen(frame):
+            if frame and frame.t > after and frame.reading.is_seen:
                 count += 1
                 yield frame
             elif time.monotonic() > patience:
-                raise self._sight.blind()
+                raise self.tracker.unseen_fault()
 
     def _follow(self) -> TrackedFrame | None:
-        """Waits for the next frame, for a short time, and lets the model follow the joints."""
-        frame, now = self._sight.next(), time.monotonic()
-        n, joints = self._robot.n_tubes, self._motors.joints
+        """Waits for the next frame, for a short time, and moves the model to the joints of the motors."""
+        frame, now = self.tracker.next(), time.monotonic()
+        n, joints = self.robot.n_tubes, self.motors.joints
         self._model.move(now, joints[:n], joints[n:], self._force)
-        self.progress.seen = self._sight.is_now
-        self._shown(self.progress)
-        if self._motors.state["stopped"]:
-            self._motors.wait()  # says why
+        self.progress.seen = self.tracker.sees_now
+        self.show(self.progress)
+        self.motors.check()
         return frame
 
-    def _doing(self, text: str) -> None:
+    def _announce(self, text: str) -> None:
         self.progress.doing = text
-        self._shown(self.progress)
+        self.show(self.progress)

@@ -1,4 +1,4 @@
-"""What an Aurora answers to each command of the combined API."""
+"""The state of a simulated Aurora and its replies to the commands of the combined API."""
 
 import re
 import struct
@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctcr.bench.devices import ndi_protocol as ndi
+from ctcr.bench.shared import ndi
+from ctcr.bench.shared.ndi import RATE_HZ
 
-RATE_HZ = 40.0
-FREEZE_TAG = "AURORA Rev 007"  # some clients ask for TX only where they read this
+FREEZE_TAG = "AURORA Rev 007"  # some clients send TX only where they read this
 PART_NUMBER = b"610029"
 _COMMAND = re.compile(rb"([A-Z0-9]+)([: ]?)(.*)", re.DOTALL)
 _ANY_TIME = {"INIT", "COMM", "RESET", "VER", "APIREV", "BEEP", "SFLIST"}  # before INIT
@@ -29,7 +29,7 @@ class Refusal(Exception):
 
 @dataclass
 class Port:
-    """A tool: its handle, where it is plugged in, and what the host has done to it."""
+    """A tool: its handle, its plug, and the state into which the host has brought it."""
 
     handle: int
     socket: int
@@ -47,21 +47,20 @@ class Port:
 
 @dataclass(frozen=True)
 class Sight:
-    """How the tracker sees one tool in one frame: `pose` None is missing."""
+    """One tool in one frame; `pose` None: missing."""
 
     pose: Pose | None
     out_of_volume: bool = False
 
 
 class AuroraDevice:
-    """The device's state. Sensor on handle 0A; two more coils stand still, of which 0B shares the plug of 0A.
+    """The sensor has handle 0A; two more coils lie still, of which 0B shares the plug of 0A.
 
-    `see(handle, frame)` says what the tracker sees; it is asked once a frame and tool at most.
+    `see(handle)` is called once a frame and tool at most.
     """
 
-    def __init__(self, see: Callable[[int, int], Sight]):
+    def __init__(self, see: Callable[[int], Sight]):
         self._see = see
-        self.baud = ndi.RESET_BAUD
         self.reset()
 
     def reset(self) -> None:
@@ -75,7 +74,7 @@ class AuroraDevice:
         )
         self._ports = {port.handle: port for port in ports}
         self._start = time.monotonic()
-        self._seen: dict[int, tuple[int, Sight]] = {}
+        self._seen: dict[int, tuple[int, Sight]] = {}  # by handle: frame, sight
 
     @property
     def frame(self) -> int:
@@ -87,20 +86,19 @@ class AuroraDevice:
         return (1 - (time.monotonic() - self._start) * RATE_HZ % 1) / RATE_HZ
 
     def acquire(self) -> None:
-        """Looks at the tools as a frame begins, whether or not anybody asks for it."""
+        """Looks at the tools as a frame begins, whether or not the host asks for it."""
         if self.tracking:
-            for _ in self._sights(""):
-                pass
+            list(self._sights(""))
 
     def answer(self, line: bytes) -> bytes:
-        """The whole answer to a line without its carriage return. `next_baud` is the rate after it."""
+        """The whole reply to a line without its carriage return. `next_baud` is the rate after it."""
         try:
-            answer = self._dispatch(line)
+            reply = self._dispatch(line)
         except Refusal as refusal:
-            answer = b"ERROR%02X" % refusal.code
+            reply = b"ERROR%02X" % refusal.code
         except (ValueError, IndexError):
-            answer = b"ERROR%02X" % 0x03
-        return answer if answer[:2] == struct.pack("<H", ndi.BX_START) else ndi.framed(answer)
+            reply = b"ERROR03"
+        return reply if reply[:2] == struct.pack("<H", ndi.BX_START) else ndi.framed(reply)
 
     def _dispatch(self, line: bytes) -> bytes:
         match = _COMMAND.fullmatch(line)
@@ -114,8 +112,7 @@ class AuroraDevice:
                 raise Refusal(0x04)
             arguments = arguments[:-4]
         command = name.decode()
-        handler = getattr(self, f"_on_{command.lower()}", None)
-        if not handler:
+        if not (handler := getattr(self, f"_on_{command.lower()}", None)):
             raise Refusal(0x01)
         if not self.initialised and command not in _ANY_TIME:
             raise Refusal(0x10)
@@ -142,7 +139,7 @@ class AuroraDevice:
         if arguments[0] not in rates:
             raise Refusal(0x06)
         if arguments[1:] != "0000":
-            raise Refusal(0x07)  # 8N1 without handshake is what this line has
+            raise Refusal(0x07)  # this line knows 8N1 without handshake only
         self.next_baud = rates[arguments[0]]
         return b"OKAY"
 
@@ -172,17 +169,17 @@ class AuroraDevice:
     # ---- tools
 
     def _on_phsr(self, kind: str) -> bytes:
-        chosen = {
-            0: lambda port: True,
-            1: lambda port: False,  # none waits to be freed
-            2: lambda port: not port.initialised,
-            3: lambda port: port.initialised and not port.enabled,
-            4: lambda port: port.enabled,
-        }
-        if int(kind or "0", 16) not in chosen:
+        present = [port for port in self._ports.values() if port.present]
+        groups = [
+            present,
+            [],  # none waits to be freed
+            [port for port in present if not port.initialised],
+            [port for port in present if port.initialised and not port.enabled],
+            [port for port in present if port.enabled],
+        ]
+        if (number := int(kind or "0", 16)) >= len(groups):
             raise Refusal(0x23)
-        keep = chosen[int(kind or "0", 16)]
-        ports = [port for port in self._ports.values() if port.present and keep(port)]
+        ports = groups[number]
         return b"%02X" % len(ports) + b"".join(b"%02X%03X" % (port.handle, port.status) for port in ports)
 
     def _port(self, arguments: str) -> Port:
@@ -245,7 +242,7 @@ class AuroraDevice:
         return b"OKAY"
 
     def _sights(self, options: str):
-        """Port, what is to be told of it (None: disabled) and its status, in one frame."""
+        """Port, its sight (None: disabled), its status and the frame, of every initialised port."""
         if not self.tracking:
             raise Refusal(0x0C)
         report_all, frame = int(options or "0001", 16) & ndi.REPORT_OUT_OF_VOLUME, self.frame
@@ -259,7 +256,7 @@ class AuroraDevice:
 
     def _sight(self, handle: int, frame: int) -> Sight:
         if self._seen.get(handle, (None,))[0] != frame:
-            self._seen[handle] = frame, self._see(handle, frame)
+            self._seen[handle] = frame, self._see(handle)
         return self._seen[handle][1]
 
     def _on_tx(self, options: str) -> bytes:

@@ -1,18 +1,21 @@
-"""Both simulators around one robot, for as long as something is done beside them."""
+"""Both simulators around one robot, while some work is done beside them."""
 
 import multiprocessing
 import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import closing, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from ctcr.bench.devices.private_folder import VARIABLE
+from ctcr.bench.shared.folder import BUS, VARIABLE
 from ctcr.bench.simulators import network
 from ctcr.bench.simulators.aurora import AuroraSimulator
 from ctcr.bench.simulators.ethercat import EthercatSimulator
 from ctcr.bench.simulators.robot import SimulatedRobot
+from ctcr.bench.simulators.simulator import Simulator
 from ctcr.errors import InputError
 
 READY_S = 20.0
@@ -25,21 +28,18 @@ def run(
     scenarios: tuple[str | None, str | None] = (None, None),
     seed: int = 1,
 ) -> int:
-    """What `work` returns, done beside the simulators of tracker and bus; `scenarios` are theirs.
+    """Runs `work` beside the simulators of tracker and bus, and returns its result; `scenarios` are theirs.
 
-    The command line is run again in a network of its own, where that is permitted: call this before anything else.
+    Where permitted, the command line starts again in a network of its own: call this before anything else.
     """
     os.environ[VARIABLE] = str(folder.resolve())
-    if network.is_permitted():
-        network.in_own_network(sys.argv[1:])
+    network.enter_own_network(sys.argv[1:])
     network.make_cable()
     motors = 2 * robot.robot.n_tubes
-    makers = (
-        lambda: AuroraSimulator(robot, folder, scenarios[0], seed),
-        lambda: EthercatSimulator(network.BUS, folder, motors, scenario=scenarios[1], seed=seed),
-    )
-    context = multiprocessing.get_context("fork")
-    served = [_start(context, make) for make in makers]
+    served = [
+        _start(lambda: AuroraSimulator(robot, folder, scenarios[0], seed)),
+        _start(lambda: EthercatSimulator(BUS, folder, motors, scenario=scenarios[1], seed=seed)),
+    ]
     try:
         for _, ready in served:
             problem = ready.recv() if ready.poll(READY_S) else InputError([])
@@ -52,26 +52,28 @@ def run(
             process.join(READY_S)
 
 
-def _start(context, make):
+def serve(simulator: Simulator) -> None:
+    """Runs a simulator until SIGTERM or Ctrl+C."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with closing(simulator), suppress(KeyboardInterrupt):
+        simulator.run()
+
+
+def _start(make: Callable[[], Simulator]) -> tuple[BaseProcess, Connection]:
+    """A process that serves, and the pipe in which it sends None once it answers, or what is wrong."""
+    context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     process = context.Process(target=_serve, args=(make, theirs), daemon=True)
     process.start()
     return process, ours
 
 
-def _serve(make, ready: Connection) -> None:
-    """A simulator until it is terminated; says None once it answers, or what is wrong."""
+def _serve(make: Callable[[], Simulator], ready: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the program beside it decides when to end
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         simulator = make()
     except InputError as problem:
         ready.send(problem)
         return
     ready.send(None)
-    try:
-        simulator.run()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        simulator.close()
+    serve(simulator)

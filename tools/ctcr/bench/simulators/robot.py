@@ -1,9 +1,9 @@
-"""The robot that stands on the simulated bench: motors turn, its tip moves, a tracker sees it."""
+"""The robot on the simulated bench: motors turn, its tip moves, a tracker sees it."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr.bench.devices.transmission import joints_of_turns
+from ctcr.bench.shared.transmission import joints_of_turns
 from ctcr.bench.simulators.oracle import Oracle
 from ctcr.effects.one_tube import one_tube
 from ctcr.model.moving import MovingModel
@@ -12,11 +12,11 @@ from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
 
-INSIDE_M = 2e-4  # a tip that stands out no farther than this is behind the plate
+INSIDE_M = 2e-4  # a tip that stands out no farther than this counts as behind the plate
 
 
 class SimulatedRobot:
-    """A robot with its effects, known or hidden. `force` is what hangs at its tip [N], base frame."""
+    """A robot with its effects, known or hidden. `force`: of the weight at its tip [N], base frame."""
 
     def __init__(self, robot: Robot, noise: str = "jitter", seed: int = 1, oracle: Oracle | None = None):
         """`noise`: none, jitter or realistic; see `model.simulation`; `oracle`: its physics instead of the model.
@@ -30,7 +30,7 @@ class SimulatedRobot:
         self.turn(0.0, np.zeros(2 * robot.n_tubes))
 
     def turn(self, t: float, turns: ArrayLike) -> None:
-        """The motors' shafts stand so many turns (2N,) from home at the time t [s]."""
+        """Moves the motors' shafts to so many turns (2N,) from home, at the time t [s]."""
         n = self.robot.n_tubes
         self._joints = joints_of_turns(self.robot, turns)
         self._model.move(t, self._joints[:n], self._joints[n:], self.force)
@@ -39,7 +39,7 @@ class SimulatedRobot:
             self._alone.move(t, self._joints[:n][own], self._joints[n:][own], self.force)
 
     def fasten(self, tube: int | None) -> None:
-        """The sensor sits at the tip of this tube (0: innermost) from now on, or nowhere."""
+        """Puts the sensor at the tip of a tube (0: innermost), or takes it off."""
         self.sensor = tube
         if tube is not None:
             self._alone = MovingModel(one_tube(self.robot, tube))
@@ -64,7 +64,7 @@ class SimulatedRobot:
         return position[0], quaternion[0]
 
     def deployed(self) -> Array:
-        """How far each tube's tip stands out of the front plate (N,) [m]: what a person sees."""
+        """How far each tube's tip stands out of the front plate (N,) [m], as a person sees it."""
         n = self.robot.n_tubes
         beta, _ = self.robot.joints_of_table(self._joints[None, :n], self._joints[None, n:])
         return beta[0] + np.array([tube.length for tube in self.robot.tubes])

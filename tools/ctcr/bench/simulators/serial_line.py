@@ -1,4 +1,4 @@
-"""A pseudo-terminal that behaves as a serial line: bytes at the pace of the baud rate, lost at the wrong one."""
+"""A pseudo-terminal that behaves as a serial line: bytes at the pace of the baud rate, garbled at the wrong one."""
 
 import os
 import pty
@@ -50,7 +50,7 @@ class SerialLine:
         self._master = self._slave = None
 
     def read(self) -> bytes:
-        """What the host sent; nothing where it sends at another rate than the device's."""
+        """Bytes of the host; none where it sends at another rate than the device's."""
         try:
             data = os.read(self._master, 4096)
         except (BlockingIOError, OSError):
@@ -61,18 +61,18 @@ class SerialLine:
         """Queues bytes; they leave `delay` seconds later, at the pace of the baud rate."""
         start = max(self._free_at, time.monotonic() + delay)
         size = max(1, int(CHUNK_S * self.baud / BITS_PER_BYTE))
-        for place in range(0, len(data), size):
-            chunk = data[place : place + size]
+        for at in range(0, len(data), size):
+            chunk = data[at : at + size]
             start += len(chunk) * BITS_PER_BYTE / self.baud
             self._leaving.append((start, chunk))
         self._free_at = start
 
     def send_due(self) -> float | None:
-        """Sends what is due; seconds until the next chunk, None where nothing waits."""
+        """Sends the chunks that are due; seconds until the next one, None where none waits."""
         while self._leaving and self._leaving[0][0] <= time.monotonic():
             _, chunk = self._leaving.popleft()
             if self.host_baud() != self.baud:
-                chunk = bytes(byte ^ 0x55 for byte in chunk)  # what a wrong rate makes of them
+                chunk = bytes(byte ^ 0x55 for byte in chunk)  # garbled by the wrong rate
             try:
                 os.write(self._master, chunk)
             except BlockingIOError:

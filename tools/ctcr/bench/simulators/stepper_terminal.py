@@ -1,6 +1,6 @@
 """A stepper motor terminal EL70x1: its object dictionary, its motor and what it exchanges with the bus."""
 
-from ctcr.bench.devices.process_image import ProcessImage, signed
+from ctcr.bench.shared.ethercat import DIAGNOSIS, ProcessImage, signed
 from ctcr.bench.simulators.object_dictionary import OUT_OF_RANGE, Abort, Entry, ObjectDictionary, ServiceDataServer
 from ctcr.bench.simulators.sii import Identity, SyncManager, eeprom
 from ctcr.bench.simulators.slave_controller import OP
@@ -14,7 +14,6 @@ SYNC_MANAGERS = (
     SyncManager(0x1180, 8, 0x20, 4),
 )
 ENCODER, STEPPER, POSITIONING = 0x7000, 0x7010, 0x7020  # outputs; inputs are 0x1000 lower
-DIAGNOSIS = 0xA010
 SATURATED, OVER_TEMPERATURE, UNDER_VOLTAGE, SHORT_CIRCUIT, STALL = (0x01, 0x02, 0x04, 0x06, 0x0B)  # of DIAGNOSIS
 MOTOR_LIMIT_MA = 1500  # more burns the motor that is connected
 ABSOLUTE, ABSOLUTE_CHANGE = 1, 0x1001  # start types of the positioning interface

@@ -1,7 +1,6 @@
-"""The control socket of a simulator: one JSON object is asked, one answers, in a folder that only its owner sees."""
+"""The control socket of a simulator in the folder of the bench: one JSON object as request, one as reply."""
 
 import json
-import os
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -16,11 +15,14 @@ class ControlSocket:
     """Listens as `folder/name.sock`; wait for `fileno` and then call `answer`."""
 
     def __init__(self, folder: Path, name: str, handler: Callable[[dict[str, Any]], Any]):
-        """`handler` gets what was asked, and returns what JSON can hold; its InputErrors go back to who asked."""
+        """`handler` gets the request and returns the reply; its InputErrors are sent back to who asked."""
         self.path, self._handler = folder / f"{name}.sock", handler
-        if _is_answered(self.path):
+        try:
+            _connected(self.path).close()
+        except OSError:
+            self.path.unlink(missing_ok=True)  # left behind by a simulator that was killed
+        else:
             raise InputError(Problem("a simulator of this name is running there already", str(self.path)))
-        self.path.unlink(missing_ok=True)
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.bind(str(self.path))
         self._socket.listen(8)
@@ -32,7 +34,7 @@ class ControlSocket:
         """Answers one request."""
         connection, _ = self._socket.accept()
         with connection:
-            connection.settimeout(0.2)  # who connects and says nothing must not stop the device
+            connection.settimeout(0.2)  # a client that sends nothing must not stop the device
             try:
                 reply = {"reply": self._handler(json.loads(connection.recv(LARGEST)))}
             except InputError as error:
@@ -42,7 +44,7 @@ class ControlSocket:
             try:
                 connection.send(json.dumps(reply).encode())
             except OSError:
-                pass  # gone without waiting for the answer
+                pass  # the client has gone
 
     def close(self) -> None:
         self._socket.close()
@@ -50,7 +52,7 @@ class ControlSocket:
 
 
 def request(folder: Path, name: str, message: dict[str, Any]) -> Any:
-    """Asks the simulator `name`; raises InputError where none answers, and with what it refuses."""
+    """The reply of the simulator `name`. Raises InputError where none runs, or where it refuses."""
     path = folder / f"{name}.sock"
     try:
         with _connected(path) as connection:
@@ -67,16 +69,8 @@ def _connected(path: Path) -> socket.socket:
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     connection.settimeout(5.0)
     try:
-        connection.connect(os.fspath(path))
+        connection.connect(str(path))
     except OSError:
         connection.close()
         raise
     return connection
-
-
-def _is_answered(path: Path) -> bool:
-    try:
-        _connected(path).close()
-    except OSError:
-        return False
-    return True

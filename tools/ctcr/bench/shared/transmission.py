@@ -12,7 +12,10 @@ Array = NDArray[np.float64]
 
 
 def transmission(robot: Robot) -> Array:
-    """Joint per motor turn (2N,): translations [m], rotations [rad]. Raises InputError where the file says null."""
+    """Transmission ratios rho (2N,): translations [m/turn], rotations [rad/turn].
+
+    Raises InputError where the robot file says null.
+    """
     ratios = []
     for field, factor in (("translation_mm_per_rev", 1e-3), ("rotation_rev_per_rev", 2 * pi)):
         value = getattr(robot.actuation, field)
@@ -23,7 +26,7 @@ def transmission(robot: Robot) -> Array:
 
 
 def home_joints(robot: Robot) -> Array:
-    """Joints (2N,) [m], [rad] at the home position, as the controller that records knows them."""
+    """Joints Delta (2N,) [m], [rad] at the home position, as the controller that records knows them."""
     known = robot.actuation
     beta = known.recorded_home_translation_mm or known.home_translation_mm
     alpha = known.recorded_home_rotation_deg or known.home_rotation_deg

@@ -1,6 +1,6 @@
 """A record that one process writes and others read, in a file of the bench's folder that is mapped into memory.
 
-The reader takes a copy and checks its checksum, so that it never sees half of a write; nobody waits for anybody.
+The reader takes a copy and verifies its checksum, so that it never sees a write half done; nobody waits.
 """
 
 import mmap
@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 
 TRIES = 100
+MOST_AXES = 8  # two a tube
+MOTORS = np.dtype([("t", "f8"), ("turns", "f8", MOST_AXES)])  # monotonic time [s], turns of each shaft since home
 _CHECK = 4  # bytes of the checksum
 
 
@@ -32,16 +34,24 @@ class SharedRecord:
             self.write()
 
     def write(self, **values) -> None:
-        """Changes some fields; the others stay."""
+        """Changes some fields; the others stay. An array may be shorter than its field: the rest stays 0."""
         for name, value in values.items():
-            self._values[name] = value
+            if np.ndim(value):
+                self._values[name][: len(value)] = value
+            else:
+                self._values[name] = value
         data = self._values.tobytes()
         self._memory[:] = zlib.crc32(data).to_bytes(_CHECK, "little") + data
 
     def read(self) -> np.void | None:
-        """A copy of all fields; None where nobody has written yet."""
+        """A copy of all fields; None before the first write."""
         for _ in range(TRIES):
             data = self._memory[:]
             if zlib.crc32(data[_CHECK:]) == int.from_bytes(data[:_CHECK], "little"):
                 return np.frombuffer(data, self._fields, offset=_CHECK)[0] if any(data[:_CHECK]) else None
         return None
+
+
+def shared_motors(folder: Path, writer: bool = False) -> SharedRecord:
+    """MOTORS, translations then rotations: the simulated bus writes them, the simulated robot reads them."""
+    return SharedRecord(folder / "motors", MOTORS, writer)

@@ -1,0 +1,111 @@
+"""What both simulators share: the loop that serves, and faults switched by the control socket or a scenario file."""
+
+import select
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from ctcr.bench.shared.control import ControlSocket
+from ctcr.bench.shared.real_time import Duty, real_time
+from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.robot import yaml_document
+
+Settings = dict[str, Any]
+
+
+class Simulator:
+    """One device. `faults` holds the present value of each fault of `none`, which maps names to the value without it.
+
+    Its control socket is `folder/name.sock`.
+    """
+
+    def __init__(self, folder: Path, name: str, none: Settings, duty: Duty, scenario: str | Path | None):
+        self._none, self._duty = none, duty
+        self.faults = SimpleNamespace(**none)
+        self._scenario = load_scenario(scenario, none) if scenario else []
+        self._control = ControlSocket(folder, name, self._reply)
+        self._start = time.monotonic()
+
+    def close(self) -> None:
+        self._control.close()
+
+    def run(self) -> None:
+        """Serves until it is interrupted."""
+        with real_time(self._duty):
+            while True:
+                self.step()
+
+    def step(self) -> None:
+        """Waits for the next thing to do, and does it."""
+        sources, wait = self.waits_for()
+        ready, _, _ = select.select([self._control, *sources], [], [], max(0.0, wait))
+        while self._scenario and self._scenario[0][0] <= time.monotonic() - self._start:
+            self.set_faults(self._scenario.pop(0)[1])
+        if self._control in ready:
+            self._control.answer()
+        self.work(bool(sources) and sources[0] in ready)
+
+    def waits_for(self) -> tuple[list, float]:
+        """The line to the host, where there is one, and the longest wait for it [s]."""
+        raise NotImplementedError
+
+    def work(self, heard: bool) -> None:
+        """Everything that is due; `heard`: the host has sent something."""
+        raise NotImplementedError
+
+    def set_faults(self, changes: Settings) -> None:
+        """Changes some faults; null ends one. Raises InputError and changes nothing where one cannot be."""
+        vars(self.faults).update(checked(changes, self._none))
+
+    def request(self, message: Settings) -> Settings:
+        """Does what the control socket asks beyond faults; returns the state."""
+        raise NotImplementedError
+
+    def _reply(self, message: Settings) -> Settings:
+        if "faults" in message:
+            self.set_faults(message["faults"])
+        return {"faults": dict(vars(self.faults))} | self.request(message)
+
+
+def checked(changes: Settings, none: Settings) -> Settings:
+    """Changes of faults with null replaced by the value without the fault. Raises InputError with all that is wrong."""
+    problems, values = [], {}
+    for name, value in changes.items():
+        if name not in none:
+            meant = did_you_mean(name, none)
+            hint = f"did you mean {meant}?" if meant else f"there are {', '.join(none)}"
+            problems.append(Problem(f"unknown fault: {hint}", field=name))
+            continue
+        values[name] = none[name] if value is None else value
+        kinds, needed = ((bool,), "true or false") if isinstance(none[name], bool) else ((int, float), "a number")
+        if type(values[name]) not in kinds:
+            problems.append(Problem(f"{value!r}: needs {needed}", field=name))
+    if problems:
+        raise InputError(problems)
+    return values
+
+
+def load_scenario(path: str | Path, none: Settings) -> list[tuple[float, Settings]]:
+    """Times [s] with the faults that change then, in order. Raises InputError with everything wrong in the file."""
+    document = yaml_document.load(path)
+    steps, problems = [], []
+    for i, entry in enumerate(document.data if isinstance(document.data, list) else [None]):
+        if not isinstance(entry, dict) or not isinstance(entry.get("at_s"), int | float):
+            text = "needs a list of `at_s: seconds` with the faults that change then"
+            problems.append(Problem(text, str(path), document.line((i,))))
+            continue
+        changes = {name: value for name, value in entry.items() if name != "at_s"}
+        try:
+            checked(changes, none)
+        except InputError as error:
+            problems += _placed(error.problems, str(path), document, i)
+        steps.append((float(entry["at_s"]), changes))
+    if problems:
+        raise InputError(problems)
+    return sorted(steps, key=lambda step: step[0])
+
+
+def _placed(problems: Iterable[Problem], file: str, document, entry: int) -> list[Problem]:
+    return [Problem(p.message, file, document.line((entry, p.field)), p.field) for p in problems]
