@@ -39,9 +39,9 @@ ctcr::Catalogue::On<3> all_effects() {
   effects.for_each([](auto& effect, int) {
     for (int k = 0; k < int(effect.parameters.size()); ++k)
       for (int i = 0; i < effect.size(k); ++i)
-        effect.values[std::size_t(effect.place(k, i))] += effect.parameters[std::size_t(k)].sigma;
+        effect.values[std::size_t(effect.index(k, i))] += effect.parameters[std::size_t(k)].sigma;
   });
-  std::get<ctcr::Friction<3>>(effects.list).past.state = {0.8, -0.6, 0.4};
+  std::get<ctcr::Friction<3>>(effects.list).history.state = {0.8, -0.6, 0.4};
   return effects;
 }
 

@@ -19,8 +19,7 @@ inline constexpr std::array parameters{
     ctcr::EffectParameter{.name = "gain",
                           .unit = "rad/m",
                           .sigma = 1,
-                          .hard_low = -5,
-                          .hard_high = 5,
+                          .hard = {-5, 5},
                           .per_tube = true,
                           .meaning = "turn per insertion"},
 };

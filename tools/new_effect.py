@@ -30,10 +30,8 @@ inline constexpr std::array parameters{
                     .unit = "",
                     .neutral = 0,
                     .sigma = 0.05,
-                    .soft_low = -0.2,
-                    .soft_high = 0.2,
-                    .hard_low = -0.9,
-                    .hard_high = 0.9,
+                    .soft = {-0.2, 0.2},
+                    .hard = {-0.9, 0.9},
                     .per_tube = true,
                     .meaning = "relative"},
 };
@@ -45,7 +43,7 @@ struct @Name@ : EffectValues<@id@::parameters, N, P> {
   static constexpr const EffectInfo& info = @id@::info;
 
   // One or more of the hooks of hooks.hpp. Compute with P throughout: it carries the derivatives.
-  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+  void material(const TubePoint<P>& place, Material<P>& m) const noexcept {
     if (place.curved) m.curvature[0] = m.curvature[0] * (1.0 + this->template get<0>(place.tube));
   }
 };
@@ -83,7 +81,7 @@ struct Case {
   }
   RecordedPrediction<2, Alone> predicted(const System<2, Alone>& with) {
     RecordedPrediction<2, Alone> prediction;
-    EXPECT_EQ(predict(with, rows.back(), memories<2, Alone>(with, rows).back(), ws, prediction), Status::ok);
+    EXPECT_EQ(predict(with, rows.back(), histories<2, Alone>(with, rows).back(), ws, prediction), Status::ok);
     return prediction;
   }
 };

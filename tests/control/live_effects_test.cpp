@@ -5,7 +5,7 @@
 
 #include "ctcr/control/closed_loop.hpp"
 #include "ctcr/control/path.hpp"
-#include "ctcr/effects/backlash_rotation.hpp"
+#include "ctcr/effects/backlash.hpp"
 #include "ctcr/effects/delay.hpp"
 #include "ctcr/effects/friction.hpp"
 #include "ctcr/parallel/wind_up.hpp"
@@ -35,12 +35,12 @@ TEST(LiveEffects, RememberWhatRecordedRowsDo) {
     rows.push_back({{q.beta, q.alpha}, {}, {.time = 0.025 * k}});
   }
   rows.front().radius = ContactRadii<3>(system.model.robot());
-  const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
+  const auto recorded = histories(system, std::span<const RecordedRow<3>>(rows));
   LiveEffects<3, Path3> live(system.model);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     (void)live.advance({rows[k].theta.translation, rows[k].theta.rotation}, rows[k].at.time);
     const auto check = [&]<std::size_t I>(std::integral_constant<std::size_t, I>) {
-      const auto& now = std::get<I>(live.effects().list).past.state;
+      const auto& now = std::get<I>(live.effects().list).history.state;
       const auto& then = std::get<I>(recorded[k]).state;
       for (std::size_t i = 0; i < now.size(); ++i)
         EXPECT_NEAR(now[i], then[i], 1e-12) << "effect " << I << " row " << k;
@@ -77,7 +77,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   add_twist<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
   ThreadPool pool(1);
   EXPECT_GT(wind_up(system, std::span(rows), pool), 0.05);
-  const auto recorded = memories(system, std::span<const RecordedRow<3>>(rows));
+  const auto recorded = histories(system, std::span<const RecordedRow<3>>(rows));
   LiveEffects<3, Rubbing> live(system.model);
   Workspace<3> ws;
   Solution<3> solution;
@@ -90,7 +90,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
     (void)live.advance(joints(system.transmission, rows[k].theta), rows[k].at.time, ws, system.settings.steps,
                        equilibrium);
-    const auto& now = std::get<0>(live.effects().list).past.state;
+    const auto& now = std::get<0>(live.effects().list).history.state;
     for (std::size_t i = 0; i < now.size(); ++i)
       EXPECT_NEAR(now[i], std::get<0>(recorded[k]).state[i], 5e-3) << "row " << k;
   }

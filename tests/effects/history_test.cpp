@@ -134,18 +134,18 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
     const Robot<2>& robot = two_tubes();
     const VecN<2>& beta = row.theta.translation;
     const double end = robot.tubes[1].length + beta[1] - 1e-9;  // where the outer tube ends, the last contact is
-    for (int station = 0; station < Contacts<2>::stations; ++station) {
-      const Tube& tube = robot.tubes[std::size_t(station % 2)];
-      double place = tube.length + beta[station % 2] - (station < 2 ? 0 : tube.curved_length);
-      if (station == Contacts<2>::plate) place = 0;
+    for (int breakpoint = 0; breakpoint < Contacts<2>::breakpoints; ++breakpoint) {
+      const Tube& tube = robot.tubes[std::size_t(breakpoint % 2)];
+      double place = tube.length + beta[breakpoint % 2] - (breakpoint < 2 ? 0 : tube.curved_length);
+      if (breakpoint == Contacts<2>::plate) place = 0;
       std::array<ShapePoint<2>, 1> here;
       ASSERT_EQ(shape<2>(system.model, {beta, row.theta.rotation}, {}, std::array{std::clamp(place, 0.0, end)}, here,
                          ws, solution),
                 Status::ok);
       const double turned = here[0].tube[0].angle - here[0].tube[1].angle;
       const double at_base = row.theta.rotation[0] - row.theta.rotation[1];
-      const double twist = row.twist.back()[Contacts<2>::place(0, station)];
-      EXPECT_NEAR(std::remainder(twist - (turned - at_base), 2 * std::numbers::pi), 0, 1e-5) << station;
+      const double twist = row.twist.back()[Contacts<2>::index(0, breakpoint)];
+      EXPECT_NEAR(std::remainder(twist - (turned - at_base), 2 * std::numbers::pi), 0, 1e-5) << breakpoint;
       largest = std::max(largest, std::abs(twist));
     }
   }
@@ -170,16 +170,16 @@ TEST(Friction, KnowsHowHardTubesPress) {
       return Vec3(here[0].bishop.rotation * rotation_z(tube.angle) * Vec3(tube.moment.x(), tube.moment.y(), 0));
     };
     const MomentJumps<2>& jumps = row.jumps.back();
-    for (const int station : {1, 2, 3}) {
-      const Tube& tube = robot.tubes[std::size_t(station % 2)];
-      const double place = tube.length + beta[station % 2] - (station < 2 ? 0 : tube.curved_length);
+    for (const int breakpoint : {1, 2, 3}) {
+      const Tube& tube = robot.tubes[std::size_t(breakpoint % 2)];
+      const double place = tube.length + beta[breakpoint % 2] - (breakpoint < 2 ? 0 : tube.curved_length);
       const bool is_met = place > 0 && place <= robot.tubes[1].length + beta[1];
       const double jump = is_met ? (inner_moment(place + 1e-7) - inner_moment(place - 1e-7)).norm() : 0;
-      EXPECT_NEAR(jumps[Contacts<2>::place(0, station)], jump, 1e-5 * MomentJumps<2>::usual) << station;
+      EXPECT_NEAR(jumps[Contacts<2>::index(0, breakpoint)], jump, 1e-5 * MomentJumps<2>::usual) << breakpoint;
     }
-    EXPECT_NEAR(jumps[Contacts<2>::place(0, Contacts<2>::plate)], inner_moment(1e-7).norm(), 1e-6);  // straight behind
+    EXPECT_NEAR(jumps[Contacts<2>::index(0, Contacts<2>::plate)], inner_moment(1e-7).norm(), 1e-6);  // straight behind
   }
-  EXPECT_GT(rows[3].jumps.back()[Contacts<2>::place(0, 1)], 0.01);
+  EXPECT_GT(rows[3].jumps.back()[Contacts<2>::index(0, 1)], 0.01);
 }
 
 TEST(Friction, LagsAndNeverLeads) {

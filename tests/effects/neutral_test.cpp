@@ -1,6 +1,7 @@
 // Effects at neutral values change nothing, and no effects cost nothing.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <type_traits>
 
 #include "support/catalogue_cases.hpp"
@@ -133,6 +134,30 @@ TYPED_TEST(NeutralEffects, HaveExactDerivativesByJointsAndLoad) {
       EXPECT_LE((exact.compliance.col(j) - slope).norm(), 1e-7 * (1 + slope.norm())) << "load " << j << ", case " << n;
     }
   }
+}
+
+/// Variants and starting values name parameters of their effect: variants in order, starts of details, shapes and choices.
+TEST(Catalogue, DescribesItsParameters) {
+  Catalogue::On<2>{}.for_each([](const auto& effect, int) {
+    const auto& list = effect.parameters;
+    const auto find = [&](std::string_view name) {
+      const auto at = std::ranges::find(list, name, &EffectParameter::name);
+      EXPECT_NE(at, list.end()) << effect.info.id << ": " << name;
+      return at;
+    };
+    for (const Variant& variant : effect.info.variants) {
+      if (variant.first.empty()) continue;
+      EXPECT_LE(find(variant.first), find(variant.last)) << effect.info.id;
+    }
+    for (const auto& start : effect.info.starts)
+      for (const StartValue& one : start) {
+        if (one.parameter.empty()) continue;
+        const EffectParameter& parameter = *find(one.parameter);
+        EXPECT_NE(parameter.role, Role::amplitude);
+        EXPECT_NE(parameter.neutral, one.value);
+        EXPECT_TRUE(one.value >= parameter.soft.low && one.value <= parameter.soft.high);
+      }
+  });
 }
 
 }  // namespace neutral_test

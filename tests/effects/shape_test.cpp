@@ -53,7 +53,7 @@ TEST(ShapeWithEffects, CarriesTheLoadFromTheTipToTheBase) {
   for (int n = 0; n < test::cases(8); ++n) {
     const auto c = test::smooth_case<N>(random, 0.1, 0.002, Vec3::Zero());
     auto effects = test::random_effects<N>(random);
-    for (double& h : test::effect<Friction, N>(effects).past.state) h = test::uniform(random, -1, 1);
+    for (double& h : test::effect<Friction, N>(effects).history.state) h = test::uniform(random, -1, 1);
     Solution<N> tip;
     const auto points = shape_of(Model<N, Catalogue>(c.robot, effects), c, tip);
     const auto& extra = test::effect<TipWeight, N>(effects).values;

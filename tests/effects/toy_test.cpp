@@ -18,7 +18,7 @@ inline constexpr std::array parameters{
 template <int N, class P = double>
 struct Stronger : EffectValues<stronger::parameters, N, P> {
   static constexpr const EffectInfo& info = stronger::info;
-  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+  void material(const TubePoint<P>& place, Material<P>& m) const noexcept {
     m.curvature[0] = m.curvature[0] * this->template get<0>(place.tube);
     m.bending_stiffness = m.bending_stiffness * this->template get<1>(place.tube);
   }

@@ -58,8 +58,8 @@ TEST(WindUp, ElasticContactsAndTubesShareARotation) {
     const Bound bound(robot, q, turn, torque, slip);
     const auto h = walk.remembered<Friction>();
     double differ = 0;
-    for (const auto& [station, place] : {std::pair(1, bound.overlap), {Contacts<2>::plate, 0.0}}) {
-      const std::size_t k = Contacts<2>::place(0, station);
+    for (const auto& [breakpoint, place] : {std::pair(1, bound.overlap), {Contacts<2>::plate, 0.0}}) {
+      const std::size_t k = Contacts<2>::index(0, breakpoint);
       EXPECT_NEAR(h[k], bound.rotation(place) / slip, 0.03 * h[k]) << slip;  // between contacts, h is a straight line
       EXPECT_NEAR(walk.rows[1].twist.back()[k], bound.rotation(place) - turn, 0.002) << slip;
       differ = h[k] - differ;
@@ -77,7 +77,7 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
     auto effects = test::random_effects<3>(random);
     auto& friction = effect<Friction, 3>(effects);
     friction.values = {0.03, 0.02, 0.05, 0.01, 0.3, 0, 0};
-    for (double& h : friction.past.state) h = test::uniform(random, -0.9, 0.9);
+    for (double& h : friction.history.state) h = test::uniform(random, -0.9, 0.9);
     effect<Contact, 3>(effects).values[0] = 0;  // what surroundings push is held
     const System<3, Catalogue> system{{2e-4, -1, {-0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}},
                                       Model<3, Catalogue>(c.robot, effects),
@@ -87,7 +87,7 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
     Workspace<3> ws;
     RecordedPrediction<3, Catalogue> prediction;
     const auto twist = [&](const System<3, Catalogue>& now) {
-      EXPECT_EQ(predict(now, row, now.model.effects().memory(), ws, prediction), Status::ok);
+      EXPECT_EQ(predict(now, row, now.model.effects().history(), ws, prediction), Status::ok);
       return twist_of(prediction.model, ws, now.settings.steps, {});
     };
     (void)twist(system);
@@ -111,7 +111,7 @@ TEST(WindUp, SlopesOfTheTwistAreItsDerivatives) {
     for (int k = 0; k < Contacts<3>::count; ++k)
       check(slopes.by_rubbing.col(k), 1e-4, 1e-6, [&](double by) {
         auto other = effects;
-        effect<Friction, 3>(other).past.state[std::size_t(k)] += by;
+        effect<Friction, 3>(other).history.state[std::size_t(k)] += by;
         System<3, Catalogue> moved = system;
         moved.model = Model<3, Catalogue>(c.robot, other);
         return moved;
@@ -149,7 +149,7 @@ TEST(WindUp, TwistIsThatOfTheEquilibrium) {
     Walk<2> walk = curved_walk(law, 1);
     const std::vector<RecordedRow<2>> plain = walk.rows;
     EXPECT_GT(wind_up(walk.system, std::span(walk.rows), pool), 0.05);
-    const auto memory = memories<2, Catalogue>(walk.system, walk.rows);
+    const auto memory = histories<2, Catalogue>(walk.system, walk.rows);
     double wound = 0;
     for (std::size_t row = 0; row < walk.rows.size(); ++row) {
       Workspace<2> ws;

@@ -45,9 +45,9 @@ Variation variation(const System<N, Catalogue>& system, int place) {
   system.model.effects().for_each([&](const auto& effect, int first) {
     for (int k = 0; k < int(effect.parameters.size()); ++k)
       for (int i = 0; i < effect.size(k); ++i)
-        if (ParameterVector<N>::count + first + effect.place(k, i) == place) {
+        if (ParameterVector<N>::count + first + effect.index(k, i) == place) {
           const EffectParameter& p = effect.parameters[std::size_t(k)];
-          const bool at_edge = effect.values[std::size_t(effect.place(k, i))] <= p.hard_low + 4e-3 * p.sigma;
+          const bool at_edge = effect.values[std::size_t(effect.index(k, i))] <= p.hard.low + 4e-3 * p.sigma;
           const bool plane = effect.info.id == "contact", shape = p.role == Role::shape;
           double h = shape && p.unit == "m" ? 1e-8 : 2e-3 * p.sigma;
           if (plane) h = shape ? 2e-5 : at_edge ? 3e-3 : 0.1;  // the tip must stay in touch
@@ -230,7 +230,7 @@ TEST(Recorded, DoesNotTouchTheHeap) {
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
   touch(recorded, 1e-3, 30, 0.0);
   const auto& [system, rows] = recorded;
-  const auto memory = memories<3, Catalogue>(system, rows);
+  const auto memory = histories<3, Catalogue>(system, rows);
   const std::vector<int> all = all_parameters<3>();
   const auto past = past_slopes<3, Catalogue>(system, rows, all);
   Slopes slopes(6, P<3>::count);

@@ -13,13 +13,13 @@
   CTCR_TEST_CATALOGUE_SOLVER(kind, none, N)                                                                        \
   CTCR_TEST_CATALOGUE_SOLVER(kind, compliance, N)                                                                  \
   kind Status predict<N, Catalogue>(const System<N, Catalogue>&, const RecordedRow<N>&,                            \
-                                    const Catalogue::On<N>::Memory&, Workspace<N>&,                                \
+                                    const Catalogue::On<N>::History&, Workspace<N>&,                               \
                                     RecordedPrediction<N, Catalogue>&) noexcept;                                   \
   kind Status differentiate<N, Catalogue>(const System<N, Catalogue>&, const RecordedRow<N>&, const Workspace<N>&, \
                                           const RecordedPrediction<N, Catalogue>&, std::span<const int>,           \
                                           Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,                    \
                                           const PastSlopesOfRow&) noexcept;                                        \
-  kind std::vector<Catalogue::On<N>::Memory> memories<N, Catalogue>(                                               \
+  kind std::vector<Catalogue::On<N>::History> histories<N, Catalogue>(                                             \
       const System<N, Catalogue>&, std::span<const RecordedRow<N>>, const Winding<N>&);
 
 namespace ctcr {

@@ -21,8 +21,8 @@ Catalogue::On<N> random_effects(Random& random, double sigmas = 1) {
         const EffectParameter& p = effect.parameters[std::size_t(k)];
         // Differences need functions that are smooth over their steps: forms stay near the usual ones.
         const double reach = (p.role == Role::amplitude ? 1 : 0.3) * sigmas * p.sigma;
-        effect.values[std::size_t(effect.place(k, i))] =
-            uniform(random, std::max(p.neutral - reach, p.soft_low), std::min(p.neutral + reach, p.soft_high));
+        effect.values[std::size_t(effect.index(k, i))] =
+            uniform(random, std::max(p.neutral - reach, p.soft.low), std::min(p.neutral + reach, p.soft.high));
       }
   });
   return effects;
@@ -35,7 +35,7 @@ Catalogue::On<N> hardly_any_effects() {
   effects.for_each([](auto& effect, int) {
     for (std::size_t k = 0; k < effect.parameters.size(); ++k)
       if (effect.parameters[k].role == Role::amplitude)
-        for (int i = 0; i < effect.size(int(k)); ++i) effect.values[std::size_t(effect.place(int(k), i))] += 1e-100;
+        for (int i = 0; i < effect.size(int(k)); ++i) effect.values[std::size_t(effect.index(int(k), i))] += 1e-100;
   });
   return effects;
 }
@@ -79,7 +79,7 @@ Recorded<N> random_recording(const Catalogue::On<N>& effects, int tube, Random& 
 template <int N>
 Status predict_last(const System<N, Catalogue>& system, const std::vector<RecordedRow<N>>& rows, Workspace<N>& ws,
                     RecordedPrediction<N, Catalogue>& prediction) {
-  return predict(system, rows.back(), memories<N, Catalogue>(system, rows).back(), ws, prediction);
+  return predict(system, rows.back(), histories<N, Catalogue>(system, rows).back(), ws, prediction);
 }
 
 }  // namespace ctcr::test

@@ -23,8 +23,8 @@ struct Walk {
   template <template <int, class> class E>
   [[nodiscard]] auto remembered() const {
     auto effects = system.model.effects();
-    effects.remember(memories<N, Catalogue>(system, rows).back());
-    return effect<E, N>(effects).past.state;
+    effects.set_history(histories<N, Catalogue>(system, rows).back());
+    return effect<E, N>(effects).history.state;
   }
   [[nodiscard]] Solution<N> solution() const {
     Workspace<N> ws;

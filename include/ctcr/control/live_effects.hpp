@@ -26,8 +26,8 @@ public:
     const auto remembered = [&](const Twist<N>& twist) {
       Effects now = effects_;
       rows_[row].twist = twist;
-      now.remember({{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}, radius_},
-                   row);
+      now.update_history(
+          {{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}, radius_}, row);
       return now;
     };
     if constexpr (Effects::follows_twist) {

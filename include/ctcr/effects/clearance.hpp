@@ -1,7 +1,71 @@
 #pragma once
-#include "ctcr/effects/lean.hpp"
+// Kinks where the tubes are held loosely or softly: clearance between the tubes, clearance and compliance of the front plate.
+#include "ctcr/effects/hooks.hpp"
+#include "ctcr/math/functions.hpp"
 
 namespace ctcr {
+namespace detail {
+
+/// How soon the whole tilt of a clearance is reached.
+inline constexpr EffectParameter saturation_moment{.name = "moment",
+                                                   .unit = "N m",
+                                                   .neutral = 0.01,
+                                                   .sigma = 0.005,
+                                                   .soft = {0.002, 0.05},
+                                                   .hard = {0.0005, 0.5},
+                                                   .role = Role::shape,
+                                                   .meaning = "at which 76 % of the tilt is reached"};
+
+/// Of the surfaces that lie against one another.
+inline constexpr EffectParameter contact_compliance{.name = "contact_compliance",
+                                                    .unit = "rad/(N m)",
+                                                    .neutral = 0,
+                                                    .sigma = 0.02,
+                                                    .soft = {0, 0.2},
+                                                    .hard = {-1, 5},
+                                                    .role = Role::detail,
+                                                    .meaning = "of the contact, added to the tilt"};
+
+/// Where the tubes turn in the front plate.
+inline constexpr EffectParameter pivot_depth{.name = "pivot",
+                                             .unit = "m",
+                                             .neutral = 0,
+                                             .sigma = 0.01,
+                                             .soft = {-0.005, 0.04},
+                                             .hard = {-0.1, 0.2},
+                                             .role = Role::shape,
+                                             .meaning = "depth behind the front of the plate about which it tilts"};
+
+/// Tilt [rad] under a moment [N m]: `tilt` along it, reached at about `size`, plus compliance times the moment.
+template <class P>
+[[nodiscard]] std::array<P, 2> tilt_under(const std::array<P, 2>& moment, const P& tilt, const P& size,
+                                          const P& compliance) noexcept {
+  const std::array<P, 2> direction = saturated(moment, size);
+  return {tilt * direction[0] + compliance * moment[0], tilt * direction[1] + compliance * moment[1]};
+}
+
+/// The moment about a pivot that lies `depth` [m] behind a breakpoint [N m].
+template <class P, int N>
+[[nodiscard]] std::array<P, 2> moment_about(const Breakpoint<P, N>& b, const P& depth) noexcept {
+  return {b.moment[0] - depth * b.force[1], b.moment[1] + depth * b.force[0]};
+}
+
+/// Adds a kink [rad].
+template <class P, int N>
+void kink(Breakpoint<P, N>& b, const std::array<P, 2>& turn) noexcept {
+  for (std::size_t i = 0; i < 2; ++i) b.kink[i] = b.kink[i] + turn[i];
+}
+
+/// Adds a kink [rad] about a pivot `depth` [m] behind the breakpoint.
+template <class P, int N>
+void kink_about(Breakpoint<P, N>& b, const std::array<P, 2>& turn, const P& depth) noexcept {
+  kink(b, turn);
+  b.shift[0] = b.shift[0] + depth * turn[1];
+  b.shift[1] = b.shift[1] - depth * turn[0];
+}
+
+}  // namespace detail
+
 namespace clearance {
 inline constexpr EffectInfo info{
     .id = "clearance",
@@ -18,25 +82,100 @@ inline constexpr std::array parameters{
                     .unit = "rad",
                     .neutral = 0,
                     .sigma = 0.0087,
-                    .soft_low = -0.03,
-                    .soft_high = 0.03,
-                    .hard_low = -0.2,
-                    .hard_high = 0.2,
+                    .soft = {-0.03, 0.03},
+                    .hard = {-0.2, 0.2},
                     .per_tube = true,
                     .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
-    leaning_moment,
-    leaning_compliance,
+    detail::saturation_moment,
+    detail::contact_compliance,
 };
 }  // namespace clearance
 
-/// Where a tube ends, the bundle inside it tilts within its clearance, towards the moment that it carries.
+namespace entry_compliance {
+inline constexpr EffectInfo info{
+    .id = "entry_compliance",
+    .title = "Compliance where the tubes leave the plate",
+    .physics = "The front plate or its bushing gives way.",
+    .signature = "The whole robot turns about the entry, in proportion to the moment there.",
+    .measure = "Hang different weights; put a sensor near the plate.",
+    .look_alikes = "entry_clearance tip_load",
+    .reference = "practice",
+    .needs = {.loads = true},
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "compliance",
+                    .unit = "rad/(N m)",
+                    .neutral = 0,
+                    .sigma = 0.5,
+                    .soft = {0, 3},
+                    .hard = {-5, 50},
+                    .meaning = "of the entry against bending"},
+    detail::pivot_depth,
+};
+}  // namespace entry_compliance
+
+namespace entry_clearance {
+inline constexpr EffectInfo info{
+    .id = "entry_clearance",
+    .title = "Clearance in the front plate",
+    .physics = "The bore is wider than the outer tube, which leans to one side.",
+    .signature = "The whole robot tilts about the entry by a constant angle whose direction follows the moment there.",
+    .measure = "Hang different weights: a tilt stays, a compliance grows.",
+    .look_alikes = "entry_compliance clearance",
+    .reference = "practice",
+    .needs = {.loads = true},
+};
+inline constexpr std::array parameters{
+    EffectParameter{.name = "tilt",
+                    .unit = "rad",
+                    .neutral = 0,
+                    .sigma = 0.0087,
+                    .soft = {0, 0.03},
+                    .hard = {-0.1, 0.2},
+                    .meaning = "largest tilt"},
+    detail::saturation_moment,
+    detail::contact_compliance,
+    detail::pivot_depth,
+};
+}  // namespace entry_clearance
+
+/// Where a tube ends, the tubes inside it tilt within its clearance, along the moment that they carry.
 template <int N, class P = double>
 struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
-  void station(Station<P, N>& s) const noexcept {
-    if (s.kind != Station<P, N>::Kind::tube_tip) return;
-    kink(s, lean(s.moment, this->template get<0>(s.tube), this->template get<1>(), this->template get<2>()));
+  void breakpoint(Breakpoint<P, N>& b) const noexcept {
+    if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
+    detail::kink(b, detail::tilt_under(b.moment, this->template get<0>(b.tube), this->template get<1>(),
+                                       this->template get<2>()));
+  }
+};
+
+/// The tubes leave the front plate turned in proportion to the moment that they carry there.
+template <int N, class P = double>
+struct EntryCompliance : EffectValues<entry_compliance::parameters, N, P> {
+  static constexpr const EffectInfo& info = entry_compliance::info;
+
+  void breakpoint(Breakpoint<P, N>& b) const noexcept {
+    if (b.kind != Breakpoint<P, N>::Kind::plate) return;
+    const P &compliance = this->template get<0>(), &depth = this->template get<1>();
+    const auto moment = detail::moment_about(b, depth);
+    detail::kink_about(b, {compliance * moment[0], compliance * moment[1]}, depth);
+  }
+};
+
+/// The tubes tilt within the bore of the front plate, along the moment that they carry there.
+template <int N, class P = double>
+struct EntryClearance : EffectValues<entry_clearance::parameters, N, P> {
+  static constexpr const EffectInfo& info = entry_clearance::info;
+
+  void breakpoint(Breakpoint<P, N>& b) const noexcept {
+    if (b.kind != Breakpoint<P, N>::Kind::plate) return;
+    const P& depth = this->template get<3>();
+    const auto moment = detail::moment_about(b, depth);
+    detail::kink_about(
+        b, detail::tilt_under(moment, this->template get<0>(), this->template get<1>(), this->template get<2>()),
+        depth);
   }
 };
 

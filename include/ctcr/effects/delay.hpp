@@ -14,25 +14,23 @@ inline constexpr EffectInfo info{
     .look_alikes = "backlash_rotation friction",
     .reference = "kalibr (time offset estimation); any streamed data",
     .needs = {.order = true, .time = true},
+    .starts = {{{"spread", 0.5}}},
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "delay",
                     .unit = "s",
                     .neutral = 0,
                     .sigma = 0.05,
-                    .soft_low = 0,
-                    .soft_high = 0.3,
-                    .hard_low = -0.05,
-                    .hard_high = 1,
+                    .soft = {0, 0.3},
+                    .hard = {-0.05, 1},
+                    .quantity = Quantity::lag,
                     .meaning = "by which poses are late"},
     EffectParameter{.name = "spread",
                     .unit = "",
                     .neutral = 0,
                     .sigma = 0.3,
-                    .soft_low = 0,
-                    .soft_high = 1,
-                    .hard_low = 0,
-                    .hard_high = 1,
+                    .soft = {0, 1},
+                    .hard = {0, 1},
                     .role = Role::detail,
                     .meaning = "share of the delay: standard deviation of the moments over which the tracker averages"},
 };
@@ -46,8 +44,8 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = delay::info;
 
   /// state: joints then minus joints now, beta and alpha of each tube.
-  void remember(const Path<N, P>& path, std::size_t row) noexcept {
-    auto& state = this->past.state;
+  void update_history(const Path<N, P>& path, std::size_t row) noexcept {
+    auto& state = this->history.state;
     for (auto& x : state) x = 0.0;
     const std::size_t first = path.first.empty() ? 0 : path.first[row];
     if (path.time.empty() || row <= first || !(path.time[row - 1] < path.time[row])) return;
@@ -71,8 +69,8 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
 
   void actuate(const Occasion&, std::array<P, N>& beta, std::array<P, N>& alpha) const noexcept {
     for (std::size_t i = 0; i < N; ++i) {
-      beta[i] = beta[i] + this->past.state[i];
-      alpha[i] = alpha[i] + this->past.state[N + i];
+      beta[i] = beta[i] + this->history.state[i];
+      alpha[i] = alpha[i] + this->history.state[N + i];
     }
   }
 };

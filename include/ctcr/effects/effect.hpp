@@ -12,22 +12,53 @@
 
 namespace ctcr {
 
-/// Whether a parameter says how strong an effect is, adds a detail, which is fitted after these, says only of what shape an
-/// effect is, or which of several forms it has: a choice has no derivatives and is never fitted.
-enum class Role { amplitude, detail, shape, choice };
+/// What a parameter does to an effect, and when a fit frees it.
+enum class Role {
+  amplitude,  ///< the effect vanishes where all its amplitudes and details are neutral; fitted first
+  detail,     ///< a further amplitude, fitted once the effect is known to act
+  shape,      ///< changes the form of an effect that acts; fitted with the details
+  choice      ///< selects one of several forms or constitutive laws; has no derivatives and is never fitted
+};
+
+/// What a parameter measures, where a program can make use of it beyond its value. Parameters of an effect with the same
+/// quantity belong together, in the order given here.
+enum class Quantity {
+  other,
+  tip_force,  ///< x, y, z of a force at the robot tip, base frame [N]
+  lag,        ///< time by which readings are later than the joints [s]
+  moment,     ///< part of the session, 0 to 1, before which the effect changes nothing; no slope leads there
+  surface,  ///< distance [m], azimuth, elevation [rad] of a surface that pushes the tip: base frame, outside is nearer
+            ///< to the origin. The response is zero, with no slope, where the tip does not reach it
+  source,   ///< volume [m^3], position x, y, z [m] of a small source of field, then of the tracker's coils, both in the
+            ///< tracker frame. Many local optima; independent of the other parameters of its effect
+  screw_pitch,  ///< translation per turn of the motor [m]: the transmission of the robot tells the usual value
+  gear_ratio    ///< turns of the motor per turn of the tube: the same
+};
+
+struct Interval {
+  double low = -std::numeric_limits<double>::infinity(), high = std::numeric_limits<double>::infinity();
+};
 
 /// One named parameter of an effect.
 struct EffectParameter {
-  std::string_view name;               ///< snake_case
-  std::string_view unit{};             ///< SI; empty: a pure number
-  double neutral = 0;                  ///< changes nothing (amplitude, detail), or the usual value (shape)
-  double sigma = 1;                    ///< plausible standard deviation about it, before any measurement
-  double soft_low = 0, soft_high = 0;  ///< beyond: explains the data, but hardly by this physics
-  double hard_low = -std::numeric_limits<double>::infinity(),
-         hard_high = std::numeric_limits<double>::infinity();  ///< beyond: impossible
-  bool per_tube = false;                                       ///< one value for each tube
+  std::string_view name;    ///< snake_case
+  std::string_view unit{};  ///< SI; empty: a pure number
+  double neutral = 0;       ///< changes nothing (amplitude, detail), or the usual value (shape, choice)
+  double sigma = 1;         ///< plausible standard deviation about it, before any measurement
+  Interval soft{0, 0};      ///< beyond it a value may explain the data, but hardly by this physics
+  Interval hard{};          ///< beyond it a value is impossible
+  bool per_tube = false;    ///< one value for each tube
   Role role = Role::amplitude;
+  Quantity quantity = Quantity::other;
   std::string_view meaning{};  ///< in plain words
+
+  /// One of several parameters that differ in their names alone.
+  [[nodiscard]] constexpr EffectParameter named(std::string_view own_name, std::string_view own_meaning) const {
+    EffectParameter p = *this;
+    p.name = own_name;
+    p.meaning = own_meaning;
+    return p;
+  }
 };
 
 /// What measurements must have for an effect to be seen.
@@ -37,6 +68,17 @@ struct Needs {
   bool orientation = false;  ///< of the sensor
   bool loads = false;        ///< different known tip loads
   bool gravity = false;      ///< its direction
+};
+
+/// A way in which an effect may act: the parameters `first` to `last` of its list, the others being neutral.
+struct Variant {
+  std::string_view first, last;
+};
+
+/// A value, other than the usual one, of a detail, a shape or a choice.
+struct StartValue {
+  std::string_view parameter;
+  double value = 0;
 };
 
 /// What is known of an effect before any data are.
@@ -49,40 +91,46 @@ struct EffectInfo {
   std::string_view look_alikes{};  ///< ids, separated by spaces
   std::string_view reference{};
   Needs needs{};
+  /// Ways to act that differ in physics or in the number of parameters, for model selection; a fit tries each of them,
+  /// and the evidence pays for the parameters. None: all amplitudes at once. Unused ones are empty.
+  Variant variants[4]{};
+  /// Further points from which a fit must start, since the usual values lead to another local optimum; each is tried with
+  /// each variant. Unused ones are empty.
+  StartValue starts[2][2]{};
 };
 
-/// What the joints' past left behind in an effect.
+/// Internal state of an effect that depends on the motion so far.
 template <int States, class P>
-struct EffectPast {
+struct EffectHistory {
   std::array<P, std::size_t(States)> state{};
 };
 
 /// The values of an effect's parameters: parameter after parameter, and within one tube after tube.
 /// @tparam List    its std::array of EffectParameter
-/// @tparam States  numbers that it remembers from row to row
+/// @tparam States  length of its internal state, which the motion changes from row to row
 template <const auto& List, int N, class P, int States = 0>
 struct EffectValues {
   static constexpr const auto& parameters = List;
 
   static constexpr int size(int k) noexcept { return List[std::size_t(k)].per_tube ? N : 1; }
-  /// Place of parameter k's value for a tube.
-  static constexpr int place(int k, int tube = 0) noexcept {
+  /// Index of parameter k's value for a tube.
+  static constexpr int index(int k, int tube = 0) noexcept {
     for (int j = 0; j < k; ++j) tube += size(j);
     return tube;
   }
-  static constexpr int count = place(int(List.size()));
+  static constexpr int count = index(int(List.size()));
 
   static constexpr int states = States;
-  using Past = EffectPast<States, P>;
+  using History = EffectHistory<States, P>;
 
   std::array<P, std::size_t(count)> values = neutral();
-  Past past{};
+  History history{};
   bool active = true;  ///< false: changes nothing, nor has derivatives, so that its hooks need not be called
 
   /// Parameter K; that of a tube, from 0, if it is per tube.
   template <int K>
   [[nodiscard]] constexpr const P& get(int tube = 0) const noexcept {
-    constexpr int first = place(K);
+    constexpr int first = index(K);
     return values[std::size_t(first + tube)];
   }
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "ctcr/effects/hooks.hpp"
-#include "ctcr/effects/metal.hpp"
+#include "ctcr/effects/metal_distortion.hpp"
 #include "ctcr/math/frame_algebra.hpp"
 
 namespace ctcr {
@@ -19,6 +19,7 @@ inline constexpr EffectInfo info{
         "metal_z say.",
     .look_alikes = "sensor_offset precurvature_profile",
     .reference = "Hummel et al. 2005; Harish et al.",
+    .variants = {{"scale", "scale"}, {"scale", "z_yz"}, {"metal_volume", "coils_z"}, {"scale", "turn_z_yz"}},
 };
 
 /// Of a displacement along the axis that its name begins with [m], or of a turn about it [rad].
@@ -28,8 +29,7 @@ consteval EffectParameter coefficient(std::string_view name, double sigma, Role 
           .unit = turn ? "rad" : "m",
           .neutral = 0,
           .sigma = sigma,
-          .soft_low = turn ? -0.02 : -0.001,
-          .soft_high = turn ? 0.02 : 0.001,
+          .soft = {turn ? -0.02 : -0.001, turn ? 0.02 : 0.001},
           .role = role,
           .meaning = turn ? "turn about the first axis at 50 mm from the centre, by the product of the others"
                           : "displacement along the first axis at 50 mm from the centre, by the product of the others"};
@@ -54,11 +54,10 @@ consteval EffectParameter coordinate(std::string_view name, double usual, double
           .unit = "m",
           .neutral = usual,
           .sigma = sigma,
-          .soft_low = -1,
-          .soft_high = 1,
-          .hard_low = -3,
-          .hard_high = 3,
+          .soft = {-1, 1},
+          .hard = {-3, 3},
           .role = Role::shape,
+          .quantity = Quantity::source,
           .meaning = meaning};
 }
 
@@ -67,11 +66,10 @@ inline constexpr EffectParameter metal[] = {
      .unit = "m^3",
      .neutral = 0,
      .sigma = 1e-5,
-     .soft_low = -1e-3,
-     .soft_high = 1e-3,
-     .hard_low = -0.1,
-     .hard_high = 0.1,
+     .soft = {-1e-3, 1e-3},
+     .hard = {-0.1, 0.1},
      .role = Role::detail,
+     .quantity = Quantity::source,
      .meaning = "of a small piece of metal beside the tracker; negative: of iron that strengthens the field"},
     coordinate("metal_x", 0.1, 0.3, "of the piece of metal, tracker frame"),
     coordinate("metal_y", 0.1, 0.3, "the same"),
@@ -87,10 +85,8 @@ consteval auto all() {
              .unit = "",
              .neutral = 0,
              .sigma = 0.003,
-             .soft_low = -0.01,
-             .soft_high = 0.01,
-             .hard_low = -0.1,
-             .hard_high = 0.1,
+             .soft = {-0.01, 0.01},
+             .hard = {-0.1, 0.1},
              .meaning = "relative"};
   std::size_t k = 1;
   for (const auto& name : quadratic) list[k++] = coefficient(name, 3e-4, Role::amplitude);
@@ -140,7 +136,7 @@ struct FieldDistortion : EffectValues<field_distortion::parameters, N, P> {
     const P* const piece = turn + std::size(field_distortion::turn);
     if (!vanishes(piece[0])) {
       const Triple<P> metal{piece[1], piece[2], piece[3]}, coils{piece[4], piece[5], piece[6]};
-      const Misreading<P> off = beside_metal<P>(difference(p, coils), difference(metal, coils), piece[0]);
+      const ReadingError<P> off = metal_distortion<P>(difference(p, coils), difference(metal, coils), piece[0]);
       for (std::size_t i = 0; i < 3; ++i) {
         by[i] = by[i] + off.shift[i];
         rotation[i] = rotation[i] + off.turn[i];

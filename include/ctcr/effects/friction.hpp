@@ -21,16 +21,16 @@ inline constexpr EffectInfo info{
         "Lock & Dupont 2011; Ha, Fagogenis & Dupont 2019; bristle: Dahl 1968; contact: as plasticity with one "
         "circular yield surface, Simo & Hughes 1998",
     .needs = {.order = true},
+    .variants = {{"coefficient", "coefficient"}, {"torque_per_length", "torque_per_length"}},
+    .starts = {{{"law", 1.0}, {"slip_angle", 0.03}}, {{"insertion", 0.0}}},
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "coefficient",
                     .unit = "",
                     .neutral = 0,
                     .sigma = 0.02,
-                    .soft_low = 0,
-                    .soft_high = 0.1,
-                    .hard_low = 0,
-                    .hard_high = 0.3,
+                    .soft = {0, 0.1},
+                    .hard = {0, 0.3},
                     .per_tube = true,
                     .meaning = "friction torque per jump of the bending moment of all tubes inside the contact, of a "
                                "tube in the next outer one (of the outermost: in the front plate)"},
@@ -38,20 +38,16 @@ inline constexpr std::array parameters{
                     .unit = "N",
                     .neutral = 0,
                     .sigma = 0.01,
-                    .soft_low = 0,
-                    .soft_high = 0.05,
-                    .hard_low = 0,
-                    .hard_high = 0.5,
+                    .soft = {0, 0.05},
+                    .hard = {0, 0.5},
                     .meaning = "friction torque per length between a tube and the next outer one, all along, however "
                                "hard they press"},
     EffectParameter{.name = "slip_angle",
                     .unit = "rad",
                     .neutral = 6 * 0.017453292519943295,
                     .sigma = 0.1,
-                    .soft_low = 0.005,
-                    .soft_high = 0.5,
-                    .hard_low = 0.005,
-                    .hard_high = 3,
+                    .soft = {0.005, 0.5},
+                    .hard = {0.005, 3},
                     .role = Role::shape,
                     .meaning =
                         "rotation of the tubes where they touch after which friction has turned round to 63 %; with "
@@ -60,10 +56,8 @@ inline constexpr std::array parameters{
                     .unit = "",
                     .neutral = 1,
                     .sigma = 0.5,
-                    .soft_low = 0,
-                    .soft_high = 1.5,
-                    .hard_low = 0,
-                    .hard_high = 4,
+                    .soft = {0, 1.5},
+                    .hard = {0, 4},
                     .role = Role::shape,
                     .meaning = "share of the sliding by insertion that turns friction away from rotation: 0 none, 1 "
                                "as much as sliding by rotation at the outer radius of the inner tube"},
@@ -71,10 +65,8 @@ inline constexpr std::array parameters{
                     .unit = "",
                     .neutral = 0,
                     .sigma = 1,
-                    .soft_low = 0,
-                    .soft_high = 1,
-                    .hard_low = 0,
-                    .hard_high = 1,
+                    .soft = {0, 1},
+                    .hard = {0, 1},
                     .role = Role::choice,
                     .meaning =
                         "0: a bristle that bends ever less; 1: an elastic contact of constant stiffness that slips at "
@@ -93,36 +85,36 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
   static constexpr const EffectInfo& info = friction::info;
   static constexpr bool follows_twist = true;
 
-  void station(Station<P, N>& s) const noexcept {
+  void breakpoint(Breakpoint<P, N>& s) const noexcept {
     P dx = 0.0, dy = 0.0;
     for (int j = 0; j < s.near; ++j) {
       const auto i = std::size_t(j);
       dx = dx + (s.far_moment[i][0] - s.near_moment[i][0]);
       dy = dy + (s.far_moment[i][1] - s.near_moment[i][1]);
       // Both tubes must be there; the outermost rubs on the front plate alone.
-      if (j + 1 < N ? j + 1 >= s.near : s.kind != Station<P, N>::Kind::plate) continue;
+      if (j + 1 < N ? j + 1 >= s.near : s.kind != Breakpoint<P, N>::Kind::plate) continue;
       constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
-      const P& h = this->past.state[j + 1 < N ? Contacts<N>::place(j, s.number()) : in_plate];
+      const P& h = this->history.state[j + 1 < N ? Contacts<N>::index(j, s.number()) : in_plate];
       const P torque = this->template get<0>(j) * h * square_root(dx * dx + dy * dy + smooth);
       s.torque[i] = s.torque[i] - torque;
       if (j + 1 < s.near) s.torque[i + 1] = s.torque[i + 1] + torque;
     }
   }
 
-  void rub(int station, std::array<P, N>& torque) const noexcept {
+  void distributed_friction(int breakpoint, std::array<P, N>& torque) const noexcept {
     for (int j = 0; j + 1 < N; ++j) {
       const auto i = std::size_t(j);
-      torque[i] = torque[i] - this->template get<1>() * this->past.state[Contacts<N>::place(j, station)];
+      torque[i] = torque[i] - this->template get<1>() * this->history.state[Contacts<N>::index(j, breakpoint)];
     }
   }
 
   /// Exactly along each straight move.
-  void remember(const Path<N, P>& path, std::size_t row) noexcept {
+  void update_history(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
     const auto &from = path.q[row - 1], &to = path.q[row];
     const bool bends = value(this->template get<4>()) < 0.5;
     const auto follow = [&](int tube, std::size_t contact, const P& turn, const P& slide) {
-      P &h = this->past.state[contact], &k = this->past.state[limits + contact];
+      P &h = this->history.state[contact], &k = this->history.state[limits + contact];
       if (bends) return bend(turn, slide, h);
       const P angle = slip_angle(tube, to.jumps[contact]);
       stretch(slip_angle(tube, from.jumps[contact]) * inverse(angle), h, k);
@@ -135,8 +127,8 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
       const auto against_next = [&](const std::array<P, N>& v) -> P { return v[i] - v[i + 1]; };
       const P turn = against_next(to.alpha) - against_next(from.alpha);
       const P slide = (against_next(to.beta) - against_next(from.beta)) * (1 / path.radius[i]);
-      for (int station = 0; station < Contacts<N>::stations; ++station) {
-        const std::size_t contact = Contacts<N>::place(j, station);
+      for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
+        const std::size_t contact = Contacts<N>::index(j, breakpoint);
         follow(j, contact, turn + (to.twist[contact] - from.twist[contact]), slide);
       }
     }

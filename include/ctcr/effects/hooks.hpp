@@ -1,16 +1,17 @@
 #pragma once
-// Where an effect may act. Each hook is a const noexcept member of the effect; P is the scalar of its parameters, so that
-// one code gives values and exact derivatives.
+// The hooks by which an effect acts. Each is a const noexcept member of the effect, but for update_history(). P is the
+// scalar of its parameters: double, or a dual number, so that one code gives values and exact derivatives.
 //
-//   material(TubePlace<P>, Material<P>&)         what a tube is made of at a place
-//   station(Station<P, N>&)                      torques between tubes, and kinks, where tubes end or start to curve
-//   rub(station, torque&)                        torque per length between each tube and the next outer one, at a station
-//   grip(torque, angle&)                         angles of the tubes at their grasped ends
-//   tip_force(gravity, force&)                   a force at the robot tip, base frame
-//   environment(position, force&)                the same, depending on where the tip is
-//   actuate(Occasion, beta&, alpha&)            joints that the tubes really have
-//   sense(Occasion, Frame<P>& reading)          what the tracker makes of the sensor's pose, tracker frame
-//   remember(Path<N, P>, row)                    makes past.state, left by the rows before, that of this row
+//   actuate(Occasion, beta&, alpha&)            joints that the tubes really have [m], [rad]
+//   material(TubePoint<P>, Material<P>&)         free shape and constitutive law of a tube at a point along it
+//   breakpoint(Breakpoint<P, N>&)                torques between tubes, and kinks of the robot, where a tube ends or starts
+//                                                to curve and at the front plate
+//   distributed_friction(breakpoint, torque&)    torque per length on each tube from the next outer one, at a breakpoint [N]
+//   base_compliance(torque, angle&)              angles of the tubes at their grasped ends, under the torque there
+//   tip_force(gravity, force&)                   a constant force at the robot tip, base frame [N]
+//   environment(position, force&)                a force at the robot tip that depends on where the tip is, base frame [N]
+//   sense(Occasion, Frame<P>& reading)           what the tracker makes of the sensor's pose, tracker frame
+//   update_history(Path<N, P>, row)              takes history.state from the row before to this one
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,7 +29,7 @@ namespace ctcr {
 
 /// A place on a tube, which need not be deployed.
 template <class P>
-struct TubePlace {
+struct TubePoint {
   int tube;     ///< from 0, innermost first
   bool curved;  ///< in the part that the data sheet calls curved
   P along;      ///< arc length of the tube from its grasped point [m]
@@ -52,7 +53,7 @@ struct Material {
 
 /// A place where a tube ends or starts to be curved, or the front plate. Vectors in the Bishop frame on its far side.
 template <class P, int N>
-struct Station {
+struct Breakpoint {
   enum class Kind { tube_tip, curve_start, plate } kind;
   int tube;                 ///< whose tip or curve start; -1 at the plate
   int far, near;            ///< tubes present on the side of the robot tip, and on that of the base
@@ -97,31 +98,39 @@ concept HasEnvironment = requires(const Effect& effect, const std::array<P, 3>& 
   effect.environment(position, force);
 };
 
-/// An effect at stations.
+/// An effect at breakpoints.
 template <class Effect, class P, int N>
-concept HasStation = requires(const Effect& effect, Station<P, N>& station) { effect.station(station); };
+concept HasBreakpoint = requires(const Effect& effect, Breakpoint<P, N>& breakpoint) { effect.breakpoint(breakpoint); };
 
 /// An effect between tubes wherever both of them are.
 template <class Effect, class P, int N>
-concept HasRub = requires(const Effect& effect, std::array<P, N>& torque) { effect.rub(0, torque); };
+concept HasDistributedFriction =
+    requires(const Effect& effect, std::array<P, N>& torque) { effect.distributed_friction(0, torque); };
 
 /// An effect on what tubes are made of.
 template <class Effect, class P>
 concept HasMaterial =
-    requires(const Effect& effect, const TubePlace<P>& place, Material<P>& m) { effect.material(place, m); };
+    requires(const Effect& effect, const TubePoint<P>& place, Material<P>& m) { effect.material(place, m); };
 
-/// An effect that remembers how the tubes were turned against one another.
+/// An effect whose history depends on how the tubes are turned against one another at their contacts.
 template <class Effect>
 concept FollowsTwist = requires { Effect::follows_twist; };
 
+/// An effect on the angles at the grasped ends.
+template <class Effect, class P, int N>
+concept HasBaseCompliance = requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
+  effect.base_compliance(torque, angle);
+};
+
+/// A force at the robot tip that does not depend on where the tip is.
+template <class Effect, class P>
+concept HasTipForce =
+    requires(const Effect& effect, const std::array<P, 3>& g, std::array<P, 3>& force) { effect.tip_force(g, force); };
+
 /// An effect that changes the equilibrium of the rod.
 template <class Effect, class P, int N>
-concept ActsOnRod = HasStation<Effect, P, N> || HasRub<Effect, P, N> || HasMaterial<Effect, P> ||
-                    requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
-                      effect.grip(torque, angle);
-                    } || requires(const Effect& effect, const std::array<P, 3>& gravity, std::array<P, 3>& force) {
-                      effect.tip_force(gravity, force);
-                    };
+concept ActsOnRod = HasBreakpoint<Effect, P, N> || HasDistributedFriction<Effect, P, N> || HasMaterial<Effect, P> ||
+                    HasBaseCompliance<Effect, P, N> || HasTipForce<Effect, P>;
 
 /// An effect on the joints.
 template <class Effect, class P, int N>
@@ -131,6 +140,17 @@ concept ActsOnJoints =
 /// An effect on what the tracker makes of the sensor's pose.
 template <class Effect, class P>
 concept HasSense = requires(const Effect& effect, const Occasion& at, Frame<P>& reading) { effect.sense(at, reading); };
+
+/// Where an effect acts between motors and reading, as its hooks say.
+struct ActsOn {
+  bool joints = false, rod = false, tip = false, reading = false;
+};
+template <class Effect, class P, int N>
+inline constexpr ActsOn acts_on{.joints = ActsOnJoints<Effect, P, N>,
+                                .rod = HasBreakpoint<Effect, P, N> || HasDistributedFriction<Effect, P, N> ||
+                                       HasMaterial<Effect, P> || HasBaseCompliance<Effect, P, N>,
+                                .tip = HasTipForce<Effect, P> || HasEnvironment<Effect, P>,
+                                .reading = HasSense<Effect, P>};
 
 /// Numbers without derivatives.
 template <class S>
@@ -177,14 +197,14 @@ struct EffectList {
     [[no_unique_address]] std::tuple<E<N, P>...> list{};
 
     static constexpr int count = (0 + ... + E<N, P>::count);    ///< values of all parameters
-    static constexpr int states = (0 + ... + E<N, P>::states);  ///< numbers that the past left behind
+    static constexpr int states = (0 + ... + E<N, P>::states);  ///< length of the internal state of all effects
     /// Whether One is among them.
     template <class One>
     static constexpr bool contains = (false || ... || std::is_same_v<One, E<N, P>>);
     /// Whether anything happens where tubes end or start to curve.
-    static constexpr bool has_station = (false || ... || HasStation<E<N, P>, P, N>);
-    /// Whether tubes rub along their length.
-    static constexpr bool has_rub = (false || ... || HasRub<E<N, P>, P, N>);
+    static constexpr bool has_breakpoint = (false || ... || HasBreakpoint<E<N, P>, P, N>);
+    /// Whether friction acts along the tubes.
+    static constexpr bool has_distributed_friction = (false || ... || HasDistributedFriction<E<N, P>, P, N>);
     /// Whether it matters how the tips are turned against one another.
     static constexpr bool follows_twist = (false || ... || FollowsTwist<E<N, P>>);
     /// Place of the effect that does, in the list.
@@ -195,30 +215,30 @@ struct EffectList {
     /// Whether the tip's surroundings act on it.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 
-    /// What the past left behind in each effect.
-    using Memory = std::tuple<typename E<N, P>::Past...>;
-    [[nodiscard]] Memory memory() const noexcept {
-      return std::apply([](const auto&... effect) { return Memory{effect.past...}; }, list);
+    /// Internal state of each effect, as the motion so far left it.
+    using History = std::tuple<typename E<N, P>::History...>;
+    [[nodiscard]] History history() const noexcept {
+      return std::apply([](const auto&... effect) { return History{effect.history...}; }, list);
     }
-    void remember(const Memory& memory) noexcept {
+    void set_history(const History& history) noexcept {
       [&]<std::size_t... I>(std::index_sequence<I...>) {
-        ((std::get<I>(list).past = std::get<I>(memory)), ...);
+        ((std::get<I>(list).history = std::get<I>(history)), ...);
       }(std::index_sequence_for<E<N, P>...>{});
     }
 
-    /// What the motion to a row of the path leaves behind, after that to the row before.
-    void remember(const Path<N, P>& path, std::size_t row) noexcept {
+    /// Updates the internal state by the motion to a row of the path, after that to the row before.
+    void update_history(const Path<N, P>& path, std::size_t row) noexcept {
       for_each([&](auto& effect, int) {
-        if constexpr (requires { effect.remember(path, row); }) effect.remember(path, row);
+        if constexpr (requires { effect.update_history(path, row); }) effect.update_history(path, row);
       });
     }
 
     /// The same effects with the scalar S.
     /// @tparam Some  EffectList of those that are wanted
-    /// @param value  value(x, place) gives a parameter's value its derivatives
-    /// @param past   past(x, place) gives them to a number that the past left behind, of all of them in the list
-    template <class S, class Some = EffectList, class Value, class Past = Constant<S>>
-    [[nodiscard]] auto seeded(const Value& value, const Past& past = {}) const noexcept {
+    /// @param value    value(x, index) gives a parameter's value its derivatives
+    /// @param history  history(x, index) gives them to an entry of the internal state; indices are those in this list
+    template <class S, class Some = EffectList, class Value, class OfHistory = Constant<S>>
+    [[nodiscard]] auto seeded(const Value& value, const OfHistory& history = {}) const noexcept {
       using Chosen = typename Some::template On<N, S>;
       Chosen r;
       int first = 0, first_state = 0;
@@ -228,8 +248,8 @@ struct EffectList {
           for (std::size_t k = 0; k < to.values.size(); ++k) to.values[k] = value(from.values[k], first + int(k));
           if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
           to.active = acts(to);
-          for (std::size_t i = 0; to.active && i < to.past.state.size(); ++i)
-            to.past.state[i] = past(from.past.state[i], first_state + int(i));
+          for (std::size_t i = 0; to.active && i < to.history.state.size(); ++i)
+            to.history.state[i] = history(from.history.state[i], first_state + int(i));
         }
         first += from.count;
         first_state += from.states;
@@ -260,12 +280,13 @@ struct EffectList {
       return any([](const auto& e) { return ActsOnRod<std::remove_cvref_t<decltype(e)>, P, N> && acts(e); });
     }
     /// Whether an effect that is active has something to do where tubes end or start to curve.
-    [[nodiscard]] bool acts_at_stations() const noexcept {
-      return any([](const auto& e) { return HasStation<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
+    [[nodiscard]] bool acts_at_breakpoints() const noexcept {
+      return any([](const auto& e) { return HasBreakpoint<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
-    /// Whether an effect that is active lets tubes rub along their length.
-    [[nodiscard]] bool acts_by_rubbing() const noexcept {
-      return any([](const auto& e) { return HasRub<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
+    /// Whether an active effect lets friction act along the tubes.
+    [[nodiscard]] bool acts_by_distributed_friction() const noexcept {
+      return any(
+          [](const auto& e) { return HasDistributedFriction<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
     /// Whether an effect that is active changes what tubes are made of.
     [[nodiscard]] bool acts_on_material() const noexcept {
@@ -292,28 +313,28 @@ struct EffectList {
       std::apply([&](const auto&... effect) { (f(effect, std::exchange(first, first + effect.count)), ...); }, list);
     }
 
-    void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+    void material(const TubePoint<P>& place, Material<P>& m) const noexcept {
       for_each([&](const auto& e, int) {
         if constexpr (HasMaterial<std::remove_cvref_t<decltype(e)>, P>)
           if (e.active) e.material(place, m);
       });
     }
-    void station(Station<P, N>& s) const noexcept {
+    void breakpoint(Breakpoint<P, N>& s) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.station(s); })
-          if (e.active) e.station(s);
+        if constexpr (requires { e.breakpoint(s); })
+          if (e.active) e.breakpoint(s);
       });
     }
-    void rub(int station, std::array<P, N>& torque) const noexcept {
+    void distributed_friction(int breakpoint, std::array<P, N>& torque) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (HasRub<std::remove_cvref_t<decltype(e)>, P, N>)
-          if (e.active) e.rub(station, torque);
+        if constexpr (HasDistributedFriction<std::remove_cvref_t<decltype(e)>, P, N>)
+          if (e.active) e.distributed_friction(breakpoint, torque);
       });
     }
-    void grip(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
+    void base_compliance(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
       for_each([&](const auto& e, int) {
-        if constexpr (requires { e.grip(torque, angle); })
-          if (e.active) e.grip(torque, angle);
+        if constexpr (requires { e.base_compliance(torque, angle); })
+          if (e.active) e.base_compliance(torque, angle);
       });
     }
     void tip_force(const std::array<P, 3>& gravity, std::array<P, 3>& force) const noexcept {

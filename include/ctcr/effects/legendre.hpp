@@ -1,5 +1,5 @@
 #pragma once
-// What effects on the profile of a tube share.
+// Legendre polynomials, for profiles along a tube.
 #include <array>
 #include <concepts>
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace ctcr {
 
-/// Sum of c_k P_k(x), k = 1, 2, ..., P_k the Legendre polynomials: over [-1, 1] its mean is 0. Real-time safe.
+/// Sum of c_k P_k(x), k = 1, 2, ..., P_k the Legendre polynomials: over [-1, 1] its mean is 0. Real time: yes.
 template <class P, std::same_as<P>... C>
 [[nodiscard]] P legendre_sum(const P& x, const C&... c) noexcept {
   constexpr std::size_t K = sizeof...(C);

@@ -1,30 +1,24 @@
 #pragma once
-// What effects share that return with every turn of a gear or of a screw: parameters, and the error.
+// Errors of the drives that return with every turn of a gear or of a lead screw.
+#include <numbers>
+
 #include "ctcr/effects/hooks.hpp"
 
 namespace ctcr {
+namespace detail {
 
-/// Amplitudes of the error, then what says how often it returns, then amplitudes of what returns twice as often.
-/// @param once    unit, deviation and bounds of an amplitude
-/// @param twice   the same of one that returns twice as often
-/// @param period  how often it returns
-constexpr std::array<EffectParameter, 5> periodic_error(const EffectParameter& once, const EffectParameter& twice,
+/// Amplitudes of the error, how often it returns, then amplitudes of the second harmonic.
+/// @param once, twice  unit, deviation and bounds of the amplitudes of the first and of the second harmonic
+/// @param period       how often the error returns
+constexpr std::array<EffectParameter, 5> periodic_error(EffectParameter once, EffectParameter twice,
                                                         const EffectParameter& period) noexcept {
-  std::array<EffectParameter, 5> all{once, once, period, twice, twice};
-  const auto call = [&](std::size_t k, std::string_view name, std::string_view meaning) {
-    all[k].name = name;
-    all[k].meaning = meaning;
-    all[k].per_tube = true;
-  };
-  call(0, "cosine", "where the joint stands at 0");
-  call(1, "sine", "a quarter of the period on");
-  call(3, "cosine_twice", "of what returns twice as often");
-  call(4, "sine_twice", "of what returns twice as often");
-  for (const std::size_t k : {3, 4}) all[k].role = Role::detail;
-  return all;
+  once.per_tube = twice.per_tube = true;
+  twice.role = Role::detail;
+  return {once.named("cosine", "where the joint stands at 0"), once.named("sine", "a quarter of the period on"), period,
+          twice.named("cosine_twice", "of the second harmonic"), twice.named("sine_twice", "of the second harmonic")};
 }
 
-/// The error of a tube's joint where it stands at `phase` [rad] of its period. @param effect  with these parameters
+/// The error of a tube's joint at a phase [rad] of its period. @param effect  with these parameters
 template <class P, class Effect>
 [[nodiscard]] P error_at(const P& phase, const Effect& effect, int tube) noexcept {
   P s, c;
@@ -34,5 +28,83 @@ template <class P, class Effect>
   if (!vanishes(cosine) || !vanishes(sine)) error = error + cosine * (c * c - s * s) + sine * (2.0 * (s * c));
   return error;
 }
+
+}  // namespace detail
+
+namespace periodic_rotation {
+inline constexpr EffectInfo info{
+    .id = "periodic_rotation",
+    .title = "Rotation error once per turn",
+    .physics =
+        "An eccentric gear, coupling or encoder turns the tube a little too far and then not far enough, once per "
+        "turn.",
+    .signature = "The error is periodic in the angle of a motor.",
+    .measure = "Drive all tubes together through two turns.",
+    .look_alikes = "anisotropy",
+    .reference = "gear metrology, general practice",
+};
+inline constexpr auto parameters =
+    detail::periodic_error({.name = {}, .unit = "rad", .sigma = 0.0087, .soft = {-0.03, 0.03}, .hard = {-0.3, 0.3}},
+                           {.name = {}, .unit = "rad", .sigma = 0.002, .soft = {-0.02, 0.02}, .hard = {-0.3, 0.3}},
+                           {.name = "turns",
+                            .neutral = 1,
+                            .sigma = 0.5,
+                            .soft = {0.01, 100},
+                            .hard = {0.001, 1000},
+                            .role = Role::shape,
+                            .quantity = Quantity::gear_ratio,
+                            .meaning = "periods per turn of the tube"});
+}  // namespace periodic_rotation
+
+namespace periodic_translation {
+inline constexpr EffectInfo info{
+    .id = "periodic_translation",
+    .title = "Translation error once per screw turn",
+    .physics = "A lead screw that wobbles moves the tube too far and then not far enough, once per turn.",
+    .signature = "The error along the tube is periodic in the insertion, with the pitch of the screw.",
+    .measure = "Insert in steps that are no divisor of the pitch.",
+    .look_alikes = "backlash_translation",
+    .reference = "lead screw metrology, general practice",
+};
+inline constexpr auto parameters = detail::periodic_error(
+    {.name = {}, .unit = "m", .sigma = 3e-05, .soft = {-0.0001, 0.0001}, .hard = {-0.002, 0.002}},
+    {.name = {}, .unit = "m", .sigma = 8e-06, .soft = {-0.0001, 0.0001}, .hard = {-0.002, 0.002}},
+    {.name = "pitch",
+     .unit = "m",
+     .neutral = 0.002,
+     .sigma = 0.0001,
+     .soft = {0.0002, 0.02},
+     .hard = {1e-05, 0.1},
+     .role = Role::shape,
+     .quantity = Quantity::screw_pitch,
+     .meaning = "translation per turn of the screw"});
+}  // namespace periodic_translation
+
+/// Error of alpha, periodic in alpha itself, in `turns` periods per turn of the tube.
+template <int N, class P = double>
+struct PeriodicRotation : EffectValues<periodic_rotation::parameters, N, P> {
+  static constexpr const EffectInfo& info = periodic_rotation::info;
+
+  void actuate(const Occasion&, std::array<P, N>&, std::array<P, N>& alpha) const noexcept {
+    for (int i = 0; i < N; ++i) {
+      P& x = alpha[std::size_t(i)];
+      x = x + detail::error_at(this->template get<2>() * x, *this, i);
+    }
+  }
+};
+
+/// Error of beta, once per turn of the lead screw.
+template <int N, class P = double>
+struct PeriodicTranslation : EffectValues<periodic_translation::parameters, N, P> {
+  static constexpr const EffectInfo& info = periodic_translation::info;
+
+  void actuate(const Occasion&, std::array<P, N>& beta, std::array<P, N>&) const noexcept {
+    const P rate = 2 * std::numbers::pi * inverse(this->template get<2>());
+    for (int i = 0; i < N; ++i) {
+      P& x = beta[std::size_t(i)];
+      x = x + detail::error_at(rate * x, *this, i);
+    }
+  }
+};
 
 }  // namespace ctcr

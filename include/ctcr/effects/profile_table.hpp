@@ -1,5 +1,5 @@
 #pragma once
-// What a tube is made of along itself, as a table that is known at run time only: of effects that are not compiled.
+// Precurvature and stiffness along the tubes as tables of run time, for effects that are not compiled in.
 #include <algorithm>
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace ctcr {
 
-/// What is added to the data sheet at a place of a tube.
+/// Differences from the data sheet at one arc length of a tube.
 struct ProfileNode {
   std::array<double, 2> curvature{};  ///< of the free tube about its x and y axes, added [1/m]
   double stiffness = 0;               ///< relative change of EI
@@ -28,11 +28,7 @@ namespace profile_table {
 inline constexpr EffectInfo info{
     .id = "profile_table",
     .title = "Profiles along the tubes",
-    .physics = "What a tube is made of changes along it.",
-    .signature = "",
-    .measure = "",
-    .look_alikes = "",
-    .reference = "",
+    .physics = "Precurvature and stiffness of a tube change along it.",
 };
 inline constexpr std::array<EffectParameter, 0> parameters{};
 }  // namespace profile_table
@@ -44,12 +40,12 @@ struct ProfileTable : EffectValues<profile_table::parameters, N, P> {
 
   const Profiles<N>* profiles = nullptr;
 
-  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
+  void material(const TubePoint<P>& at, Material<P>& m) const noexcept {
     if (profiles == nullptr) return;
-    const auto tube = std::size_t(place.tube);
+    const auto tube = std::size_t(at.tube);
     const std::vector<ProfileNode>& nodes = profiles->nodes[tube];
     if (nodes.size() < 2) return;
-    const P x = place.along * (double(nodes.size() - 1) / profiles->length[tube]);
+    const P x = at.along * (double(nodes.size() - 1) / profiles->length[tube]);
     const auto first = std::size_t(std::clamp(value(x), 0.0, double(nodes.size() - 2)));
     const ProfileNode &a = nodes[first], &b = nodes[first + 1];
     const P part = x - double(first);

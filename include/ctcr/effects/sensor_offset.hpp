@@ -12,66 +12,28 @@ inline constexpr EffectInfo info{
     .measure = "Turn the innermost tube alone; record the orientation too.",
     .look_alikes = "precurvature_profile helical_precurvature field_distortion",
     .reference = "Hummel et al. 2005",
+    .variants = {{"x", "z"}, {"x", "turn_z"}},
 };
-inline constexpr std::array parameters{
-    EffectParameter{.name = "x",
-                    .unit = "m",
-                    .neutral = 0,
-                    .sigma = 0.001,
-                    .soft_low = -0.003,
-                    .soft_high = 0.003,
-                    .hard_low = -0.03,
-                    .hard_high = 0.03,
-                    .meaning = "tube frame at its tip"},
-    EffectParameter{.name = "y",
-                    .unit = "m",
-                    .neutral = 0,
-                    .sigma = 0.001,
-                    .soft_low = -0.003,
-                    .soft_high = 0.003,
-                    .hard_low = -0.03,
-                    .hard_high = 0.03,
-                    .meaning = "tube frame at its tip"},
-    EffectParameter{.name = "z",
-                    .unit = "m",
-                    .neutral = 0,
-                    .sigma = 0.001,
-                    .soft_low = -0.003,
-                    .soft_high = 0.003,
-                    .hard_low = -0.03,
-                    .hard_high = 0.03,
-                    .meaning = "along the tube"},
-    EffectParameter{.name = "turn_x",
-                    .unit = "rad",
-                    .neutral = 0,
-                    .sigma = 0.017,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -0.5,
-                    .hard_high = 0.5,
-                    .meaning = "of the sensor against the tip"},
-    EffectParameter{.name = "turn_y",
-                    .unit = "rad",
-                    .neutral = 0,
-                    .sigma = 0.017,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -0.5,
-                    .hard_high = 0.5,
-                    .meaning = "of the sensor against the tip"},
-    EffectParameter{.name = "turn_z",
-                    .unit = "rad",
-                    .neutral = 0,
-                    .sigma = 0.017,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -3.2,
-                    .hard_high = 3.2,
-                    .meaning = "of the sensor about the tube"},
-};
+inline constexpr EffectParameter offset{
+    .name = {}, .unit = "m", .neutral = 0, .sigma = 0.001, .soft = {-0.003, 0.003}, .hard = {-0.03, 0.03}};
+consteval EffectParameter turn(std::string_view name, double limit, std::string_view meaning) {
+  return {.name = name,
+          .unit = "rad",
+          .neutral = 0,
+          .sigma = 0.017,
+          .soft = {-0.05, 0.05},
+          .hard = {-limit, limit},
+          .meaning = meaning};
+}
+inline constexpr std::array parameters{offset.named("x", "tube frame at its tip"),
+                                       offset.named("y", "tube frame at its tip"),
+                                       offset.named("z", "along the tube"),
+                                       turn("turn_x", 0.5, "of the sensor against the tip"),
+                                       turn("turn_y", 0.5, "of the sensor against the tip"),
+                                       turn("turn_z", 3.2, "of the sensor about the tube")};
 }  // namespace sensor_offset
 
-/// The sensor is not where the tip is, and not turned as it is: T_tip_sensor.
+/// Pose of the sensor in the frame of the tip: T_tip_sensor.
 template <int N, class P = double>
 struct SensorOffset : EffectValues<sensor_offset::parameters, N, P> {
   static constexpr const EffectInfo& info = sensor_offset::info;

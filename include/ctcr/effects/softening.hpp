@@ -20,31 +20,23 @@ inline constexpr std::array parameters{
                     .unit = "m^2",
                     .neutral = 0,
                     .sigma = 0.004,
-                    .soft_low = 0,
-                    .soft_high = 0.016,
-                    .hard_low = 0,
-                    .hard_high = 0.08,
+                    .soft = {0, 0.016},
+                    .hard = {0, 0.08},
                     .per_tube = true,
                     .meaning = "part of the stiffness that is lost per square of the change of curvature, as long as "
                                "that is small"},
     EffectParameter{.name = "plateau",
-                    .unit = {},
                     .neutral = 0.25,
                     .sigma = 0.15,
-                    .soft_low = 0.05,
-                    .soft_high = 0.6,
-                    .hard_low = 0.02,
-                    .hard_high = 0.9,
+                    .soft = {0.05, 0.6},
+                    .hard = {0.02, 0.9},
                     .role = Role::shape,
                     .meaning = "part of the stiffness that is left in the end"},
     EffectParameter{.name = "sharpness",
-                    .unit = {},
                     .neutral = 2,
                     .sigma = 1.5,
-                    .soft_low = 2,
-                    .soft_high = 8,
-                    .hard_low = 2,
-                    .hard_high = 8,
+                    .soft = {2, 8},
+                    .hard = {2, 8},
                     .role = Role::shape,
                     .meaning = "how suddenly the tube gives way: 2 gradually, 8 at a knee"},
 };
@@ -56,8 +48,8 @@ template <int N, class P = double>
 struct Softening : EffectValues<softening::parameters, N, P> {
   static constexpr const EffectInfo& info = softening::info;
 
-  void material(const TubePlace<P>& place, Material<P>& m) const noexcept {
-    m.softening = m.softening + this->template get<0>(place.tube);
+  void material(const TubePoint<P>& at, Material<P>& m) const noexcept {
+    m.softening = m.softening + this->template get<0>(at.tube);
     m.plateau = this->template get<1>();
     m.sharpness = this->template get<2>();
   }

@@ -12,48 +12,27 @@ inline constexpr EffectInfo info{
     .look_alikes = "entry_compliance sensor_offset",
     .reference = "Rucker & Webster 2011; disturbance wrenches",
     .needs = {.gravity = true},
+    .variants = {{"mass", "mass"}, {"force_x", "force_z"}},
 };
-inline constexpr std::array parameters{
-    EffectParameter{.name = "mass",
-                    .unit = "kg",
-                    .neutral = 0,
-                    .sigma = 0.001,
-                    .soft_low = 0,
-                    .soft_high = 0.005,
-                    .hard_low = 0,
-                    .hard_high = 0.05,
-                    .meaning = "hanging on the tip"},
-    EffectParameter{.name = "force_x",
-                    .unit = "N",
-                    .neutral = 0,
-                    .sigma = 0.01,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -0.5,
-                    .hard_high = 0.5,
-                    .meaning = "base frame"},
-    EffectParameter{.name = "force_y",
-                    .unit = "N",
-                    .neutral = 0,
-                    .sigma = 0.01,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -0.5,
-                    .hard_high = 0.5,
-                    .meaning = "base frame"},
-    EffectParameter{.name = "force_z",
-                    .unit = "N",
-                    .neutral = 0,
-                    .sigma = 0.01,
-                    .soft_low = -0.05,
-                    .soft_high = 0.05,
-                    .hard_low = -0.5,
-                    .hard_high = 0.5,
-                    .meaning = "base frame"},
-};
+inline constexpr EffectParameter force{.name = {},
+                                       .unit = "N",
+                                       .neutral = 0,
+                                       .sigma = 0.01,
+                                       .soft = {-0.05, 0.05},
+                                       .hard = {-0.5, 0.5},
+                                       .quantity = Quantity::tip_force};
+inline constexpr std::array parameters{EffectParameter{.name = "mass",
+                                                       .unit = "kg",
+                                                       .neutral = 0,
+                                                       .sigma = 0.001,
+                                                       .soft = {0, 0.005},
+                                                       .hard = {0, 0.05},
+                                                       .meaning = "hanging on the tip"},
+                                       force.named("force_x", "base frame"), force.named("force_y", "base frame"),
+                                       force.named("force_z", "base frame")};
 }  // namespace tip_load
 
-/// A force at the robot tip that no one told the model: of an end cap, a sensor, its cable.
+/// A constant force at the robot tip that is not among the known loads: of an end cap, a sensor, its cable.
 template <int N, class P = double>
 struct TipWeight : EffectValues<tip_load::parameters, N, P> {
   static constexpr const EffectInfo& info = tip_load::info;

@@ -19,10 +19,8 @@ inline constexpr std::array parameters{
                     .unit = "rad/(N m)",
                     .neutral = 0,
                     .sigma = 2.0,
-                    .soft_low = -2,
-                    .soft_high = 30,  // half of what the slender inner tube of Table II twists itself: -beta / GJ = 55
-                    .hard_low = -30,
-                    .hard_high = 100,
+                    .soft = {-2, 30},  // half of what the slender inner tube of Table II twists itself: -beta / GJ = 55
+                    .hard = {-30, 100},
                     .per_tube = true,
                     .meaning = "of the drive of a tube"},
 };
@@ -33,7 +31,7 @@ template <int N, class P = double>
 struct TorsionalCompliance : EffectValues<torsional_compliance::parameters, N, P> {
   static constexpr const EffectInfo& info = torsional_compliance::info;
 
-  void grip(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
+  void base_compliance(const std::array<P, N>& torque, std::array<P, N>& angle) const noexcept {
     for (std::size_t i = 0; i < N; ++i) angle[i] = angle[i] - this->template get<0>(int(i)) * torque[i];
   }
 };

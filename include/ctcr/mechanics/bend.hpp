@@ -13,8 +13,9 @@ template <int N, class S>
 struct TubesHere {
   int present = 0;  ///< tubes 1..present
   std::array<bool, N> curved{};
-  std::array<S, N> along;               ///< arc length of each present tube here [m]
-  std::array<S, N> rub, rub_rate;       ///< torque per length on each tube from the next outer one [N], its rate [N/m]
+  std::array<S, N> along;  ///< arc length of each present tube here [m]
+  std::array<S, N> friction,
+      friction_rate;                    ///< torque per length on each tube from the next outer one [N], its rate [N/m]
   std::array<Material<S>, N> material;  ///< of each present tube here
   std::array<double, 2> u{};            ///< curvature a little further out, where iterations may begin [1/m]
   bool bent = false;                    ///< whether it is known

@@ -16,27 +16,27 @@ template <int N, class S>
 struct ContactAngles {
   std::array<S, std::size_t(Contacts<N>::count)> angle{};
 
-  void operator()(int station, const auto& state) noexcept {
-    if (station < N) present = station + 1;
-    passed[std::size_t(station)] = true;
+  void operator()(int breakpoint, const auto& state) noexcept {
+    if (breakpoint < N) present = breakpoint + 1;
+    passed[std::size_t(breakpoint)] = true;
     for (int i = 0; i + 1 < N && i + 1 < present; ++i) {
       const S here = state.psi(i) - state.psi(i + 1);
       const auto fill = [&](const auto& which) {
-        for (int k = 0; k < Contacts<N>::stations; ++k)
-          if (which(k)) angle[Contacts<N>::place(i, k)] = here;
+        for (int k = 0; k < Contacts<N>::breakpoints; ++k)
+          if (which(k)) angle[Contacts<N>::index(i, k)] = here;
       };
-      if (station == i + 1)
+      if (breakpoint == i + 1)
         fill([](int) { return true; });
-      else if (station == Contacts<N>::plate)
-        fill([&](int k) { return k == station || (k >= N && !passed[std::size_t(k)]); });
+      else if (breakpoint == Contacts<N>::plate)
+        fill([&](int k) { return k == breakpoint || (k >= N && !passed[std::size_t(k)]); });
       else
-        fill([&](int k) { return k == station; });
+        fill([&](int k) { return k == breakpoint; });
     }
   }
 
 private:
   int present = 0;
-  std::array<bool, std::size_t(Contacts<N>::stations)> passed{};
+  std::array<bool, std::size_t(Contacts<N>::breakpoints)> passed{};
 };
 
 }  // namespace detail
@@ -55,12 +55,12 @@ template <int N, class Fx>
   detail::ContactAngles<N, double> angles;
   rod.rod.run(
       rod.events, steps, y, frame,
-      [&](int station, const auto&, const auto& state, const auto&) { angles(station, state); },
+      [&](int breakpoint, const auto&, const auto& state, const auto&) { angles(breakpoint, state); },
       typename decltype(rod)::NoNode{});
   for (int i = 0; i + 1 < N; ++i) {
     const double at_base = ws.q.alpha[i] - ws.q.alpha[i + 1];
-    for (int station = 0; station < Contacts<N>::stations; ++station) {
-      const std::size_t k = Contacts<N>::place(i, station);
+    for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
+      const std::size_t k = Contacts<N>::index(i, breakpoint);
       last[k] += wrapped(angles.angle[k] - at_base - last[k]);
     }
   }
@@ -78,15 +78,15 @@ template <int N, class Fx>
   Frame<double> frame;
   MomentJumps<N> jumps;
   jumps.fill(0);
-  const auto gather = [&](int station, const auto&, const auto&, const auto& moments) {
+  const auto gather = [&](int breakpoint, const auto&, const auto&, const auto& moments) {
     const auto [far, near] = moments();
     double dx = 0, dy = 0;
     for (std::size_t i = 0; i < N; ++i) {
       dx += far[i][0] - near[i][0];
       dy += far[i][1] - near[i][1];
       const bool is_outermost = i + 1 == N;
-      if (is_outermost && station != Contacts<N>::plate) continue;
-      jumps[is_outermost ? Contacts<N>::count : Contacts<N>::place(int(i), station)] = std::hypot(dx, dy);
+      if (is_outermost && breakpoint != Contacts<N>::plate) continue;
+      jumps[is_outermost ? Contacts<N>::count : Contacts<N>::index(int(i), breakpoint)] = std::hypot(dx, dy);
     }
   };
   rod.rod.run(rod.events, steps, y, frame, gather, typename decltype(rod)::NoNode{});
@@ -133,16 +133,16 @@ template <int Most, int N, class Fx>
     RodInputs<N, S, Fx> in = inputs(window);
     in.effects.for_each([&](auto& effect, int) {
       if constexpr (FollowsTwist<std::remove_cvref_t<decltype(effect)>>)
-        for (int k = 0; k < contacts; ++k) window.add(effect.past.state[std::size_t(k)], unknowns + k, 1);
+        for (int k = 0; k < contacts; ++k) window.add(effect.history.state[std::size_t(k)], unknowns + k, 1);
     });
     detail::ContactAngles<N, S> angles;
     const Pass pass(in, sort_events(model.coefficients().plain, ws.q.beta), ws.guess, 0, steps, window,
-                    [&](int station, const auto& state) { angles(station, state); });
+                    [&](int breakpoint, const auto& state) { angles(breakpoint, state); });
     LaneRow<Window::groups> row[Pass::rows];
     pass.write(row, 0);
     for (int i = 0; i + 1 < N; ++i)
-      for (int station = 0; station < Contacts<N>::stations; ++station) {
-        const std::size_t k = Contacts<N>::place(i, station);
+      for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
+        const std::size_t k = Contacts<N>::index(i, breakpoint);
         const S twist = angles.angle[k] - (in.alpha[std::size_t(i)] - in.alpha[std::size_t(i) + 1]);
         for (int lane = 0; lane < window.size; ++lane)
           put(window.first + lane, turned_by_unknown, turned, int(k), twist.d[lane / lane_count][lane % lane_count]);

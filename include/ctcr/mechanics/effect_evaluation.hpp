@@ -57,7 +57,7 @@ public:
   using Inputs = RodInputs<N, S, Fx>;
 
   /// @param in   with derivatives along the window's variables other than the unknowns
-  /// @param met  called as met(station, state) at each station of Contacts<N> but the robot tip
+  /// @param met  called as met(breakpoint, state) at each breakpoint of Contacts<N> but the robot tip
   template <class Met = Ignored>
   EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, int steps,
              const Window& window, const Met& met = {}) noexcept
@@ -85,7 +85,7 @@ public:
       twist[i] = y.torque(i).v / in.tubes[t].kz.v;
       angle_[t] = y.psi(i) + in.beta[t] * (y.torque(i) * inverse(in.tubes[t].kz));
     }
-    in.effects.grip(torque, angle_);
+    in.effects.base_compliance(torque, angle_);
   }
 
   TubeTips<N> tips;  ///< tips of tubes 2..N as seen from the robot tip

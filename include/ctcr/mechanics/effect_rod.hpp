@@ -18,11 +18,13 @@ public:
   using Bend = ctcr::Bend<N, S>;
 
   explicit EffectRod(const Inputs& inputs) noexcept
-    : in_(inputs), varied_(inputs.effects.acts_on_material()), rubs_(inputs.effects.acts_by_rubbing()) {}
+    : in_(inputs),
+      varied_(inputs.effects.acts_on_material()),
+      distributed_friction_(inputs.effects.acts_by_distributed_friction()) {}
 
   /// Integrates from the state at the tip to the grasped side of the front plate.
   /// @param frame  out: Bishop frame there as seen from the tip frame
-  /// @param met    called as met(station, frame, state, moments) at each station of Contacts<N> but the robot tip;
+  /// @param met    called as met(breakpoint, frame, state, moments) at each breakpoint of Contacts<N> but the robot tip;
   ///               moments() are those of the tubes on its far and on its near side, Bishop axes
   /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
@@ -45,7 +47,7 @@ public:
       }
       locate(near);
       if (place.present > 0) {
-        using Kind = typename Station<S, N>::Kind;
+        using Kind = typename Breakpoint<S, N>::Kind;
         stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
       }
       if (id > 0) met(id, frame, y, [&] { return std::pair(moments(place, y), moments(near, y)); });
@@ -53,7 +55,7 @@ public:
       place.bent = false;
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
       const S next = last ? S(0.0) : event_place(events.id[e + 1]);
-      rub_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, place);
+      set_friction_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, place);
       const S h = (1.0 / steps) * (next - here);
       for (int i = 0; i < steps; ++i) {
         if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, place, y, frame, *this);
@@ -63,7 +65,7 @@ public:
       here = next;
     }
     met(Contacts<N>::plate, frame, y, [&] { return std::pair(moments(place, y), moments_behind_plate(place, y)); });
-    stop(Station<S, N>::Kind::plate, -1, place, place, y, frame);
+    stop(Breakpoint<S, N>::Kind::plate, -1, place, place, y, frame);
   }
 
   struct NoNode {};
@@ -87,8 +89,8 @@ public:
       return r;
     };
     const auto advance = [&] {
-      if (rubs())
-        for (std::size_t i = 0; i < N; ++i) place.rub[i] = place.rub[i] + half * place.rub_rate[i];
+      if (has_distributed_friction())
+        for (std::size_t i = 0; i < N; ++i) place.friction[i] = place.friction[i] + half * place.friction_rate[i];
       if (!varied_) return;
       for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
       locate(place);
@@ -115,18 +117,20 @@ private:
     return id < N ? tip : tip - in_.tubes[i].curved_length;
   }
 
-  [[nodiscard]] bool rubs() const noexcept { return Fx::template On<N, S>::has_rub && rubs_; }
+  [[nodiscard]] bool has_distributed_friction() const noexcept {
+    return Fx::template On<N, S>::has_distributed_friction && distributed_friction_;
+  }
 
-  /// Sets what tubes rub from a station to the next one, a distance of h < 0 towards the base.
-  void rub_between(int far, int near, const S& h, Place& place) const noexcept {
-    if (!rubs()) return;
+  /// Sets the friction along the tubes from a breakpoint to the next one, a distance of h < 0 towards the base.
+  void set_friction_between(int far, int near, const S& h, Place& place) const noexcept {
+    if (!has_distributed_friction()) return;
     constexpr double shortest = 1e-9;  // [m]: no division by 0
     std::array<S, N> end;
-    for (std::size_t i = 0; i < N; ++i) place.rub[i] = end[i] = 0.0;
-    in_.effects.rub(far, place.rub);
-    in_.effects.rub(near, end);
+    for (std::size_t i = 0; i < N; ++i) place.friction[i] = end[i] = 0.0;
+    in_.effects.distributed_friction(far, place.friction);
+    in_.effects.distributed_friction(near, end);
     const S per_length = value(h) < -shortest ? inverse(h) : S(0.0);
-    for (std::size_t i = 0; i < N; ++i) place.rub_rate[i] = (end[i] - place.rub[i]) * per_length;
+    for (std::size_t i = 0; i < N; ++i) place.friction_rate[i] = (end[i] - place.friction[i]) * per_length;
   }
 
   static void clear_twist(Frame<S>& frame) noexcept {
@@ -147,7 +151,7 @@ private:
       const S straight = t.length - t.curved_length;
       const S within = place.curved[i] ? S(place.along[i] - straight) : place.along[i];
       const S part = within * inverse(place.curved[i] ? t.curved_length : straight);
-      in_.effects.material(TubePlace<S>{j, place.curved[i], place.along[i], within, part}, m);
+      in_.effects.material(TubePoint<S>{j, place.curved[i], place.along[i], within, part}, m);
     }
     return m;
   }
@@ -170,10 +174,10 @@ private:
         d.psi(j) = d.torque(j) = 0.0;
       }
     }
-    if (rubs()) {
+    if (has_distributed_friction()) {
       for (int j = 0; j + 1 < place.present; ++j) {
-        d.torque(j) = d.torque(j) - place.rub[std::size_t(j)];
-        d.torque(j + 1) = d.torque(j + 1) + place.rub[std::size_t(j)];
+        d.torque(j) = d.torque(j) - place.friction[std::size_t(j)];
+        d.torque(j + 1) = d.torque(j + 1) + place.friction[std::size_t(j)];
       }
     }
     const S &ux = u[0], &uy = u[1];
@@ -189,11 +193,11 @@ private:
   }
 
   /// Lets the effects act where tubes end or start to curve.
-  void stop(typename Station<S, N>::Kind kind, int tube, const Place& far, const Place& near, State& y,
+  void stop(typename Breakpoint<S, N>::Kind kind, int tube, const Place& far, const Place& near, State& y,
             Frame<S>& frame) const noexcept {
-    if constexpr (Fx::template On<N, S>::has_station) {
-      if (!in_.effects.acts_at_stations()) return;
-      Station<S, N> s{
+    if constexpr (Fx::template On<N, S>::has_breakpoint) {
+      if (!in_.effects.acts_at_breakpoints()) return;
+      Breakpoint<S, N> s{
           .kind = kind,
           .tube = tube,
           .far = far.present,
@@ -201,10 +205,10 @@ private:
           .moment = {y.m(0), y.m(1)},
           .force = {y.n(0), y.n(1)},
           .far_moment = moments(far, y),
-          .near_moment = kind == Station<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
+          .near_moment = kind == Breakpoint<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
       for (std::size_t i = 0; i < N; ++i) s.torque[i] = 0.0;
       s.kink = s.shift = {0.0, 0.0};
-      in_.effects.station(s);
+      in_.effects.breakpoint(s);
       for (int i = 0; i < near.present; ++i) y.torque(i) = y.torque(i) + s.torque[std::size_t(i)];
       if (!vanishes(s.shift[0]) || !vanishes(s.shift[1])) {
         const S straight[3] = {0.0, 0.0, 0.0};
@@ -273,8 +277,8 @@ private:
   }
 
   const Inputs& in_;
-  bool varied_;  ///< whether effects change what tubes are made of
-  bool rubs_;    ///< whether tubes rub along their length
+  bool varied_;                ///< whether effects change what tubes are made of
+  bool distributed_friction_;  ///< whether friction acts along the tubes
 };
 
 }  // namespace ctcr

@@ -184,12 +184,12 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
   const Equilibrium equilibrium(model, q, load);
   const Rod& rod = equilibrium.rod;
   const Events<N>& events = equilibrium.events;
-  const auto no_station = [](int, const Frame<double>&, const State&, const auto&) noexcept {};
+  const auto no_breakpoint = [](int, const Frame<double>&, const State&, const auto&) noexcept {};
 
   const State tip = equilibrium.at_tip(guess);
   State plate = tip;
   Frame<double> frame;
-  rod.run(events, steps, plate, frame, no_station, typename Rod::NoNode{});
+  rod.run(events, steps, plate, frame, no_breakpoint, typename Rod::NoNode{});
   std::array<double, N> psi, w, torque, angle;
   for (int i = 0; i < N; ++i) {
     const auto t = std::size_t(i);
@@ -198,7 +198,7 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
     w[t] = torque[t] / equilibrium.in.tubes[t].kz;
     angle[t] = psi[t] + q.beta[i] * w[t];
   }
-  equilibrium.in.effects.grip(torque, angle);
+  equilibrium.in.effects.base_compliance(torque, angle);
   BaseView base;
   base.turn = q.alpha[0] - angle[0];
   base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * pose_of(frame).inverse();
@@ -234,7 +234,7 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
     node = {s, place, y, f};
   };
   State y = tip;
-  rod.run(events, steps, y, frame, no_station, record);
+  rod.run(events, steps, y, frame, no_breakpoint, record);
   fill_down_to(-2 * same_place);
   for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, psi, w, points[left - 1]);
 }

@@ -23,7 +23,7 @@ public:
       variables_(&variables),
       window_(window),
       effect_(std::get<Effects::follower>(variables.effects(system.model.effects(), window).list)) {
-    effect_.past = {};
+    effect_.history = {};
   }
 
   /// A place without slopes of the twist.
@@ -40,7 +40,7 @@ public:
     Effect next = effect_;
     if (!from_) return next;
     const std::array<Row, 2> q{*from_, to};
-    next.remember({q, {}, {}, radius_}, 1);
+    next.update_history({q, {}, {}, radius_}, 1);
     return next;
   }
   /// Goes there.

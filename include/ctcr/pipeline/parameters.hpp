@@ -19,7 +19,7 @@ struct SystemParameters {
     Effects{}.for_each([&](const auto& effect, int first) {
       for (int k = 0; k < int(effect.parameters.size()); ++k)
         for (int i = 0; i < effect.size(k); ++i)
-          if (Robot::count + first + effect.place(k, i) == index) {
+          if (Robot::count + first + effect.index(k, i) == index) {
             const EffectParameter& parameter = effect.parameters[std::size_t(k)];
             text.append("effects.").append(effect.info.id).append(".").append(parameter.name);
             if (parameter.per_tube) text.append(".").append(std::to_string(i + 1));

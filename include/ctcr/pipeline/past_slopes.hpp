@@ -30,7 +30,7 @@ class PastSlopes {
 
 public:
   /// Fill all windows; then they are known. What is given must outlive this.
-  /// @param rows       as memories() takes them
+  /// @param rows       as histories() takes them
   /// @param variables  places in SystemParameters<N, Fx>, each once
   /// @param wanted     rows whose slopes are asked for
   PastSlopes(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, std::span<const int> variables,
@@ -103,7 +103,7 @@ private:
   void follow_joints(auto& effect, int first, const Window& window) {
     const detail::RecordedPath<N, S> path(system_.transmission, rows_, variables_.seeding(window));
     for (std::size_t row = 0, k = 0; row < rows_.size(); ++row) {
-      for (; k <= path.end[row]; ++k) effect.remember(path, k);
+      for (; k <= path.end[row]; ++k) effect.update_history(path, k);
       keep(effect, first, window, row);
     }
   }
@@ -133,7 +133,7 @@ private:
   void keep(const auto& effect, int first, const Window& window, std::size_t row) noexcept {
     if (place_[row] < 0) return;
     for (int i = 0; i < effect.states; ++i) {
-      const auto& d = effect.past.state[std::size_t(i)].d;
+      const auto& d = effect.history.state[std::size_t(i)].d;
       auto column = slopes_.col(place_[row] * kept_count_ + kept_[std::size_t(first + i)]);
       variables_.for_each_in(window, [&](int lane, int variable) {
         const int here = lane - window.first;

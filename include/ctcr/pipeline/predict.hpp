@@ -8,7 +8,7 @@
 
 namespace ctcr {
 
-/// Every station of the way.
+/// Every breakpoint of the way.
 template <int N>
 struct Prediction {
   Joints<N> q;

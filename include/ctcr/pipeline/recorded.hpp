@@ -18,24 +18,24 @@ namespace ctcr {
 /// @param winding  how the rows' twist changes with the parameters; as it stands, if that is not known
 /// Real time: no (allocates).
 template <int N, class Fx>
-std::vector<typename Fx::template On<N>::Memory> memories(const System<N, Fx>& system,
-                                                          std::span<const RecordedRow<N>> rows,
-                                                          const Winding<N>& winding = {}) {
-  std::vector<typename Fx::template On<N>::Memory> memory(rows.size());
+std::vector<typename Fx::template On<N>::History> histories(const System<N, Fx>& system,
+                                                            std::span<const RecordedRow<N>> rows,
+                                                            const Winding<N>& winding = {}) {
+  std::vector<typename Fx::template On<N>::History> memory(rows.size());
   if constexpr (Fx::template On<N>::states > 0) {
     auto effects = system.model.effects();
-    effects.remember({});
+    effects.set_history({});
     detail::RecordedPath<N, double> path(system.transmission, rows, [](double x, int) { return x; });
     winding.unwind(SystemParameters<N, Fx>::values(system), path);
     for (std::size_t row = 0, place = 0; row < rows.size(); ++row) {
-      for (; place <= path.end[row]; ++place) effects.remember(path, place);
-      memory[row] = effects.memory();
+      for (; place <= path.end[row]; ++place) effects.update_history(path, place);
+      memory[row] = effects.history();
     }
   }
   return memory;
 }
 
-/// Every station of a row's way; q are the joints that the tubes have.
+/// Every breakpoint of a row's way; q are the joints that the tubes have.
 template <int N, class Fx>
 struct RecordedPrediction : Prediction<N> {
   TipLoad load;                    ///< with what the surroundings add
@@ -90,16 +90,16 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
 }  // namespace detail
 
 /// What the tracker will read in a row.
-/// @param memory  of this row, as memories() gives it
+/// @param memory  of this row, as histories() gives it
 /// @return as solve(), not_finite where a parameter of an effect is not a number, not_converged where the tip and its
 ///         surroundings find no balance. Real time: yes.
 template <int N, class Fx>
   requires(!Fx::none)
 CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& row,
-                             const typename Fx::template On<N>::Memory& memory, Workspace<N>& ws,
+                             const typename Fx::template On<N>::History& memory, Workspace<N>& ws,
                              RecordedPrediction<N, Fx>& out) noexcept {
   auto effects = system.model.effects();
-  effects.remember(memory);
+  effects.set_history(memory);
   std::array<double, N> beta, alpha;
   detail::joints_of<N, double>(system.transmission, row.theta, [](double x, int) { return x; }, beta, alpha);
   effects.actuate(row.at, beta, alpha);
@@ -126,7 +126,7 @@ CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& 
 /// As above without effects, by the faster way of predict.hpp.
 template <int N, class Fx>
   requires(Fx::none)
-Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typename Fx::template On<N>::Memory&,
+Status predict(const System<N, Fx>& system, const RecordedRow<N>& row, const typename Fx::template On<N>::History&,
                Workspace<N>& ws, RecordedPrediction<N, Fx>& out) noexcept {
   out.load = row.load;
   return predict(system, row.theta, row.load, ws, out);

@@ -93,7 +93,7 @@ private:
 
   /// What is rubbed.
   static Vec rubbing(const Effects& effects) noexcept {
-    return Vec::Map(std::get<Effects::follower>(effects.list).past.state.data());
+    return Vec::Map(std::get<Effects::follower>(effects.list).history.state.data());
   }
 
   /// What a change of the rubbing did to the equilibrium's twist, by the contacts that may have done it: where tubes hardly

@@ -38,14 +38,14 @@ class Winder {
 public:
   using Slopes = TwistSlopes<N>;
   struct Stand {
-    decltype(Follower::Past::state) rubbed;  ///< on the way to here
+    decltype(Follower::History::state) rubbed;  ///< on the way to here
     Twist<N> twist;
   };
 
   /// Stands before the first place.
   explicit Winder(const On& effects) noexcept : effects_(effects) {}
 
-  [[nodiscard]] Stand stand() const noexcept { return {follower(effects_).past.state, from_.twist}; }
+  [[nodiscard]] Stand stand() const noexcept { return {follower(effects_).history.state, from_.twist}; }
 
   /// Goes on to place k with the twist that the path says. Of the equilibria before it then knows nothing.
   void pass(const Path<N, double>& path, std::size_t k) noexcept {
@@ -74,7 +74,7 @@ public:
     Twist<N> found = given;
     Vec::Map(found.data()) += wound_;
     const auto in_equilibrium = [&](const On& with) {
-      return has_equilibrium(predict(system, here, with.memory(), ws_, prediction_)) ? &prediction_.model : nullptr;
+      return has_equilibrium(predict(system, here, with.history(), ws_, prediction_)) ? &prediction_.model : nullptr;
     };
     const int steps = system.settings.steps;
     effects_ = balance_.solve(
@@ -112,8 +112,8 @@ private:
     std::array way{dual(from_), dual(to)};
     for (S& twist : way[1].twist) twist.d[0] = unit_lane(0);
     auto effects = before.template seeded<S>(Constant<S>{});
-    follower(effects).remember({way, {}, {}, radius}, 1);
-    for (int c = 0; c < Contacts<N>::count; ++c) slopes[c] = follower(effects).past.state[std::size_t(c)].d[0][0];
+    follower(effects).update_history({way, {}, {}, radius}, 1);
+    for (int c = 0; c < Contacts<N>::count; ++c) slopes[c] = follower(effects).history.state[std::size_t(c)].d[0][0];
     return slopes;
   }
 
@@ -131,8 +131,9 @@ private:
   On effects_at(const Path<N, double>& path, std::size_t k) const noexcept {
     On now = effects_;
     now.for_each([&](auto& effect, int) {
-      if constexpr (!FollowsTwist<std::remove_cvref_t<decltype(effect)>> && requires { effect.remember(path, k); })
-        effect.remember(path, k);
+      if constexpr (!FollowsTwist<std::remove_cvref_t<decltype(effect)>> &&
+                    requires { effect.update_history(path, k); })
+        effect.update_history(path, k);
     });
     return now;
   }
@@ -142,7 +143,7 @@ private:
     if (k == 0) return now;
     std::array<Row, 2> way{from_, path.q[k]};
     way[1].twist = twist;
-    follower(now).remember({way, {}, {}, path.radius}, 1);
+    follower(now).update_history({way, {}, {}, path.radius}, 1);
     return now;
   }
 

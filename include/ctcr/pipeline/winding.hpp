@@ -70,7 +70,7 @@ public:
       Slopes rubbed;
       for (int c = 0; c < contacts; ++c)
         for (int i = 0; i < Window::size; ++i)
-          rubbed(c, i) = next.past.state[std::size_t(c)].d[i / lane_count][i % lane_count];
+          rubbed(c, i) = next.history.state[std::size_t(c)].d[i / lane_count][i % lane_count];
       slopes_.noalias() = there->by_rubbing * rubbed;
       variables_->for_each_in(window_, [&](int lane, int variable) {
         slopes_.col(lane - window_.first) += there->by_variables.col(variable);

@@ -1,6 +1,7 @@
 #pragma once
 // A recording of a robot whose number of tubes is known at run time.
 #include <Eigen/Core>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -66,13 +67,17 @@ struct CatalogueParameter {
   std::string effect, name, unit, meaning;
   double neutral, sigma, soft_low, soft_high, hard_low, hard_high;
   bool per_tube;
-  std::string kind;  ///< strength, detail, shape or choice
-  int first;         ///< place of its first value among those of the catalogue
+  std::string kind;      ///< as Role
+  std::string quantity;  ///< as Quantity
+  int first;             ///< index of its first value among those of the catalogue
 };
-/// An effect in words.
+/// An effect as its EffectInfo and its hooks describe it.
 struct CatalogueEntry {
   std::string id, title, physics, signature, measure, look_alikes, reference;
   bool order, time, orientation, loads, gravity;
+  std::vector<std::string> acts_on;                   ///< as ActsOn
+  std::vector<std::vector<std::string>> variants;     ///< names of parameters; at least one
+  std::vector<std::map<std::string, double>> starts;  ///< values of parameters; may be empty
 };
 
 /// Defined for N = 1..4.

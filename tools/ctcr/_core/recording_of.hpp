@@ -158,14 +158,16 @@ ParameterNames parameter_names() {
 
 template <int N>
 std::vector<CatalogueParameter> catalogue_parameters() {
-  constexpr std::array kinds{"strength", "detail", "shape", "choice"};  // as Role
+  constexpr std::array kinds{"amplitude", "detail", "shape", "choice"};  // as Role
+  constexpr std::array quantities{"other",   "tip_force", "lag",         "moment",
+                                  "surface", "source",    "screw_pitch", "gear_ratio"};  // as Quantity
   std::vector<CatalogueParameter> out;
   typename Catalogue::On<N>{}.for_each([&](const auto& effect, int first) {
     for (int k = 0; k < int(effect.parameters.size()); ++k) {
       const EffectParameter& p = effect.parameters[std::size_t(k)];
       out.push_back({std::string(effect.info.id), std::string(p.name), std::string(p.unit), std::string(p.meaning),
-                     p.neutral, p.sigma, p.soft_low, p.soft_high, p.hard_low, p.hard_high, p.per_tube,
-                     kinds[std::size_t(p.role)], first + effect.place(k)});
+                     p.neutral, p.sigma, p.soft.low, p.soft.high, p.hard.low, p.hard.high, p.per_tube,
+                     kinds[std::size_t(p.role)], quantities[std::size_t(p.quantity)], first + effect.index(k)});
     }
   });
   return out;

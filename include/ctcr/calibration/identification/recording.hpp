@@ -23,7 +23,7 @@ namespace ctcr {
 template <int N, class Fx = Standard>
 class Recording {
   using P = SystemParameters<N, Fx>;
-  using MemoryOfRow = typename Fx::template On<N>::Memory;
+  using HistoryOfRow = typename Fx::template On<N>::History;
 
 public:
   /// @param measured    T_tracker_sensor of each row, NaN where not measured
@@ -59,7 +59,7 @@ public:
   /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const System<N, Fx> system = this->system(x);
-    const std::vector<MemoryOfRow> memory = memories<N, Fx>(system, rows_, *winding_);
+    const std::vector<HistoryOfRow> memory = histories<N, Fx>(system, rows_, *winding_);
     const std::optional<PastSlopes<N, Fx>> past = jacobian ? std::optional(past_slopes(system)) : std::nullopt;
     const Mat3 turning = left_jacobian(turn_of(x));
     residual.resize(6 * size());
@@ -146,7 +146,7 @@ private:
     Eigen::Matrix<double, 6, Eigen::Dynamic> slopes;
   };
 
-  bool solve_row(const System<N, Fx>& system, const MemoryOfRow& memory, std::size_t i, Worker& w) noexcept {
+  bool solve_row(const System<N, Fx>& system, const HistoryOfRow& memory, std::size_t i, Worker& w) noexcept {
     Workspace<N>& ws = w.workspace;
     if (start_[i].known)
       ws.begin_at(start_[i].guess);

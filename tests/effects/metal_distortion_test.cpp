@@ -1,5 +1,5 @@
 // A reading beside metal, against the least squares that define it.
-#include "ctcr/effects/metal.hpp"
+#include "ctcr/effects/metal_distortion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ TEST(Metal, MisleadsAsTheBestPoseForTheSumOfFieldsDoes) {
       columns.col(3 + axis) = turned.reshaped();
     }
     const Vec6 best = columns.colPivHouseholderQr().solve(extra.reshaped());
-    const Misreading<double> off = beside_metal(triple(p), triple(m), volume);
+    const ReadingError<double> off = metal_distortion(triple(p), triple(m), volume);
     EXPECT_LE((vector(off.shift) - best.head<3>()).norm(), 1e-5 * best.head<3>().norm());
     EXPECT_LE((vector(off.turn) - best.tail<3>()).norm(), 1e-5 * best.tail<3>().norm());
   }
@@ -48,7 +48,7 @@ TEST(Metal, MisleadsAsTheBestPoseForTheSumOfFieldsDoes) {
 TEST(Metal, StaysFiniteAtTheMetalAndAtTheCoils) {
   for (const Vec3& p : {Vec3(0.1, 0, -0.2), Vec3(0, 0, 0), Vec3(1e-9, 0, 0)})
     for (const Vec3& m : {Vec3(0.1, 0, -0.2), Vec3(0, 0, 0)}) {
-      const Misreading<double> off = beside_metal(triple(p), triple(m), 1e-6);
+      const ReadingError<double> off = metal_distortion(triple(p), triple(m), 1e-6);
       EXPECT_TRUE(vector(off.shift).allFinite() && vector(off.turn).allFinite());
     }
 }
