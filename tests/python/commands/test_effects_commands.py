@@ -192,7 +192,7 @@ def test_add_what_a_diagnosis_found(run, tmp_path, robot):
     written = robot_file.load(target).effects
     assert list(written) == ["delay", "friction", "frame_jump"]
     assert written["friction"]["law"] == 1 and written["frame_jump"]["when"] == 0.25
-    assert not any(written["friction"]["coefficient"])  # a strength is fitted, not taken over
+    assert not any(written["friction"]["coefficient"])  # an amplitude is fitted, not taken over
 
 
 def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, plan, hidden):

@@ -248,7 +248,7 @@ def test_a_file_makes_its_effects_known(file, robot, tmp_path):
         (('"t"', '""'), "mine.title: needs a text"),
         (("sigma=0.1", "sigma=0"), "sigma = 0: needs a number above 0"),
         (("sigma=0.1", "sigma=1, bounds=(1, 2)"), "with the neutral value 0 between"),
-        (("sigma=0.1", "sigma=1, shape=True"), "strength of the effect"),
+        (("sigma=0.1", "sigma=1, shape=True"), "an amplitude of the effect"),
         (("def joints", "def other"), "needs at least one of the functions joints"),
         (("class Mine(Effect)", "class Mine"), "holds no effect"),
         (("import numpy as np", "import nonsense_module"), "nonsense_module"),

@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 class EffectParameter:
     """A parameter of an effect.
 
-    Its kind: a strength changes nothing at its neutral value, nor does a detail, which is fitted after the strengths; a
-    shape only says of what form, a choice which of several forms, and is never fitted.
+    Its kind: an amplitude changes nothing at its neutral value, nor does a detail, which is fitted after the
+    amplitudes. A shape changes the form of an effect that acts. A choice selects one of several forms and is never
+    fitted.
     """
 
     name: str
@@ -33,8 +34,9 @@ class EffectParameter:
     soft: tuple[float, float]  # beyond: hardly this physics
     hard: tuple[float, float]  # beyond: impossible
     per_tube: bool
-    kind: str  # strength, detail, shape, choice
+    kind: str  # amplitude, detail, shape, choice
     full_names: tuple[str, ...]  # one, or one a tube
+    quantity: str = "other"  # as Quantity in include/ctcr/effects/effect.hpp
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,10 @@ class Effect:
     look_alikes: tuple[str, ...]
     reference: str
     needs: frozenset[str]  # of order, time, orientation, loads, gravity
+    acts_on: frozenset[str]  # of joints, rod, tip, reading
     parameters: tuple[EffectParameter, ...]
+    variants: tuple[tuple[str, ...], ...] = ()  # names of parameters of each way to act; none: all amplitudes
+    starts: tuple[dict[str, float], ...] = ()  # values of further starting points, by name
 
     def names(self, *parameters: str) -> list[str]:
         """Full names of all its parameters, or of the given ones."""
@@ -55,12 +60,16 @@ class Effect:
 
     @property
     def amplitudes(self) -> list[str]:
-        return [name for p in self.parameters if p.kind == "strength" for name in p.full_names]
+        return [name for p in self.parameters if p.kind == "amplitude" for name in p.full_names]
 
     @property
     def shapes(self) -> list[str]:
-        """Shapes and details: what is fitted once the strengths are."""
+        """Shapes and details: what is fitted once the amplitudes are."""
         return [name for p in self.parameters if p.kind in ("detail", "shape") for name in p.full_names]
+
+    def names_with(self, quantity: str) -> list[str]:
+        """Full names of the parameters with this quantity, in the order that it defines."""
+        return [name for p in self.parameters if p.quantity == quantity for name in p.full_names]
 
     @property
     def choices(self) -> list[str]:
@@ -74,32 +83,35 @@ def catalogue(n_tubes: int) -> dict[str, Effect]:
     parameters: dict[str, list[EffectParameter]] = {}
     for p in _core.effect_parameters(n_tubes):
         stem = f"effects.{p.effect}.{p.name}"
-        parameters.setdefault(p.effect, []).append(
-            EffectParameter(
-                p.name,
-                p.unit,
-                p.meaning,
-                p.neutral,
-                p.sigma,
-                (p.soft_low, p.soft_high),
-                (p.hard_low, p.hard_high),
-                p.per_tube,
-                p.kind,
-                tuple(f"{stem}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem,),
-            )
+        described = EffectParameter(
+            name=p.name,
+            unit=p.unit,
+            meaning=p.meaning,
+            neutral=p.neutral,
+            sigma=p.sigma,
+            soft=(p.soft_low, p.soft_high),
+            hard=(p.hard_low, p.hard_high),
+            per_tube=p.per_tube,
+            kind="amplitude" if p.kind == "strength" else p.kind,  # a module built before the word changed
+            full_names=tuple(f"{stem}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem,),
+            quantity=getattr(p, "quantity", "other"),
         )
+        parameters.setdefault(p.effect, []).append(described)
     needs = ("order", "time", "orientation", "loads", "gravity")
     return {
         e.id: Effect(
-            e.id,
-            e.title,
-            e.physics,
-            e.signature,
-            e.measure,
-            tuple(e.look_alikes.split()),
-            e.reference,
-            frozenset(name for name in needs if getattr(e, name)),
-            tuple(parameters[e.id]),
+            id=e.id,
+            title=e.title,
+            physics=e.physics,
+            signature=e.signature,
+            measure=e.measure,
+            look_alikes=tuple(e.look_alikes.split()),
+            reference=e.reference,
+            needs=frozenset(name for name in needs if getattr(e, name)),
+            acts_on=frozenset(getattr(e, "acts_on", ())),
+            parameters=tuple(parameters[e.id]),
+            variants=tuple(map(tuple, getattr(e, "variants", ()))),
+            starts=tuple(getattr(e, "starts", ())),
         )
         for e in _core.effect_catalogue()
     }

@@ -69,7 +69,7 @@ def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
     if ids and effect.id not in ids:
         raise _fault(text, f"{effect.id} is not among the effects to add")
     if len(parts) == 1:
-        amplitudes = [p.name for p in effect.parameters if p.kind == "strength"]
+        amplitudes = [p.name for p in effect.parameters if p.kind == "amplitude"]
         if len(amplitudes) != 1:
             raise _fault(text, f"{effect.id} has several parameters, name one: {', '.join(amplitudes)}")
         parts.append(amplitudes[0])

@@ -50,7 +50,15 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
+ACTS_ON = {  # where each hook acts
+    "joints": "joints",
+    "force": "tip",
+    "base": "rod",
+    "reading": "reading",
+    "curvature": "rod",
+    "stiffness": "rod",
+}
+HOOKS = tuple(ACTS_ON)
 NEEDS = ("order", "time", "orientation", "loads", "gravity")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -124,6 +132,7 @@ class Effect:
             tuple(self.look_alikes),
             self.reference,
             frozenset(self.needs),
+            frozenset(ACTS_ON[hook] for hook in self.hooks),
             tuple(
                 catalogue.EffectParameter(
                     p.name,
@@ -134,7 +143,7 @@ class Effect:
                     usual(p),
                     p.bounds,
                     p.per_tube,
-                    "shape" if p.shape else "strength",
+                    "shape" if p.shape else "amplitude",
                     full(p),
                 )
                 for p in self.parameters
@@ -246,7 +255,7 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
         say('needs a list such as [Parameter("gain", unit="rad/m", sigma=1.0)]', "parameters")
         return problems
     if all(p.shape for p in found.parameters):
-        say("needs one that is not a shape: the strength of the effect", "parameters")
+        say("needs one that is not a shape: an amplitude of the effect", "parameters")
     for p in found.parameters:
         for text in _parameter_faults(p):
             say(text, f"parameters.{p.name}")

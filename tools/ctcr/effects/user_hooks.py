@@ -79,7 +79,7 @@ class Hooks:
         return position, rotation
 
     def check_neutral(self, values: Values) -> None:
-        """Refuses an effect that acts where its strengths are neutral."""
+        """Refuses an effect that acts where its amplitudes are neutral."""
         count = len(self.rows.run)
         position, rotation = np.full((count, 3), 0.1), np.tile(np.eye(3), (count, 1, 1))
         frame, everywhere = (np.zeros(3), np.eye(3)), np.ones(count, bool)
@@ -90,7 +90,7 @@ class Hooks:
             neutral = dict(values) | {
                 name: p.neutral
                 for p in effect.described(self.robot.n_tubes).parameters
-                if p.kind == "strength"
+                if p.kind == "amplitude"
                 for name in p.full_names
             }
             profiles = alone.profiles(neutral)
