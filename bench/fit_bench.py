@@ -69,7 +69,7 @@ def session(kind: str, rows: int):
 
 def measured(kind: str, rows: int) -> dict:
     """Seconds and megabytes of one case, the making of the readings not counted as time."""
-    from ctcr.diagnose.analysis import diagnose
+    from ctcr.diagnose.pipeline import diagnose
     from ctcr.fit import joint
 
     robot, readings = session(kind, rows)
@@ -79,7 +79,7 @@ def measured(kind: str, rows: int) -> dict:
         said = f"{len(fit.names)} parameters, {fit.status}, chi-square {fit.reduced_chi_square:.3f}"
     else:
         result = diagnose(robot, readings)
-        said = f"{result.verdict.word} {' '.join(a.entry.id for a in result.accepted)}".rstrip()
+        said = f"{result.verdict.word} {' '.join(a.id for a in result.accepted)}".rstrip()
     return {
         "seconds": perf_counter() - began,
         "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,

@@ -50,7 +50,7 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     if result.accepted:
         ids, fixed, start = settings.found(result.as_json(), robot)
         known["with the effects found"] = add.add(robot, session, ids, fixed=fixed, start=start).robot
-    return known, f"{result.verdict.word}: {' + '.join(a.entry.id for a in result.accepted) or 'nothing'}"
+    return known, f"{result.verdict.word}: {' + '.join(a.id for a in result.accepted) or 'nothing'}"
 
 
 def upright(points: np.ndarray) -> np.ndarray:

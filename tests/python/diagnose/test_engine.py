@@ -31,7 +31,7 @@ def fit(engine):
 
 @pytest.mark.parametrize("names", [ADDED, ADDED[::-1], ["tracker.position.x", ADDED[1]]])
 def test_slopes_are_those_of_the_residual_in_prior_deviations(engine, fit, names):
-    slopes = engine.slopes(fit, names)
+    slopes = engine.derivatives(fit, names)
     everything = list(dict.fromkeys([*fit.names, *names]))
     neutral, sd, _, _ = engine.priors(everything)
     at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
@@ -64,6 +64,6 @@ def test_readings_say_how_the_robot_came_to_its_first_row(engine, plan, from_hom
     noise = noise_of_readings(engine.robot, readings)
     taken = Engine(engine.robot, replace(readings, from_home=True), noise, np.ones(len(readings), bool))
     fit = taken.fit(play)
-    assert taken.begins_otherwise(fit, play) is not from_home
+    assert taken.revise_initial_history(fit, play) is not from_home
     assert taken.measurements.from_home is from_home
-    assert not taken.begins_otherwise(taken.fit(play), play)
+    assert not taken.revise_initial_history(taken.fit(play), play)

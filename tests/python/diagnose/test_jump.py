@@ -32,9 +32,9 @@ def test_a_frame_that_jumps_within_a_run_is_followed_to_the_row(robot, when):
     result = diagnose(robot, table)
     assert [a.ids for a in result.accepted] == [["frame_jump"]]
     assert result.verdict.word == "identified"
-    found = dict(result.accepted[0].entry.candidate.shape)[jump.WHEN]
+    found = dict(result.accepted[0].best.candidate.shape)[jump.WHEN]
     assert abs(np.searchsorted(recording.session_part(table), found) - at) <= 1
-    assert not result.locked[table.run == run].any() or when != 0.30
+    assert not result.held_out[table.run == run].any() or when != 0.30
     assert result.rms_mm["with_effects"] < 1.15 * result.rms_mm["noise_floor"]
 
 
@@ -63,7 +63,7 @@ def test_the_moment_of_a_jump_is_found_whatever_rows_are_fitted(robot, shuffled)
         when = dict(found.shape)[jump.WHEN]
         np.testing.assert_array_equal(part[fitted] > when, part[fitted] >= at)
         np.testing.assert_array_equal(slopes[fitted, 0, 0], part[fitted] > when)
-        assert found.price == pytest.approx(np.log(fitted.sum() - 1))
+        assert found.penalty == pytest.approx(np.log(fitted.sum() - 1))
 
 
 def test_rows_between_fitted_ones_may_hide_a_jump(robot):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import _core
-from ctcr.diagnose import add, diagnose, metal
+from ctcr.diagnose import metal
 from ctcr.diagnose.candidates import METAL, Candidate, candidates, forms
 from ctcr.diagnose.engine import Engine
 from ctcr.effects.catalogue import get
@@ -40,7 +40,8 @@ def found_from(engine, signal, jitter):
     return np.array([dict(candidate.shape)[name] for name in NAMES[1:]]), columns
 
 
-def test_a_piece_is_tried_with_the_slopes_of_the_residual(engine):
+def test_derivatives(engine):
+    """The piece is tried with the derivatives of the residual, in the right axes and with the right sign."""
     jitter = np.repeat([3e-5, 5e-4], 3)
     place, columns = found_from(engine, np.zeros((len(engine.measurements), 6)), jitter)
     table = engine.recording(NAMES)
@@ -52,14 +53,15 @@ def test_a_piece_is_tried_with_the_slopes_of_the_residual(engine):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_piece_is_found_wherever_it_is(engine, seed):
+def test_search(engine, seed):
+    """The global search finds a piece wherever it is beside the workspace."""
     rng = np.random.default_rng(seed)
     jitter = np.repeat([3e-5, 5e-4], 3)
     side = rng.standard_normal(3)
-    reach = 0.06 + np.max((engine.places - np.median(engine.places, axis=0)) @ side) / np.linalg.norm(side)
-    place = np.median(engine.places, axis=0) + reach * side / np.linalg.norm(side)
+    reach = 0.06 + np.max((engine.positions - np.median(engine.positions, axis=0)) @ side) / np.linalg.norm(side)
+    place = np.median(engine.positions, axis=0) + reach * side / np.linalg.norm(side)
     coils = rng.normal(0, 0.02, 3)
-    signal = -3e-6 * _core.beside_metal(engine.places - coils, place - coils)
+    signal = -3e-6 * _core.beside_metal(engine.positions - coils, place - coils)
     signal[~engine.rows] = 0
     found, columns = found_from(engine, signal, jitter)
     assert np.linalg.norm(found[:3] - place) < 0.015
@@ -67,22 +69,8 @@ def test_a_piece_is_found_wherever_it_is(engine, seed):
     assert (column @ whole) ** 2 > 0.98 * (column @ column) * (whole @ whole)
 
 
-def test_a_piece_of_metal_is_named_with_its_place(engine):
-    place = np.median(engine.places, axis=0) + [0.06, -0.05, 0.06]
-    given = dict(zip(NAMES, [3e-6, *place, 0, 0, 0], strict=True))
-    with_metal = add.with_values(engine.robot, ["field_distortion"], given)
-    read = simulation.simulate(with_metal, engine.measurements, seed=5)
-    found = diagnose(engine.robot, read)
-    assert found.verdict.word == "identified"
-    assert [a.ids for a in found.accepted] == [["field_distortion"]]
-    values = found.parameters(found.accepted[0])
-    at = np.array([values[name] for name in METAL[1:4]])
-    assert np.linalg.norm(at - place) < 0.01
-    assert values["metal_volume"] == pytest.approx(3e-6, rel=0.3)
-    assert found.rms_mm["with_effects"] < 1.15 * found.rms_mm["noise_floor"]
-
-
-def test_a_field_takes_metal_up_where_the_race_left_its_place(engine):
+def test_forms(engine):
+    """A piece of metal enters alone; a field takes it up where its position was fitted before."""
     effect = get("field_distortion", engine.robot.n_tubes)
     fields = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id == "field_distortion"]
     assert sum({*NAMES} <= {*candidate.names} for candidate in fields) == 1

@@ -1,17 +1,32 @@
-"""One word for what a diagnosis found, and the limits that decide it."""
+"""One word for what a diagnosis found: outcomes for a real diagnosis, and for the same one with other evidence."""
 
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from ctcr.diagnose import verdict
-from ctcr.diagnose.leftover import Leftover
 
 ROOT = Path(__file__).parents[3]
+RUNS = ("run 3", "run 5", "run 8")
 
 
-def test_the_tutorial_explains_every_verdict_with_its_limits():
+def judged(found, **changes):
+    """The verdict on a diagnosis, with some of what it is judged by changed."""
+    given = {
+        "calibrated": found.calibrated,
+        "with_effects": found.with_effects,
+        "accepted": found.accepted,
+        "residual": found.residual,
+        "judged": found.judged,
+        "explained": dict.fromkeys(RUNS, 0.99),
+        "outdone": False,
+    }
+    return verdict.judge(**given | changes)
+
+
+def test_words_in_tutorial():
+    """The tutorial explains every verdict, with its limits."""
     text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     words = ["nothing_missing", "identified", "probable", "ambiguous", "stand_in", "not_in_catalogue"]
@@ -20,27 +35,44 @@ def test_the_tutorial_explains_every_verdict_with_its_limits():
     assert f"less than {100 * verdict.EXPLAINED:.0f} %" in rows["stand_in"]
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "explained", "structured", "outdone", "word"),
-    [
-        (0.3, 0.1, (0.95, 0.99, 0.9), True, False, "identified"),
-        (0.3, 0.25, (0.3, 0.99, -0.2), True, False, "stand_in"),
-        (0.3, 0.29, (0.3, 0.99, -0.2), False, False, "identified"),
-        (0.3, 0.45, (1, 1, 1), False, False, "stand_in"),
-        (0.061, 0.062, (), True, False, "identified"),
-        (0.3, 0.16, (0.78, 0.99, 0.77), True, False, "probable"),
-        (0.3, 0.2, (0.95, 0.99, -0.2), True, False, "probable"),
-        (0.3, 0.1, (0.95, 0.99, 0.9), True, True, "stand_in"),
-    ],
-)
-def test_what_other_runs_do_not_confirm_is_a_stand_in(before, after, explained, structured, outdone, word):
-    noise = SimpleNamespace(position_jitter=0.06e-3 / np.sqrt(3))
-    fits = [SimpleNamespace(noise=noise, rms_mm=lambda _, rms=rms: rms) for rms in (before, after)]
-    entry = SimpleNamespace(id="delay", implausible=())
-    found = SimpleNamespace(entry=entry, ids=["delay"], share=0.9, margin=20.0)
-    left = Leftover(structured, [], None, SimpleNamespace(chosen=[]), None)
-    runs = dict(zip(("run 3", "run 5", "run 8"), explained, strict=False))
-    said = verdict.judge(*fits, [found], left, np.ones(3, bool), runs, outdone)
-    assert said.word == word
-    one_is_off = word == "probable" and explained[2] < 0
-    assert any("run 8" in text for text in said.sentences) == one_is_off
+def test_nothing_accepted(tip_load):
+    """Without an effect the residual decides: noise, or structure for which the catalogue has no cause."""
+    noise, more = (replace(tip_load.residual, rejected=rejected, clusters=[]) for rejected in (False, True))
+    assert judged(tip_load, accepted=[], residual=noise).word == "nothing_missing"
+    assert judged(tip_load, accepted=[], residual=more).word == "not_in_catalogue"
+    at_joints = judged(tip_load, accepted=[], residual=replace(noise, clusters=[7, 8]))
+    assert at_joints.word == "not_in_catalogue" and "rows 7, 8" in " ".join(at_joints.sentences)
+
+
+def test_doubts(tip_load):
+    """Each doubt takes the word of certainty away, and says so."""
+    (one,) = tip_load.accepted
+    doubts = {
+        "ambiguous": {"accepted": [replace(one, ids=["tip_load", "contact"])]},
+        "probable": {"accepted": [replace(one, margin=0.0)]},
+        "stand_in": {"accepted": [replace(one, best=replace(one.best, implausible=("mass = 3 kg",)))]},
+    }
+    assert judged(tip_load).word == "identified"
+    assert {word: judged(tip_load, **change).word for word, change in doubts.items()} == {word: word for word in doubts}
+    assert judged(tip_load, outdone=True).word == "stand_in"
+
+
+def test_worse_prediction_is_spurious(tip_load):
+    """Effects with which held-out runs are predicted far worse than without are not there."""
+    swapped = judged(tip_load, calibrated=tip_load.with_effects, with_effects=tip_load.calibrated)
+    assert swapped.word == "stand_in" and "worse" in swapped.sentences[0]
+
+
+@pytest.mark.parametrize("rejected", [True, False])
+def test_held_out_runs(tip_load, rejected):
+    """The less effects explain of held-out runs, the less sure the verdict; noise asks for nothing."""
+    left = replace(tip_load.residual, rejected=rejected)
+    sure = ["stand_in", "probable", "identified"]
+    words = [
+        judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, part)).word for part in np.linspace(0, 1, 50)
+    ]
+    assert words == (sorted(words, key=sure.index) if rejected else ["identified"] * 50)
+    assert not rejected or set(words) == set(sure)
+    one_off = judged(tip_load, residual=left, explained=dict(zip(RUNS, (0.95, 0.99, -0.2), strict=True)))
+    assert one_off.word == ("probable" if rejected else "identified")  # the median run counts, and the odd one is named
+    assert any("run 8" in sentence for sentence in one_off.sentences) == rejected

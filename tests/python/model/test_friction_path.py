@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.diagnose import add
-from ctcr.diagnose.accepted import WRONG, Accepted, with_shapes
 from ctcr.diagnose.candidates import Candidate, forms
-from ctcr.diagnose.engine import FITS, Engine, Gain
-from ctcr.diagnose.race import Entry
+from ctcr.diagnose.engine import FITS, Engine
+from ctcr.diagnose.linearised import Gain
+from ctcr.diagnose.round import CandidateFit
+from ctcr.diagnose.selection import WRONG, Accepted, Selection
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import simulation, user_recording
@@ -73,11 +74,11 @@ def test_candidates_are_screened_where_the_tubes_of_a_fit_are_wound_up(robot, pl
     fit = engine.fit(rubbing, start=TRUE, fixed={LAW: 1.0})
     assert fit.predict.is_wound
     own = fit.jacobian_all.reshape(*fit.residual.shape, -1) * fit.prior_sd
-    np.testing.assert_allclose(engine.slopes(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
+    np.testing.assert_allclose(engine.derivatives(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
     # A fit in which nothing rubs comes between: what was wound up is not forgotten.
     assert not engine.fit().predict.is_wound
     again = engine.recording(fit.names, {LAW: 1.0})
-    again.begin_at(engine._wound)
+    again.begin_at(engine._friction_path)
     assert again.wind_up(fit.values) < joint.WOUND
 
 
@@ -118,11 +119,13 @@ def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot
     for given, fitted in names.items():
         fit = engine.fit(fitted)
         gain = Gain(0.0, *4 * [np.zeros(1)])
-        entry = Entry(Candidate("friction", fitted), gain, fit=fit)
-        one = Accepted(entry, ["friction"], 100.0, 50.0, 0.5)
-        after = with_shapes(engine, [one], one, fit, lambda _: None)
+        entered = CandidateFit(Candidate("friction", fitted), gain, fit=fit)
+        one = Accepted(entered, ["friction"], 100.0, 50.0, 0.5)
+        selection = Selection(engine, lambda _: None, accepted=[one], fit=fit)
+        selection.refine_form(one)
+        after = selection.fit
         assert (np.max(fit.inflation) > WRONG) == (given == "torque_per_length")
-        assert set(names["coefficient"]) <= set(one.entry.candidate.names)
-        assert not set(names["torque_per_length"]) & set(one.entry.candidate.names)
+        assert set(names["coefficient"]) <= set(one.best.candidate.names)
+        assert not set(names["torque_per_length"]) & set(one.best.candidate.names)
         assert np.max(after.inflation) < FITS
-        assert after.rms_mm() < 1.2 * joint.noise_floor(after, noise, engine.places)[0]
+        assert after.rms_mm() < 1.2 * joint.noise_floor(after, noise, engine.positions)[0]

@@ -1,5 +1,5 @@
-"""Which physical effect is missing: data audit, calibration, the race of all candidates, validation, verdict."""
+"""Which physical effect is missing: data audit, calibration, forward selection of effects, validation, verdict."""
 
-from ctcr.diagnose.analysis import Diagnosis, diagnose
+from ctcr.diagnose.pipeline import Diagnosis, diagnose
 
 __all__ = ["Diagnosis", "diagnose"]

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ctcr.audit.preparation import prepared
 from ctcr.calibrate.checks import sentence
-from ctcr.diagnose import distorted, far_off, unsteady
+from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.prediction import predictive
-from ctcr.diagnose.race import begin, likeliest, screen
+from ctcr.diagnose.held_out import fit_to_predict
+from ctcr.diagnose.round import linearised_end, screen
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.fit import folds, joint, one_sided
@@ -116,18 +116,18 @@ def add(
                 fit = stage(fitted, fitted, ~held, [*elsewhere, now])
             progress.advance(1)
             errors[identity] = fit.residual
-        glitches = far_off.alone(readings, fit, held)
+        glitches = outliers.isolated(readings, fit, held)
         judged = held & ~glitches if held.any() else np.ones(len(readings), bool)
         stages = [_stage(name, residual, judged) for name, residual in errors.items()]
-        off = [sentence(text) for text in far_off.in_words(readings, fit, glitches)]
+        off = [sentence(text) for text in outliers.messages(readings, fit, glitches)]
         if held.any():
             fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
         progress.advance(1)
-    varies = unsteady.followed(stage.engine, fit)[1]
-    if (smooth := distorted.noise_of(stage.engine, fit)) is not None:
-        varies.append(distorted.in_words(smooth))
-    fit = unsteady.widened(stage.engine, one_sided.widened(fit))
-    stages.append(Stage("noise_floor", *joint.noise_floor(fit, fit.noise, stage.engine.places)))
+    varies = segment_delays.corrected(stage.engine, fit)[1]
+    if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
+        varies.append(smooth_field.message(smooth))
+    fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
+    stages.append(Stage("noise_floor", *joint.noise_floor(fit, fit.noise, stage.engine.positions)))
     return Added(
         _applied(stage.robot, fit),
         list(ids),
@@ -260,11 +260,11 @@ class _Fitter:
         known = [catalogue.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        likely = likeliest(engine, own, self._best(own, begins), {})
-        if any("order" in effect.needs for effect in known) and engine.begins_otherwise(likely, own):
-            likely = likeliest(engine, own, values_of(likely), {})
+        likely = engine.fit_with_field(own, self._best(own, begins))
+        if any("order" in effect.needs for effect in known) and engine.revise_initial_history(likely, own):
+            likely = engine.fit_with_field(own, values_of(likely))
         # The robot is to predict; how sure its values are is another question.
-        fit = predictive(engine, likely, {}, tolerance=engine.tolerance)
+        fit = fit_to_predict(engine, likely, {}, tolerance=engine.tolerance)
         fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
         return replace(fit, units=[fields.field_of(name).unit for name in fit.names])
 
@@ -282,7 +282,7 @@ class _Fitter:
         for weights in (None, np.ones((len(engine.measurements), 2))):
             there = engine.linear_fit(before, weights=weights)
             entries = [e for e in screen(*engine.thinned(there), plain, {}) if e.candidate.shape]
-            found += [(entry, begin(engine, there, entry)) for entry in entries[:PLACES]]
+            found += [(entry, linearised_end(engine, there, entry)) for entry in entries[:PLACES]]
         if found:
             fitted = catalogue.get(identity, self.robot.n_tubes).shapes
             chosen = {name: x for name, x in found[0][0].candidate.shape if name not in fitted}

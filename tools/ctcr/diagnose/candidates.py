@@ -33,10 +33,10 @@ class Candidate:
     id: str
     names: tuple[str, ...]
     shape: tuple[tuple[str, float], ...] = ()
-    price: float = 0.0  # log evidence that it costs to have picked such a value among many
+    penalty: float = 0.0  # log evidence that it costs to have picked such a value among many
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """Its parameters, and the values of those that are held."""
         own = dict.fromkeys(name.split(".")[2] for name in self.names)
         told = [*own] if len(own) <= TOLD else [*list(own)[:3], f"{len(own) - 3} more"]
@@ -45,7 +45,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        return f"{self.id} ({self.told})"
+        return f"{self.id} ({self.summary})"
 
 
 def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate], dict[str, str]]:
@@ -69,10 +69,10 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
     return found, left_out
 
 
-def forms(effect: catalogue.Effect, candidate: Candidate, aside: Collection[str] = ()) -> list[Candidate]:
+def forms(effect: catalogue.Effect, candidate: Candidate, rejected_variants: Collection[str] = ()) -> list[Candidate]:
     """What an accepted candidate may become: under each law that the effect offers, its shape free, with the strengths
     by which it entered the race or with all that it may enter by. A piece of metal is among these where the race left
-    its place, full names, `aside`."""
+    its place, full names, `rejected_variants`."""
     laws = set(effect.choices)
     rest = {name: value for name, value in candidate.shape if name not in laws}
     shapes = [candidate.shape]
@@ -81,7 +81,7 @@ def forms(effect: catalogue.Effect, candidate: Candidate, aside: Collection[str]
         law = full if laws & set(full) else {}  # with the shape from which it begins
         shapes.append(tuple((rest | law).items()))
     wider = [name for names in _strengths(effect) if set(candidate.names) <= set(names) for name in names]
-    has_metal = any(is_of_metal(name) for name in (*candidate.names, *aside))
+    has_metal = any(is_of_metal(name) for name in (*candidate.names, *rejected_variants))
     details = [name for name in effect.shapes if has_metal or not is_of_metal(name)]
     more = [details, [*wider, *details]]
     if is_of_metal(candidate.names[0]):  # besides it, the field of what is farther away
@@ -91,7 +91,7 @@ def forms(effect: catalogue.Effect, candidate: Candidate, aside: Collection[str]
     return [Candidate(effect.id, names, shape) for names in dict.fromkeys(free) for shape in unlike]
 
 
-def other_strengths(effect: catalogue.Effect, candidate: Candidate) -> list[Candidate]:
+def other_amplitudes(effect: catalogue.Effect, candidate: Candidate) -> list[Candidate]:
     """The same of an effect that offers several laws, by strengths that are neither part of its own nor hold them."""
     strengths = _strengths(effect) if effect.choices else []
     own = {name for names in strengths for name in names} & set(candidate.names)

@@ -16,7 +16,7 @@ def planes(engine, candidate: Candidate, by_force: NDArray, part: float) -> list
     """The candidate with each plane in front of which this part of the tips stays, with its slope; `by_force` (M, 6, 3)
     are those of a force at the tip [1/N]."""
     tracker = engine.robot.tracker
-    tips = (engine.places - tracker.position) @ tracker.rotation
+    tips = (engine.positions - tracker.position) @ tracker.rotation
     sigma = catalogue.parameter_of(engine.robot.n_tubes)[STEM + "stiffness"].sigma
     shapes = catalogue.get("contact", engine.robot.n_tubes).shapes
     neutral = dict(zip(shapes, map(float, engine.priors(shapes)[0]), strict=True))

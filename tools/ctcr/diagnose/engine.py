@@ -1,4 +1,4 @@
-"""Fits and linearisations of a robot with any effects, at one table of measurements, one noise and one split."""
+"""Fits and linearisations of a robot with any effects: one table of measurements, one noise, one choice of rows."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve
 
 from ctcr import _core
+from ctcr.diagnose.linearised import Linear
 from ctcr.effects import catalogue
-from ctcr.fit import folds, joint
+from ctcr.fit import folds, joint, one_sided
 from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -18,8 +18,7 @@ from ctcr.table.measurements import Measurements
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-
-SLOPES = 1500  # rows by whose slopes candidates are screened where there are twice as many or more
+SCREENING_ROWS = 1500  # rows at whose derivatives candidates are screened where there are twice as many or more
 OUTLIER = 0.3  # weight below which a reading is taken for one
 SIGNIFICANCE = 0.01
 FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
@@ -27,71 +26,23 @@ SAID = 5.0  # log evidence by which readings say how the robot came to its first
 CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What a candidate would bring, by the slopes at a fit alone."""
-
-    log_evidence: float  # over the fit without it
-    values: Array  # of its parameters, over their neutral values, in units of their prior sd
-    calibration: Array  # change of the fitted parameters that goes with them, in units of their prior sd
-    signal: Array  # whitened change of the residual that calibration cannot imitate (K,)
-    columns: Array  # whitened slopes that calibration cannot imitate (K, k)
-
-
-def laplace(information: Array, gradient: Array) -> tuple[Array, Array]:
-    """Log evidence of adding parameters, and their values, in units of their prior sd: of what the readings tell of
-    them beside calibration (..., k, k), and the gradient (..., k) of half the chi-square."""
-    S = information + np.eye(information.shape[-1])
-    S = 0.5 * (S + np.swapaxes(S, -1, -2))
-    eta = -np.linalg.solve(S, gradient[..., None])[..., 0]
-    return -0.5 * np.sum(gradient * eta, axis=-1) - 0.5 * np.linalg.slogdet(S)[1], eta
-
-
-class Linear:
-    """Whitened residual and slopes at a fit, everything in units of prior sd."""
-
-    def __init__(self, residual: Array, jacobian: Array) -> None:
-        self.residual, self.jacobian = residual, jacobian
-        information = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
-        self.cholesky = np.linalg.cholesky(information)
-
-    def imitation(self, columns: Array) -> Array:
-        """The change of the fitted parameters that imitates whitened columns best, given their priors."""
-        return self.imitation_by(self.jacobian.T @ columns)
-
-    def imitation_by(self, overlap: Array) -> Array:
-        """The same of columns of which this is jacobian.T @ columns."""
-        return cho_solve((self.cholesky, True), overlap, check_finite=False)
-
-    def covariance(self) -> Array:
-        """Of the parameters, given the readings and the priors."""
-        return self.imitation_by(np.eye(len(self.cholesky)))
-
-    def gain(self, columns: Array) -> Gain:
-        """Laplace evidence of adding parameters with these slopes, exact where the model is linear in them."""
-        imitation = self.imitation(columns)
-        left = columns - self.jacobian @ imitation
-        log_evidence, eta = laplace(columns.T @ left, columns.T @ self.residual)
-        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left)
-
-
 @dataclass
 class Engine:
     robot: Robot
     measurements: Measurements
-    noise: Any
+    noise: Any  # of the tracker, as stated
     rows: Mask  # that are fitted
-    robust: bool = True  # whether readings that are far off count for little
+    robust: bool = True  # whether outliers count for little
     threads: int = 0
-    free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in identify.expand
-    tolerance: float = 0.02  # of log evidence, in fits that are not told another one
-    steps: int = field(init=False)
-    places: Array = field(init=False)
-    base: list[str] = field(init=False)  # their names
-    _wound: _core.Recording | None = field(init=False, default=None)  # of the last fit in which tubes rub
+    free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in parameters.expand
+    tolerance: float = 0.02  # of log evidence, in fits for which no other is given
+    steps: int = field(init=False)  # of integration
+    positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
+    base: list[str] = field(init=False)  # names of the calibration parameters
+    _friction_path: _core.Recording | None = field(init=False, default=None)  # of the last fit with friction
 
     def __post_init__(self) -> None:
-        self.places = joint.places_of(self.robot, self.measurements)
+        self.positions = joint.places_of(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
         self.measured = folds.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
@@ -101,18 +52,13 @@ class Engine:
         """Rows that hold something to fit."""
         return self.measured & self.rows
 
-    def noise_with(self, part: float) -> Any:
-        """The tracker's noise with a part of its stated field error."""
-        return joint.with_field(self.noise, part)
-
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of parameters of the robot and of effects."""
         found: dict[str, tuple[float, ...]] = {}
-        own = [name for name in names if not name.startswith("effects.")]
-        added = [name for name in names if name.startswith("effects.")]
-        for source, some in ((parameters, own), (catalogue, added)):
-            if some:
-                found |= zip(some, zip(*source.priors(self.robot, some), strict=True), strict=True)
+        for source, is_effect in ((parameters, False), (catalogue, True)):
+            own = [name for name in names if name.startswith("effects.") == is_effect]
+            if own:
+                found |= zip(own, zip(*source.priors(self.robot, own), strict=True), strict=True)
         mean, sd, low, high = np.array([found[name] for name in names]).reshape(-1, 4).T
         return mean, sd, low, high
 
@@ -134,10 +80,10 @@ class Engine:
         tolerance: float | None = None,
         near: bool = False,
     ) -> joint.Fit:
-        """Calibration and `added` parameters of effects together. `near`: the start is where a like fit ended, so that
-        a fit of few of many rows would teach nothing.
+        """Calibration and `added` parameters of effects together, the others of effects at their `fixed` values.
 
-        Frozen `weights` of outliers and `inflation` of the noise make evidences comparable; without them both follow
+        near: the start is the end of a similar fit, so that a fit of a part of many rows would teach nothing.
+        Frozen `weights` of outliers and `inflation` of the noise make evidences comparable. Without them both follow
         the fit: where the model is wrong, the noise is inflated so that calibration stays plausible.
         """
         names = [*self.base, *added]
@@ -145,7 +91,7 @@ class Engine:
         mean_of = dict(zip(names, mean, strict=True))
         at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
         table = self.recording(names, fixed)
-        _wind_as(table, self._wound)
+        _begin_at(table, self._friction_path)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         fitted = joint.identify_rows(
@@ -157,7 +103,7 @@ class Engine:
             low,
             high,
             noise or self.noise,
-            self.places,
+            self.positions,
             robust=weights is None,
             weights=weights,
             admit_model_error=inflation is None,
@@ -170,16 +116,37 @@ class Engine:
             within=parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )
         if isinstance(table, _core.Recording) and table.is_wound:
-            self._wound = table
+            self._friction_path = table
         return fitted
 
     def fit_like(self, other: joint.Fit, added: Iterable[str] = (), **options: Any) -> joint.Fit:
         """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
         return self.fit(added, noise=other.noise, weights=other.weights, inflation=other.inflation, **options)
 
-    def begins_otherwise(self, fit: joint.Fit, added: Iterable[str], fixed: dict[str, float] | None = None) -> bool:
-        """Whether the robot came to its first row the other way than a fit has it, straight from home or at rest there:
-        where the readings say so, that is taken for all fits to come."""
+    def fit_with_field(
+        self, added: Sequence[str], start: dict[str, float], fixed: dict[str, float] | None = None
+    ) -> joint.Fit:
+        """As fit(), under that part of the tracker's stated field error which makes the readings likeliest."""
+
+        def again(values: Array, like: joint.Fit | None) -> joint.Fit:
+            from_there = dict(zip(full.names, map(float, values), strict=True))
+            if like is None:
+                return self.fit(added, start=from_there, fixed=fixed, near=True)
+            return self.fit_like(like, added, start=from_there, fixed=fixed, near=True, tolerance=joint.COARSE)
+
+        full = self.fit(added, start=start, fixed=fixed, near=bool(start))
+        full = one_sided.crossed(full, again)
+        noise = self.likeliest_noise(full)
+        # Fitted anew, not linearised: far from the full model's values effects are not linear.
+        if noise is full.noise:
+            return full
+        return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, near=True)
+
+    def revise_initial_history(
+        self, fit: joint.Fit, added: Iterable[str], fixed: dict[str, float] | None = None
+    ) -> bool:
+        """Whether the readings say that the robot came to its first row otherwise than assumed: straight from home, or
+        at rest there. If so, all later fits assume that."""
         other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
         there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=joint.COARSE)
         if there.log_evidence - fit.log_evidence < SAID:
@@ -204,7 +171,7 @@ class Engine:
             at,
             low,
             high,
-            self.places,
+            self.positions,
             noise=noise,
             rows=self.rows,
             weights=weights,
@@ -214,11 +181,11 @@ class Engine:
         )
 
     def likeliest_noise(self, fit: joint.Fit) -> Any:
-        """The noise of a fit with the part of the field error that its readings ask for."""
+        """The noise of a fit with that part of its field error which makes the readings likeliest."""
         _, _, low, high = self.priors(fit.names)
-        return joint.likeliest_field(fit, low, high, self.places)
+        return joint.likeliest_field(fit, low, high, self.positions)
 
-    def thinned(self, fit: joint.Fit, least: int = SLOPES) -> tuple["Engine", joint.Fit]:
+    def thinned(self, fit: joint.Fit, least: int = SCREENING_ROWS) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
         few = folds.few_of(self.fitted, least)
         if few is None:
@@ -232,15 +199,15 @@ class Engine:
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
     def rejects(self, fit: joint.Fit) -> bool:
-        """Whether noise alone, as stated, does not explain what is left."""
+        """Whether the noise as stated does not explain the residual."""
         return bool(np.max(fit.inflation) > FITS or self.as_stated(fit).p_value < SIGNIFICANCE)
 
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)
 
-    def slopes(self, fit: joint.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
-        """Raw slopes (M, 6, k) of the residual by parameters, fitted or neutral, in units of their prior sd.
+    def derivatives(self, fit: joint.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
+        """Of the residual (M, 6, k) by parameters, at their fitted or neutral values, in units of their prior sd.
 
         0 in rows that are not fitted.
         """
@@ -248,20 +215,25 @@ class Engine:
         neutral, sd, _, _ = self.priors(everything)
         at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
         table = self.recording(everything, fixed)
-        _wind_as(table, fit.predict)
+        _begin_at(table, fit.predict)
         table.activate(self.fitted.tolist())
         values = np.array([at[name] for name in everything])
-        # A part of the table, scaled in place: of many rows this is the largest one of all.
-        slopes = table.residual(values, True)[1][:, len(everything) - len(names) :]
-        slopes *= sd[len(everything) - len(names) :]
-        slopes[~np.isfinite(slopes)] = 0.0
-        return slopes.reshape(len(self.measurements), 6, len(names))
+        # A part of the table, scaled in place: with many rows it is the largest array of a diagnosis.
+        columns = table.residual(values, True)[1][:, len(everything) - len(names) :]
+        columns *= sd[len(everything) - len(names) :]
+        columns[~np.isfinite(columns)] = 0.0
+        return columns.reshape(len(self.measurements), 6, len(names))
 
 
-def _wind_as(table: Any, other: Any) -> None:
-    """Begins where another recording has wound up tubes that rub: much as it will be."""
+def _begin_at(table: Any, other: Any) -> None:
+    """Begins at the friction path that another recording solved: it is close to this one's."""
     if isinstance(table, _core.Recording) and isinstance(other, _core.Recording):
         table.begin_at(other)
+
+
+def effects_in(fit: joint.Fit) -> list[str]:
+    """Names of the fitted parameters of effects."""
+    return [name for name in fit.names if name.startswith("effects.")]
 
 
 def values_of(fit: joint.Fit) -> dict[str, float]:

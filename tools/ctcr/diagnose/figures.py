@@ -5,27 +5,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ctcr.compare.figures import drawable
-from ctcr.diagnose.decision import imitated
+from ctcr.diagnose.round import imitated
 from ctcr.show.html_page import short
 from ctcr.show.style import ERROR, FAINT, INK, NOISE
 
 if TYPE_CHECKING:
-    from ctcr.diagnose.analysis import Diagnosis
+    from ctcr.diagnose.pipeline import Diagnosis
     from ctcr.fit.result import Fit
 
 GOOD = "#4b8b3b"
 CANDIDATES = 10
 PANELS = 3
-PALE = 0.45  # of bars by slopes alone
+PALE = 0.45  # opacity of bars of linearised gains
 
 
 def waterfall(figure, d: "Diagnosis") -> None:
-    """RMS error on locked runs, from the robot file to the noise floor."""
+    """RMS error on held-out runs, from the robot file to the noise floor."""
     axes = figure.subplots()
     rms = d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
     for k, a in enumerate(d.accepted, start=1):
-        reached = rms["with_effects"] if k == len(d.accepted) else d.reached_mm(a)
+        reached = rms["with_effects"] if k == len(d.accepted) else d.rms_mm_after(a)
         bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
@@ -43,35 +43,35 @@ def waterfall(figure, d: "Diagnosis") -> None:
     axes.text(last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom")
     axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
-    axes.set_ylabel("RMS error on locked runs, mm")
+    axes.set_ylabel("RMS error on held-out runs, mm")
     axes.set_yscale("log")
     axes.set_ylim(0.5 * min([rms["noise_floor"], *[v for _, v, _ in bars]]), 2 * max(v for _, v, _ in bars))
 
 
 def candidates(figure, d: "Diagnosis") -> bool | None:
     """Log evidence of every candidate in each round; what the data cannot tell apart is boxed."""
-    rounds = [r for r in d.rounds if r.entries]
+    rounds = [r for r in d.rounds if r.tried]
     if not rounds:
         return False
     panels = figure.subplots(1, len(rounds), squeeze=False)[0]
     for number, (axes, round_) in enumerate(zip(panels, rounds, strict=True), start=1):
         shown = round_.best[:CANDIDATES]
-        for i, entry in enumerate(shown):
-            value = entry.linear if entry.refit is None else entry.refit
-            accepted = entry.id in round_.ids
+        for i, one in enumerate(shown):
+            value = one.linear if one.refit is None else one.refit
+            accepted = one.id in round_.ids
             axes.barh(
                 i,
                 max(value, 0.3),
                 color=GOOD if accepted else FAINT,
                 edgecolor=INK if accepted else "none",
                 linewidth=1.5,
-                alpha=PALE if entry.refit is None else 1,
+                alpha=PALE if one.refit is None else 1,
             )
             axes.text(max(value, 0.3), i, f" {value:.1f}", va="center", fontsize=9)
-        axes.set_yticks(range(len(shown)), [entry.id.replace("_", " ") for entry in shown])
+        axes.set_yticks(range(len(shown)), [one.id.replace("_", " ") for one in shown])
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
-        axes.set_xlim(0, 8 * max(10.0, *(max(entry.linear, entry.score) for entry in shown)))
+        axes.set_xlim(0, 8 * max(10.0, *(max(one.linear, one.score) for one in shown)))
         axes.set_xlabel("log evidence over none")
         axes.set_title(f"round {number}")
     return None
@@ -82,7 +82,7 @@ def before_after(figure, d: "Diagnosis") -> bool | None:
 
     Both along the tip's motion where it is that, else along the direction in which the effects act most.
     """
-    ranking, sample = d.leftover.before, d.leftover.sample
+    ranking, sample = d.residual.before, d.residual.sample
     drawn = drawable([*ranking.chosen, *ranking.distinct()], sample, ranking.rows)
     drawn = drawn[: max(1, min(len(ranking.chosen), PANELS))]
     if not drawn or not d.accepted:
@@ -122,20 +122,20 @@ def varying(figure, d: "Diagnosis") -> None:
 
 def overlap(figure, d: "Diagnosis") -> bool | None:
     """How much of the signal of each candidate of the first round another one can imitate together with calibration."""
-    best = [entry for entry in d.rounds[0].best if entry.fit is not None]
+    best = [one for one in d.rounds[0].best if one.fit is not None]
     if len(best) < 2:
         return False
-    share = np.array([[imitated(of, by) for by in best] for of in best])
+    fraction = np.array([[imitated(of, by) for by in best] for of in best])
     axes = figure.subplots()
     axes.grid(False)
-    picture = axes.imshow(share, vmin=0, vmax=1, cmap="Blues")
-    for i, j in np.ndindex(share.shape):
-        axes.text(j, i, f"{share[i, j]:.2f}", ha="center", va="center", color="w" if share[i, j] > 0.6 else INK)
-    names = [entry.id.replace("_", " ") for entry in best]
+    picture = axes.imshow(fraction, vmin=0, vmax=1, cmap="Blues")
+    for i, j in np.ndindex(fraction.shape):
+        axes.text(j, i, f"{fraction[i, j]:.2f}", ha="center", va="center", color="w" if fraction[i, j] > 0.6 else INK)
+    names = [one.id.replace("_", " ") for one in best]
     axes.set_xticks(range(len(best)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(best)), names)
     axes.set_xlabel("imitated by")
-    figure.colorbar(picture, ax=axes, label="share of the signal")
+    figure.colorbar(picture, ax=axes, label="fraction of the signal")
     return None
 
 
@@ -151,12 +151,12 @@ def directions(figure, d: "Diagnosis") -> None:
     for fit, colour, label in fits_shown(d):
         size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
         axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
-    first = np.flatnonzero(np.diff(d.locked.astype(int)) != 0) + 1
-    edges = np.concatenate([[0], first, [len(d.locked)]])
+    first = np.flatnonzero(np.diff(d.held_out.astype(int)) != 0) + 1
+    edges = np.concatenate([[0], first, [len(d.held_out)]])
     for start, end in zip(edges, edges[1:], strict=False):
-        if end > start and d.locked[start]:
+        if end > start and d.held_out[start]:
             axes.axvspan(start + 0.5, end + 0.5, color="#eef2f5", zorder=0)
     axes.set_yscale("log")
-    axes.set_xlabel("reading (grey: runs that no fit saw)")
+    axes.set_xlabel("reading (grey: held-out runs)")
     axes.set_ylabel("error, mm")
     axes.legend(markerscale=3)

@@ -42,8 +42,8 @@ def moment(engine, candidate: Candidate, columns: NDArray, worth: Callable[[NDAr
     if best is None:
         return []
     when = float(0.5 * (part[fitted[best - 1]] + part[fitted[best]]))
-    price = float(np.log(len(fitted) - 1))  # it could have been at any row but the first
-    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),), price), jumped(best))]
+    penalty = float(np.log(len(fitted) - 1))  # it could have been at any row but the first
+    return [(Candidate(candidate.id, candidate.names, ((WHEN, when),), penalty), jumped(best))]
 
 
 def uncertain_rows(measurements: Measurements, fitted: NDArray[np.bool_], when: float) -> NDArray[np.bool_]:

@@ -19,12 +19,12 @@ STEPS = 150
 def piece(engine, candidate: Candidate, worth: Callable[[NDArray], float]) -> list[tuple[Candidate, NDArray]]:
     """The candidate with the piece of metal that `worth`, of slopes (M, 6, 1), likes best, and with its slopes."""
     _, sd, _, _ = engine.priors(candidate.names)
-    centre = np.median(engine.places, axis=0)
-    radius = np.quantile(np.linalg.norm(engine.places - centre, axis=1), 0.95)
+    centre = np.median(engine.positions, axis=0)
+    radius = np.quantile(np.linalg.norm(engine.positions - centre, axis=1), 0.95)
 
     def slopes(place: NDArray) -> NDArray:  # of metal and coils
         metal, coils = place[:3], place[3:]
-        column = -sd[0] * _core.beside_metal(engine.places - coils, metal - coils)
+        column = -sd[0] * _core.beside_metal(engine.positions - coils, metal - coils)
         column[~engine.fitted] = 0.0
         return column[:, :, None]
 

@@ -15,7 +15,7 @@ from ctcr.show.html_page import cards, figure, short, table
 from ctcr.show.output import atomic_writer
 
 if TYPE_CHECKING:
-    from ctcr.diagnose.analysis import Diagnosis
+    from ctcr.diagnose.pipeline import Diagnosis
 
 MOST_ARROWS = 800
 
@@ -58,8 +58,8 @@ def _opening(d: "Diagnosis", title: str) -> str:
         f"<h1>{html.escape(title)}</h1>"
         f'<p class="lead"><b>{html.escape(verdict.capitalize())}.</b> {html.escape(lead)}</p>'
         f"{cards(numbers)}"
-        f'<p class="soft">Errors of {int(d.judged.sum())} readings of runs that no fit saw. Even of a right '
-        f"model the tracker's errors and uncertain parameters allow {short(d.expected_mm)} mm there.</p>"
+        f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs; of a right model noise '
+        f"and uncertain parameters let expect {short(d.expected_mm)} mm there.</p>"
     )
 
 
@@ -71,12 +71,12 @@ def _found(d: "Diagnosis") -> str:
         for identity in a.ids:
             e = catalogue.get(identity, d.robot.n_tubes)
             items.append(f"<li><b>{html.escape(e.title)}</b> ({identity}). {html.escape(e.physics)}</li>")
-    heading = "What takes the place of the cause" if d.verdict.names_no_cause else "What is missing"
+    heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
     return f"<h2>{heading}</h2><ul>{''.join(items)}</ul>"
 
 
 def _errors(d: "Diagnosis") -> str:
-    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on runs that no fit saw (logarithmic axis).")
+    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs (logarithmic axis).")
     right = figure(figures.directions, d, 5.2, 3.8, "The error of every reading, in the order measured.")
     more = figure(
         figures.before_after,
@@ -91,10 +91,10 @@ def _errors(d: "Diagnosis") -> str:
 
 
 def _varying(d: "Diagnosis") -> str:
-    """What an effect of one's own would have to do."""
+    """The varying-coefficient model: where an effect of one's own would have to act."""
     if not d.varying:
         return ""
-    items = "".join(f"<li>{html.escape(v.in_words)}</li>" for v in d.varying.variations)
+    items = "".join(f"<li>{html.escape(v.message)}</li>" for v in d.varying.variations)
     drawn = figure(
         figures.varying,
         d,
@@ -104,7 +104,7 @@ def _varying(d: "Diagnosis") -> str:
         True,
     )
     return (
-        f"<h2>What does not stay constant</h2><p>{html.escape(d.varying.lead)}:</p><ul>{items}</ul>{drawn}"
+        f"<h2>Parameters that vary</h2><p>{html.escape(d.varying.lead)}:</p><ul>{items}</ul>{drawn}"
         f"<p>{html.escape(d.varying.advice)}</p>"
     )
 
@@ -123,7 +123,7 @@ def _candidates(d: "Diagnosis") -> str:
         d,
         10.4,
         4.4,
-        "Every candidate was judged together with the calibration; pale: by slopes alone, too far behind to be fitted. "
+        "Every candidate was judged together with the calibration; pale: linearised, too far behind to be fitted. "
         "Boxed: accepted, with all that these data cannot tell from it.",
         True,
     )
@@ -132,8 +132,8 @@ def _candidates(d: "Diagnosis") -> str:
         d,
         5.2,
         4.2,
-        "How much of one candidate's signal another one can imitate together with calibration: near 1 both ways, these "
-        "data cannot tell the two apart.",
+        "Fraction of a candidate's signal that another one can imitate together with calibration: where it is near 1 "
+        "both ways, these data cannot tell the two apart.",
     )
     why = next((r.why_not for r in reversed(d.rounds) if r.why_not), "")
     below = f'<div class="pair">{apart}<div><p>{html.escape(why)}</p></div></div>'
@@ -165,10 +165,10 @@ def _parameters(d: "Diagnosis") -> str:
 
 
 def _limits(d: "Diagnosis") -> str:
-    unseen = (f"{identity}: {reason}" for identity, reason in d.unseen.items())
-    lines = [*d.leftover.in_words, *d.notices, *unseen]
+    unseen = (f"{identity}: {reason}" for identity, reason in d.not_testable.items())
+    lines = [*d.residual.messages, *d.notices, *unseen]
     return (
-        "<h2>What is left, and what these data cannot say</h2><ul>"
+        "<h2>The residual, and limits of these data</h2><ul>"
         + "".join(f"<li>{html.escape(line)}</li>" for line in lines)
         + "</ul>"
     )

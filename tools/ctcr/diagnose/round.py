@@ -1,29 +1,60 @@
-"""One round of forward selection: the candidates that were fitted, and what was decided."""
+"""One round of forward selection: all candidates screened, the best ones fitted with the calibration, one accepted."""
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ctcr.diagnose.candidates import Candidate
-from ctcr.diagnose.engine import Gain
-from ctcr.fit import joint
+from ctcr.diagnose import contact, jump, metal, segment_delays
+from ctcr.diagnose.candidates import Candidate, is_of_metal
+from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
+from ctcr.diagnose.held_out import predicts_better
+from ctcr.diagnose.linearised import Gain
+from ctcr.effects import catalogue
+from ctcr.errors import InputError
+from ctcr.fit import folds, joint
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+SURE = 5.0  # log evidence beyond which candidates can surely be told apart
+CERTAIN = 200.0  # log evidence of a further effect that a linearised cross-validation does not outweigh
+REFITS = 6  # effects that are refitted, the best ones by linearisation
+ITERATIONS = 5  # of a first refit: kinks of an effect that is far behind need not be followed to the end
+CONTENDS = 0.5  # fraction of the best gain above which a candidate is refitted to convergence
+END = 50  # iterations by which a refit has converged, or never will
+IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
+NEAR = 0.2  # of the best linearised gain: candidates below it are not refitted
+MOST_OUTLIERS = 0.01  # fraction of readings: where more are outliers, the model may be wrong and not they
+
+EVIDENCE = 5.0  # of the best candidate over none, beyond the penalty for having looked at many: log(number of effects)
+UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains the residual, and
+FIRST_UNASKED = 5.0  # of the first one
+EXPLAINED = 0.25  # fraction of the unexplained chi-square that a further effect must explain, and
+FIRST_EXPLAINED = 0.1  # the first one, and
+SUSPECT_EXPLAINED = 0.5  # a look-alike of one whose constitutive law is not known: it imitates part of another law
+TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
+ALIKE = 0.5  # ... and of forms of one effect the one with the fewest settings is taken
+SAME = 0.95  # fraction of a signal that another candidate can imitate, both ways: the same to these data
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A candidate in one round of the race."""
+class CandidateFit:
+    """A candidate in one round."""
 
     candidate: Candidate
-    gain: Gain  # over none, by slopes
-    refit: float | None = None  # log evidence after a joint refit; None: too far behind to be refitted
-    share: float = 0.0  # of the excess chi-square that it removes
-    spread: float = np.inf  # standard deviation of that share
+    gain: Gain  # over none, linearised at the fit before
+    refit: float | None = None  # log evidence over none after a joint refit; None: not refitted
+    explained: float = 0.0  # fraction of the unexplained chi-square that it explains
+    explained_sd: float = np.inf
     fit: joint.Fit | None = None
-    implausible: tuple[str, ...] = ()  # what its values, or those of the calibration, would have to be
+    implausible: tuple[str, ...] = ()  # values beyond the soft bounds of their effect
 
     @property
     def linear(self) -> float:
-        return self.gain.log_evidence - self.candidate.price
+        """Log evidence by linearisation."""
+        return self.gain.log_evidence - self.candidate.penalty
 
     @property
     def score(self) -> float:
@@ -36,41 +67,334 @@ class Entry:
 
 @dataclass
 class Round:
-    """One round: the fit before, all entries, best first, and what came of it."""
-
     before: joint.Fit
-    entries: list[Entry]
-    overlaps: dict[str, float]  # by id: share of the winner's signal that it imitates, or the other way round: the less
-    accepted: Entry | None = None
-    ids: list[str] = field(default_factory=list)  # the accepted effect and those the data cannot tell from it
+    tried: list[CandidateFit]  # the best first
+    overlap: dict[str, float] = field(
+        default_factory=dict
+    )  # by id: fraction of signal shared with the best, see decide
+    accepted: CandidateFit | None = None
+    ids: list[str] = field(default_factory=list)  # the accepted effect and those that the data cannot tell from it
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
-    is_stand_in: bool = False  # whether the best candidate surely removes too little of the excess
+    is_spurious: bool = False  # whether the best candidate surely explains too little
 
     @property
     def why_not(self) -> str:
-        """A sentence, or nothing where an effect was accepted."""
+        """A sentence; empty where an effect was accepted."""
         return f"Nothing accepted: {self.reason}." if self.reason else ""
 
     @property
-    def best(self) -> list[Entry]:
+    def best(self) -> list[CandidateFit]:
         """Of each effect the accepted form, or the best one; those that were refitted come first."""
-        found = {entry.id: entry for entry in reversed(self.entries)}
+        found = {one.id: one for one in reversed(self.tried)}
         if self.accepted:
             found[self.accepted.id] = self.accepted
-        return sorted(found.values(), key=lambda entry: (-entry.score, -entry.linear))
+        return sorted(found.values(), key=lambda one: (-one.score, -one.linear))
 
-    def shed(self) -> None:
-        """Gives back the memory of what was fitted: of many rows, a round would keep as much as all else."""
+    @property
+    def rejected_variants(self) -> dict[str, float]:
+        """Values of those variants of the accepted effect whose shape was fitted, but which were not accepted."""
+        found = {}
+        for one in reversed(self.tried):
+            if one.id == self.accepted.id and one.fit is not None and one is not self.accepted:
+                own = one.candidate.names
+                if any(name in own for name, _ in one.candidate.shape):  # a shape of amplitude 0 has no derivatives
+                    found |= {name: value for name, value in values_of(one.fit).items() if name in own}
+        return found
+
+    def release_memory(self) -> None:
+        """Drops the readings of its fits: with many rows, a round would need as much memory as everything else."""
         self.before = self.before.without_readings()
-        for place, entry in enumerate(self.entries):
-            if entry.fit is not None:
-                self.entries[place] = replace(entry, fit=entry.fit.without_readings())
-            if entry is self.accepted:
-                self.accepted = self.entries[place]
+        for i, one in enumerate(self.tried):
+            if one.fit is not None:
+                self.tried[i] = replace(one, fit=one.fit.without_readings())
+            if one is self.accepted:
+                self.accepted = self.tried[i]
 
     def is_hopeless(self, more: float) -> bool:
         """Whether nothing would be accepted even with `more` times the readings."""
-        best = max((entry.score for entry in self.entries), default=-np.inf)
-        return self.accepted is None and (self.is_stand_in or more * best < self.needed)
+        best = max((one.score for one in self.tried), default=-np.inf)
+        return self.accepted is None and (self.is_spurious or more * best < self.needed)
+
+
+def unexplained(fit: joint.Fit) -> float:
+    """Chi-square beyond what the noise as stated explains, at least its usual scatter; in units of inflated noise."""
+    used = (fit.weights > 0).sum(axis=0)
+    by_noise = float(3 * np.sum(used / fit.inflation**2))
+    return max(_chi_square(fit) - by_noise, np.sqrt(2 * fit.observations))
+
+
+def fraction_explained(before: joint.Fit, after: joint.Fit, added: int) -> float:
+    """Fraction of the unexplained chi-square that `added` parameters explain, at the same weights and noise."""
+    removed = _chi_square(before) - _chi_square(after) - added
+    return float(removed / max(unexplained(before), removed, 1.0))
+
+
+def _chi_square(fit: joint.Fit) -> float:
+    """Of residual and prior, in units of the fit's inflated noise."""
+    return fit.admitted_chi_square + fit.shift_square
+
+
+def outlier_fraction(fit: joint.Fit) -> float:
+    """Of the fitted positions."""
+    used = fit.weights[:, 0] > 0
+    return float(np.mean(fit.weights[used, 0] < OUTLIER)) if used.any() else 0.0
+
+
+def parameters_of(fits: Collection[CandidateFit]) -> tuple[list[str], dict[str, float]]:
+    """Names of all parameters of effects that are fitted, and the values at which others are held."""
+    names = [name for one in fits for name in one.candidate.names]
+    return names, dict(pair for one in fits for pair in one.candidate.shape)
+
+
+def run_round(
+    engine: Engine, before: joint.Fit, candidates: list[Candidate], accepted: list[CandidateFit], progress: Progress
+) -> Round:
+    """Screens all candidates, refits the best jointly with calibration and accepted effects, and decides."""
+    progress("screening all candidates")
+    names, fixed = parameters_of(accepted)
+    if accepted:  # what a refit without a further effect finds too is no gain of one
+        again = engine.fit_like(before, names, start=values_of(before), fixed=fixed, near=True, tolerance=joint.COARSE)
+        before = max(before, again, key=lambda fit: fit.log_evidence)
+    screened = screen(*engine.thinned(before), candidates, fixed)
+    if not screened:
+        return Round(before, [], reason="no effect is left to try")
+    chosen = _worth_a_refit(screened)
+    chosen = _in_reach(engine, before, chosen, fixed, progress)
+    tried = refit_all(engine, before, chosen, fixed, progress)
+    if accepted:
+        before, tried = _without_candidate(engine, before, tried, names, fixed)
+    fitted = [one.candidate for one in tried]
+    tried += [one for one in screened if one.candidate not in fitted]
+    tried.sort(key=lambda one: (-one.score, -one.linear))
+    round_ = Round(before, tried)
+    n_effects = len({c.id for c in candidates})
+    decide(round_, n_effects, bool(accepted), engine.rejects(before), _suspects(engine, accepted))
+    unsure = round_.accepted and accepted and round_.accepted.score < CERTAIN
+    if unsure and not predicts_better(engine, before, round_.accepted.fit):
+        round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
+        round_.accepted, round_.ids = None, []
+    round_.release_memory()
+    return round_
+
+
+def screen(
+    engine: Engine, before: joint.Fit, candidates: list[Candidate], fixed: dict[str, float]
+) -> list[CandidateFit]:
+    """All candidates with their linearised gain, best first."""
+    linear = segment_delays.linearised(engine, before)
+    candidates = [c for c in candidates if not set(c.names) & set(before.names)]
+    names = list(dict.fromkeys([name for c in candidates for name in c.names] + contact.FORCE))
+    columns = dict(
+        zip(names, np.moveaxis(engine.derivatives(before, names, fixed | {jump.WHEN: -1.0}), 2, 0), strict=True)
+    )
+    found = []
+
+    def worth(columns: Array) -> float:
+        return linear.gain(before.whiten(columns)).log_evidence
+
+    for candidate in candidates:
+        if candidate.shape:
+            own = engine.derivatives(before, candidate.names, fixed | dict(candidate.shape))
+        else:
+            own = np.stack([columns[name] for name in candidate.names], axis=2)
+        kinds = [[(candidate, own)]]  # of each the best enters
+        if candidate.id == "frame_jump":
+            kinds = [jump.moment(engine, candidate, own, worth)]
+        elif candidate.id == "contact":
+            tip = np.stack([columns[name] for name in contact.FORCE], axis=2) / engine.priors(contact.FORCE)[1]
+            kinds = [contact.planes(engine, candidate, tip, part) for part in contact.DEPTHS]
+        elif is_of_metal(candidate.names[0]):
+            kinds = [metal.piece(engine, candidate, worth)]
+        for options in kinds:
+            gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
+            if gains:
+                gain, variant = max(gains, key=lambda pair: pair[0].log_evidence)
+                found.append(CandidateFit(variant, gain))
+    return sorted(found, key=lambda one: -one.linear)
+
+
+def _worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
+    """The best REFITS effects, two of each at most. Forms of the same parameters come last: once an effect is accepted,
+    all its forms are tried."""
+    worth = [one for one in screened if one.linear > max(1.0, NEAR * screened[0].linear)]
+    first = {one.candidate.names: one for one in reversed(worth)}
+    chosen: list[CandidateFit] = []
+    for one in sorted(worth, key=lambda one: first[one.candidate.names] is not one):
+        same = [other for other in chosen if other.id == one.id]
+        if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
+            chosen.append(one)
+    return chosen
+
+
+def _in_reach(
+    engine: Engine, before: joint.Fit, chosen: list[CandidateFit], fixed: dict[str, float], progress: Progress
+) -> list[CandidateFit]:
+    """Those that a refit to a few of many rows does not leave far behind the best, with the fit where that ended."""
+    few = folds.few_of(engine.fitted)
+    if few is None or len(chosen) < 2:
+        return chosen
+    small = replace(engine, rows=few)
+    base = small.fit_like(before, effects_in(before), start=values_of(before), fixed=fixed, near=True)
+    tried = refit_all(small, base, chosen, fixed, progress)
+    best = max(one.score for one in tried)
+    reach = min(best, IN_REACH * best)  # the best itself always is
+    return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
+
+
+def refit_all(
+    engine: Engine, before: joint.Fit, chosen: list[CandidateFit], fixed: dict[str, float], progress: Progress
+) -> list[CandidateFit]:
+    """Each after a joint fit with calibration and accepted effects, at the same weights and noise. Those that contend
+    are refitted to convergence: a candidate that is slow to fit must not lose to one that is quick."""
+    evidence = segment_delays.log_evidence(engine, before)
+    tried = [_refit(engine, before, evidence, one, fixed, progress, ITERATIONS) for one in chosen]
+    near = CONTENDS * max((one.score for one in tried), default=0.0)
+    return [
+        _refit(engine, before, evidence, one, fixed, progress, END)
+        if one.fit and not one.fit.converged and one.score > near
+        else one
+        for one in tried
+    ]
+
+
+def _refit(
+    engine: Engine,
+    before: joint.Fit,
+    evidence: float,
+    one: CandidateFit,
+    fixed: dict[str, float],
+    progress: Progress,
+    iterations: int,
+) -> CandidateFit:
+    """One of them; `evidence` is that of the fit before."""
+    candidate = one.candidate
+    progress(f"fitting {candidate.label}")
+    first = values_of(one.fit) if one.fit else linearised_end(engine, before, one)
+    for start in (first, values_of(before)):
+        try:
+            fit = engine.fit_like(
+                before,
+                [*effects_in(before), *candidate.names],
+                start=start,
+                fixed=fixed | dict(candidate.shape),
+                max_iterations=iterations,
+                tolerance=joint.COARSE,
+                near=one.fit is not None,
+            )
+            break
+        except InputError:
+            continue  # the model has no solution there
+    else:
+        return replace(one, fit=None)
+    explained = fraction_explained(before, fit, len(candidate.names))
+    return replace(
+        one,
+        refit=segment_delays.log_evidence(engine, fit) - evidence - candidate.penalty,
+        explained=explained,
+        # A chi-square removed has a standard deviation of twice its root.
+        explained_sd=2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0)),
+        fit=fit,
+        implausible=tuple(_implausible(engine, fit, candidate)),
+    )
+
+
+def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict[str, float]:
+    """Values at which the refit will end if the model is linear."""
+    fitted = one.candidate.names[: len(one.gain.values)]  # shapes that have no derivatives yet come after
+    neutral, sd, _, _ = engine.priors(fitted)
+    moved = before.values + before.prior_sd * one.gain.calibration[: len(before.names)]
+    own = dict(zip(fitted, neutral + sd * one.gain.values, strict=True))
+    return dict(zip(before.names, map(float, moved), strict=True)) | dict(one.candidate.shape) | own
+
+
+def _implausible(engine: Engine, fit: joint.Fit, candidate: Candidate) -> list[str]:
+    """Values beyond the soft bounds of their effect, by more than two standard deviations."""
+    known = catalogue.parameter_of(engine.robot.n_tubes)
+    found = []
+    for name, value, sd in zip(fit.names, fit.values, fit.sd, strict=True):
+        if name not in candidate.names or name not in known:
+            continue
+        low, high = known[name].soft
+        if value + 2 * sd < low or value - 2 * sd > high:
+            found.append(f"{name} = {value:.3g} {known[name].unit}".rstrip())
+    return found
+
+
+def _without_candidate(
+    engine: Engine, before: joint.Fit, tried: list[CandidateFit], names: list[str], fixed: dict[str, float]
+) -> tuple[joint.Fit, list[CandidateFit]]:
+    """The fit before and the candidates, after a fit without the best candidate that begins where its fit ended: what
+    that gains as well is no gain of the candidate, but another optimum of the effects accepted before."""
+    best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
+    if best is None:
+        return before, tried
+    there = engine.fit_like(before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=joint.COARSE)
+    found = there.log_evidence - before.log_evidence
+    if found <= 0:
+        return before, tried
+
+    def over_there(one: CandidateFit) -> CandidateFit:
+        explained = fraction_explained(there, one.fit, len(one.candidate.names))
+        return replace(one, refit=one.refit - found, explained=explained)
+
+    return there, [one if one.fit is None else over_there(one) for one in tried]
+
+
+def _suspects(engine: Engine, accepted: list[CandidateFit]) -> set[str]:
+    """Look-alikes of accepted effects whose constitutive law is open: it may be none of those that are offered."""
+    known = (catalogue.get(one.id, engine.robot.n_tubes) for one in accepted)
+    return {identity for effect in known if effect.choices for identity in effect.look_alikes}
+
+
+def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, suspects: Collection[str] = ()) -> None:
+    """Accepts the best candidate, with all that the data cannot tell from it, or says why not.
+
+    n_effects that were looked at; is_further: whether others are in the model already; is_rejected: whether the noise
+    as stated does not explain the residual; suspects: ids that may imitate the unknown law of an accepted effect.
+    """
+    round_.needed = EVIDENCE + np.log(n_effects)
+    unasked = UNASKED if is_further else FIRST_UNASKED
+    threshold = round_.needed + (0.0 if is_rejected else unasked)
+    refitted = [one for one in round_.tried if one.fit is not None]
+    fitted = [one for one in refitted if not (is_further and one.implausible)]
+    if not fitted:
+        round_.reason = "no candidate explains anything"
+        if refitted:
+            values = ", ".join(refitted[0].implausible)
+            round_.reason = f"the best candidate, {refitted[0].id}, would need an implausible value, {values}"
+        return
+    best = fitted[0]
+    alike = [one for one in fitted if one.id == best.id and best.score - one.score < ALIKE]
+    best = min(alike, key=lambda one: len(one.candidate.shape))
+    if best.score < threshold:
+        round_.reason = (
+            f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
+        )
+        return
+    needed = SUSPECT_EXPLAINED if best.id in suspects else EXPLAINED if is_further else FIRST_EXPLAINED
+    if best.explained < needed:
+        round_.is_spurious = best.explained + 2 * best.explained_sd < needed
+        round_.reason = (
+            f"the best candidate, {best.id}, explains {best.explained:.0%} of the unexplained chi-square: less than "
+            f"{needed:.0%} suggests a spurious attribution"
+        )
+        return
+    rivals = [one for one in refitted if one.id != best.id]
+    for rival in rivals:
+        overlap = min(imitated(best, rival), imitated(rival, best))
+        round_.overlap[rival.id] = max(overlap, round_.overlap.get(rival.id, 0.0))
+    same = [one for one in rivals if best.score - one.score < TIE or round_.overlap[one.id] >= SAME]
+    round_.accepted = best
+    round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
+    others = [one.score for one in rivals if one.id not in round_.ids]
+    round_.margin = best.score - max(others, default=-np.inf)
+
+
+def imitated(one: CandidateFit, by: CandidateFit) -> float:
+    """Fraction of a candidate's signal that another one can imitate together with the calibration."""
+    signal = one.gain.signal
+    q, r = np.linalg.qr(by.gain.columns)
+    keep = np.abs(np.diag(r)) > 1e-9 * np.abs(np.diag(r)).max(initial=1e-300)
+    return float(np.sum((q[:, keep].T @ signal) ** 2) / max(signal @ signal, 1e-300))

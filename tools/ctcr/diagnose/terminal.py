@@ -12,20 +12,20 @@ from ctcr.diagnose import fitted_effects
 from ctcr.show import output
 
 if TYPE_CHECKING:
-    from ctcr.diagnose.analysis import Diagnosis
+    from ctcr.diagnose.pipeline import Diagnosis
 
 SHOWN = 8  # candidates of a round
 
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """Says what is being tried, on a terminal."""
+    """A function that shows the current step, on a terminal."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return
     columns = (BarColumn(20), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=None)  # how many rounds there will be, nobody knows
+        task = bar.add_task("reading", total=None)  # the number of rounds depends on the data
         yield lambda text: bar.update(task, description=text)
 
 
@@ -37,26 +37,28 @@ def show(console: Any, result: "Diagnosis") -> None:
     console.print()
     console.print(_errors(result))
     for number, round_ in enumerate(result.rounds, start=1):
-        if round_.entries:
+        if round_.tried:
             console.print(_candidates(number, round_))
         if round_.why_not:
             console.print(round_.why_not, markup=False)
-    console.print("  slopes, fit: gain in log evidence, by slopes alone and in the fit; removed: of the excess error")
+    console.print(
+        "  linear, fit: log evidence gained, linearised and in the joint fit; explained: of the unexplained chi-square"
+    )
     if result.accepted:
         fit = result.final
         fitted_effects.show(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
-    for line in result.leftover.in_words:
+    for line in result.residual.messages:
         console.print(line, markup=False)
     if result.varying:
         console.print(f"{result.varying.lead}:", markup=False)
         for variation in result.varying.variations:
-            console.print(f"  • {variation.in_words}", markup=False)
+            console.print(f"  • {variation.message}", markup=False)
         console.print(result.varying.advice, markup=False)
         console.print(f"What to measure next: {result.varying.measure[0]}", markup=False)
     for notice in result.notices:
         console.print(f"{notice}.", markup=False)
-    for identity, reason in result.unseen.items():
-        console.print(f"Not looked for: {identity}: {reason}.", markup=False)
+    for identity, reason in result.not_testable.items():
+        console.print(f"Not tested: {identity}: {reason}.", markup=False)
 
 
 def _errors(result: "Diagnosis") -> Any:
@@ -68,30 +70,16 @@ def _errors(result: "Diagnosis") -> Any:
     }
     runs = len(set(result.measurements.run[result.judged].tolist()))
     rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
-    rows.append(["allowed by the tracker and uncertain parameters", f"{result.expected_mm:.3f}"])
-    title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} run(s) that no fit saw"
+    rows.append(["expected from noise and uncertain parameters", f"{result.expected_mm:.3f}"])
+    title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} held-out run(s)"
     return output.table(title, ["model", "mm"], rows)
 
 
 def _candidates(number: int, round_: Any) -> Any:
     rows = []
-    for entry in round_.best[:SHOWN]:
-        refitted = entry.refit is not None
-        rows.append(
-            [
-                entry.id,
-                entry.candidate.told,
-                f"{entry.linear:.1f}",
-                f"{entry.refit:.1f}" if refitted else "",
-                f"{entry.share:.0%}" if refitted else "",
-                _remark(entry, round_),
-            ]
-        )
+    for one in round_.best[:SHOWN]:
+        refitted = [f"{one.refit:.1f}", f"{one.explained:.0%}"] if one.refit is not None else ["", ""]
+        remark = "accepted" if one is round_.accepted else "as likely" if one.id in round_.ids else ""
+        rows.append([one.id, one.candidate.summary, f"{one.linear:.1f}", *refitted, remark])
     title = f"Round {number}: effects, each fitted together with the calibration"
-    return output.table(title, ["effect", "parameters", "slopes", "fit", "removed", ""], rows, text=(0, 1, 5))
-
-
-def _remark(entry: Any, round_: Any) -> str:
-    if entry is round_.accepted:
-        return "accepted"
-    return "as likely" if entry.id in round_.ids else ""
+    return output.table(title, ["effect", "parameters", "linear", "fit", "explained", ""], rows, text=(0, 1, 5))

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.diagnose.analysis import Diagnosis
-from ctcr.diagnose.race import SURE, Entry
+from ctcr.diagnose.pipeline import Diagnosis
+from ctcr.diagnose.round import SURE, CandidateFit
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
@@ -49,17 +49,17 @@ class Proposal:
 
 def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
     """Fits of the effects of the first round whose effect the measurements cannot tell from others."""
-    before: list[Entry] = []
+    before: list[CandidateFit] = []
     for round_, accepted in zip(diagnosis.rounds, diagnosis.accepted, strict=False):
-        entries: dict[str, Entry] = {}
-        for entry in round_.entries:
+        entries: dict[str, CandidateFit] = {}
+        for entry in round_.tried:
             near = entry.refit is not None and round_.accepted.score - entry.score < SURE
             if entry.fit is not None and (entry.id in round_.ids or near):
                 entries.setdefault(entry.id, entry)
         if len(entries) > 1:
             shapes = dict(pair for entry in before for pair in entry.candidate.shape)
             return [Rival(entry.id, entry.fit, shapes | dict(entry.candidate.shape)) for entry in entries.values()]
-        before.append(accepted.entry)
+        before.append(accepted.best)
     return []
 
 

@@ -1,27 +1,19 @@
-"""What no effect explains: which parameter would have to change with which quantity."""
+"""The varying-coefficient model: which parameter would have to change with which quantity."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from ctcr.compare.sample import take_sample
-from ctcr.diagnose import diagnose, other_runs, race, report, terminal, varying
+from ctcr.diagnose import diagnose, held_out, report, terminal, varying_coefficients
 from ctcr.diagnose.engine import Engine
 from ctcr.fit.folds import held_out_rows
 from ctcr.model import effect_model, simulation
 from ctcr.model.noise import noise_of_readings
-from ctcr.robot import robot_file
 from ctcr.show import output
 
-ROOT = Path(__file__).parents[3]
 GAIN, AMPLITUDE, SLIP = 1.5, 0.015, 0.05  # rad/m, rad, rad
 TEETH = 9
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
 
 
 def twisted(plan):
@@ -45,28 +37,38 @@ def readings_of(robot, plan, alpha, seed=3):
 
 
 def looked_at(robot, readings):
-    """A calibration of three quarters of the runs, and what would have to vary."""
-    noise = noise_of_readings(robot, readings)
-    engine = Engine(robot, readings, noise, ~held_out_rows(robot, readings, 0))
-    fit = race.baseline(engine, [], {}, lambda _: None)
-    return (
-        engine,
-        fit,
-        varying.found(engine, fit, take_sample(robot, readings, effect_model.readings(robot, readings))),
-    )
+    """An engine for three quarters of the runs, its calibration, and the model of what varies."""
+    engine = Engine(robot, readings, noise_of_readings(robot, readings), ~held_out_rows(robot, readings, 0))
+    fit = engine.fit_with_field([], {})
+    sample = take_sample(robot, readings, effect_model.readings(robot, readings))
+    return engine, fit, varying_coefficients.varying_model(engine, fit, sample)
 
 
-def test_a_twist_while_pushing_is_seen_with_its_gain(robot, recorded):
-    found = looked_at(robot, readings_of(robot, recorded, twisted(recorded)))[2]
+@pytest.fixture(scope="module")
+def twist(robot, recorded):
+    """Engine, fit and model of readings of a robot whose tube 1 turns while it is pushed."""
+    return looked_at(robot, readings_of(robot, recorded, twisted(recorded)))
+
+
+@pytest.fixture(scope="module")
+def noise(robot, plan):
+    """The same of readings that hold noise alone."""
+    return looked_at(robot, readings_of(robot, plan, plan.alpha))
+
+
+def test_twist(twist):
+    """A tube that turns while it is pushed: its home rotation changes with its deployed length, by the right gain."""
+    _, _, found = twist
     [only] = found.variations
     assert (only.parameter, only.covariate.name, only.unit) == ("actuation.home_rotation.1", "length1", "deg")
     assert np.polyfit(only.covariate.value, only.change, 1)[0] == pytest.approx(np.rad2deg(GAIN), rel=0.1)
-    assert found.share > 0.9 and found.depends_on == ["length1"]
-    for text in (only.in_words, only.measure):
+    assert found.explained > 0.9 and found.depends_on == ["length1"]
+    for text in (only.message, only.measure):
         assert "home rotation of tube 1" in text and "deployed length of tube 1" in text
 
 
-def test_worn_teeth_are_counted(robot, recorded):
+def test_worn_teeth(robot, recorded):
+    """Worn teeth of the wheels are counted, and their amplitude is right."""
     found = looked_at(robot, readings_of(robot, recorded, toothed(recorded)))[2]
     seen = {(v.parameter, v.covariate.name) for v in found.variations}
     assert {(f"actuation.home_rotation.{i}", f"alpha{i}") for i in (1, 2, 3)} <= seen
@@ -75,7 +77,8 @@ def test_worn_teeth_are_counted(robot, recorded):
     assert np.ptp(first.change) == pytest.approx(2 * np.rad2deg(AMPLITUDE), rel=0.2)
 
 
-def test_a_slip_shows_in_time(robot, recorded):
+def test_slip(robot, recorded):
+    """A tube that slips halfway: its home rotation changes with time."""
     first = looked_at(robot, readings_of(robot, recorded, slipped(recorded)))[2].variations[0]
     assert (first.parameter, first.covariate.name) == ("actuation.home_rotation.2", "time")
     assert "again and again" in first.measure
@@ -83,37 +86,41 @@ def test_a_slip_shows_in_time(robot, recorded):
     assert late - early == pytest.approx(np.rad2deg(SLIP), rel=0.4)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_noise_varies_with_nothing(robot, plan, seed):
+@pytest.mark.parametrize("seed", range(3))
+def test_noise(robot, plan, seed):
+    """Noise varies with nothing."""
     assert looked_at(robot, readings_of(robot, plan, plan.alpha, seed))[2] is None
 
 
-def test_excess_is_none_for_noise_and_grows_with_the_square_of_an_error(robot, plan):
-    engine, fit, _ = looked_at(robot, readings_of(robot, plan, plan.alpha))
-    excess = other_runs.excess_of(engine, fit, ~engine.rows)
+def test_unexplained_chi_square(noise):
+    """Noise leaves none unexplained; an error adds its square; rows that were fitted do not count."""
+    engine, fit, _ = noise
+    unexplained = held_out.unexplained_of(engine, fit, ~engine.rows)
     unseen = int(6 * np.sum(~engine.rows))
-    assert excess(fit.residual) < 3 * np.sqrt(2 * unseen)
+    assert unexplained(fit.residual) < 3 * np.sqrt(2 * unseen)
     off = np.zeros_like(fit.residual)
     off[:, 0] = 1e-2  # m
-    assert (excess(2 * off) + unseen) / (excess(off) + unseen) == pytest.approx(4, rel=1e-9)
+    assert (unexplained(2 * off) + unseen) / (unexplained(off) + unseen) == pytest.approx(4, rel=1e-9)
     seen = np.where(engine.rows[:, None], off, 0.0)
-    assert excess(seen) == 0.0  # of rows that were fitted it says nothing
+    assert unexplained(seen) == 0.0  # of rows that were fitted it says nothing
 
 
-def test_few_of_many_readings_say_the_same(robot, recorded, monkeypatch):
+def test_part_of_the_rows(robot, recorded, monkeypatch):
+    """A part of many rows gives the same answer."""
     readings = readings_of(robot, recorded, twisted(recorded))
-    monkeypatch.setattr(varying, "ROWS", 60)
+    monkeypatch.setattr(varying_coefficients, "ROWS", 60)
     engine, fit, found = looked_at(robot, readings)
     assert engine.thinned(fit, 60)[0].rows.sum() < engine.rows.sum() / 2
     first = found.variations[0]
     assert (first.parameter, first.covariate.name) == ("actuation.home_rotation.1", "length1")
 
 
-def test_effects_that_leave_far_more_are_outdone(robot, recorded):
-    engine, fit, found = looked_at(robot, readings_of(robot, recorded, twisted(recorded)))
-    assert varying.may_outdo(engine, fit, fit) and found.outdoes(engine, fit, fit)
+def test_outdone(twist):
+    """A model of what varies outdoes effects that explain nothing, and not those that explain everything."""
+    engine, fit, found = twist
+    assert varying_coefficients.may_outdo(engine, fit, fit) and found.outdoes(engine, fit, fit)
     right = replace(fit, core=NoResidual(fit))
-    assert not varying.may_outdo(engine, fit, right) and not found.outdoes(engine, fit, right)
+    assert not varying_coefficients.may_outdo(engine, fit, right) and not found.outdoes(engine, fit, right)
 
 
 class NoResidual:
@@ -124,7 +131,8 @@ class NoResidual:
         self.report = lambda _: (0 * fit.residual.ravel(), fit.jacobian_all, 0 * fit.field.ravel(), None)
 
 
-def test_a_diagnosis_tells_it_everywhere(robot, recorded, capsys):
+def test_diagnosis(robot, recorded, capsys):
+    """The terminal, the report and the JSON say what varies."""
     found = diagnose(robot, readings_of(robot, recorded, twisted(recorded)))
     assert found.verdict.word != "identified"
     assert "length1" in found.as_json()["leftover"]["depends_on"]
@@ -132,20 +140,21 @@ def test_a_diagnosis_tells_it_everywhere(robot, recorded, capsys):
     page = report.page(found, "a test")
     for text in (capsys.readouterr().out, page):
         assert "home rotation of tube 1" in text
-    assert "What does not stay constant" in page and "identified" not in page.split("</p>")[0]
+    assert "Parameters that vary" in page and "identified" not in page.split("</p>")[0]
 
 
-def test_where_noise_explains_the_rest_nothing_is_said_to_vary(robot, plan):
-    found = diagnose(robot, readings_of(robot, plan, plan.alpha))
-    assert found.varying is None
-    assert "What does not stay constant" not in report.page(found, "a test")
+def test_diagnosis_of_noise(tip_load):
+    """Where the residual is noise nothing is said to vary."""
+    assert tip_load.varying is None
+    assert "Parameters that vary" not in report.page(tip_load, "a test")
 
 
-def test_each_run_says_how_much_of_it_is_explained(robot, recorded):
-    engine, before, _ = looked_at(robot, readings_of(robot, recorded, twisted(recorded)))
+def test_explained_by_run(twist, recorded):
+    """The fraction explained is counted for each held-out run, in chi-square."""
+    engine, before, _ = twist
     runs = np.unique(recorded.run[~engine.rows])
     names = {f"run {run}" for run in runs}
-    same = other_runs.explained(engine, before, before)
+    same = held_out.explained_by_run(engine, before, before)
     assert len(runs) >= 3 and set(same) <= names and [*same.values()] == pytest.approx(len(same) * [0])
 
     def with_residual(residual):
@@ -155,12 +164,13 @@ def test_each_run_says_how_much_of_it_is_explained(robot, recorded):
 
     far = 20 * before.residual
     one_is_off = far * (recorded.run == runs[0])[:, None]
-    shares = other_runs.explained(engine, with_residual(far), with_residual(one_is_off))
-    assert shares == pytest.approx({name: float(name != f"run {runs[0]}") for name in names}, abs=1e-6)
-    half = other_runs.explained(engine, with_residual(far), with_residual(far / 2))
+    fractions = held_out.explained_by_run(engine, with_residual(far), with_residual(one_is_off))
+    assert fractions == pytest.approx({name: float(name != f"run {runs[0]}") for name in names}, abs=1e-6)
+    half = held_out.explained_by_run(engine, with_residual(far), with_residual(far / 2))
     assert half == pytest.approx(dict.fromkeys(names, 0.75), abs=0.02)
 
 
-def test_where_noise_explains_other_runs_nothing_is_left_to_explain(robot, recorded):
-    engine, fit, _ = looked_at(robot, readings_of(robot, recorded, recorded.alpha))
-    assert other_runs.explained(engine, fit, fit) == {}
+def test_runs_of_noise(noise):
+    """Runs that noise explains say nothing of effects."""
+    engine, fit, _ = noise
+    assert held_out.explained_by_run(engine, fit, fit) == {}

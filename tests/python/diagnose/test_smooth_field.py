@@ -1,26 +1,18 @@
-"""A field distorted by more than a small piece of metal: what that leaves is smooth, and errors allow for it."""
+"""A field distorted by a piece of metal, alone and with more: the rest is smooth, and errors are corrected for it."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr.diagnose import add, diagnose, distorted, varying
+from ctcr.diagnose import add, diagnose, smooth_field
 from ctcr.diagnose.candidates import METAL
 from ctcr.diagnose.engine import Engine
 from ctcr.fit import joint
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
-from ctcr.robot import robot_file
 
-ROOT = Path(__file__).parents[3]
-NAMES = [distorted.EFFECT + name for name in METAL]
+NAMES = [smooth_field.EFFECT + name for name in METAL]
 LENGTH, SIZE = 0.04, 1.5e-4  # of the smooth error [m]
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -64,44 +56,37 @@ def fitted(robot, readings, start):
     return engine, engine.fit(list(start), start=start)
 
 
-def test_a_smooth_error_is_seen_as_large_and_as_long_as_it_is(robot, more, piece):
-    noise = distorted.noise_of(*fitted(robot, more, piece))
+def test_size_and_length(robot, more, piece):
+    """The smooth error is estimated with its size and its length, in a fit with a distorted field alone."""
+    noise = smooth_field.likeliest_noise(*fitted(robot, more, piece))
     assert noise.correlation_length == pytest.approx(LENGTH, rel=0.5)
     assert SIZE / 2 < noise.position_field < 2 * SIZE
-    assert f"{1e3 * noise.position_field:.2g} mm" in distorted.in_words(noise)
-    # Of another cause it is no distortion of the field.
-    assert distorted.noise_of(*fitted(robot, more, {})) is None
+    assert f"{1e3 * noise.position_field:.2g} mm" in smooth_field.message(noise)
+    assert smooth_field.likeliest_noise(*fitted(robot, more, {})) is None
 
 
-def test_runs_that_no_fit_saw_are_corrected_by_those_nearby(distorted_more):
+def test_correction(distorted_more):
+    """Held-out readings are corrected by those nearby; then nothing seems to vary any more."""
     assert [a.ids for a in distorted_more.accepted] == [["field_distortion"]]
     assert distorted_more.verdict.word == "identified"
-    assert distorted.FOLLOWED in distorted_more.leftover.in_words
+    assert smooth_field.CORRECTED in distorted_more.residual.messages
     rms = distorted_more.rms_mm
-    plain = distorted_more.reached_mm(distorted_more.accepted[0])
+    plain = distorted_more.rms_mm_after(distorted_more.accepted[0])
     noise = rms["noise_floor"] ** 2
+    assert not distorted_more.residual.structured and distorted_more.varying is None
     assert plain**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
     jitter = 1e3 * np.sqrt(3) * distorted_more.with_effects.noise.position_jitter
     assert rms["noise_floor"] == pytest.approx(jitter, rel=0.1)
 
 
-def test_what_seemed_to_vary_before_it_was_allowed_for_is_not_told(robot, by_metal, monkeypatch):
-    more = replace(by_metal, position=by_metal.position + smooth(by_metal.position, 0.025, 3e-4))
-    seen = []
-
-    def found(_engine, fit, _sample):
-        seen.append(fit)
-        return varying.Varying([], 0.5, fit.residual)
-
-    monkeypatch.setattr(varying, "may_outdo", lambda *_: True)
-    monkeypatch.setattr(varying, "found", found)
-    told = diagnose(robot, more)
-    assert seen, "no more than noise was left before it was allowed for"
-    assert not told.leftover.structured and told.varying is None
-
-
-def test_what_a_piece_of_metal_does_leaves_nothing_smooth(robot, by_metal):
+def test_metal_alone(robot, by_metal, piece):
+    """A piece of metal is found with its position and volume, and leaves nothing smooth."""
     found = diagnose(robot, by_metal)
+    assert found.verdict.word == "identified"
     assert [a.ids for a in found.accepted] == [["field_distortion"]]
-    assert not any("more than the small piece" in line for line in found.leftover.in_words)
+    values = found.parameters(found.accepted[0])
+    volume, *at = (piece[name] for name in NAMES[:4])
+    assert np.linalg.norm([values[name] for name in METAL[1:4]] - np.array(at)) < 0.01
+    assert values[METAL[0]] == pytest.approx(volume, rel=0.3)
+    assert not any("more than the small piece" in line for line in found.residual.messages)
     assert found.rms_mm["with_effects"] < 1.15 * found.rms_mm["noise_floor"]

@@ -1,7 +1,7 @@
-"""A tracker's field that is distorted by more than a small piece of metal.
+"""A tracker's field that is distorted by more than the dipole of a small piece of metal.
 
-What a bar, a table or several pieces do is not what a dipole does, but it too is alike where readings are near to one
-another: what a fit with the effect leaves is smooth in space.
+A bar, a table or several pieces do not act as one dipole, but their error too is alike where readings are near to one
+another. So the residual of a fit with a distorted field is modelled as a Gaussian process in space.
 """
 
 from typing import Any
@@ -13,16 +13,16 @@ from ctcr.diagnose.engine import Engine
 from ctcr.fit.joint import Fit, with_field
 
 EFFECT = "effects.field_distortion."
-LENGTHS = (0.025, 0.04, 0.07)  # over which what is left may change [m]
-SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # its standard deviation [m]
-SURE = 5.0  # log evidence from which it is allowed for, and told
+LENGTHS = (0.025, 0.04, 0.07)  # correlation lengths that are tried [m]
+SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # standard deviations an axis that are tried [m]
+SURE = 5.0  # log evidence from which the error is allowed for
 
-FOLLOWED = "Errors with the effects found allow for it: readings of runs that no fit saw are corrected by those nearby."
+CORRECTED = "Errors with the effects found are corrected for it: those of held-out runs by readings nearby."
 
 
-def noise_of(engine: Engine, fit: Fit) -> Any:
-    """The tracker's noise with a smooth error such as a fit with a distorted field leaves, by slopes; None where the
-    effect is not in it, or leaves nothing smooth for sure."""
+def likeliest_noise(engine: Engine, fit: Fit) -> Any:
+    """The tracker's noise with the smooth error that a linearised fit with a distorted field leaves; None where that
+    effect is not in the fit, or no smooth error is sure."""
     if not any(name.startswith(EFFECT) for name in fit.names):
         return None
     engine, at = engine.thinned(fit)
@@ -45,9 +45,9 @@ def noise_of(engine: Engine, fit: Fit) -> Any:
     return best.noise if best.log_evidence > least else None
 
 
-def taken_off(engine: Engine, fit: Fit, noise: Any) -> Fit:
-    """The fit by slopes under that noise, to readings without the smooth error: in rows that were not fitted, as those
-    near to them tell it."""
+def corrected(engine: Engine, fit: Fit, noise: Any) -> Fit:
+    """The linearised fit under that noise, to readings without the smooth error; rows that were not fitted are
+    corrected by those near to them."""
     there = engine.linear_fit(fit, noise=noise, weights=fit.weights, inflation=fit.inflation)
     return engine.linear_fit(
         there,
@@ -59,10 +59,9 @@ def taken_off(engine: Engine, fit: Fit, noise: Any) -> Fit:
     )
 
 
-def in_words(noise: Any) -> str:
-    """What is to be said of that noise."""
+def message(noise: Any) -> str:
     return (
-        "The field is distorted by more than the small piece of metal that was fitted: what that leaves is smooth, "
-        f"{1e3 * noise.position_field:.2g} mm an axis (standard deviation), and changes within "
-        f"{1e3 * noise.correlation_length:.2g} mm. A robot file does not hold that: better find the metal, remove it."
+        "The field is distorted by more than the small piece of metal that was fitted: the residual is smooth in "
+        f"space, {1e3 * noise.position_field:.2g} mm an axis (standard deviation), and changes within "
+        f"{1e3 * noise.correlation_length:.2g} mm. A robot file cannot hold that: better find the metal and remove it."
     )

@@ -1,0 +1,235 @@
+"""A round of forward selection: it asks what a further effect adds, not what a better fit of the others would add."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ctcr import settings
+from ctcr.diagnose import add, held_out
+from ctcr.diagnose import round as rounds
+from ctcr.diagnose.candidates import Candidate, candidates, forms, other_amplitudes
+from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.linearised import Gain
+from ctcr.diagnose.round import CandidateFit, Round
+from ctcr.effects.catalogue import get
+from ctcr.model import simulation
+from ctcr.model.noise import noise_of_readings
+
+MASS = "effects.tip_load.mass"
+SPREAD = "effects.delay.spread"
+NO_GAIN = Gain(0.0, *4 * [np.zeros(1)])
+
+
+def engine_for(robot, plan, hidden, seed=4):
+    """An engine that fits all readings, with jitter, of a robot with hidden effects."""
+    ids = list(dict.fromkeys(name.split(".")[1] for name in hidden))
+    made = simulation.simulate(add.with_values(robot, ids, hidden), plan, "jitter", seed=seed)
+    return Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool))
+
+
+def pool(engine, *ids):
+    return [c for c in candidates(engine.robot, engine.measurements)[0] if c.id in ids]
+
+
+@pytest.fixture(scope="module")
+def weighted(robot, plan):
+    return engine_for(robot, plan, {MASS: 0.01})
+
+
+# ---- Rounds on small simulated sets
+
+
+def test_unconverged_fit(weighted):
+    """The gain of converging the fit before is no gain of a further effect."""
+    ended = weighted.fit([MASS])
+    early = weighted.fit_like(ended, [MASS], max_iterations=1)
+    assert ended.log_evidence - early.log_evidence > 2 * rounds.UNASKED
+    accepted = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=early)
+    others = [c for c in candidates(weighted.robot, weighted.measurements)[0] if c.id not in ("tip_load", "contact")]
+    round_ = rounds.run_round(weighted, early, others, [accepted], lambda _: None)
+    assert round_.accepted is None
+    assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
+    assert max(one.score for one in round_.tried) < rounds.EVIDENCE
+
+
+def test_contenders_converge(weighted, monkeypatch):
+    """A candidate that is slow to fit does not lose to one that is quick."""
+    monkeypatch.setattr(rounds, "ITERATIONS", 1)
+    before = weighted.fit()
+    screened = rounds.screen(weighted, before, pool(weighted, "tip_load", "softening"), {})
+    tried = rounds.refit_all(weighted, before, screened, {}, lambda _: None)
+    best = max(tried, key=lambda one: one.score)
+    assert best.id == "tip_load" and best.fit.converged
+    assert all(one.fit.iterations <= 1 for one in tried if one.score < rounds.CONTENDS * best.score)
+
+
+def test_best_of_few_rows(robot, plan, monkeypatch):
+    """The candidate that is best on a part of many rows is refitted to all, even without evidence for it."""
+    monkeypatch.setattr(settings, "FEW_ROWS", 20)
+    engine = engine_for(robot, plan, {})
+    before = engine.fit()
+    screened = rounds.screen(engine, before, pool(engine, "tip_load", "softening", "straight_curvature"), {})
+    kept = rounds._in_reach(engine, before, screened, {}, lambda _: None)
+    assert kept and {one.candidate for one in kept} <= {one.candidate for one in screened}
+
+
+@pytest.mark.parametrize(("offset", "accepted"), [(2e-3, True), (1.2e-4, False)])
+def test_cross_validation_vetoes(robot, plan, monkeypatch, offset, accepted):
+    """An effect that does not improve a linearised cross-validation is rejected, but not against all evidence."""
+    engine = engine_for(robot, plan, {MASS: 0.01, "effects.sensor_offset.x": offset}, seed=5)
+    before = engine.fit([MASS])
+    first = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=before)
+    monkeypatch.setattr(rounds, "predicts_better", lambda *_: False)
+    monkeypatch.setattr(rounds, "CERTAIN", 90.0)  # these are few rows
+    round_ = rounds.run_round(engine, before, pool(engine, "sensor_offset"), [first], lambda _: None)
+    assert (round_.tried[0].score > rounds.CERTAIN) == accepted and round_.tried[0].score > round_.needed
+    assert round_.ids == (["sensor_offset"] if accepted else [])
+    assert ("cross-validation" in round_.reason) != accepted
+
+
+def test_one_odd_run():
+    """One run that goes where no other went does not dominate the typical error."""
+    before, after = np.full(9, 0.09), np.array([*np.full(8, 0.04), 1.4])
+    assert held_out.typical(after) < held_out.typical(before) < np.mean(after)
+
+
+# ---- Laws of the decision
+
+
+def candidate_fit(identity, score, *, shape=(), explained=0.9, columns=None, **changes):
+    columns = np.zeros((1, 1)) if columns is None else columns
+    gain = Gain(score, np.zeros(1), np.zeros(1), columns[:, 0], columns)
+    candidate = Candidate(identity, (f"effects.{identity}.any",), shape)
+    return CandidateFit(candidate, gain, refit=score, explained=explained, fit=object(), **changes)
+
+
+def decided(*tried, is_further=False, is_rejected=True, suspects=()):
+    round_ = Round(None, sorted(tried, key=lambda one: -one.score))
+    rounds.decide(round_, 20, is_further, is_rejected, suspects)
+    return round_
+
+
+SCORES, FRACTIONS = np.linspace(0, 30, 61), np.linspace(0, 1, 51)
+STRICTER = ({}, {"is_rejected": False}, {"is_further": True}, {"is_further": True, "suspects": ("delay",)})
+
+
+def accepted_over(scores=(100.0,), fractions=(0.9,), **options):
+    """Whether a candidate is accepted, for all scores and fractions explained."""
+    return np.array(
+        [
+            decided(candidate_fit("delay", s, explained=f), **options).accepted is not None
+            for s in scores
+            for f in fractions
+        ]
+    )
+
+
+@pytest.mark.parametrize("options", STRICTER)
+def test_more_evidence_never_rejects(options):
+    """Acceptance is monotone in the log evidence and in the fraction explained, and a rejection gives its reason."""
+    for accepted in (accepted_over(SCORES, **options), accepted_over(fractions=FRACTIONS, **options)):
+        assert (np.diff(accepted.astype(int)) >= 0).all() and accepted[-1] and not accepted[0]
+    assert decided(candidate_fit("delay", 0.0), **options).why_not.startswith(
+        "Nothing accepted: the best candidate, delay"
+    )
+
+
+def test_stricter():
+    """More is asked of a further effect, where noise explains the residual, and of a look-alike of an open law."""
+    by_score = [accepted_over(SCORES, **options).sum() for options in STRICTER]
+    by_fraction = [accepted_over(fractions=FRACTIONS, **options).sum() for options in STRICTER]
+    assert by_score[0] > by_score[1] and by_fraction[0] > by_fraction[2] > by_fraction[3]
+    assert accepted_over(SCORES, is_further=True, is_rejected=False).sum() < by_score[1]
+
+
+def test_hopeless():
+    """More readings may save a round that only lacks evidence, not one whose best candidate is surely spurious."""
+    few = decided(candidate_fit("delay", 3.0))
+    assert few.is_hopeless(1) and not few.is_hopeless(10)
+    spurious, unsure = (decided(candidate_fit("delay", 100.0, explained=0.05, explained_sd=sd)) for sd in (0.001, 1.0))
+    assert spurious.is_hopeless(1e6) and not unsure.is_hopeless(1.5)
+    assert not decided(candidate_fit("delay", 100.0)).is_hopeless(1)
+    assert Round(None, []).is_hopeless(1e6)
+
+
+def test_simplest_form():
+    """Of forms that are equally likely the one with the fewest settings is taken, else the likeliest."""
+    for better, shape in ((0.4 * rounds.ALIKE, ()), (2 * rounds.ALIKE, ((SPREAD, 0.5),))):
+        plain, spread = candidate_fit("delay", 100.0), candidate_fit("delay", 100.0 + better, shape=((SPREAD, 0.5),))
+        round_ = decided(plain, spread, candidate_fit("tip_load", 20.0))
+        assert round_.accepted.candidate.shape == shape and round_.ids == ["delay"]
+        assert [one.id for one in round_.best] == ["delay", "tip_load"] and round_.best[0] is round_.accepted
+
+
+def test_indistinguishable():
+    """Named together: candidates of nearly equal evidence, and those with the same signal, however far behind."""
+    random = np.random.default_rng(0)
+    signal, other = random.normal(size=(2, 40, 1))
+    best = candidate_fit("delay", 100.0, columns=signal)
+    near = candidate_fit("clearance", 100.0 - 0.5 * rounds.TIE, columns=other)
+    same, apart = (candidate_fit(name, 50.0, columns=c) for name, c in (("contact", 2 * signal), ("tip_load", other)))
+    round_ = decided(best, near, same, apart)
+    assert round_.ids == ["delay", "clearance", "contact"] and round_.margin == pytest.approx(50.0)
+
+
+def test_implausible_further_effect():
+    """A further effect that needs an implausible value is not accepted, and the value is named."""
+    wants = candidate_fit("tip_load", 600.0, implausible=(f"{MASS} = 3 kg",))
+    assert decided(wants).accepted
+    assert f"{MASS} = 3 kg" in decided(wants, is_further=True).why_not
+    plausible = candidate_fit("delay", 100.0)
+    assert decided(wants, plausible, is_further=True).ids[0] == "delay"
+
+
+def test_penalty():
+    """A candidate whose start was picked among many pays for it."""
+    candidate = Candidate("frame_jump", (MASS,), (), penalty=5.0)
+    assert CandidateFit(candidate, replace(NO_GAIN, log_evidence=12.0)).linear == 7.0
+
+
+# ---- Candidates and the forms that they may take
+
+
+def test_suspects(robot, weighted):
+    """Look-alikes of an effect with several constitutive laws may imitate a law that is not offered."""
+
+    def suspects(*ids):
+        return rounds._suspects(weighted, [CandidateFit(Candidate(name, ()), NO_GAIN) for name in ids])
+
+    assert suspects("softening", "friction") == set(get("friction", robot.n_tubes).look_alikes)
+    assert suspects("softening") == set()
+
+
+def test_form_keeps_its_start(robot, plan):
+    """A delay whose averaging window is open is freed from the start with which it entered."""
+    timed = replace(plan, t=np.arange(len(plan), dtype=float))
+    found = [c for c in candidates(robot, timed)[0] if c.id == "delay"]
+    assert [dict(c.shape) for c in found] == [{}, {SPREAD: 0.5}]
+    for candidate in found:
+        [form] = forms(get("delay", robot.n_tubes), candidate)
+        assert form.names == ("effects.delay.delay", SPREAD)
+        assert form.shape == candidate.shape
+
+
+def test_variety_first():
+    """Other parameters of an effect are refitted before other forms of the same ones."""
+    found = [
+        replace(candidate_fit("delay", 20.0 - k, shape=shape), candidate=Candidate("delay", (name,), shape))
+        for k, (name, shape) in enumerate([("a", ()), ("a", ((SPREAD, 0.5),)), ("b", ())])
+    ]
+    assert [one.candidate.names for one in rounds._worth_a_refit(found)] == [("a",), ("b",)]
+
+
+def test_other_amplitudes():
+    """An effect with several constitutive laws has other amplitudes by which it may act."""
+    friction = get("friction", 3)
+    coefficient, torque = (tuple(friction.names(name)) for name in ("coefficient", "torque_per_length"))
+    shape = (("effects.friction.insertion", 0.0),)
+    assert other_amplitudes(friction, Candidate("friction", coefficient, shape)) == [
+        Candidate("friction", torque, shape)
+    ]
+    freed = Candidate("friction", (*torque, "effects.friction.slip_angle"))
+    assert [other.names for other in other_amplitudes(friction, freed)] == [coefficient]
+    for identity in ("tip_load", "precurvature_profile", "field_distortion"):
+        effect = get(identity, 3)
+        assert not other_amplitudes(effect, Candidate(identity, tuple(effect.amplitudes)))

@@ -1,0 +1,115 @@
+"""Prediction of runs that a fit has not seen: cross-validation within the fitted runs, and the held-out runs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr import settings
+from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
+from ctcr.fit import folds, joint
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+IMPROVEMENT = 0.1  # of the error of left-out runs that a further effect must remove
+# Another noise must predict left-out runs so much better to be preferred to that of the most evidence.
+BETTER = 0.95
+MUCH_BETTER = 0.9  # where the model explains the readings as it is
+SOUND = 1.05  # inflation of the noise up to which it does
+
+
+def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
+    """Mean square position errors [mm^2] of fitted runs, each left out with a few others, of the model linearised at a
+    fit."""
+    group = folds.groups(engine.measurements)
+    plain, squares = fit.weights[:, 0] > OUTLIER, []
+    for fold in range(settings.FOLDS):
+        out = engine.rows & (group % settings.FOLDS == fold)
+        if not out.any():
+            continue
+        inflation = fit.inflation if noise is None else None  # another noise has its own
+        trial = engine.linear_fit(fit, noise=noise, weights=fit.weights * ~out[:, None], inflation=inflation)
+        errors = (trial.rms_mm(out & plain & (group == k)) for k in np.unique(group[out]))
+        squares += [error**2 for error in errors if error > 0]
+    return np.array(squares)
+
+
+def typical(squares: Array) -> float:
+    """The geometric mean: a run that goes where no other went would dominate the arithmetic one."""
+    return float(np.exp(np.log(squares).mean()))
+
+
+def predicts_better(engine: Engine, before: joint.Fit, after: joint.Fit) -> bool:
+    """Whether a further effect removes a sufficient part of the error of left-out runs beyond jitter."""
+    jitter = 3e6 * engine.noise.position_jitter**2
+    old, new = typical(cross_validated(engine, before)), typical(cross_validated(engine, after))
+    return old - new >= IMPROVEMENT * max(old - jitter, 0.0)
+
+
+def fit_to_predict(
+    engine: Engine, fit: joint.Fit, fixed: dict[str, float], tolerance: float = joint.COARSE
+) -> joint.Fit:
+    """The same parameters fitted under the noise that predicts best; `fixed` are values of effects that are held."""
+    noise = _noise_that_predicts(engine, fit)
+    if noise is fit.noise:
+        return fit
+    start = values_of(fit)
+    return engine.fit(
+        effects_in(fit), start=start, fixed=fixed, noise=noise, weights=fit.weights, near=True, tolerance=tolerance
+    )
+
+
+def _noise_that_predicts(engine: Engine, fit: joint.Fit) -> Any:
+    """The noise of a fit, or that with the part of the field error that predicts left-out runs better.
+
+    A field error that is not there lets calibration stay wrong; one that is there and left out biases it.
+    """
+    tried = {part: joint.with_field(engine.noise, part) for part in joint.FIELDS}
+    errors = {part: typical(cross_validated(engine, fit, noise)) for part, noise in tried.items()}
+    part = min(errors, key=lambda part: errors[part])
+    usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
+    needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
+    return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
+
+
+def unexplained_of(
+    engine: Engine, fit: joint.Fit, rows: Mask, *, positions_alone: bool = False
+) -> Callable[[Array], float]:
+    """The unexplained chi-square of a residual (M, 6) in some rows (M,), as a function of the residual.
+
+    In units of the noise as stated, the tracker's smooth error included: where that is large, millimetres say little.
+    Outliers of the fit, the better the model, count for little.
+    """
+    there = replace(engine, rows=rows)
+    weights = there.linear_fit(fit, max_iterations=0).weights.copy()
+    if positions_alone:
+        weights[:, 1] = 0.0
+    noise = there.linear_fit(fit, weights=weights, inflation=np.ones(2), max_iterations=0)
+
+    def unexplained(residual: Array) -> float:
+        whitened = noise.whiten(np.nan_to_num(residual))
+        return max(float(np.sum(whitened**2)) - len(whitened), 0.0)
+
+    return unexplained
+
+
+def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dict[str, float]:
+    """Fraction of the unexplained chi-square of positions that `after` explains, by the name of each held-out run.
+
+    Runs that noise explains under `before` are left out.
+    """
+    table = engine.measurements
+    group, fractions = folds.groups(table), {}
+    for k in np.unique(group[~engine.rows]):
+        rows = (group == k) & ~engine.rows & engine.measured
+        unexplained = unexplained_of(engine, after, rows, positions_alone=True)
+        to_explain = unexplained(before.residual)
+        if to_explain > 3 * np.sum(rows):  # as much again as noise
+            run, lines = np.unique(table.run[rows]), table.row[rows]
+            is_run = len(run) == 1 and not np.any((table.run == run[0]) & (group != k))
+            name = f"run {run[0]}" if is_run else f"rows {lines.min()} to {lines.max()}"
+            fractions[name] = 1 - unexplained(after.residual) / to_explain
+    return fractions

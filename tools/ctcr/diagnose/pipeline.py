@@ -1,0 +1,256 @@
+"""The whole diagnosis: which effects are missing, judged on runs that no fit has seen."""
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.audit.preparation import prepared
+from ctcr.diagnose import jump, outliers, segment_delays, smooth_field
+from ctcr.diagnose.candidates import candidates
+from ctcr.diagnose.engine import FITS, Engine, values_of
+from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
+from ctcr.diagnose.residual import Residual, residual_of
+from ctcr.diagnose.round import MOST_OUTLIERS, Progress, Round, outlier_fraction, parameters_of
+from ctcr.diagnose.selection import HARDLY, WRONG, Accepted, select_effects
+from ctcr.diagnose.varying_coefficients import VaryingModel, may_outdo, varying_model
+from ctcr.diagnose.verdict import Verdict, judge
+from ctcr.effects import catalogue
+from ctcr.fit import folds, joint, one_sided
+from ctcr.fit.result import rms
+from ctcr.model.noise import noise_of_readings
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+Mask = NDArray[np.bool_]
+
+TURNS = 2  # quarters of the runs that are held out in turn, where that is needed
+MANY = 0.1  # fraction of outliers of the calibration beyond which it is hardly right
+MOST_OPEN = 1.5  # expected mean square error of a held-out run over that of the fitted ones
+
+
+@dataclass
+class Diagnosis:
+    robot: Robot
+    measurements: Measurements
+    held_out: Mask  # (M,) rows that no fit has seen
+    isolated: Mask  # (M,) isolated outliers among them, which do not count
+    not_testable: dict[str, str]  # effects that these data cannot show, and why
+    calibrated: joint.Fit  # without effects, for prediction
+    with_effects: joint.Fit  # for prediction
+    final: joint.Fit  # with effects, under the noise of the most evidence: its values are those to quote
+    noise_floor_mm: float  # RMS position residual that the tracker's noise leaves of a right model
+    rounds: list[Round]
+    accepted: list[Accepted]
+    residual: Residual
+    varying: VaryingModel | None  # an explanation of the residual
+    verdict: Verdict
+    notices: list[str] = field(default_factory=list)
+    seconds: float = 0.0
+
+    @property
+    def mistakes_effect_for_outliers(self) -> bool:
+        """Whether more readings are outliers than a tracker makes, and effects do not explain why."""
+        before, after = outlier_fraction(self.rounds[0].before), outlier_fraction(self.final)
+        explained = self.accepted[0].explained if self.accepted else 0.0
+        others_fit = np.max(self.rounds[0].before.inflation) < FITS
+        is_wrong = before > MANY and np.max(self.final.inflation) > WRONG
+        many = before > MOST_OUTLIERS and after > max(MOST_OUTLIERS, 0.5 * before)
+        return many and bool(explained < HARDLY or others_fit or is_wrong)
+
+    @property
+    def judged(self) -> Mask:
+        """Held-out rows that hold a reading, without isolated outliers (M,)."""
+        return self.held_out & ~self.isolated & folds.measured_rows(self.measurements)
+
+    @property
+    def rms_mm(self) -> dict[str, float]:
+        """Position error of the judged rows."""
+        return {
+            "nominal": self.calibrated.nominal_rms_mm(self.judged),
+            "calibrated": self.calibrated.rms_mm(self.judged),
+            "with_effects": self.with_effects.rms_mm(self.judged),
+            "noise_floor": self.noise_floor_mm,
+        }
+
+    @property
+    def expected_mm(self) -> float:
+        """Expected RMS error of a right model on the judged rows: noise and uncertain parameters.
+
+        Far above the noise floor where these rows are unlike those that were fitted.
+        """
+        return max(self.with_effects.floor_mm(self.judged), self.noise_floor_mm)
+
+    def rms_mm_after(self, accepted: Accepted) -> float:
+        """RMS error of the judged rows with this effect and those accepted before."""
+        return 1e3 * rms(accepted.residual, self.judged)
+
+    def release_memory(self) -> None:
+        """Drops what its fits can compute again."""
+        self.calibrated, self.with_effects, self.final = (
+            fit.at_rest() for fit in (self.calibrated, self.with_effects, self.final)
+        )
+
+    def parameters(self, accepted: Accepted) -> dict[str, float]:
+        """Fitted values, and those of its choices, by name without the id."""
+        stem = f"effects.{accepted.id}."
+        values = dict(accepted.best.candidate.shape) | values_of(self.final)
+        return {name.removeprefix(stem): value for name, value in values.items() if name.startswith(stem)}
+
+    @property
+    def depends_on(self) -> list[str]:
+        """Ids of the quantities on which the residual depends."""
+        more = self.varying.depends_on if self.varying else []
+        return list(dict.fromkeys([*self.residual.depends_on, *more]))
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "verdict": self.verdict.word,
+            "effects": [
+                {"class": a.ids, "parameters": self.parameters(a), "delta_log_evidence": round(a.log_evidence, 3)}
+                for a in self.accepted
+            ],
+            "leftover": {"structured": self.residual.structured, "depends_on": self.depends_on},
+            "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
+            "seconds": round(self.seconds, 2),
+        }
+
+
+def diagnose(
+    robot: Robot, measurements: Measurements, *, progress: Progress = lambda _: None, threads: int = 0
+) -> Diagnosis:
+    """Which effects are missing. Raises InputError where no fit is possible.
+
+    What is found in three quarters of the runs is judged on the held-out quarter. Where nothing was found and that
+    quarter has errors which the others do not have, another one is held out and everything begins anew; so it does
+    without those held-out runs that the others turn out not to determine.
+    """
+    began = perf_counter()
+    measurements, notices = prepared(robot, measurements)
+    for turn in range(TURNS):
+        held_out = folds.held_out_rows(robot, measurements, turn)
+        result = _diagnose_robustly(robot, measurements, held_out, progress, threads)
+        undetermined = _undetermined_groups(result)
+        if undetermined:
+            result.release_memory()
+            held_out = folds.held_out_rows(robot, measurements, turn, undetermined)
+            again = _diagnose_robustly(robot, measurements, held_out, progress, threads)
+            if again.accepted or not result.accepted:  # else the runs that showed the effect are now held out
+                result = again
+        if result.accepted or not _has_new_errors(result):
+            break
+    if not result.measurements.from_home:
+        notices.append("taken to have been at rest at the first reading, not to have come from home: it fits better")
+    result.notices += notices
+    result.seconds = perf_counter() - began
+    return result
+
+
+def _diagnose_robustly(
+    robot: Robot, measurements: Measurements, held_out: Mask, progress: Progress, threads: int
+) -> Diagnosis:
+    """With outliers down-weighted, and also without where an effect that acts on few readings may look like them."""
+    result = _diagnose(robot, measurements, held_out, progress, threads, robust=True)
+    clusters = result.residual.clusters
+    if not result.mistakes_effect_for_outliers and not clusters:
+        return result
+    result.release_memory()
+    other = _diagnose(robot, measurements, held_out, progress, threads, robust=False)
+    if clusters:
+        there = np.isin(measurements.row, clusters)
+        return min(result, other, key=lambda r: (outliers.outliers(r.with_effects).sum(), r.with_effects.rms_mm(there)))
+    return max(result, other, key=lambda r: r.final.log_evidence)
+
+
+def _undetermined_groups(result: Diagnosis) -> set[int]:
+    """Held-out groups that the fitted ones turned out not to determine, whatever the model."""
+    fit, group = result.with_effects, folds.groups(result.measurements)
+    expected = fit.expected_square[:, 0]
+    usual = np.nanmean(expected[~result.held_out])
+    held_out = np.unique(group[result.held_out])
+    found = {k for k in held_out if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
+    for a in result.accepted:
+        if "order" in catalogue.get(a.id, result.robot.n_tubes).needs and 0 in held_out:
+            found.add(0)  # how the robot came to its first row is not recorded
+        if a.id == "frame_jump":  # before or after it?
+            when = dict(a.best.candidate.shape)[jump.WHEN]
+            found |= set(group[jump.uncertain_rows(result.measurements, ~result.held_out, when)])
+    return found
+
+
+def _has_new_errors(result: Diagnosis) -> bool:
+    """Whether the held-out runs have errors that the fitted ones do not have."""
+    seen = np.isfinite(result.calibrated.residual[:, 0])
+    return bool(np.mean(outliers.outliers(result.calibrated)[seen & result.held_out]) > MOST_OUTLIERS)
+
+
+def _diagnose(
+    robot: Robot, measurements: Measurements, held_out: Mask, progress: Progress, threads: int, robust: bool
+) -> Diagnosis:
+    # Forward selection of effects on the fitted runs, each judged together with the calibration.
+    engine = Engine(robot, measurements, noise_of_readings(robot, measurements), ~held_out, robust, threads=threads)
+    pool, not_testable = candidates(robot, measurements)
+    chosen = select_effects(engine, [c for c in pool if c.id not in robot.effects], progress)
+    accepted, fit = chosen.accepted, chosen.fit
+    names, fixed = parameters_of(chosen.fits)
+
+    # Structure of the residual, corrected for a delay that varies between time segments.
+    progress("structure of the residual")
+    corrected, corrections = segment_delays.corrected(engine, fit)
+    corrections += [segment_delays.CORRECTED] if corrections else []
+    residual = residual_of(engine, chosen.calibrated, corrected, corrections)
+
+    # Prediction of the held-out runs without and with effects.
+    progress("prediction of held-out runs")
+    calibrated = with_effects = fit_to_predict(engine, chosen.calibrated, {})
+    if accepted:
+        with_effects = fit_to_predict(engine, fit, fixed)
+        if corrections:
+            with_effects, _ = segment_delays.corrected(engine, with_effects)
+    explained = explained_by_run(engine, calibrated, with_effects) if accepted else {}
+    isolated = outliers.isolated(engine.measurements, with_effects, held_out)
+
+    # The rival of the effects: calibration parameters that vary.
+    rival = None
+    if residual.rejected and accepted and may_outdo(engine, calibrated, with_effects):
+        progress("parameters that are not constant")
+        rival = varying_model(engine, chosen.calibrated, residual.sample)
+    outdone = rival is not None and rival.outdoes(engine, calibrated, with_effects)
+
+    verdict = judge(calibrated, with_effects, accepted, residual, held_out & ~isolated, explained, outdone)
+    floor_noise = fit.noise
+
+    # A smooth field error explains many causes that have nothing to do with the field: only beside a distorted field.
+    smooth = smooth_field.likeliest_noise(engine, fit) if verdict.word == "identified" else None
+    if smooth is not None:
+        fit = engine.fit(names, start=values_of(fit), fixed=fixed, noise=smooth, near=True)
+        corrected = segment_delays.corrected(engine, fit)[0] if corrections else fit
+        with_effects = smooth_field.corrected(engine, corrected, smooth)
+        corrections = [*corrections, smooth_field.message(smooth), smooth_field.CORRECTED]
+        residual = residual_of(engine, chosen.calibrated, corrected, corrections)
+
+    # What would have to vary to explain a residual that is more than noise.
+    varying = rival if residual.rejected and verdict.names_no_cause else None
+    if residual.rejected and varying is None:
+        progress("parameters that are not constant")
+        varying = varying_model(engine, chosen.calibrated if verdict.names_no_cause else fit, residual.sample)
+
+    return Diagnosis(
+        robot=robot,
+        measurements=engine.measurements,
+        held_out=held_out,
+        isolated=isolated,
+        not_testable=not_testable,
+        calibrated=calibrated,
+        with_effects=one_sided.widened(with_effects),
+        final=segment_delays.widened(engine, one_sided.widened(fit)),
+        noise_floor_mm=joint.noise_floor(with_effects, floor_noise, engine.positions)[0],
+        rounds=chosen.rounds,
+        accepted=accepted,
+        residual=residual,
+        varying=varying,
+        verdict=verdict,
+        notices=outliers.messages(engine.measurements, with_effects, isolated),
+    )

@@ -1,0 +1,76 @@
+"""The residual that no accepted effect explains: whether it has structure, and on which quantities it depends."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ctcr.compare.dependence import Ranking, rank
+from ctcr.compare.sample import Sample, take_sample
+from ctcr.diagnose.engine import OUTLIER, Engine
+from ctcr.diagnose.outliers import clustered
+from ctcr.fit import joint
+from ctcr.model import effect_model
+from ctcr.show.output import listed
+
+LEVEL = 0.01  # probability that a dependence is named where there is none
+SHOWN = 6
+
+
+@dataclass(frozen=True)
+class Residual:
+    rejected: bool  # whether the noise as stated does not explain it
+    clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
+    before: Ranking  # of quantities on which the residual depends, before effects were added
+    after: Ranking
+    sample: Sample  # the readings that were ranked
+    corrections: list[str] = field(default_factory=list)  # nuisance errors for which the errors are corrected
+
+    @property
+    def structured(self) -> bool:
+        return self.rejected or bool(self.clusters)
+
+    @property
+    def depends_on(self) -> list[str]:
+        return [item.name for item in self.after.chosen] if self.structured else []
+
+    @property
+    def about_clusters(self) -> list[str]:
+        if not self.clusters:
+            return []
+        return [
+            f"{len(self.clusters)} readings (rows {listed(self.clusters, SHOWN)}) are outliers in the same direction "
+            "as their neighbours in joints and load: something acts at these joints."
+        ]
+
+    @property
+    def messages(self) -> list[str]:
+        if not self.structured:
+            return [*self.corrections, "The residual is noise."]
+        on = ", ".join(item.label for item in self.after.chosen)
+        depends = f"it depends on {on}" if on else "no quantity alone predicts its size on held-out runs"
+        rejected = [f"The residual is more than noise; {depends}."] if self.rejected else []
+        return rejected + self.corrections + self.about_clusters
+
+
+def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: list[str]) -> Residual:
+    sample = take_sample(engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements))
+    ranked = _rank(engine, sample, before)
+    after = ranked if fit is before else _rank(engine, sample, fit)
+    clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
+    return Residual(engine.rejects(fit), clusters, ranked, after, sample, corrections)
+
+
+def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
+    """The quantities on which the position residual depends, without field error and outliers."""
+    rows = np.searchsorted(engine.measurements.row, sample.row)
+    left = (fit.residual - fit.field)[rows, :3]
+    weight = fit.weights[rows, 0]
+    left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < OUTLIER))] = 0.0
+    error = left @ sample.rotation
+    return rank(sample, error - error.mean(axis=0), screw_pitch(engine), LEVEL)
+
+
+def screw_pitch(engine: Engine) -> float | None:
+    """Translation per turn of the motor [m], where the robot file states it."""
+    pitch = engine.robot.actuation.translation_mm_per_rev
+    return 1e-3 * pitch if pitch else None

@@ -1,0 +1,230 @@
+"""Forward selection of effects with a refinement of each one's form, then backward elimination."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ctcr.diagnose import segment_delays
+from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
+from ctcr.diagnose.engine import FITS, Engine, values_of
+from ctcr.diagnose.round import (
+    END,
+    EVIDENCE,
+    ITERATIONS,
+    SURE,
+    TIE,
+    CandidateFit,
+    Progress,
+    Round,
+    fraction_explained,
+    parameters_of,
+    run_round,
+)
+from ctcr.effects import catalogue
+from ctcr.fit import folds, joint
+
+Array = NDArray[np.float64]
+
+MAX_EFFECTS = 4
+HARDLY = 0.4  # fraction of the unexplained chi-square below which the first effect hardly explains anything
+LOST = 10.0  # log evidence by which a fit with its own weights may be worse, before it has lost the effect to outliers
+SAFE = 100.0  # log evidence of an effect that others have surely not made superfluous
+WRONG = 3.0  # inflation of the noise at which a model is hardly right
+HOPELESS = 1.0  # log evidence lost per number read, as by three times the mean square error: such a law is not followed
+
+
+@dataclass
+class Accepted:
+    """An effect that was accepted, with all that the data cannot tell from it."""
+
+    best: CandidateFit  # in its best form
+    ids: list[str]
+    log_evidence: float
+    margin: float
+    explained: float  # fraction of the unexplained chi-square
+    residual: Array | None = None  # (M, 3) [m] with it and those accepted before
+    rejected_variants: dict[str, float] = field(default_factory=dict)  # fitted values of its other variants
+
+    @property
+    def id(self) -> str:
+        return self.best.id
+
+
+@dataclass
+class Selection:
+    """Effects that were accepted so far, the rounds that led to them, and the fits without and with them."""
+
+    engine: Engine
+    progress: Progress
+    rounds: list[Round] = field(default_factory=list)
+    accepted: list[Accepted] = field(default_factory=list)
+    calibrated: joint.Fit | None = None  # without effects
+    fit: joint.Fit | None = None  # with the accepted effects
+    finished: bool = False  # whether another round would accept nothing
+
+    @property
+    def fits(self) -> list[CandidateFit]:
+        return [a.best for a in self.accepted]
+
+    def calibrate(self, fits: list[CandidateFit], start: dict[str, float]) -> joint.Fit:
+        """Calibration and these effects together."""
+        self.progress("calibration")
+        names, fixed = parameters_of(fits)
+        return self.engine.fit_with_field(names, start, fixed)
+
+    def grow(self, pool: list[Candidate], more: float = 1.0) -> None:
+        """Accepts one effect after the other.
+
+        more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
+        left to them.
+        """
+        while len(self.accepted) < MAX_EFFECTS:
+            taken = {identity for a in self.accepted for identity in a.ids}
+            open_to = [c for c in pool if c.id not in taken]
+            round_ = run_round(self.engine, self.fit, open_to, self.fits, self.progress)
+            sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= SURE)
+            if more > 1 and not sure:
+                return
+            self.rounds.append(round_)
+            if round_.accepted is None:
+                break
+            rejected = self._accept(round_)
+            if rejected and self.accepted[0].explained < HARDLY:
+                break  # no effect is stacked on one that hardly explains anything
+        for a in self.accepted[:-1]:  # what the others hid of their forms shows now
+            self.refine_form(a)
+        self.finished = True
+
+    def _accept(self, round_: Round) -> bool:
+        """Adds the effect of a round in its best form; whether the noise rejected the fit in the form of the round."""
+        best, engine, before = round_.accepted, self.engine, self.fit
+        engine.robust = True
+        variants = round_.rejected_variants
+        one = Accepted(best, round_.ids, best.refit, round_.margin, best.explained, rejected_variants=variants)
+        self.accepted.append(one)
+        converged = self._refit_to_convergence(best.fit, before)
+        self.fit = self.calibrate(self.fits, values_of(converged))
+        if self.fit.log_evidence < converged.log_evidence - LOST:
+            names, fixed = parameters_of(self.fits)
+            self.fit = engine.fit_like(before, names, start=values_of(converged), fixed=fixed, near=True)
+        rejected = engine.rejects(self.fit)
+        if "order" in catalogue.get(one.id, engine.robot.n_tubes).needs and engine.revise_initial_history(
+            self.fit, *parameters_of(self.fits)
+        ):
+            self.fit = self.calibrate(self.fits, values_of(self.fit))
+        self.refine_form(one)
+        one.residual = self.fit.residual[:, :3]
+        return rejected
+
+    def _refit_to_convergence(self, fit: joint.Fit, before: joint.Fit) -> joint.Fit:
+        """The end of the refit of a round, at the weights of the fit before."""
+        if fit.converged:
+            return fit
+        names, fixed = parameters_of(self.fits)
+        return self.engine.fit_like(before, names, start=values_of(fit), fixed=fixed, near=True)
+
+    def refine_form(self, one: Accepted) -> None:
+        """Frees the shape of an accepted effect, and tries its other constitutive laws, where that helps.
+
+        Where all of them are hardly right, its other amplitudes are tried too, if it was accepted last.
+        """
+        given, fit = one.best.candidate, self.fit
+        effect = catalogue.get(given.id, self.engine.robot.n_tubes)
+        others = other_amplitudes(effect, given) if one is self.accepted[-1] else []
+        ended: list[tuple[joint.Fit, CandidateFit, joint.Fit]] = []  # calibrated anew, form, fit of the form
+        for variant in (given, *others):
+            freed = self._fit_forms(
+                one, [form for form in forms(effect, variant, one.rejected_variants) if form != given]
+            )
+            gain = max((there.log_evidence for _, there in freed), default=-np.inf) - fit.log_evidence
+            if variant is given and gain < TIE:
+                freed, ended = [], [(fit, one.best, fit)]
+            for best, there in _best_of_each_law(freed, fit):
+                ended.append((self.calibrate(self._with(one, best), values_of(there)), best, there))
+                if np.max(ended[-1][0].inflation) < FITS:
+                    break  # it explains the readings: no other law can do more
+            if min(np.max(calibrated.inflation) for calibrated, _, _ in ended) <= WRONG:
+                break
+        self.fit, best, freed = max(ended, key=lambda end: end[0].log_evidence)
+        if self.fit is not fit:
+            one.best = replace(best, fit=freed.without_readings())
+            one.explained += (1 - one.explained) * fraction_explained(fit, freed, len(freed.names) - len(fit.names))
+
+    def _with(self, one: Accepted, best: CandidateFit) -> list[CandidateFit]:
+        """The accepted effects, one of them in another form."""
+        return [best if a is one else a.best for a in self.accepted]
+
+    def _fit_forms(self, one: Accepted, tried: list[Candidate]) -> list[tuple[CandidateFit, joint.Fit]]:
+        """Forms of an accepted effect, each fitted in the noise of the fit with the given form."""
+        found, fit = [], self.fit
+        for form in tried:
+            self.progress(f"freeing the shape of {form.id}")
+            best = replace(one.best, candidate=form)
+            names, fixed = parameters_of(self._with(one, best))
+            neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
+            start = neutral | one.rejected_variants | dict(form.shape) | values_of(fit)
+            found.append((best, self.engine.fit_like(fit, names, start=start, fixed=fixed, near=True)))
+        return found
+
+    def eliminate(self) -> None:
+        """Drops one accepted effect that the later ones have made superfluous."""
+        for a in self.accepted[:-1]:
+            rest = [b.best for b in self.accepted if b is not a]
+            self.progress(f"without {a.id}")
+            names, fixed = parameters_of(rest)
+            start = values_of(self.fit)
+            for iterations in (ITERATIONS, END):  # a fit that is far behind need not converge
+                without = self.engine.fit_like(
+                    self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=joint.COARSE
+                )
+                evidence = segment_delays.log_evidence
+                a.log_evidence = evidence(self.engine, self.fit) - evidence(self.engine, without)
+                if a.log_evidence > SAFE:
+                    break
+                start = values_of(without)
+            if a.log_evidence < EVIDENCE:
+                self.accepted.remove(a)
+                self.fit = self.calibrate(rest, values_of(without))
+                return
+
+
+def select_effects(engine: Engine, pool: list[Candidate], progress: Progress) -> Selection:
+    """The effects that explain the fitted readings. Of many readings a part decides rounds whose outcome is sure."""
+    chosen = Selection(engine, progress)
+    few = folds.few_of(engine.fitted)
+    start_plain, start = {}, {}
+    if few is not None:
+        progress("a part of the readings first")
+        chosen.engine = replace(engine, rows=few, tolerance=joint.COARSE)
+        chosen.fit = chosen.calibrate([], {})
+        start_plain = values_of(chosen.fit)
+        chosen.grow(pool, more=np.sum(engine.fitted) / np.sum(few))
+        start = values_of(chosen.fit)
+        engine.measurements, chosen.engine = chosen.engine.measurements, engine
+    chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
+    if chosen.accepted:
+        engine.robust = True
+        chosen.fit = chosen.calibrate(chosen.fits, start)
+    if not chosen.finished:
+        chosen.grow(pool)
+    if len(chosen.accepted) > 1:
+        chosen.eliminate()
+    return chosen
+
+
+def _best_of_each_law(
+    tried: list[tuple[CandidateFit, joint.Fit]], fit: joint.Fit
+) -> list[tuple[CandidateFit, joint.Fit]]:
+    """The best form alone; or that of each constitutive law, the best first, where the noise of the fit before is so
+    inflated that its law must be wrong: in such noise laws can hardly be told apart, but for hopeless ones."""
+    tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)
+    if np.max(fit.inflation) <= WRONG:
+        return tried[:1]
+    least = fit.log_evidence - HOPELESS * fit.observations
+    laws: dict[tuple, tuple[CandidateFit, joint.Fit]] = {}
+    for best, freed in tried:
+        if freed.log_evidence > least:
+            held = tuple(pair for pair in best.candidate.shape if pair[0] not in best.candidate.names)
+            laws.setdefault(held, (best, freed))
+    return list(laws.values())
