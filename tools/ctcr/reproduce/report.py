@@ -1,76 +1,107 @@
-"""The page: the paper's values, ours, their ratio, and why they differ."""
+"""The page: the paper's values, ours, their ratio, why they differ, and the figures."""
 
 from pathlib import Path
 
-from ctcr.reproduce import pictures
+import numpy as np
+from matplotlib.figure import Figure
+
 from ctcr.reproduce.control import Scenarios
 from ctcr.reproduce.influence import SLOW_FEEDBACK, Influence
 from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
-from ctcr.sensitivity import figures as sensitivity_figures
+from ctcr.sensitivity import figures as sensitivity
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table
 from ctcr.show.output import atomic_writer
-from ctcr.track import figures as track_figures
+from ctcr.show.style import AXES, ERROR
+from ctcr.track import figures as track
+from ctcr.track.result import errors_mm
 from ctcr.track.scenario import shipped
-from ctcr.track.scene import scene
 
 
 def write(
     target: str | Path, claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made: str, quick: bool
 ) -> None:
     """Writes the page; `made` says how long it took. Raises InputError where the file cannot be written."""
-    robot, wanted = paper_robot(), shipped("S2")
-    runs = [s.runs[key][0] for key in (("S2", 0.0), ("S3", 20.0), ("S4", 20.0))]
+    title, wanted = "The paper and this library", shipped("S2")
+    runs = {f"{name}, {mass:g} g": s.runs[name, mass][0] for name, mass in (("S2", 0.0), ("S3", 20.0), ("S4", 20.0))}
     shown = "fewer designs, configurations and repetitions than the paper" if quick else "as many as the paper"
+    joints = (runs["S2, 0 g"], paper_robot(), wanted)
+    slow = f"Figure 4. Wrong parameters in closed loop, with a feedback of {SLOW_FEEDBACK:g} 1/s."
+    pictures = [
+        (_integration, errors, 8, 3.4, "Figure 2. Error of one integration step a segment."),
+        (_forces, s, 9, 3.4, "Figures 3b and 6. Tracking errors by weight, simulated."),
+        (sensitivity.curves, found.slow, 10.4, 5.4, slow),
+        (track.actuators, joints, 10.4, 3.6, "Figure 5. Actuators in S2."),
+        (_beyond, s, 8, 3.4, "Beyond the paper: weights above 20 g. Dashed: 1 mm."),
+        (sensitivity.bars, found.opened, 10.4, 8, "Wrong parameters in open loop (Section V.A)."),
+    ]
     sections = [
-        "<h1>The paper and this library</h1>"
+        f"<h1>{title}</h1>"
         '<p class="lead">Boyer et al., On High Performance Control of Concentric Tube Continuum Robots through '
         "Parsimonious Calibration, RA-L 2024.</p>",
         cards([("good", str(len(claims)), "values of the paper beside ours"), ("noise", made, shown)]),
         table("Values", COLUMNS, [claim.row() for claim in claims], 3),
-        "<h2>Table II: the robot</h2>" + _robot(robot),
+        "<h2>Table II: the robot</h2>" + _robot(),
         '<h2>Figure 3a: the path</h2><div id="view"></div>',
         "<h2>Figures 2 to 6</h2>",
-        figure(pictures.integration, errors, 8, 3.4, "Figure 2. Error of one integration step a segment.", wide=True),
-        figure(pictures.forces, s, 9, 3.4, "Figures 3b and 6. Tracking errors by weight, simulated.", wide=True),
-        figure(
-            sensitivity_figures.curves,
-            found.slow,
-            10.4,
-            5.4,
-            f"Figure 4. Wrong parameters in closed loop, with a feedback of {SLOW_FEEDBACK:g} 1/s.",
-            wide=True,
-        ),
-        figure(track_figures.actuators, (runs[0], robot, wanted), 10.4, 3.6, "Figure 5. Actuators in S2.", wide=True),
-        figure(pictures.beyond, s, 8, 3.4, "Beyond the paper: weights above 20 g. Dashed: 1 mm.", wide=True),
-        figure(
-            sensitivity_figures.bars, found.opened, 10.4, 8, "Wrong parameters in open loop (Section V.A).", wide=True
-        ),
+        *(figure(*picture, wide=True) for picture in pictures),
     ]
+    view = track.scene(list(runs.values()), wanted, list(runs))
     with atomic_writer(target) as file:
-        file.write(
-            html_page.page(
-                "The paper and this library",
-                sections,
-                "ctcr reproduce",
-                "ctcr reproduce",
-                scene(runs, wanted, ["S2, 0 g", "S3, 20 g", "S4, 20 g"]),
-            )
-        )
+        file.write(html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view))
 
 
-def _robot(robot) -> str:
-    a, columns = robot.actuation, ["parameter", "tube 1", "tube 2", "tube 3", "unit"]
-    tubes = robot.tubes
-    rows = [
-        ["offset (translation)", *(f"{x:g}" for x in a.home_translation_mm), "mm"],
-        ["offset (rotation)", *(f"{x:g}" for x in a.home_rotation_deg), "deg"],
-        ["Young's modulus", *(f"{t.youngs_modulus_GPa:g}" for t in tubes), "GPa"],
-        ["Poisson's ratio", *(f"{t.poisson_ratio:g}" for t in tubes), ""],
-        ["precurvature", *(f"{t.curvature_per_m:g}" for t in tubes), "1/m"],
-        ["precurved length", *(f"{t.curved_length_mm:g}" for t in tubes), "mm"],
-        ["length", *(f"{t.length_mm:g}" for t in tubes), "mm"],
-        ["inner diameter", *(f"{t.inner_diameter_mm:g}" for t in tubes), "mm"],
-        ["outer diameter", *(f"{t.outer_diameter_mm:g}" for t in tubes), "mm"],
-    ]
-    return table("As in the paper: these are inputs", columns, rows, 1)
+def _robot() -> str:
+    robot = paper_robot()
+    columns = {
+        ("offset (translation)", "mm"): robot.actuation.home_translation_mm,
+        ("offset (rotation)", "deg"): robot.actuation.home_rotation_deg,
+    }
+    fields = {
+        ("Young's modulus", "GPa"): "youngs_modulus_GPa",
+        ("Poisson's ratio", ""): "poisson_ratio",
+        ("precurvature", "1/m"): "curvature_per_m",
+        ("precurved length", "mm"): "curved_length_mm",
+        ("length", "mm"): "length_mm",
+        ("inner diameter", "mm"): "inner_diameter_mm",
+        ("outer diameter", "mm"): "outer_diameter_mm",
+    }
+    columns |= {key: [getattr(tube, name) for tube in robot.tubes] for key, name in fields.items()}
+    rows = [[name, *(f"{x:g}" for x in values), unit] for (name, unit), values in columns.items()]
+    return table("As in the paper: these are inputs", ["parameter", "tube 1", "tube 2", "tube 3", "unit"], rows, 1)
+
+
+def _integration(picture: Figure, errors: dict[str, np.ndarray]) -> None:
+    """Fig. 2: errors of one step a segment."""
+    axes = picture.subplots()
+    percent = {name: 100 * np.maximum(error, 1e-13) for name, error in errors.items()}
+    track.box_plot(axes, percent, ["#cfe3ee"] * len(percent), means=False)
+    axes.set(yscale="log", ylabel="tip error, % of the length")
+
+
+def _forces(picture: Figure, s: Scenarios) -> None:
+    """Fig. 3b and Fig. 6: errors by weight, up to 20 g."""
+    axes, colour = picture.subplots(), {"S2": "#e3e7ea", "S3": "#f6dcc0", "S4": "#cfe3ee"}
+    groups = [("S2", 0.0), *((name, mass) for name in ("S3", "S4") for mass in (5.0, 10.0, 15.0, 20.0))]
+    errors = {f"{name}\n{mass:g} g": errors_mm(s.runs[name, mass]) for name, mass in groups}
+    track.box_plot(axes, errors, [colour[name] for name, _ in groups])
+    axes.set(ylabel="tracking error, mm")
+
+
+def _beyond(picture: Figure, s: Scenarios) -> None:
+    """The largest error by weight: the paper's scheme with unknown and known force, ours, and the least possible."""
+    axes = picture.subplots()
+    for scenario, colour, label in (
+        ("S3", ERROR, "the paper's scheme, force unknown (S3)"),
+        ("S4", AXES[1], "the paper's scheme, force known (S4)"),
+        ("S5", AXES[0], "ours (S5)"),
+    ):
+        masses = sorted(mass for name, mass in s.runs if name == scenario)
+        largest = [errors_mm(s.runs[scenario, mass]).max() for mass in masses]
+        axes.plot(masses, largest, "o-", color=colour, label=label)
+    least = {mass: 1e3 * away for mass, away in s.reach.items() if away > 0}
+    axes.plot(list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits")
+    axes.axhline(1, color="#8794a0", lw=1, ls="--")
+    axes.set(yscale="log", xlabel="weight at the tip, g", ylabel="largest error, mm")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.legend(fontsize=9)

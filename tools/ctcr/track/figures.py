@@ -1,34 +1,48 @@
-"""The pictures of a scenario, as SVG text through `html_page.figure`."""
+"""The pictures of a scenario: SVG text through `html_page.figure`, and the 3-D view as JSON for plotly.js."""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ctcr.robot.description import Robot
-from ctcr.show.style import AXES, ERROR, FAINT
+from ctcr.show import scene as show
+from ctcr.show.style import AXES, ERROR, FAINT, INK, OUT
 from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
 
+Array = NDArray[np.float64]
+
+MOST_POINTS = 3000  # of a line of the 3-D view
+COLOURS = (OUT, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
+
+
+def box_plot(axes, groups: Mapping[str, Array], colours: Sequence[str], means: bool = True) -> None:
+    """Boxes at the quartiles of each group of errors, whiskers to all values, a diamond at the mean."""
+    drawn = axes.boxplot(
+        list(groups.values()),
+        tick_labels=list(groups),
+        whis=(0, 100),
+        showmeans=means,
+        patch_artist=True,
+        medianprops={"color": INK},
+        meanprops={"marker": "D", "markersize": 4},
+    )
+    for box, colour in zip(drawn["boxes"], colours, strict=True):
+        box.set(facecolor=colour)
+
 
 def boxes(figure: Figure, runs: list[Run]) -> bool | None:
-    """Errors by weight as box plots (paper, Fig. 3b and Fig. 6)."""
-    groups = {mass: errors_mm(group) for mass, group in by_mass(runs).items()}
-    groups = {mass: error for mass, error in groups.items() if len(error)}
+    """Errors by weight as box plots (paper, Fig. 3b and Fig. 6); red where a run failed."""
+    groups = {mass: group for mass, group in by_mass(runs).items() if len(errors_mm(group))}
     if not groups:
         return False
     axes = figure.subplots()
-    failed = [any(run.failed for run in group) for mass, group in by_mass(runs).items() if mass in groups]
-    drawn = axes.boxplot(
-        list(groups.values()),
-        tick_labels=[f"{mass:g} g" for mass in groups],
-        whis=(0, 100),
-        showmeans=True,
-        patch_artist=True,
-        medianprops={"color": "#1c2733"},
-        meanprops={"marker": "D", "markersize": 4},
-    )
-    for box, bad in zip(drawn["boxes"], failed, strict=True):
-        box.set(facecolor="#f2cdc6" if bad else "#cfe3ee")
-    largest = [error.max() for error in groups.values()]
+    errors = {f"{mass:g} g": errors_mm(group) for mass, group in groups.items()}
+    failed = [any(run.failed for run in group) for group in groups.values()]
+    box_plot(axes, errors, ["#f2cdc6" if bad else "#cfe3ee" for bad in failed])
+    largest = [error.max() for error in errors.values()]
     top = max((value for value, bad in zip(largest, failed, strict=True) if not bad), default=max(largest))
     axes.set(ylabel="tracking error, mm", xlabel="weight at the tip", ylim=(0, 1.3 * top))
     if max(largest) > 1.3 * top:
@@ -66,11 +80,39 @@ def tasks(figure: Figure, subject: tuple[Run, Scenario]) -> None:
     most = 1e3 * run.counted.max(initial=0)
     top.set(ylabel="error, mm", ylim=(0, 1.15 * most) if most > 0 else None)
     top.legend(fontsize=9)
-    weights = [getattr(scenario.tasks, name.replace(" ", "_")) for name in TASKS]
-    rows = [k for k in range(len(TASKS)) if any(weights[k])]
-    for place, k in enumerate(rows):
-        gave = np.where(run.shortfall[:, k] > 1, place, np.nan)
+    rows = np.flatnonzero(scenario.tasks.weights.any(axis=1))
+    for line, k in enumerate(rows):
+        gave = np.where(run.shortfall[:, k] > 1, line, np.nan)
         bottom.plot(run.time, gave, color=ERROR, lw=6, solid_capstyle="butt")
-    bottom.plot(run.time, np.where(run.at_limit, len(rows), np.nan), color="#1c2733", lw=6, solid_capstyle="butt")
+    bottom.plot(run.time, np.where(run.at_limit, len(rows), np.nan), color=INK, lw=6, solid_capstyle="butt")
     bottom.set(xlabel="time, s", ylim=(-0.6, len(rows) + 0.6))
     bottom.set_yticks(range(len(rows) + 1), [*(TASKS[k] for k in rows), "held at a limit"])
+
+
+def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -> str:
+    """JSON text {"data", "layout"}; mm, base frame. `names` of the runs; None: one run a weight, named by it."""
+    names = names or [f"{run.mass_g:g} g" for run in runs]
+    data = [_line(1e3 * runs[0].wanted, "wanted", "#8794a0", 3, "dash")]
+    for run, name, colour in zip(runs, names, COLOURS * 3, strict=False):
+        if run.started:
+            failed = " (failed)" if run.failed else ""
+            data.append(_line(1e3 * run.tip, name + failed, colour, 4, "solid"))
+    if scenario.obstacle:
+        data.append(_ball(np.array(scenario.obstacle.centre_mm), scenario.obstacle.radius_mm))
+    plate = {"mode": "markers", "visible": "legendonly", "marker": {"size": 6, "symbol": "diamond", "color": INK}}
+    data.append(show.trace(np.zeros((1, 3)), "front plate", **plate))
+    return show.view(data, eye=(1.4, -1.62, 0.86), legend={"orientation": "h", "y": 0, "x": 0})
+
+
+def _line(points: Array, name: str, colour: str, width: int, dash: str) -> dict:
+    shown = points[:: max(1, len(points) // MOST_POINTS)]
+    return show.trace(shown, name, mode="lines", hoverinfo="name", line={"color": colour, "width": width, "dash": dash})
+
+
+def _ball(centre: Array, radius: float) -> dict:
+    around, down = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
+    unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
+    ball = np.round(centre[:, None, None] + radius * unit, 3)
+    shape = {axis: values.tolist() for axis, values in zip("xyz", ball, strict=True)}
+    style = {"showscale": False, "showlegend": True, "hoverinfo": "name", "opacity": 0.6}
+    return {"type": "surface", "name": "obstacle", **shape, **style, "colorscale": [[0, ERROR], [1, ERROR]]}

@@ -1,4 +1,4 @@
-"""How near any posture within the limits brings the tip to a point: what no controller can beat."""
+"""The least distance from the path that any posture within the limits reaches: no controller can do better."""
 
 from dataclasses import dataclass
 
@@ -62,7 +62,7 @@ class Room:
         return Bounds(np.append(self.low, -free), np.append(self.high, free))
 
     def drawn(self, random: np.random.Generator) -> Array:
-        """Positions anywhere in it (N,), outermost tube first."""
+        """Random positions within it (N,); drawn from the outermost tube inwards."""
         beta, after = np.empty(len(self.low)), 0.0
         for i in reversed(range(len(beta))):
             low, high = max(self.gap_low[i] + after, self.low[i]), min(self.gap_high[i] + after, self.high[i])
@@ -70,7 +70,7 @@ class Room:
         return beta
 
     def holds(self, x: Array) -> bool:
-        """Whether (beta, alpha) lies within it, but for rounding."""
+        """Whether (beta, alpha) lies within it, up to rounding."""
         gaps, beta, slack = self._gaps @ x, x[: len(self.low)], 1e-6
         return bool(
             ((gaps > self.gap_low - slack) & (gaps < self.gap_high + slack)).all()
@@ -79,6 +79,7 @@ class Room:
 
 
 def _nearest(model: Model, force: Array, room: Room, target: Array, starts: int, random: np.random.Generator) -> float:
+    """The least distance [m] of the tip from the target (3,), of searches from `starts` random postures."""
     n, best = len(room.low), np.inf
 
     def squared_mm(x: Array) -> tuple[float, Array]:
@@ -88,17 +89,10 @@ def _nearest(model: Model, force: Array, room: Room, target: Array, starts: int,
         away = 1e3 * (tips.position[0] - target)
         return float(away @ away), 2e3 * tips.jacobian[0, :3].T @ away
 
+    search = {"method": "SLSQP", "jac": True, "options": {"maxiter": 200, "ftol": 1e-9}}
     for _ in range(starts):
         start = np.append(room.drawn(random), random.uniform(-np.pi, np.pi, n))
-        found = minimize(
-            squared_mm,
-            start,
-            jac=True,
-            method="SLSQP",
-            bounds=room.bounds,
-            constraints=room.constraint,
-            options={"maxiter": 200, "ftol": 1e-9},
-        )
+        found = minimize(squared_mm, start, bounds=room.bounds, constraints=room.constraint, **search)
         if room.holds(found.x):
             best = min(best, 1e-3 * np.sqrt(found.fun))
         if best < REACHED:

@@ -10,7 +10,6 @@ from ctcr.show.output import atomic_writer
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
-from ctcr.track.scene import scene
 
 
 def write(
@@ -32,7 +31,7 @@ def write(
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
     with atomic_writer(target) as file:
-        file.write(html_page.page(title, sections, source, "ctcr track", scene(drawn, scenario)))
+        file.write(html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario)))
 
 
 def _shown(runs: list[Run]) -> list[Run]:

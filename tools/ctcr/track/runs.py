@@ -14,7 +14,7 @@ from ctcr.errors import InputError, Problem
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.track.result import FAR, UNSETTLED, Run, beside_obstacle, limit_in_words
-from ctcr.track.scenario import TASKS, Scenario
+from ctcr.track.scenario import Scenario
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def run_once(
         plant=plant if simulated else controller,
         device=None if simulated else plant,
         tasks=_core.TaskValues(
-            weights=np.array([getattr(tasks, name.replace(" ", "_")) for name in TASKS]),
+            weights=tasks.weights,
             gain=tasks.feedback_per_s,
             correction=1e-3 * tasks.fastest_feedback_mm_s,
             tracking_tolerance=1e-3,

@@ -22,18 +22,19 @@ from ctcr.robot.units import Quantity
 
 Array = NDArray[np.float64]
 
-# All twelve edges of a cube: three are travelled twice, as eight of its corners have three edges. Bit k of a corner's
-# number: its place along axis k.
+# All twelve edges of a cube: three are travelled twice, as each of its eight corners has three edges. Bit k of a
+# corner's number says at which end of axis k it lies.
 CUBE_TOUR = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
 TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stability margin", "posture")
 MOST_BYTES = 1 << 18
+NESTED = "its fields, indented below it"
 
 Lengths = Annotated[list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")]
 Weight = Annotated[list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)]
 
 
 class Trajectory(Section):
-    """The way of the tip, from rest to rest: a polyline rests at each corner, a spline only at its ends."""
+    """The path of the tip, from rest to rest: a polyline rests at each corner, a spline only at its ends."""
 
     kind: Literal["cube", "polyline", "spline"] = Field(description="cube, polyline or spline")
     corner_mm: Annotated[Three | None, Quantity("mm", usual=(0, 1000), count="three numbers")] = None
@@ -52,7 +53,7 @@ class Trajectory(Section):
 
 
 class Start(Section):
-    """Where the robot is put before it settles at the start of the path."""
+    """The joints from which the robot moves to the start of the path, and how long it may take."""
 
     beta_mm: Annotated[list[float], Quantity("mm", usual=(0, 2000), count="one number a tube,")]
     alpha_deg: Annotated[list[float], Quantity("deg", usual=(0, 720), count="one number a tube,")]
@@ -80,9 +81,14 @@ class Tasks(Section):
     posture_alpha_deg: Annotated[list[float] | None, Quantity("deg", usual=(0, 720), count="one number a tube,")] = None
     posture_rate_per_s: Annotated[float, Quantity("1/s", usual=(1e-3, 10), least=0)] = 0.1
 
+    @property
+    def weights(self) -> Array:
+        """(tasks, 2), in the order of TASKS."""
+        return np.array([getattr(self, name.replace(" ", "_")) for name in TASKS])
+
 
 class Limits(Section):
-    """What no step may violate. `at_limits` hold: as the paper; redistribute: the other joints take over."""
+    """Hard limits of every step. `at_limits` hold: as the paper; redistribute: the other joints take over."""
 
     base_gap_mm: Annotated[float, Quantity("mm", usual=(0.1, 300), least=0)] = 2.0
     tip_gap_mm: Annotated[float, Quantity("mm", usual=(0.1, 300), least=0)] = 2.0
@@ -101,7 +107,7 @@ class Obstacle(Section):
 
 
 class TipLoad(Section):
-    """Weights that hang at the tip; `direction` in the base frame is that of their pull."""
+    """Weights that hang at the tip, and the direction of their pull, base frame."""
 
     mass_g: Annotated[list[float], Len(1), Quantity("g", usual=(0.1, 500), least=0, count="a list of numbers")] = [0.0]
     direction: Annotated[Three, Quantity("", usual=(0, 1), count="three numbers")] = [0.0, -1.0, 0.0]
@@ -114,12 +120,12 @@ class Scenario(Section):
     name: str = Field(description="text")
     about: str = Field("", description="text")
     rate_Hz: Annotated[float, Quantity("Hz", usual=(1, 5000), above=0)] = 40.0
-    trajectory: Trajectory = Field(description="its fields, indented below it")
-    start: Start = Field(description="its fields, indented below it")
-    tasks: Tasks = Field(default_factory=Tasks, description="its fields, indented below it")
-    limits: Limits = Field(default_factory=Limits, description="its fields, indented below it")
-    obstacle: Obstacle | None = Field(None, description="its fields, indented below it")
-    load: TipLoad = Field(default_factory=TipLoad, description="its fields, indented below it")
+    trajectory: Trajectory = Field(description=NESTED)
+    start: Start = Field(description=NESTED)
+    tasks: Tasks = Field(default_factory=Tasks, description=NESTED)
+    limits: Limits = Field(default_factory=Limits, description=NESTED)
+    obstacle: Obstacle | None = Field(None, description=NESTED)
+    load: TipLoad = Field(default_factory=TipLoad, description=NESTED)
     noise_mm: Annotated[float, Quantity("mm", usual=(1e-4, 5), least=0)] = 0.035
     noise_deg: Annotated[float, Quantity("deg", usual=(1e-4, 5), least=0)] = 0.0
     repetitions: Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")] = 10
@@ -172,93 +178,82 @@ def parse(text: str, file: str, n_tubes: int) -> Scenario:
     document = yaml_document.parse(text, file)
     if not isinstance(document.data, dict):
         raise InputError(Problem("does not describe a scenario: no fields such as name, trajectory, start", file))
-    scenario, faults = None, []
     try:
         scenario = Scenario.model_validate(document.data)
+        faults = [*_relations(scenario, n_tubes), *_unusual(scenario)]
     except ValidationError as error:
-        faults = [_told(item) for item in error.errors(include_url=False)]
-    if scenario:
-        faults = list(_relations(scenario, n_tubes)) + list(_unusual(scenario))
-    if scenario is None or faults:
+        faults = [_fault(item) for item in error.errors(include_url=False)]
+    if faults:
         found = [Problem(text, file, document.line(path), path_text(path)) for path, text in faults]
         raise InputError(sorted(found, key=lambda problem: problem.line or 0))
     scenario._source = (file, document)
     return scenario
 
 
-def _owner(path: tuple) -> tuple[type[Section], str]:
-    section = _SECTIONS.get(path[0]) if len(path) > 1 else None
-    return (section, path[1]) if section else (Scenario, path[0])
-
-
-def _told(error: dict) -> tuple[tuple, str]:
+def _fault(error: dict) -> tuple[tuple, str]:
+    """Path and message of a fault that pydantic found."""
     path = error["loc"]
-    section, field = _owner(path)
+    section, field = (_SECTIONS[path[0]], path[1]) if len(path) > 1 and path[0] in _SECTIONS else (Scenario, path[0])
     if error["type"] == "extra_forbidden":
         meant = did_you_mean(str(field), section.model_fields)
         return path, f"unknown field{f': did you mean {meant}?' if meant else ''}"
     expected = section.expected(field) if field in section.model_fields else "its fields"
-    if error["type"] == "missing":
-        return path, f"is missing: needs {expected}"
-    return path, f"{shown(error['input'])}: needs {expected}"
+    fault = "is missing" if error["type"] == "missing" else shown(error["input"])
+    return path, f"{fault}: needs {expected}"
 
 
 def _relations(s: Scenario, n: int):
-    t = s.trajectory
+    """Faults (path, message) of fields that do not go together."""
+    t, tasks = s.trajectory, s.tasks
     if t.kind == "cube" and t.corner_mm is None:
         yield ("trajectory", "corner_mm"), f"is missing: a cube needs {Trajectory.expected('corner_mm')}"
     if t.kind != "cube":
         least = 4 if t.kind == "spline" else 2
-        distinct = np.unique(np.array(t.points_mm or np.empty((0, 3))), axis=0)
-        if len(distinct) < least:
+        if len(np.unique(np.array(t.points_mm or np.empty((0, 3))), axis=0)) < least:
             yield ("trajectory", "points_mm"), f"a {t.kind} needs at least {least} different points"
         elif t.kind == "spline" and (np.linalg.norm(np.diff(t.points_mm, axis=0), axis=1) == 0).any():
             yield ("trajectory", "points_mm"), "a point of a spline may not follow itself"
-    per_tube = [
-        ("start", "beta_mm"),
-        ("start", "alpha_deg"),
-        ("tasks", "posture_beta_mm"),
-        ("tasks", "posture_alpha_deg"),
-        ("limits", "beta_low_mm"),
-        ("limits", "beta_high_mm"),
-    ]
-    for section, field in per_tube:
-        values = getattr(getattr(s, section), field)
+    per_tube = {
+        "start": ("beta_mm", "alpha_deg"),
+        "tasks": ("posture_beta_mm", "posture_alpha_deg"),
+        "limits": ("beta_low_mm", "beta_high_mm"),
+    }
+    for path in ((section, field) for section, fields in per_tube.items() for field in fields):
+        values = getattr(getattr(s, path[0]), path[1])
         if values is not None and len(values) != n:
-            yield (section, field), f"has {len(values)} values: this robot needs {n}, one a tube"
-    if any(s.tasks.posture) and not (s.tasks.posture_beta_mm and s.tasks.posture_alpha_deg):
+            yield path, f"has {len(values)} values: this robot needs {n}, one a tube"
+    if any(tasks.posture) and not (tasks.posture_beta_mm and tasks.posture_alpha_deg):
         yield ("tasks", "posture"), "needs posture_beta_mm and posture_alpha_deg"
-    if not (any(s.tasks.damping) and s.tasks.damping[0] > 0 and s.tasks.damping[1] > 0):
+    if not min(tasks.damping) > 0:
         yield ("tasks", "damping"), "both weights must be above 0: without damping the step is not determined"
-    if not s.tasks.tracking[0] > 0:
+    if not tasks.tracking[0] > 0:
         yield ("tasks", "tracking"), "its first weight must be above 0: nothing else follows the path"
     if not np.linalg.norm(s.load.direction) > 0:
         yield ("load", "direction"), "has no length"
-    if s.tasks.feedback_per_s > 2 * s.rate_Hz:
-        text = f"{s.tasks.feedback_per_s:g} 1/s is unstable at {s.rate_Hz:g} Hz: at most twice the rate"
+    if tasks.feedback_per_s > 2 * s.rate_Hz:
+        text = f"{tasks.feedback_per_s:g} 1/s is unstable at {s.rate_Hz:g} Hz: at most twice the rate"
         yield ("tasks", "feedback_per_s"), text
-    given = t.corner_mm if t.kind == "cube" else t.points_mm
-    places = {
-        ("trajectory", "corner_mm" if t.kind == "cube" else "points_mm"): given,
+    points = "corner_mm" if t.kind == "cube" else "points_mm"
+    lengths = {
+        ("trajectory", points): getattr(t, points),
         ("start", "beta_mm"): s.start.beta_mm,
         ("obstacle", "centre_mm"): s.obstacle and s.obstacle.centre_mm,
     }
-    for path, values in places.items():
+    for path, values in lengths.items():
         if values and np.abs(values).max() < 1:
             yield path, "all below 1 mm: is this m?"
-    if s.obstacle and given:
-        inside = np.linalg.norm(1e3 * t.points[0] - s.obstacle.centre_mm) <= s.obstacle.radius_mm
-        if inside:
+    if s.obstacle and getattr(t, points):
+        if np.linalg.norm(1e3 * t.points[0] - s.obstacle.centre_mm) <= s.obstacle.radius_mm:
             yield ("obstacle", "centre_mm"), "the obstacle lies on the start of the path: move one of them"
 
 
 def _unusual(s: Scenario):
     """Values that look like another unit: in a file that moves a robot they are faults."""
-    for name in ("trajectory", "start", "tasks", "limits", "obstacle", "load", None):
-        section = getattr(s, name) if name else s
+    for path in ((), *((name,) for name in _SECTIONS)):
+        section = getattr(s, path[0]) if path else s
         for field in type(section).model_fields if section else ():
             quantity, value = type(section).quantity(field), getattr(section, field)
-            for number in value if isinstance(value, list) else [value]:
-                if quantity and isinstance(number, float | int) and not quantity.is_usual(number):
-                    yield ((name, field) if name else (field,)), quantity.doubt(number)
-                    break
+            numbers = [x for x in (value if isinstance(value, list) else [value]) if isinstance(x, float | int)]
+            strange = [x for x in numbers if quantity and not quantity.is_usual(x)]
+            if strange:
+                yield (*path, field), quantity.doubt(strange[0])
