@@ -12,7 +12,7 @@ from ctcr.bench.shared.ethercat import ProcessImage, signed
 from ctcr.bench.simulators.object_dictionary import Entry, ObjectDictionary, ServiceDataServer
 from ctcr.bench.simulators.segment import Segment
 from ctcr.bench.simulators.slave_controller import SlaveController
-from ctcr.bench.simulators.stepper_terminal import Coupler, StepperTerminal
+from ctcr.bench.simulators.stepper_terminal import StepperTerminal, coupler
 from simulated_bench import ROOT, run_on_bench, skip_without_bench  # noqa: E402
 
 sys.path.insert(0, str(ROOT / "tools"))
@@ -71,8 +71,7 @@ def dictionary():
     made.variable(0x1000, "I", 0x1389, "type")
     made.variable(0x1008, "s", "a name that does not fit into one mail of this mailbox", "name")
     made.record(0x2000, "record", {i: Entry("H", 100 * i, True) for i in range(1, 21)}, resizable=True)
-    made._entries[0x2001, 0] = Entry("s", "", True)
-    made._names[0x2001] = "text"
+    made.variable(0x2001, "s", "", "text", writable=True)
     return made
 
 
@@ -80,17 +79,17 @@ def dictionary():
 def test_objects_in_segments(dictionary, mailbox):
     client = Client(dictionary, mailbox)
     assert client.read(0x1000, 0) == struct.pack("<I", 0x1389)
-    assert client.read(0x1008, 0).decode() == dictionary[0x1008, 0]
+    assert client.read(0x1008, 0).decode() == dictionary.value(0x1008, 0)
     whole = struct.pack("<H20H", 20, *(100 * i for i in range(1, 21)))
     assert client.read(0x2000, 0, complete=True) == whole
     assert client.read(0x2000, 1, complete=True) == whole[2:]
     for room in (3, 7, 12, 60):
         text = f"a long text in pieces of {room} bytes, and some more".encode()
         client.write(0x2001, 0, text, room=room)
-        assert dictionary[0x2001, 0].encode() == text
+        assert dictionary.value(0x2001, 0).encode() == text
         numbers = struct.pack("<20H", *range(room, room + 20))
         client.write(0x2000, 1, numbers, complete=True, room=room)
-        assert dictionary[0x2000, 20] == room + 19
+        assert dictionary.value(0x2000, 20) == room + 19
     client.write(0x2000, 0, b"\x03")
     assert client.read(0x2000, 1, complete=True) == struct.pack("<3H", *range(60, 63))
 
@@ -136,7 +135,7 @@ def working_counter(made) -> int:
 
 
 def test_addressing():
-    segment = Segment([SlaveController(Coupler()), SlaveController(StepperTerminal(0)), SlaveController(Coupler())])
+    segment = Segment([SlaveController(coupler()), SlaveController(StepperTerminal(0)), SlaveController(coupler())])
     made = frame(7, 0, 0x0130, bytes(2))  # BRD of the AL status
     assert segment.pass_through(made, 0.0) and working_counter(made) == 3
     assert struct.unpack_from("<H", made, 18)[0] == 3 and made[26] == 1 and made[6] & 2
@@ -163,8 +162,8 @@ def test_addressing():
 def test_layouts_differ_between_variants(variant, status):
     terminal = StepperTerminal(0, variant)
     other = 0x1A06 + 0x1A06 - 1 - status  # the first of the one is no first of the other
-    assert terminal.objects.name(status) == "POS Status compact"
-    assert other not in terminal.objects or terminal.objects.name(other) != "POS Status compact"
+    assert terminal.objects[status].name == "POS Status compact"
+    assert other not in terminal.objects or terminal.objects[other].name != "POS Status compact"
     assert terminal.lengths() == (8, 8)
 
 
@@ -172,11 +171,11 @@ def test_positioning_interface():
     """A rising edge of execute starts a move on the counter, a falling one ends it."""
     terminal = StepperTerminal(0)
     for index, assigned in ((0x1C12, (0x1601, 0x1602, 0x1605)), (0x1C13, (0x1A01, 0x1A03, 0x1A06))):
-        terminal.objects[index, 0] = 3
+        terminal.objects.set(index, 0, 3)
         for i, pdo in enumerate(assigned, start=1):
-            terminal.objects[index, i] = pdo
+            terminal.objects.set(index, i, pdo)
     assert terminal.lengths() == (14, 14)
-    terminal.objects[0x8010, 1] = 1000
+    terminal.objects.set(0x8010, 1, 1000)
     terminal.entered(8)
     now = 0.0
 
@@ -206,7 +205,7 @@ def test_too_much_current_burns_the_motor():
     inputs = [terminal.cycle(0.01 * i, struct.pack("<HHHh", 0, 0, 1, 0), 8) for i in range(40)]
     ready, error = ([struct.unpack("<4H", data)[3] >> bit & 1 for data in inputs] for bit in (1, 3))
     assert ready[5] and not error[5] and error[-1] and not ready[-1]
-    assert terminal.objects[0xA010, 2] == 1
+    assert terminal.objects.value(0xA010, 2) == 1
     assert struct.unpack("<4H", terminal.cycle(1.0, struct.pack("<HHHh", 0, 0, 2, 0), 8))[3] >> 3 & 1 == 0
 
 

@@ -13,6 +13,7 @@ from ctcr.demo.hidden_robot import VALUE
 from ctcr.demo.story import LOG, Story, new_folder
 from ctcr.errors import InputError
 from ctcr.table import measurements
+from rich.console import Console
 from simulated_bench import ROOT, before_others, ctcr, skip_without_bench, was_starved
 
 TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
@@ -46,16 +47,8 @@ def test_start_of_a_recording(tmp_path):
 # ---- stories
 
 
-class Silent:
-    def begins(self, why, command):
-        pass
-
-    def ended(self, step):
-        pass
-
-
 def test_a_story_keeps_what_commands_say(tmp_path):
-    story = Story(new_folder(tmp_path / "story"), Silent())
+    story = Story(new_folder(tmp_path / "story"), Console(quiet=True))
     robot = ROOT / "examples" / "data" / "demo" / "robot.yaml"
     story.do("describe it", f"info {robot}", lambda told: told["robot"]["name"], "described")
     assert story.steps[0].found == "demo" and story.answers["described"]["robot"]["name"] == "demo"

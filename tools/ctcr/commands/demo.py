@@ -42,11 +42,10 @@ def bench(target, short, folder) -> int:
 def _tell(target, hidden, short) -> int:
     from ctcr.demo import bench_report, bench_story
     from ctcr.demo.story import Story, new_folder
-    from ctcr.demo.terminal import Teller
     from ctcr.show import output
 
     console, report = output.console(), f"{target}/report.html"
-    story = Story(new_folder(target), Teller(console))
+    story = Story(new_folder(target), console)
     bench_story.tell(story, short)
     console.print(bench_report.write(story, hidden, report), markup=False)
     console.print(f"Report: {report}", markup=False)

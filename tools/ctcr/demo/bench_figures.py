@@ -1,6 +1,5 @@
 """The pictures of the story at the bench, as SVG text through `html_page.figure`."""
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,18 +10,20 @@ from numpy.typing import NDArray
 from ctcr.diagnose.figures import GOOD
 from ctcr.model import simulation
 from ctcr.robot.description import Robot
+from ctcr.show import scene as show
 from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-BOXES = {  # name: (x, y, width, what it says)
-    "commands": (0.0, 0.5, 2.6, "ctcr record, ctcr track\nwhat a person types"),
-    "reader": (3.6, 1.2, 2.3, "tracker reader\n40 frames a second"),
-    "owner": (3.6, -0.2, 2.3, "bus owner\na cycle every 4 ms"),
-    "aurora": (7.4, 1.2, 2.3, "Aurora\nsimulated"),
-    "terminals": (7.4, -0.2, 2.3, "EK1100, 6 EL7041\nsimulated"),
-    "robot": (10.6, 0.5, 2.0, "robot\nwith hidden friction"),
+OURS, SIMULATED = "#e2eef4", "#f6ead9"
+BOXES = {  # name: x, y, width, colour, text
+    "commands": (0.0, 0.5, 2.6, OURS, "ctcr record, ctcr track\nwhat a person types"),
+    "reader": (3.6, 1.2, 2.3, OURS, "tracker reader\n40 frames a second"),
+    "owner": (3.6, -0.2, 2.3, OURS, "bus owner\na cycle every 4 ms"),
+    "aurora": (7.4, 1.2, 2.3, SIMULATED, "Aurora\nsimulated"),
+    "terminals": (7.4, -0.2, 2.3, SIMULATED, "EK1100, 6 EL7041\nsimulated"),
+    "robot": (10.6, 0.5, 2.0, SIMULATED, "robot\nwith hidden friction"),
 }
 WIRES = (
     ("commands", "reader", ""),
@@ -32,31 +33,21 @@ WIRES = (
     ("aurora", "robot", ""),
     ("terminals", "robot", ""),
 )
-SIMULATED = ("aurora", "terminals", "robot")
 HEIGHT = 0.9
 
 
 def bench(figure: Figure, _) -> None:
-    """Which processes there are, and what goes over the wires between them."""
+    """The processes, and what goes over the wires between them."""
     axes = figure.subplots()
     axes.set(xlim=(-0.1, 12.7), ylim=(-0.75, 2.2))
     axes.axis("off")
     for start, end, text in WIRES:
-        (x, y, width, _), (to_x, to_y, _, _) = BOXES[start], BOXES[end]
+        (x, y, width, *_), (to_x, to_y, *_) = BOXES[start], BOXES[end]
         axes.plot([x + width, to_x], [y + HEIGHT / 2 - 0.2, to_y + HEIGHT / 2 - 0.2], color=INK, lw=1.2, zorder=0)
         axes.text((x + width + to_x) / 2, y + 0.3, text, ha="center", va="bottom", fontsize=8.5, color=OUT)
-    for name, (x, y, width, text) in BOXES.items():
-        colour = "#f6ead9" if name in SIMULATED else "#e2eef4"
-        box = FancyBboxPatch(
-            (x, y - 0.2),
-            width,
-            HEIGHT,
-            boxstyle="round,pad=0,rounding_size=0.12",
-            facecolor=colour,
-            edgecolor=INK,
-            lw=0.8,
-        )
-        axes.add_patch(box)
+    for x, y, width, colour, text in BOXES.values():
+        style = {"boxstyle": "round,pad=0,rounding_size=0.12", "facecolor": colour, "edgecolor": INK, "lw": 0.8}
+        axes.add_patch(FancyBboxPatch((x, y - 0.2), width, HEIGHT, **style))
         title, below = text.split("\n")
         axes.text(x + width / 2, y + HEIGHT / 2 - 0.04, title, ha="center", weight="bold", fontsize=9)
         axes.text(x + width / 2, y + HEIGHT / 2 - 0.38, below, ha="center", fontsize=8.5)
@@ -64,7 +55,7 @@ def bench(figure: Figure, _) -> None:
 
 @dataclass(frozen=True)
 class Loop:
-    """Readings of runs that go out and come back through the same joints, and who predicts them."""
+    """Readings of runs that go out and come back through the same joints, and the models that predict them."""
 
     table: Measurements
     models: dict[str, Robot]
@@ -72,24 +63,22 @@ class Loop:
 
 def out_and_return(figure: Figure, loop: Loop) -> None:
     """The error of each model along the runs, both ways, in the direction in which the first model errs most."""
-    table = loop.table
+    table, predict = loop.table, simulation.simulate
     errors = {
-        name: 1e3 * (table.position - simulation.simulate(robot, table, "none").position)
-        for name, robot in loop.models.items()
+        name: 1e3 * (table.position - predict(robot, table, "none").position) for name, robot in loop.models.items()
     }
     first = next(iter(errors.values()))
     axis = np.linalg.svd(first - first.mean(axis=0), full_matrices=False)[2][0]
-    numbers = [number for number in np.unique(table.run) if np.sum(table.run == number) > 2]
+    runs = [run for run in np.unique(table.run) if np.sum(table.run == run) > 2]
     panels = figure.subplots(1, len(errors), sharey=True)
     for axes, (name, error) in zip(panels, errors.items(), strict=True):
-        for place, number in enumerate(numbers):
-            along = error[table.run == number] @ axis
+        for number, run in enumerate(runs):
+            along = error[table.run == run] @ axis
             half = (len(along) + 1) // 2
-            way = np.arange(half) + place * (half + 1)
-            back = along[-half:][::-1]
-            axes.fill_between(way, along[:half], back, color=FAINT, alpha=0.6, lw=0)
-            for values, colour, label in ((along[:half], OUT, "out"), (back, BACK, "back")):
-                axes.plot(way, values, color=colour, marker="o", ms=3.5, label=None if place else label)
+            stops, out, back = np.arange(half) + number * (half + 1), along[:half], along[-half:][::-1]
+            axes.fill_between(stops, out, back, color=FAINT, alpha=0.6, lw=0)
+            for values, colour, label in ((out, OUT, "out"), (back, BACK, "back")):
+                axes.plot(stops, values, color=colour, marker="o", ms=3.5, label=None if number else label)
         axes.axhline(0, color=NOISE, lw=0.8)
         axes.set(title=name, xlabel="stops of the runs, one after the other", xticks=[])
     panels[0].set_ylabel("error, mm")
@@ -98,28 +87,27 @@ def out_and_return(figure: Figure, loop: Loop) -> None:
 
 @dataclass(frozen=True)
 class Driven:
-    """Along the cube with one model: places and tips (P, 3) [mm] of the blind drive, path (R,) [s] and errors (R,) [mm]
-    of the controlled one."""
+    """Along the cube with one model, blindly and controlled."""
 
-    places: Array
-    tips: Array
-    path: Array
-    controlled: Array
+    corners: Array  # (P, 3) [mm]
+    tips: Array  # (P, 3) [mm], of the blind drive
+    time: Array  # (R,) [s], of the controlled one
+    controlled: Array  # (R,) [mm], its errors
 
     @property
     def blind(self) -> Array:
-        """Errors at the places (P,) [mm]."""
-        return np.linalg.norm(self.tips - self.places, axis=1)
+        """Errors at the corners (P,) [mm]."""
+        return np.linalg.norm(self.tips - self.corners, axis=1)
 
 
 def tracking(figure: Figure, drives: dict[str, Driven]) -> None:
-    """How far the tip was from the cube: by the model alone, and with the tracker's help."""
+    """Distance of the tip from the cube: by the model alone, and with the tracker's help."""
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.4))
     for (name, driven), colour in zip(drives.items(), (ERROR, GOOD), strict=True):
         corner = np.arange(len(driven.blind)) + 1
         left.plot(corner, driven.blind, color=colour, marker="o", ms=4, label=f"{name}: {driven.blind.mean():.2f} mm")
         label = f"{name}: {driven.controlled.mean():.2f} mm"
-        right.plot(driven.path, driven.controlled, color=colour, lw=1.1, label=label)
+        right.plot(driven.time, driven.controlled, color=colour, lw=1.1, label=label)
     left.set(title="blind: the model alone", xlabel="corners of the tour", ylabel="distance from the cube, mm")
     right.set(title="controlled: the tracker corrects at 40 Hz", xlabel="time along the tour, s")
     for axes in (left, right):
@@ -129,33 +117,12 @@ def tracking(figure: Figure, drives: dict[str, Driven]) -> None:
 
 def scene(drives: dict[str, Driven]) -> str:
     """JSON text {"data", "layout"} for Plotly.newPlot: the cube and the tips of the blind drives, mm, base frame."""
-    first = next(iter(drives.values()))
-    data = [_line(first.places, "cube", "#8794a0", "dash", 3)]
+
+    def line(points: Array, name: str, colour: str, dash: str, width: float) -> dict:
+        style = {"line": {"color": colour, "dash": dash, "width": width}, "marker": {"color": colour, "size": 3}}
+        return show.trace(points, name, mode="lines+markers", hoverinfo="name", **style)
+
+    data = [line(next(iter(drives.values())).corners, "cube", "#8794a0", "dash", 3)]
     for (name, driven), colour in zip(drives.items(), (ERROR, GOOD), strict=True):
-        data.append(_line(driven.tips, name, colour, "solid", 5))
-    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
-    layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "paper_bgcolor": "#ffffff",
-        "font": {"family": "system-ui, sans-serif", "color": INK},
-        "legend": {"orientation": "h", "y": 0, "x": 0},
-        "scene": {
-            "aspectmode": "data",
-            "camera": {"eye": {"x": 1.3, "y": -1.4, "z": 0.9}},
-            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
-        },
-    }
-    return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
-
-
-def _line(points: Array, name: str, colour: str, dash: str, width: float) -> dict:
-    columns = {axis: np.round(points[:, k], 3).tolist() for k, axis in enumerate("xyz")}
-    return {
-        "type": "scatter3d",
-        "mode": "lines+markers",
-        "name": name,
-        "hoverinfo": "name",
-        **columns,
-        "line": {"color": colour, "dash": dash, "width": width},
-        "marker": {"color": colour, "size": 3},
-    }
+        data.append(line(driven.tips, name, colour, "solid", 5))
+    return show.view(data, eye=(1.3, -1.4, 0.9), legend={"orientation": "h", "y": 0, "x": 0})

@@ -35,15 +35,27 @@ SHOWN = ("actuation.home_rotation_deg", "tracker.position_mm")  # of the calibra
 
 
 def write(story: Story, hidden: Robot, target) -> str:
-    """The end of the story in words. `hidden` is what stood on the bench. Raises InputError where it cannot write."""
+    """The end of the story in words. `hidden` is the robot on the bench. Raises InputError where it cannot write."""
     drives = _drives(story.folder)
     with atomic_writer(target) as file:
         file.write(page(story, hidden, drives))
-    return _summary(story, drives)
+    rms = story.answers["added"]["rms_mm"]
+    text = (
+        f"The error of the model fell from {rms['nominal']:.2f} to {rms['calibrated']:.2f} mm by calibration, and to "
+        f"{rms[EFFECT]:.2f} mm with {EFFECT}."
+    )
+    if drives:
+        without, with_it = drives.values()
+        text += (
+            f"\nDriven blindly along a cube, the tip was off by {without.blind.mean():.2f} mm before and "
+            f"{with_it.blind.mean():.2f} mm after; under control by {without.controlled.mean():.2f} and "
+            f"{with_it.controlled.mean():.2f} mm."
+        )
+    return text
 
 
 def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
-    """The whole HTML text; without `drives` the story ended before the cube."""
+    """The whole HTML text; `drives` is empty where the story ended before the cube."""
     folder = story.folder
     known, found = robot_file.load(folder / "robot.yaml"), robot_file.load(folder / "with_effect.yaml")
     sections = [
@@ -52,45 +64,28 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         _steps(story),
         _first_look(story, known.n_tubes),
         _model(found),
-        _cube(drives),
+        _cube(drives) if drives else "",
         _truth(story, known, found, hidden),
-        _wires(story),
+        _loops(story),
     ]
     drawing = bench_figures.scene(drives) if drives else None
     return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench", drawing)
-
-
-def _summary(story: Story, drives: dict[str, Driven]) -> str:
-    rms = story.answers["added"]["rms_mm"]
-    lines = [
-        f"The error of the model fell from {rms['nominal']:.2f} to {rms['calibrated']:.2f} mm by calibration, and to "
-        f"{rms[EFFECT]:.2f} mm with {EFFECT}."
-    ]
-    if drives:
-        without, with_it = drives.values()
-        lines.append(
-            f"Driven blindly along a cube, the tip was off by {without.blind.mean():.2f} mm before and "
-            f"{with_it.blind.mean():.2f} mm after; under control by {without.controlled.mean():.2f} and "
-            f"{with_it.controlled.mean():.2f} mm."
-        )
-    return "\n".join(lines)
 
 
 def _drives(folder: Path) -> dict[str, Driven]:
     """Along the cube, by what the model knew; empty where the story ended before."""
     if not list(folder.glob("track_*")):
         return {}
-    seen_by, places, found = robot_file.load(folder / "calibrated.yaml"), cube(folder), {}
+    seen_by, corners, found = robot_file.load(folder / "calibrated.yaml"), cube(folder), {}
 
-    def in_base(points):
+    def in_base(points: Array) -> Array:
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
         return 1e3 * tracker_to_base(seen_by.tracker, points, upright)[0]
 
     for robot, name in ROBOTS.items():
         table = measurements.load(folder / f"blind_{robot}" / TABLE, seen_by.n_tubes)
-        path, error = _controlled(folder / f"track_{robot}", robot_file.load(folder / f"{robot}.yaml"))
-        tips = table.position[-len(places) :]
-        found[name] = Driven(in_base(places), in_base(tips), path, error)
+        time, error = _controlled(folder / f"track_{robot}", robot_file.load(folder / f"{robot}.yaml"))
+        found[name] = Driven(in_base(corners), in_base(table.position[-len(corners) :]), time, error)
     return found
 
 
@@ -107,9 +102,9 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
     rms = story.answers["added"]["rms_mm"]
     minutes, seconds = divmod(round(sum(step.seconds for step in story.steps)), 60)
     numbers = [
-        ("error", f"{rms['nominal']:.2f} mm", "error of the model before, where it was found"),
-        ("error", f"{rms['calibrated']:.2f} mm", "the best that calibration can do"),
-        ("good", f"{rms[EFFECT]:.2f} mm", f"with {EFFECT}, on a run that no fit saw"),
+        ("error", f"{rms['nominal']:.2f} mm", "error of the model before, on held-out runs"),
+        ("error", f"{rms['calibrated']:.2f} mm", "the best that calibration alone can do"),
+        ("good", f"{rms[EFFECT]:.2f} mm", f"with {EFFECT}"),
     ]
     if drives:
         without, with_it = drives.values()
@@ -118,16 +113,13 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
             ("tracked at 40 Hz", without.controlled, with_it.controlled),
         ):
             numbers.append(("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}"))
+    count = len(free_parameters.expand("standard", found))
     return (
         f"<h1>{TITLE}</h1>"
-        f'<p class="lead">A robot stands on a simulated bench. It is off its file in {len(_calibrated(found))} '
-        f"calibrated parameters, and {EFFECT} acts between its tubes, of which no file says a word. The commands "
-        f"below met it through the devices' own protocols only, and took {minutes} min {seconds} s.</p>{cards(numbers)}"
+        f'<p class="lead">A robot stands on a simulated bench. It is off its file in {count} calibrated parameters, '
+        f"and {EFFECT} acts between its tubes, which its file does not know. The commands below met it through the "
+        f"devices' own protocols only, and took {minutes} min {seconds} s.</p>{cards(numbers)}"
     )
-
-
-def _calibrated(robot: Robot) -> list[str]:
-    return free_parameters.expand("standard", robot)
 
 
 def _bench() -> str:
@@ -144,37 +136,27 @@ def _steps(story: Story) -> str:
         f"<code>{html.escape(step.command)}</code><br>{html.escape(step.found)}</li>"
         for step in story.steps
     )
-    return f'<h2>What was done</h2><ol class="steps">{rows}</ol>'
+    return f'<h2>The steps</h2><ol class="steps">{rows}</ol>'
 
 
 def _first_look(story: Story, n_tubes: int) -> str:
-    folder = story.folder
-    loop = bench_figures.Loop(
-        measurements.load(folder / "both.csv", n_tubes),
-        {
-            "calibrated": robot_file.load(folder / "calibrated.yaml"),
-            f"calibrated, with {EFFECT}": robot_file.load(folder / "with_effect.yaml"),
-        },
-    )
+    names = {"calibrated": "calibrated", "with_effect": f"calibrated, with {EFFECT}"}
+    models = {name: robot_file.load(story.folder / f"{file}.yaml") for file, name in names.items()}
+    loop = bench_figures.Loop(measurements.load(story.folder / "both.csv", n_tubes), models)
     text = (
         "The error of the model where the same joints were reached from both sides, in its main direction. Without "
         "friction no model can be right on both ways."
     )
-    return "<h2>The same joints, out and back</h2>" + figure(
-        bench_figures.out_and_return, loop, 10.4, 3.6, text, wide=True
-    )
+    drawn = figure(bench_figures.out_and_return, loop, 10.4, 3.6, text, wide=True)
+    return "<h2>The same joints, out and back</h2>" + drawn
 
 
 def _model(found: Robot) -> str:
-    stages = history.waterfall(found)
-    return "<h2>The error of the model falls</h2>" + figure(
-        history.draw_waterfall, stages, 8.4, 3.8, "RMS error on a run that no fit saw."
-    )
+    text, stages = "RMS error on held-out runs.", history.waterfall(found)
+    return "<h2>The error of the model falls</h2>" + figure(history.draw_waterfall, stages, 8.4, 3.8, text)
 
 
 def _cube(drives: dict[str, Driven]) -> str:
-    if not drives:
-        return ""
     without, with_it = drives.values()
     helps = with_it.controlled.mean() < without.controlled.mean()
     text = (
@@ -182,12 +164,9 @@ def _cube(drives: dict[str, Driven]) -> str:
         "the tracker, so that the error is that of the model. Controlled: the tracker corrects what the model does not "
         f"know; there, knowing {EFFECT} {'helps too' if helps else 'does not help'}."
     )
-    return (
-        "<h2>The error in tracking</h2>"
-        + figure(bench_figures.tracking, drives, 10.4, 3.8, text, wide=True)
-        + '<div id="view"></div><p class="soft">The cube, and the corners where the blind robot came to; base frame. '
-        "Drag to turn, click a name to hide it.</p>"
-    )
+    drawn = figure(bench_figures.tracking, drives, 10.4, 3.8, text, wide=True)
+    below = "The cube, and the corners that the blind robot reached; base frame. Drag to turn, click a name to hide it."
+    return f'<h2>The error in tracking</h2>{drawn}<div id="view"></div><p class="soft">{below}</p>'
 
 
 def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
@@ -198,13 +177,11 @@ def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
         if ".coefficient." in name
     ]
     for change in found.history[-1]["changes"]:
-        if change["field"].startswith(SHOWN):
-            true = _at(hidden, change["field"])
-            before = _at(known, change["field"])
-            numbers = [f"{v:.2f}" for v in (before, change["new"], change["sd"], true)]
-            rows.append([f"{change['field']}", *numbers])
+        if (field := change["field"]).startswith(SHOWN):
+            numbers = (_at(known, field), change["new"], change["sd"], _at(hidden, field))
+            rows.append([field, *(f"{number:.2f}" for number in numbers)])
     columns = ["", "robot file", "found", "standard deviation", "true"]
-    return "<h2>What was found, and what was there</h2>" + table("", columns, rows, 1)
+    return "<h2>Found and true values</h2>" + table("", columns, rows, 1)
 
 
 def _at(robot: Robot, path: str) -> float:
@@ -215,33 +192,13 @@ def _at(robot: Robot, path: str) -> float:
     return value
 
 
-def _wires(story: Story) -> str:
+def _loops(story: Story) -> str:
+    columns = ["recording", "frames", "missed", "99 % late, ms", "bus cycles", "bad", "99 % late, ms", "worst, ms"]
     rows = []
-    for path in sorted(story.folder.glob("*/session.json"), key=lambda path: path.stat().st_mtime):
+    for path in sorted(story.folder.glob(f"*/{ABOUT}"), key=lambda path: path.stat().st_mtime):
         about = json.loads(path.read_text(encoding="utf-8"))["sittings"][-1]
         bus, tracker = about["bus"], about["tracker"]
-        rows.append(
-            [
-                path.parent.name,
-                str(tracker["frames"]),
-                str(tracker["missed"]),
-                f"{about['frames_late']['p99_ms']:.2f}",
-                str(bus["cycles"]),
-                str(bus["bad_cycles"]),
-                f"{bus['p99_late_ms']:.2f}",
-                f"{bus['worst_late_ms']:.2f}",
-                "yes" if bus["real_time_priority"] else "no",
-            ]
-        )
-    columns = [
-        "recording",
-        "frames",
-        "missed",
-        "99 % late, ms",
-        "bus cycles",
-        "bad",
-        "99 % late, ms",
-        "worst, ms",
-        "real-time",
-    ]
-    return "<h2>How steady the loops were</h2>" + table("", columns, rows, 1)
+        counts = [tracker["frames"], tracker["missed"], f"{about['frames_late']['p99_ms']:.2f}"]
+        counts += [bus["cycles"], bus["bad_cycles"], f"{bus['p99_late_ms']:.2f}", f"{bus['worst_late_ms']:.2f}"]
+        rows.append([path.parent.name, *map(str, counts), "yes" if bus["real_time_priority"] else "no"])
+    return "<h2>How steady the loops were</h2>" + table("", [*columns, "real-time"], rows, 1)

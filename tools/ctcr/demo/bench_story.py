@@ -1,6 +1,7 @@
 """The story of `ctcr demo bench`: from a robot that nobody knows to one that does what its model says."""
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,12 @@ Array = NDArray[np.float64]
 
 FILES = Path(__file__).parent / "bench"
 BENCH = "--bench bench.yaml"
-KNOWN = "known.yaml"  # the robot file as the procedures leave it
+KNOWN = "known.yaml"  # the robot file after the procedures
 ROBOTS = {"calibrated": "without friction", "with_effect": "with friction"}  # in the model
 
 
 def tell(story: Story, short: bool = False) -> None:
-    """Runs the story in its folder, beside the simulators. `short` leaves out what only shows more."""
+    """Runs the story in its folder, beside the simulators. `short` leaves out what only illustrates."""
     for file in FILES.iterdir():
         shutil.copy(file, story.folder)
     _find_the_joints(story, short)
@@ -34,99 +35,73 @@ def tell(story: Story, short: bool = False) -> None:
 
 
 def _find_the_joints(story: Story, short: bool) -> None:
-    if not short:
+    if short:
+        story.do("Find the joints", f"move robot.yaml {BENCH} --at-home", "taken from their marks")
+    else:
         story.do("See which devices answer", f"devices {BENCH}", _devices, "devices")
-    home = "--at-home" if short else "--home"
-    found = "taken from their marks" if short else "each tube flush with the plate in turn: its length says where it is"
-    story.do("Find the joints", f"move robot.yaml {BENCH} {home}", lambda _: found)
-    story.do(
-        "Touch six points with the probe: where the tracker stands",
-        f"calibrate registration points.csv --live --cad cad.csv {BENCH} --readings 5 --robot robot.yaml "
-        "-o registered.yaml",
-        _registered,
-        "registration",
-    )
+        found = "each tube flush with the plate in turn: its length says where it is"
+        story.do("Find the joints", f"move robot.yaml {BENCH} --home", found)
+    why = "Touch six points with the probe: where the tracker stands"
+    live = f"--live {BENCH} --readings 5 --robot robot.yaml -o registered.yaml"
+    story.do(why, f"calibrate registration points.csv --cad cad.csv {live}", _registered, "registration")
     if short:
         shutil.copy(story.folder / "registered.yaml", story.folder / KNOWN)
         return
-    story.do(
-        "Turn one tube after the other, alone: how they stand at home",
-        f"calibrate rotation-offset circles.csv --live {BENCH} --readings 2 --step-deg 60 --robot registered.yaml "
-        f"-o {KNOWN}",
-        _turned,
-        "circles",
-    )
+    live = f"--live {BENCH} --readings 2 --step-deg 60 --robot registered.yaml -o {KNOWN}"
+    why = "Turn one tube after the other, alone: how they stand at home"
+    story.do(why, f"calibrate rotation-offset circles.csv {live}", _turned, "circles")
 
 
 def _find_the_effect(story: Story, short: bool) -> None:
-    record = _record(KNOWN, 0.05 if short else 0.2)
-    story.do("Measure: all tubes turn by 40 degrees and back", record.format("first"), _recorded, "first")
+    dwell, first, second = 0.05 if short else 0.2, "first/measurements.csv", "second/measurements.csv"
+    why = "Measure: all tubes turn by 40 degrees and back"
+    story.do(why, _record(KNOWN, "first", dwell), _recorded, "first")
     if not short:
-        story.do("How wrong is the model?", f"compare {KNOWN} first/measurements.csv", _compared, "compared")
-    story.do("Which effect is missing?", f"diagnose {KNOWN} first/measurements.csv", _diagnosed, "first_diagnosis")
-    story.do(
-        "Ask for the runs that decide",
-        f"next {KNOWN} first/measurements.csv --runs 2 -o second.csv",
-        _proposed,
-        "proposal",
-    )
+        story.do("How wrong is the model?", f"compare {KNOWN} {first}", _compared, "compared")
+    story.do("Which effect is missing?", f"diagnose {KNOWN} {first}", _diagnosed, "first_diagnosis")
+    propose = f"next {KNOWN} {first} --runs 2 -o second.csv"
+    story.do("Ask for the runs that decide", propose, _proposed, "proposal")
     if not story.answers["proposal"]["runs"]:  # the first recording has decided
-        shutil.copy(story.folder / "first" / TABLE, story.folder / "both.csv")
+        shutil.copy(story.folder / first, story.folder / "both.csv")
         shutil.copy(story.folder / "first_diagnosis.json", story.folder / "diagnosis.json")
         return
-    story.do("Measure them", record.format("second"), _recorded, "second")
-    story.do(
-        "Put both recordings together",
-        f"join {KNOWN} first/measurements.csv second/measurements.csv -o both.csv",
-        lambda _: "both.csv",
-    )
+    story.do("Measure them", _record(KNOWN, "second", dwell), _recorded, "second")
+    story.do("Put both recordings together", f"join {KNOWN} {first} {second} -o both.csv", "both.csv")
     story.do("Which effect is missing?", f"diagnose {KNOWN} both.csv", _diagnosed, "diagnosis")
 
 
 def _add_the_effect(story: Story, short: bool) -> None:
     table = "both.csv"
     if not short:
-        story.do("Measure all over the workspace", _record(KNOWN).format("workspace"), _recorded, "workspace")
         table = "all.csv"
-        story.do(
-            "Put it to the others", f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", lambda _: table
-        )
-    story.do(
-        "Calibrate alone, to compare", f"calibrate fit {KNOWN} {table} -o calibrated.yaml", _calibrated, "calibrated"
-    )
-    story.do(
-        "Add what was found",
-        f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml",
-        _added,
-        "added",
-    )
+        why = "Measure all over the workspace"
+        story.do(why, _record(KNOWN, "workspace"), _recorded, "workspace")
+        story.do("Join it", f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", table)
+    fit = f"calibrate fit {KNOWN} {table} -o calibrated.yaml"
+    story.do("Calibrate alone, to compare", fit, _calibrated, "calibrated")
+    add = f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml"
+    story.do("Add the effect that was found", add, _added, "added")
 
 
 def _track(story: Story) -> None:
     """Along the edges of a cube, first by the model alone, then with the tracker's help."""
-    places = cube(story.folder)
+    corners = cube(story.folder)
     for robot, name in ROBOTS.items():
         blind = f"blind_{robot}"
         loaded = robot_file.load(story.folder / f"{robot}.yaml")
-        plan = blind_drive.drive(loaded, start(story.folder), places)
+        plan = blind_drive.drive(loaded, _start(story.folder), corners)
         simulation.write(plan, story.folder / f"{blind}.csv", loaded.n_tubes)
-        story.do(
-            f"Drive along a cube blindly, by the model {name}",
-            _record(f"{robot}.yaml").format(blind),
-            lambda _, blind=blind: f"{blind_errors(story.folder, blind).mean():.2f} mm off the cube",
-            blind,
-        )
+
+        off = partial(_off_the_cube, story.folder / blind / TABLE, corners, loaded.n_tubes)
+        why = f"Drive along a cube blindly, by the model {name}"
+        story.do(why, _record(f"{robot}.yaml", blind), off, blind)
     for robot, name in ROBOTS.items():
-        story.do(
-            f"Track the cube at 40 Hz, by the model {name}",
-            f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}",
-            _tracked,
-            f"track_{robot}",
-        )
+        track = f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}"
+        story.do(f"Track the cube at 40 Hz, by the model {name}", track, _tracked, f"track_{robot}")
 
 
-def _record(robot: str, dwell: float = 0.2) -> str:
-    return f"record {robot} {{0}}.csv {BENCH} --dwell {dwell} -o {{0}}"
+def _record(robot: str, name: str, dwell: float = 0.2) -> str:
+    return f"record {robot} {name}.csv {BENCH} --dwell {dwell} -o {name}"
 
 
 def cube(folder: Path) -> Array:
@@ -136,20 +111,13 @@ def cube(folder: Path) -> Array:
     return blind_drive.in_tracker(robot, path.points)
 
 
-def start(folder: Path) -> Array:
+def _start(folder: Path) -> Array:
     """Joints (2N,) [m], [rad] where tracking begins."""
-    begin = scenario.load(folder / "cube.yaml", robot_file.load(folder / "robot.yaml").n_tubes).start
-    return np.concatenate([1e-3 * np.array(begin.beta_mm), np.deg2rad(begin.alpha_deg)])
+    start = scenario.load(folder / "cube.yaml", robot_file.load(folder / "robot.yaml").n_tubes).start
+    return np.concatenate([1e-3 * np.array(start.beta_mm), np.deg2rad(start.alpha_deg)])
 
 
-def blind_errors(folder: Path, recording: str) -> Array:
-    """How far the tip was from each place of the cube (P,) [mm]."""
-    table = measurements.load(folder / recording / TABLE, robot_file.load(folder / "robot.yaml").n_tubes)
-    places = cube(folder)
-    return 1e3 * np.linalg.norm(table.position[-len(places) :] - places, axis=1)
-
-
-# ---- what the commands found, in words
+# ---- results of the commands, in words
 
 
 def _devices(told) -> str:
@@ -176,6 +144,11 @@ def _compared(told) -> str:
     return f"by {told['position_mm']['rms']:.2f} mm RMS, where noise alone would be {noise:.2f} mm"
 
 
+def _off_the_cube(recording: Path, corners: Array, n_tubes: int, _) -> str:
+    tips = measurements.load(recording, n_tubes).position[-len(corners) :]
+    return f"{1e3 * np.linalg.norm(tips - corners, axis=1).mean():.2f} mm off the cube"
+
+
 def _diagnosed(told) -> str:
     named = " and ".join(" or ".join(effect["class"]) for effect in told["effects"]) or "nothing"
     return f"{told['verdict'].replace('_', ' ')}: {named.replace('_', ' ')}"
@@ -188,7 +161,7 @@ def _proposed(told) -> str:
 
 
 def _calibrated(told) -> str:
-    return f"{told['rms_mm']['held_out']:.2f} mm RMS on runs that the fit has not seen"
+    return f"{told['rms_mm']['held_out']:.2f} mm RMS on held-out runs"
 
 
 def _tracked(told) -> str:
@@ -198,4 +171,4 @@ def _tracked(told) -> str:
 
 def _added(told) -> str:
     (name,) = told["added"]
-    return f"{told['rms_mm'][name]:.2f} mm RMS on runs that the fit has not seen"
+    return f"{told['rms_mm'][name]:.2f} mm RMS on held-out runs"

@@ -1,4 +1,4 @@
-"""Joints that bring the tip to places by the model alone, without looking at the tracker: as good as the model is."""
+"""Joints that bring the tip to points by the model alone, without a look at the tracker: as good as the model is."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,11 +12,11 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-TURN = np.deg2rad(60.0)  # in one direction: after it friction has forgotten what was before
-CLOSE = 2e-5  # [m] from a place, by the model
+TURN = np.deg2rad(60.0)  # in one direction: longer than the memory of friction
+CLOSE = 2e-5  # [m] from a point, by the model
 MOST_STEPS = 40
 DAMPING = 1e-3  # of the least-squares step, relative
-RADIAN = 0.05  # [m]: what a turn by 1 rad counts in it
+RADIAN = 0.05  # [m]: weight of a turn by 1 rad in it
 
 
 def in_tracker(robot: Robot, points: ArrayLike) -> Array:
@@ -25,31 +25,31 @@ def in_tracker(robot: Robot, points: ArrayLike) -> Array:
     return base_to_tracker(robot.tracker, points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)))[0]
 
 
-def drive(robot: Robot, start: ArrayLike, places: ArrayLike) -> Measurements:
-    """A plan without poses: a turn that wipes out what friction remembers, the start (2N,), then a row a place.
+def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:
+    """A plan without poses: a turn that wipes out the memory of friction, the start (2N,), then a row a point.
 
-    places (P, 3) [m], tracker frame. Raises InputError where the model cannot reach one.
+    points (P, 3) [m], tracker frame. Raises InputError where the model cannot reach one.
     """
     start = np.asarray(start, float)
     n = robot.n_tubes
     rows = [start - np.repeat([0.0, TURN], n), start]
-    for number, place in enumerate(np.asarray(places, float), start=1):
+    for number, point in enumerate(np.asarray(points, float), start=1):
         rows.append(rows[-1])
         for _ in range(MOST_STEPS):
             table = _table(np.array(rows))
-            error = robot.tracker.rotation.T @ (place - simulation.simulate(robot, table, "none").position[-1])
+            error = robot.tracker.rotation.T @ (point - simulation.simulate(robot, table, "none").position[-1])
             if np.linalg.norm(error) < CLOSE:
                 break
             rows[-1] = rows[-1] + _step(robot, table, error)
         else:
-            raise InputError(Problem(f"the model does not reach place {number}", field="drive"))
+            raise InputError(Problem(f"the model does not reach point {number}", field="drive"))
     return _table(np.array(rows))
 
 
 def _step(robot: Robot, table: Measurements, error: Array) -> Array:
     """Joints (2N,) by which the tip moves by `error` [m], base frame, with the least motion."""
     beta, alpha = robot.joints_of_table(table.beta[-1:], table.alpha[-1:])
-    plain = robot.model_copy(update={"effects": {}})  # an effect that remembers has no Jacobian of one place
+    plain = robot.model_copy(update={"effects": {}})  # an effect with history has no Jacobian of a single pose
     jacobian = Model(plain).predict(beta, alpha, table.force[-1:], derivatives=True).jacobian[0, :3]
     scale = np.repeat([1.0, 1 / RADIAN], robot.n_tubes)
     scaled = jacobian * scale

@@ -12,7 +12,7 @@ SHIFT_MM, TURN_DEG = ((9.0, -6.0, 7.0), (3.0, -2.5, 2.0))  # of the tracker, and
 
 
 def hidden_robot(known: Robot, misplaced: bool) -> Robot:
-    """What stands on the bench, where `known` is what the file says of it."""
+    """The robot on the bench; `known`: the robot file."""
     built = simulation.as_built(known, np.random.default_rng(SEED))
     if misplaced:
         built.tracker.position_mm = list(np.add(built.tracker.position_mm, SHIFT_MM))

@@ -1,4 +1,4 @@
-"""A story told by commands: each runs as a person would type it, and what it found is kept."""
+"""A story told by commands: each runs as a person would type it, and its result is kept."""
 
 import json
 import shlex
@@ -9,7 +9,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
+
+from rich.console import Console
 
 from ctcr.errors import InputError, Problem, file_fault
 
@@ -18,7 +20,7 @@ LOG = "log.txt"
 
 @dataclass(frozen=True)
 class Step:
-    """A command that was run: why, how it is typed, what it found in words, how long it took [s]."""
+    """A command that was run: why, how it is typed, its result in words, its duration [s]."""
 
     why: str
     command: str
@@ -27,7 +29,7 @@ class Step:
 
 
 def new_folder(path: str | Path) -> Path:
-    """An empty folder for a story; what an earlier one left there is removed. Raises InputError for anything else."""
+    """An empty folder for a story; that of an earlier story is removed. Raises InputError for anything else."""
     folder = Path(path)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / LOG).exists():
         raise InputError(Problem("is not empty and holds no demonstration: choose another folder", str(folder)))
@@ -41,37 +43,30 @@ def new_folder(path: str | Path) -> Path:
     return folder
 
 
-class Listener(Protocol):
-    """Who hears of every step."""
-
-    def begins(self, why: str, command: str) -> None: ...
-
-    def ended(self, step: Step) -> None: ...
-
-
 class Story:
-    """Runs `ctcr` commands in a folder; what they print goes to its log."""
+    """Runs `ctcr` commands in a folder, with their output in its log, and prints each step."""
 
-    def __init__(self, folder: Path, listener: Listener):
+    def __init__(self, folder: Path, console: Console):
         self.folder, self.steps, self.answers = folder, [], {}
-        self._listener = listener
+        self._console = console
 
-    def do(self, why: str, command: str, found: Callable[[Any], str], answer: str = "") -> None:
-        """Runs one command line. With `answer` its JSON is kept under that name, and put into words by `found`.
+    def do(self, why: str, command: str, found: str | Callable[[Any], str], answer: str = "") -> None:
+        """Runs one command line. With `answer` its JSON is kept under that name; `found` puts it into words.
 
-        Raises InputError with what the command said where it fails.
+        Raises InputError with the message of the command where it fails.
         """
-        self._listener.begins(why, f"ctcr {command}")
+        self._console.print(f"[bold]{len(self.steps) + 1:2}. {why}[/bold]")
+        self._console.print(f"    $ ctcr {command}", style="dim", markup=False)
         start, told = time.monotonic(), None
         self._run(shlex.split(command) + (["--json", f"{answer}.json"] if answer else []), command)
         if answer:
-            told = json.loads((self.folder / f"{answer}.json").read_text(encoding="utf-8"))
-            self.answers[answer] = told
-        self.steps.append(Step(why, f"ctcr {command}", found(told), time.monotonic() - start))
-        self._listener.ended(self.steps[-1])
+            told = self.answers[answer] = json.loads((self.folder / f"{answer}.json").read_text(encoding="utf-8"))
+        words = found(told) if callable(found) else found
+        step = Step(why, f"ctcr {command}", words, time.monotonic() - start)
+        self.steps.append(step)
+        self._console.print(f"    {step.found} ({step.seconds:.0f} s)", style="green", markup=False)
 
     def _run(self, arguments: list[str], command: str) -> None:
-        shown = sys.stderr.isatty()  # progress of the command goes to the terminal, if there is one
         with open(self.folder / LOG, "a", encoding="utf-8") as log:
             log.write(f"$ ctcr {command}\n")
             log.flush()
@@ -80,12 +75,11 @@ class Story:
                 cwd=self.folder,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
-                stderr=None if shown else subprocess.PIPE,
+                stderr=None if sys.stderr.isatty() else subprocess.PIPE,  # the command shows its progress on a terminal
                 text=True,
             )
             log.write(f"{done.stderr or ''}\n")
         if done.returncode:
             said = (done.stderr or "").strip().removeprefix("Error: ")
-            raise InputError(
-                Problem(f"failed{': ' + said if said else ''}", f"ctcr {command} (see {self.folder / LOG})")
-            )
+            where = f"ctcr {command} (see {self.folder / LOG})"
+            raise InputError(Problem(f"failed{': ' + said if said else ''}", where))

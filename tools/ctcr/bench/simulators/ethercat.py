@@ -12,7 +12,7 @@ from ctcr.bench.shared.shared_record import MOST_AXES, shared_motors
 from ctcr.bench.simulators.segment import ETHERTYPE, Segment
 from ctcr.bench.simulators.simulator import Settings, Simulator
 from ctcr.bench.simulators.slave_controller import SlaveController
-from ctcr.bench.simulators.stepper_terminal import Coupler, StepperTerminal
+from ctcr.bench.simulators.stepper_terminal import StepperTerminal, coupler
 from ctcr.errors import InputError, Problem
 
 TICK_S = 0.0005  # terminals work no more often
@@ -50,7 +50,7 @@ class EthercatSimulator(Simulator):
         if not 1 <= motors <= MOST_AXES:
             raise InputError(Problem(f"{motors} motors: 1 to {MOST_AXES} can be simulated"))
         self.terminals = [StepperTerminal(i, variant) for i in range(motors)]
-        self.segment = Segment([SlaveController(device) for device in (Coupler(), *self.terminals)])
+        self.segment = Segment([SlaveController(device) for device in (coupler(), *self.terminals)])
         self._socket = raw_socket(interface)
         super().__init__(folder, ETHERCAT, FAULTS, SIMULATED_BUS, scenario)
         self._record = shared_motors(folder, writer=True)

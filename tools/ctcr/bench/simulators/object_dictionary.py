@@ -3,8 +3,10 @@
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 SDO_REQUEST, SDO_RESPONSE, SDO_INFORMATION = 2, 3, 8  # services of CoE
+# Abort codes.
 NO_OBJECT, NO_SUBINDEX, READ_ONLY, WRONG_LENGTH = 0x06020000, 0x06090011, 0x06010002, 0x06070010
 OUT_OF_RANGE, UNKNOWN_COMMAND, TOGGLE, NO_COMPLETE_ACCESS = 0x06090030, 0x05040001, 0x05030000, 0x06010000
 _TYPES = {"?": 0x0001, "b": 0x0002, "h": 0x0003, "i": 0x0004, "B": 0x0005, "H": 0x0006, "I": 0x0007, "s": 0x0009}
@@ -40,81 +42,68 @@ class Entry:
         return struct.unpack("<" + self.kind, data)[0]
 
 
-class ObjectDictionary:
-    """Entries by (index, subindex). `check` may raise Abort before a value is written."""
+class Object(NamedTuple):
+    """Entries by subindex."""
+
+    name: str
+    entries: dict[int, Entry]
+
+
+class ObjectDictionary(dict[int, Object]):
+    """Objects by index. `check(index, subindex, value)` may raise Abort before a value is written."""
 
     def __init__(self, check: Callable[[int, int, int], None] = lambda index, subindex, value: None):
-        self._entries: dict[tuple[int, int], Entry] = {}
-        self._names: dict[int, str] = {}
+        super().__init__()
         self._check = check
 
-    def variable(self, index: int, kind: str, value: int | str, name: str) -> None:
-        self._names[index] = name
-        self._entries[index, 0] = Entry(kind, value, name=name)
+    def variable(self, index: int, kind: str, value: int | str, name: str, writable: bool = False) -> None:
+        self[index] = Object(name, {0: Entry(kind, value, writable, name)})
 
     def record(self, index: int, name: str, entries: dict[int, Entry], resizable: bool = False) -> None:
         """Subindex 0 is the highest subindex; the host may change it where the list is `resizable`."""
-        self._names[index] = name
-        self._entries[index, 0] = Entry("B", max(entries), resizable, "SubIndex 000")
-        for subindex, entry in entries.items():
-            self._entries[index, subindex] = entry
+        self[index] = Object(name, {0: Entry("B", max(entries), resizable, "SubIndex 000"), **entries})
 
-    def __getitem__(self, key: tuple[int, int]) -> int | str:
-        return self._entries[key].value
+    def value(self, index: int, subindex: int) -> int | str:
+        return self[index].entries[subindex].value
 
-    def __setitem__(self, key: tuple[int, int], value: int | str) -> None:
-        self._entries[key].value = value
-
-    def __contains__(self, index: int) -> bool:
-        return index in self._names
-
-    @property
-    def indices(self) -> list[int]:
-        return sorted(self._names)
-
-    def name(self, index: int) -> str:
-        return self._names[index]
-
-    def last(self, index: int) -> int:
-        """Highest subindex."""
-        return max(subindex for at, subindex in self._entries if at == index)
+    def set(self, index: int, subindex: int, value: int | str) -> None:
+        self[index].entries[subindex].value = value
 
     def entry(self, index: int, subindex: int) -> Entry:
         """Raises Abort where there is none."""
-        if index not in self._names:
+        if index not in self:
             raise Abort(NO_OBJECT)
-        if (index, subindex) not in self._entries:
+        if subindex not in self[index].entries:
             raise Abort(NO_SUBINDEX)
-        return self._entries[index, subindex]
+        return self[index].entries[subindex]
 
     def read(self, index: int, subindex: int, complete: bool) -> bytes:
-        """One value, or from `subindex` on all; then subindex 0 takes two bytes."""
+        """One value, or all from `subindex` on; then subindex 0 takes two bytes."""
         if not complete:
             return self.entry(index, subindex).data
-        data = b""
-        for i in self._members(index, subindex):
-            value = self.entry(index, i).data
-            data += value.ljust(2, b"\0") if i == 0 else value
-        return data
+        last = self.entry(index, 0).value
+        entries = self._from(index, subindex).items()
+        return b"".join(entry.data.ljust(2 if i == 0 else 0, b"\0") for i, entry in entries if i <= last)
 
     def write(self, index: int, subindex: int, complete: bool, data: bytes) -> None:
         if not complete:
             self._write_one(index, subindex, data)
             return
-        for i in self._members(index, subindex, most=0xFF):
+        for i, entry in self._from(index, subindex).items():
             if not data:
                 return
-            size = 2 if i == 0 else len(self.entry(index, i).data)
+            size = 2 if i == 0 else len(entry.data)
             part, data = data[:size], data[size:]
             self._write_one(index, i, part[:1] if i == 0 else part)
         if data:
             raise Abort(WRONG_LENGTH)
 
-    def _members(self, index: int, first: int, most: int | None = None) -> list[int]:
+    def _from(self, index: int, first: int) -> dict[int, Entry]:
+        """The entries of a complete access, in order."""
         if first > 1:
             raise Abort(NO_COMPLETE_ACCESS)
-        last = self.entry(index, 0).value if most is None else most
-        return [i for at, i in sorted(self._entries) if at == index and first <= i <= last]
+        self.entry(index, 0)
+        return {i: entry for i, entry in sorted(self[index].entries.items()) if i >= first}
 
     def _write_one(self, index: int, subindex: int, data: bytes) -> None:
         entry = self.entry(index, subindex)
@@ -129,7 +118,7 @@ class ServiceDataServer:
     """Answers CoE messages about a dictionary. `mailbox` is the size of a mail [bytes]."""
 
     def __init__(self, dictionary: ObjectDictionary, mailbox: int):
-        self._dictionary, self._room = dictionary, mailbox - 6 - 2  # after the heads of mail and CoE
+        self._dictionary, self._room = dictionary, mailbox - 6 - 2  # after the headers of mail and CoE
         self._sending, self._receiving = b"", None
         self._toggle = 0
 
@@ -150,14 +139,13 @@ class ServiceDataServer:
                 raise Abort(UNKNOWN_COMMAND)
             reply = handlers[command >> 5](command, index, subindex, message[2:])
         except Abort as abort:
-            reply = struct.pack("<BHBI", 0x80, index, subindex, abort.code)
-            return [struct.pack("<H", SDO_REQUEST << 12) + reply]
+            return [struct.pack("<HBHBI", SDO_REQUEST << 12, 0x80, index, subindex, abort.code)]
         return [struct.pack("<H", SDO_RESPONSE << 12) + reply]
 
     def _upload(self, command: int, index: int, subindex: int, _: bytes) -> bytes:
         data = self._dictionary.read(index, subindex, bool(command & 0x10))
         if len(data) <= 4:
-            return struct.pack("<BHB", 0x43 | (4 - len(data)) << 2, index, subindex) + data.ljust(4, b"\0")
+            return struct.pack("<BHB4s", 0x43 | (4 - len(data)) << 2, index, subindex, data)
         room = self._room - 8
         self._sending, self._toggle = data[room:], 0
         return struct.pack("<BHBI", 0x41, index, subindex, len(data)) + data[:room]
@@ -172,37 +160,36 @@ class ServiceDataServer:
         return bytes([head]) + data.ljust(7, b"\0")
 
     def _download(self, command: int, index: int, subindex: int, message: bytes) -> bytes:
-        complete = bool(command & 0x10)
+        target = index, subindex, bool(command & 0x10)
         self._dictionary.entry(index, subindex)
         if command & 0x02:
             size = 4 - (command >> 2 & 3) if command & 0x01 else 4
-            self._dictionary.write(index, subindex, complete, message[4 : 4 + size])
+            self._dictionary.write(*target, message[4 : 4 + size])
         else:
             size = struct.unpack_from("<I", message, 4)[0]
-            data = message[8 : 8 + size]
-            if len(data) == size:
-                self._dictionary.write(index, subindex, complete, data)
-            else:
-                self._receiving, self._toggle = (index, subindex, complete, size, data), 0
+            self._receive(target, size, message[8:], last=len(message) - 8 >= size)
+            self._toggle = 0
         return struct.pack("<BHBI", 0x60, index, subindex, 0)
 
-    def _download_segment(self, command: int, index: int, subindex: int, message: bytes) -> bytes:
+    def _download_segment(self, command: int, _index: int, _subindex: int, message: bytes) -> bytes:
         if command & 0x10 != self._toggle or not self._receiving:
             raise Abort(TOGGLE)
-        index, subindex, complete, size, data = self._receiving
+        target, size, data = self._receiving
         part = message[1:]
         if len(part) == 7:
             part = part[: 7 - (command >> 1 & 7)]
-        data = (data + part)[:size]
-        self._receiving = index, subindex, complete, size, data
-        if command & 0x01:
-            self._receiving = None
-            if len(data) != size:
-                raise Abort(WRONG_LENGTH)
-            self._dictionary.write(index, subindex, complete, data)
-        reply = struct.pack("<B", 0x20 | self._toggle) + bytes(7)
+        self._receive(target, size, data + part, last=bool(command & 0x01))
+        reply = struct.pack("<B7x", 0x20 | self._toggle)
         self._toggle ^= 0x10
         return reply
+
+    def _receive(self, target: tuple[int, int, bool], size: int, data: bytes, last: bool) -> None:
+        """Keeps what has come so far of `size` bytes; writes it after the last segment."""
+        self._receiving = None if last else (target, size, data[:size])
+        if last and len(data) < size:
+            raise Abort(WRONG_LENGTH)
+        if last:
+            self._dictionary.write(*target, data[:size])
 
     # ---- SDO information
 
@@ -211,41 +198,32 @@ class ServiceDataServer:
         try:
             if operation == 1:
                 kind = struct.unpack_from("<H", request, 4)[0]
-                indices = dictionary.indices if kind in (0, 1) else []
+                indices = sorted(dictionary) if kind in (0, 1) else []
                 numbers = [len(indices), 0, 0, 0, 0] if kind == 0 else indices
-                return self._fragments(2, struct.pack("<H", kind), b"".join(map(_u16, numbers)))
+                return _fragments(2, struct.pack("<H", kind), struct.pack(f"<{len(numbers)}H", *numbers))
             index = struct.unpack_from("<H", request, 4)[0]
             if operation == 3:
-                entry, last = dictionary.entry(index, 0), dictionary.last(index)
-                kind = _TYPES[entry.kind] if last == 0 else 0
+                entry, last = dictionary.entry(index, 0), max(dictionary[index].entries)
+                kind = 0 if last else _TYPES[entry.kind]
                 shape = struct.pack("<HHBB", index, kind, last, _RECORD if last else _VARIABLE)
-                return self._fragments(4, shape, dictionary.name(index).encode())
+                return _fragments(4, shape, dictionary[index].name.encode())
             if operation == 5:
                 subindex, information = request[6], request[7]
                 entry = dictionary.entry(index, subindex)
-                access = 0x07 | (0x38 if entry.writable else 0)
-                shape = struct.pack(
-                    "<HBBHHH", index, subindex, information, _TYPES[entry.kind], 8 * len(entry.data), access
-                )
-                return self._fragments(6, shape, entry.name.encode())
+                numbers = _TYPES[entry.kind], 8 * len(entry.data), 0x3F if entry.writable else 0x07
+                shape = struct.pack("<HBBHHH", index, subindex, information, *numbers)
+                return _fragments(6, shape, entry.name.encode())
             raise Abort(UNKNOWN_COMMAND)
         except Abort as abort:
-            return self._fragments(7, struct.pack("<I", abort.code), b"")
-
-    @staticmethod
-    def _fragments(operation: int, start: bytes, rest: bytes) -> list[bytes]:
-        """`start` comes in the first fragment alone."""
-        room = _INFO_LIMIT - len(start)
-        parts = [start + rest[:room]]
-        rest = rest[room:]
-        while rest:
-            parts, rest = [*parts, rest[:_INFO_LIMIT]], rest[_INFO_LIMIT:]
-        head, messages = struct.pack("<H", SDO_INFORMATION << 12), []
-        for i, part in enumerate(parts):
-            left = len(parts) - 1 - i
-            messages.append(head + struct.pack("<BBH", operation | (0x80 if left else 0), 0, left) + part)
-        return messages
+            return _fragments(7, struct.pack("<I", abort.code), b"")
 
 
-def _u16(number: int) -> bytes:
-    return struct.pack("<H", number)
+def _fragments(operation: int, start: bytes, rest: bytes) -> list[bytes]:
+    """Messages of SDO information; `start` comes in the first one alone."""
+    content = start + rest
+    parts = [content[i : i + _INFO_LIMIT] for i in range(0, len(content), _INFO_LIMIT)]
+    lefts = range(len(parts) - 1, -1, -1)
+    return [
+        struct.pack("<HBBH", SDO_INFORMATION << 12, operation | (0x80 if left else 0), 0, left) + part
+        for left, part in zip(lefts, parts, strict=True)
+    ]

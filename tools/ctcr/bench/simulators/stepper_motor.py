@@ -1,11 +1,11 @@
-"""A stepper motor with its encoder: a shaft that follows the field its coils turn, or loses it."""
+"""A stepper motor with its encoder: a shaft that follows the field of its coils, or falls out of step."""
 
-ENCODER_COUNTS = 4096  # of a turn: 1024 lines, four edges each
-STEP_COUNTS = 12800  # of a turn: 200 full steps of 64 microsteps, the internal counter
+ENCODER_COUNTS = 4096  # a turn: 1024 lines, four edges each
+STEP_COUNTS = 12800  # a turn: 200 full steps of 64 microsteps, the internal counter
 ACCELERATION = 200.0  # [turns/s^2]: the terminal's ramp in direct velocity control is that of the motor
 MICROSTEP = 1 / STEP_COUNTS
 HEATING_S = 0.2  # at too much current, until the terminal switches off
-SLIP = 0.1  # share of the steps that a slipping motor loses
+SLIP = 0.1  # fraction of the steps that a slipping motor loses
 
 
 class StepperMotor:
@@ -23,8 +23,8 @@ class StepperMotor:
         self.enabled, self.heat = False, 0.0
         self._stepped = 0.0  # turns commanded so far
         self._offsets = {True: -self.shaft * ENCODER_COUNTS, False: 0.0}
-        self._wanted_speed, self._place, self._ramp = 0.0, None, (10.0, ACCELERATION)
-        self._last_place = None
+        self._wanted_speed, self._target, self._ramp = 0.0, None, (10.0, ACCELERATION)
+        self._last_target = None
         self._time = None
 
     # ---- counter
@@ -43,34 +43,34 @@ class StepperMotor:
 
     # ---- commands
 
-    def command_velocity(self, share: float) -> None:
-        """A share of the full speed, signed."""
-        self._place, self._wanted_speed = None, share * self.full_speed
+    def command_velocity(self, fraction: float) -> None:
+        """A signed fraction of the full speed."""
+        self._target, self._wanted_speed = None, fraction * self.full_speed
         self._ramp = self.full_speed, ACCELERATION
 
-    def command_place(self, counter: int, from_encoder: bool, speed_share: float, ramp_s: float) -> None:
-        """A place on the counter, with a trapezoid of velocity."""
+    def command_position(self, counter: int, from_encoder: bool, speed_fraction: float, ramp_s: float) -> None:
+        """A position on the counter, with a trapezoidal velocity profile."""
         scale = ENCODER_COUNTS if from_encoder else STEP_COUNTS
-        self._place = self._last_place = self._stepped + (counter - self.counter(from_encoder)) / scale
-        self._ramp = speed_share * self.full_speed, speed_share * self.full_speed / ramp_s
+        self._target = self._last_target = self._stepped + (counter - self.counter(from_encoder)) / scale
+        self._ramp = speed_fraction * self.full_speed, speed_fraction * self.full_speed / ramp_s
 
-    def end_place(self) -> None:
-        if self._place is not None:
-            self._place, self._wanted_speed = None, 0.0
+    def end_positioning(self) -> None:
+        if self._target is not None:
+            self._target, self._wanted_speed = None, 0.0
 
     @property
     def is_positioning(self) -> bool:
-        return self._place is not None and abs(self._place - self._stepped) > MICROSTEP
+        return self._target is not None and abs(self._target - self._stepped) > MICROSTEP
 
     @property
-    def at_place(self) -> bool:
-        return self._last_place is not None and abs(self._last_place - self._stepped) < 2 * MICROSTEP
+    def in_target(self) -> bool:
+        return self._last_target is not None and abs(self._last_target - self._stepped) < 2 * MICROSTEP
 
     # ---- motion
 
     @property
     def stalled(self) -> bool:
-        return self.enabled and self.jammed and abs(self.speed) > 0
+        return self.enabled and self.jammed and self.speed != 0
 
     @property
     def is_too_hot(self) -> bool:
@@ -86,8 +86,8 @@ class StepperMotor:
         self.heat = self.heat + step if overload else 0.0
         most, acceleration = self._ramp
         wanted = self._wanted_speed
-        if self._place is not None:
-            left = self._place - self._stepped
+        if self._target is not None:
+            left = self._target - self._stepped
             wanted = min(most, (2 * acceleration * abs(left)) ** 0.5, abs(left) / max(step, 1e-6))
             wanted = wanted if left > 0 else -wanted
         change = acceleration * step
