@@ -14,8 +14,8 @@ MOVED_FAR = 2.0  # prior standard deviations beyond which a fitted value contrad
 
 STEPS = 2  # integration steps per segment, at least
 MOST_STEPS = 16  # ... and at most: no known robot needs more
-INTEGRATION_CHI_SQUARE = 0.25  # of integration errors over all rows: shifts no parameter by more than half its sd
-INTEGRATION_CHI_SQUARE_COARSE = 1.0  # the same where log evidences are only compared: their error is a half of it
+INTEGRATION_ERROR = 0.25  # of integration errors over all rows: shifts no parameter by more than half its sd
+INTEGRATION_ERROR_COARSE = 1.0  # the same where log evidences are only compared: their error is a half of it
 INTEGRATION_SAMPLE = 300  # rows on which integration errors are estimated
 DIFFERENCE_STEP = 1e-4  # [prior sd] of central differences of a user's functions
 POSITION_STEP, ROTATION_STEP = 1e-6, 1e-5  # [m], [rad] of central differences by the sensor's pose
@@ -44,7 +44,7 @@ FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are t
 
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
-COARSE_TOLERANCE = 0.5  # [log evidence] of fits that only find a start, or tell models apart
+COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart
 ITERATIONS = 50  # by which a fit has converged, or never will
 STARTS = 3  # starts that are compared
 FRICTION_PATH_CHANGE = 0.005  # [rad] of relative torsion angle below which the friction path is solved

@@ -18,7 +18,7 @@ LENGTH, SIZE = 0.04, 1.5e-4  # of the smooth error [m]
 @pytest.fixture(scope="module")
 def piece(robot, recorded):
     """A small piece of metal beside the robot."""
-    places = joint.places_of(robot, simulation.simulate(robot, recorded, "none"))
+    places = joint.sensor_positions(robot, simulation.simulate(robot, recorded, "none"))
     at = np.median(places, axis=0) + [0.06, -0.05, 0.06]
     return dict(zip(NAMES, [6e-6, *at, 0, 0, 0], strict=True))
 

@@ -5,19 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.fit import joint, one_sided
+from ctcr.fit.result import Priors
 from ctcr.model import recording
 from ctcr.model.noise import Noise
+from ctcr.model.protocol import ResidualModel
 from ctcr.robot import robot_file
 from ctcr.table import measurements as tables
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tools"))
 DATA = ROOT / "examples" / "data" / "calibration"
+NAMES = ["tubes.1.curved_length", "tracker.position.z"]
 NOISE = Noise(position_jitter=1e-4, rotation_jitter=1e-3)
 
 
-class Kinked:
+class Kinked(ResidualModel):
     """Readings of a curved length `c` that shows only where a tube is deployed further, and of an offset `o`."""
 
     REACH = np.linspace(0.03, 0.05, 21)
@@ -38,23 +42,11 @@ class Kinked:
         slope[:, 2, 1] = -1.0
         return residual.ravel(), slope.reshape(-1, 2), True
 
-    def __call__(self, x, derivatives):
-        return self.residual(x, derivatives)[:2]
-
 
 def fit_of(curved_length, offset, random, offset_sd=1e-3):
     mean, sd = np.array([0.0493, 0.0]), np.array([2.5e-3, offset_sd])
-    return joint.identify_with(
-        Kinked(curved_length, offset, random),
-        ["tubes.1.curved_length", "tracker.position.z"],
-        mean,
-        sd,
-        mean - 0.05,
-        mean + 0.05,
-        NOISE,
-        np.zeros((21, 3)),
-        starts=1,
-    )
+    priors = Priors(NAMES, mean, sd, mean - 0.05, mean + 0.05)
+    return joint.fit_joint(Kinked(curved_length, offset, random), priors, NOISE, np.zeros((21, 3)))
 
 
 def test_a_length_bounded_on_one_side_is_within_its_deviation_as_often_as_that_says():
@@ -83,7 +75,7 @@ def test_a_length_bounded_on_both_sides_is_left_alone_and_an_open_side_is_told()
         slope = wide.jacobian_all.reshape(len(Kinked.REACH), 6, 2)[:, :3, 0]
         open_to = np.sum(slope**2, axis=1) * (wide.sd[0] ** 2 - fit.sd[0] ** 2)
         np.testing.assert_allclose(wide.expected_square[:, 0], fit.expected_square[:, 0] + open_to)
-        shown += wide.floor_mm() > 1.1 * fit.floor_mm()
+        shown += wide.expected_mm() > 1.1 * fit.expected_mm()
         assert "how much longer" in wide.warnings[-1] and wide.ratio[0] > 0.3
         assert wide.covariance[0, 0] == pytest.approx(wide.sd[0] ** 2)
     assert shown > 5
@@ -102,24 +94,13 @@ def test_a_curve_that_the_file_has_behind_the_plate_is_found_where_the_readings_
     """From the flat side no slope leads to the truth; a truth on that side stays there."""
     random = np.random.default_rng(6)
     for truth in random.uniform(0.046, 0.054, 40):
-        predict = Kinked(truth, 0.0, random)
+        model = Kinked(truth, 0.0, random)
 
-        def fitted_from(start, like=None, predict=predict):
+        def fitted_from(start, like=None, model=model):
             frozen = {} if like is None else {"weights": like.weights, "inflation": like.inflation}
             mean, sd = np.array([0.0515, 0.0]), np.array([2.5e-3, 1e-3])
-            return joint.identify_with(
-                predict,
-                ["tubes.1.curved_length", "tracker.position.z"],
-                mean,
-                sd,
-                mean - 0.05,
-                mean + 0.05,
-                NOISE,
-                np.zeros((21, 3)),
-                start=start,
-                starts=1,
-                **frozen,
-            )
+            priors = Priors(NAMES, mean, sd, mean - 0.05, mean + 0.05)
+            return joint.fit_joint(model, priors, NOISE, np.zeros((21, 3)), start=start, **frozen)
 
         stuck = fitted_from(np.array([0.0515, 0.0]))
         found = one_sided.crossed(stuck, fitted_from)
@@ -140,7 +121,7 @@ def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
     table.force[:] = [0.0, -0.1, 0.0]
     noise = Noise(position_jitter=3.5e-5, rotation_jitter=5e-4)
     steps = recording.steps_for(robot, table, noise)
-    assert (steps > recording.STEPS) == more
+    assert (steps > settings.STEPS) == more
     fine = recording.recording_of(robot, table, steps=16).residual(np.empty(0))[0].reshape(-1, 6)
     scale = np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
 
@@ -148,10 +129,10 @@ def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
         coarse = recording.recording_of(robot, table, steps=steps).residual(np.empty(0))[0].reshape(-1, 6)
         return np.nansum(((coarse - fine) / scale) ** 2)
 
-    assert missed(steps) < 2 * recording.UNSEEN
-    assert not more or missed(steps - 1) > 0.5 * recording.UNSEEN
+    assert missed(steps) < 2 * settings.INTEGRATION_ERROR
+    assert not more or missed(steps - 1) > 0.5 * settings.INTEGRATION_ERROR
     coarse = Noise(position_jitter=1e-2, rotation_jitter=1e-1)
-    assert recording.steps_for(robot, table, coarse) == recording.STEPS
+    assert recording.steps_for(robot, table, coarse) == settings.STEPS
 
 
 @pytest.mark.slow

@@ -8,10 +8,12 @@ import pytest
 from ctcr import settings
 from ctcr.errors import InputError
 from ctcr.fit import joint
+from ctcr.fit.result import Priors
 from ctcr.frames import base_to_tracker, product, quaternion_from_rotation_vector
 from ctcr.model import parameters
 from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of
+from ctcr.model.protocol import LinearModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -165,7 +167,7 @@ def test_a_fit_finds_the_robot_that_was_measured():
     assert (np.abs(error) < 4 * fit.sd).all()
     assert 0.7 < fit.reduced_chi_square < 1.3 and 0.001 < fit.p_value
     assert fit.nominal_rms_mm() > 5 * fit.rms_mm()
-    assert fit.rms_mm(held_out) == pytest.approx(fit.floor_mm(held_out), rel=0.3)
+    assert fit.rms_mm(held_out) == pytest.approx(fit.expected_mm(held_out), rel=0.3)
     assert not fit.used[held_out].any() and np.isfinite(fit.residual[held_out]).all()
     # The fitted robot predicts what the fit says it does.
     again = joint.fit(fit.apply(bench), readings, "tracker.position.x", noise=NOISE)
@@ -292,19 +294,12 @@ def test_doubtful_tables_are_commented():
         joint.fit(bench, readings, "standard")
 
 
-def test_any_function_can_be_fitted():
+def test_any_model_can_be_fitted():
     slope = np.random.default_rng(1).standard_normal((60, 2))
-    measured = slope @ [1.0, -0.5]
-    fit = joint.identify_with(
-        lambda x, derivatives: (measured - slope @ x, -slope),
-        ["a", "b"],
-        np.zeros(2),
-        np.ones(2),
-        np.full(2, -inf),
-        np.full(2, inf),
-        Noise(position_jitter=0.01, rotation_jitter=0.01),
-        np.zeros((10, 3)),
-    )
+    measured, zero = slope @ [1.0, -0.5], np.zeros(2)
+    model = LinearModel(measured, -slope, zero, zero)
+    noise = Noise(position_jitter=0.01, rotation_jitter=0.01)
+    fit = joint.fit_joint(model, Priors(["a", "b"], zero, zero + 1, zero - inf, zero + inf), noise, np.zeros((10, 3)))
     np.testing.assert_allclose(fit.values, [1, -0.5], atol=1e-3)
 
 
@@ -339,7 +334,7 @@ def test_truth_and_unseen_readings_lie_where_the_fits_say():
         chi_square.append(fit.reduced_chi_square)
         p_values.append(fit.p_value)
         errors.append(fit.rms_mm(held_out) ** 2)
-        floors.append(fit.floor_mm(held_out) ** 2)
+        floors.append(fit.expected_mm(held_out) ** 2)
     assert 0.90 < np.mean(within) < 0.98
     assert np.mean(chi_square) == pytest.approx(1, abs=0.03)
     assert np.mean(np.array(p_values) < 0.05) < 0.12

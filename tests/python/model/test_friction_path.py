@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import add
 from ctcr.diagnose.candidates import Candidate, forms
 from ctcr.diagnose.engine import FITS, Engine
@@ -44,7 +45,7 @@ def test_stiff_friction_is_found(robot, plan):
 def test_what_is_predicted_is_wound_up(robot, plan):
     rubbing = add.with_values(robot, ["friction"], TRUE)
     table = user_recording.recording_of(rubbing, plan, list(TRUE))
-    assert table.wind_up(table.nominal()) < joint.WOUND  # it was, when it was made
+    assert table.wind_up(table.nominal()) < settings.FRICTION_PATH_CHANGE  # it was, when it was made
     table.residual(table.nominal())
     wound = table.predicted()[0]
     assert table.wind_up(0 * table.nominal()) == 0  # nothing rubs: nothing changes
@@ -57,7 +58,7 @@ def test_what_is_predicted_is_wound_up(robot, plan):
 def test_a_recording_begins_at_the_twist_of_another(robot, plan):
     x, still = np.array(list(TRUE.values())), np.zeros(len(TRUE))
     first, like, unlike, fresh = (user_recording.recording_of(robot, plan, list(TRUE)) for _ in range(4))
-    assert first.wind_up(x) > 10 * joint.WOUND
+    assert first.wind_up(x) > 10 * settings.FRICTION_PATH_CHANGE
     for table in (like, unlike):
         table.begin_at(first)
     assert like.wind_up(x) < 1e-3
@@ -72,14 +73,14 @@ def test_candidates_are_screened_where_the_tubes_of_a_fit_are_wound_up(robot, pl
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
     rubbing = [name for name in TRUE if name != LAW]
     fit = engine.fit(rubbing, start=TRUE, fixed={LAW: 1.0})
-    assert fit.predict.is_wound
+    assert fit.model.is_wound
     own = fit.jacobian_all.reshape(*fit.residual.shape, -1) * fit.prior_sd
     np.testing.assert_allclose(engine.derivatives(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
     # A fit in which nothing rubs comes between: what was wound up is not forgotten.
-    assert not engine.fit().predict.is_wound
+    assert not engine.fit().model.is_wound
     again = engine.recording(fit.names, {LAW: 1.0})
     again.begin_at(engine._friction_path)
-    assert again.wind_up(fit.values) < joint.WOUND
+    assert again.wind_up(fit.values) < settings.FRICTION_PATH_CHANGE
 
 
 def predicted(table, x):
@@ -128,4 +129,4 @@ def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot
         assert set(names["coefficient"]) <= set(one.best.candidate.names)
         assert not set(names["torque_per_length"]) & set(one.best.candidate.names)
         assert np.max(after.inflation) < FITS
-        assert after.rms_mm() < 1.2 * joint.noise_floor(after, noise, engine.positions)[0]
+        assert after.rms_mm() < 1.2 * joint.tracker_error(after, noise)[0]

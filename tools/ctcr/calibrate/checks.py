@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.compare.offsets import find_run_offsets
 from ctcr.compare.sample import take_sample
 from ctcr.compare.visits import find_revisits, find_stops
@@ -18,11 +19,7 @@ from ctcr.show.output import listed
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
-OUTLIER_WEIGHT = 0.3  # below it a reading hardly counts
 LISTED = 12
-RUN_LEVEL = 0.0125  # chance of a false alarm that runs differ
-# Runs have frames of their own where the error is that many noise floors, and such frames leave that share of it.
-FRAMES_BEYOND, FRAMES_LEAVE = 4.0, 0.5
 
 
 def start(robot: Robot, readings: Measurements) -> float:
@@ -66,7 +63,7 @@ def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
 
 def outlier_rows(fit, readings: Measurements) -> list[int]:
     """Rows of the file whose readings hardly counted."""
-    small = (fit.weights > 0) & (fit.weights < OUTLIER_WEIGHT)  # 0: not fitted
+    small = (fit.weights > 0) & (fit.weights < settings.OUTLIER_WEIGHT)  # 0: not fitted
     return readings.row[small.any(axis=1)].tolist()
 
 
@@ -95,7 +92,7 @@ def _one_frame(robot: Robot, readings: Measurements, fit) -> list[str]:
     """A sentence where an error far beyond noise goes away with another frame for all."""
     together = replace(readings, run=np.zeros_like(readings.run))
     before_mm, after_mm = error_with_frames(robot, together, fit.noise)
-    if before_mm < FRAMES_BEYOND * fit.floor_mm() or after_mm > FRAMES_LEAVE * before_mm:
+    if before_mm < settings.FRAMES_BEYOND * fit.expected_mm() or after_mm > settings.FRAMES_LEAVE * before_mm:
         return []
     return [
         f"Another tracker frame leaves {wording.mm(after_mm)} of the {wording.mm(before_mm)} RMS error, but lies "
@@ -110,12 +107,12 @@ def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
     if len(np.unique(readings.run)) < 2:
         return []
     before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
-    if before_mm > FRAMES_BEYOND * fit.floor_mm() and after_mm < FRAMES_LEAVE * before_mm:
+    if before_mm > settings.FRAMES_BEYOND * fit.expected_mm() and after_mm < settings.FRAMES_LEAVE * before_mm:
         text = f"The runs do not share one frame: a frame for each leaves {wording.mm(after_mm)} of the "
         return [f"{text}{wording.mm(before_mm)} RMS error. --frame-per-run fits them."]
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     sample = take_sample(robot, readings, Model(robot.standard).predict(beta, alpha, readings.force))
-    found = find_run_offsets(sample, find_revisits(find_stops(sample), sample.lever), RUN_LEVEL)
+    found = find_run_offsets(sample, find_revisits(find_stops(sample), sample.lever), settings.RUN_OFFSET_SIGNIFICANCE)
     if not found.found:
         return []
     text = f"The runs do not share one frame or homing: an offset for each explains {wording.percent(found.share)} of "

@@ -4,8 +4,8 @@ import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
+from ctcr import settings
 from ctcr.calibrate.joint_fit import Calibration
-from ctcr.model.fields import SAYS_NOTHING
 from ctcr.show.style import ERROR, FAINT, INK, NOISE, OUT
 from ctcr.show.wording import mm
 
@@ -142,9 +142,9 @@ def correlations(figure, c: Calibration) -> None:
         right.axhline(edge, color="#e7ebef", lw=1.5)
     figure.colorbar(image, ax=left, location="left", shrink=0.5, pad=0.02, label="correlation")
     ratio = np.array([item.ratio for item in c.fitted[:count]])
-    colours = [FAINT if value > SAYS_NOTHING else OUT for value in ratio]
+    colours = [FAINT if value > settings.SAYS_NOTHING else OUT for value in ratio]
     right.barh(range(count), 100 * ratio, color=colours, height=0.7)
-    right.axvline(100 * SAYS_NOTHING, color=NOISE, ls="--", lw=1)
+    right.axvline(100 * settings.SAYS_NOTHING, color=NOISE, ls="--", lw=1)
     right.set(xlim=(0, 105), xlabel="sd left, %")
     right.set_title("sd after / before", fontsize=9)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from ctcr import settings
 from ctcr.frames import base_to_tracker
 from ctcr.model import effect_model
 from ctcr.model.model import Model
@@ -16,9 +17,6 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
-MOST_PLACES = 400
-DRAWS = 24
-SEED = 1
 
 
 @dataclass(frozen=True)
@@ -43,16 +41,16 @@ class Halves:
 
 def compare_halves(robot: Robot, readings: Measurements, first, second, kind: str) -> Halves | None:
     """Halves of two fits of one robot to two halves of a table; None where the models cannot be solved."""
-    rows = np.unique(np.linspace(0, len(readings) - 1, min(len(readings), MOST_PLACES)).astype(np.int64))
+    rows = np.unique(np.linspace(0, len(readings) - 1, min(len(readings), settings.HALVES_ROWS)).astype(np.int64))
     models = [fit.apply(robot) for fit in (first, second)]
     tips = [_tips(model, readings, rows) for model in models]
     spread = _root(_difference_covariance(first, second))
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(settings.HALVES_SEED)
     squares = []
-    for _ in range(DRAWS):
+    for _ in range(settings.HALVES_DRAWS):
         values = first.values + spread @ rng.standard_normal(spread.shape[1])
         try:
-            moved = _moved(first, values).apply(robot)
+            moved = replace(first, values=values).apply(robot)
         except ValidationError:  # a draw that no robot can have, such as a negative modulus
             continue
         squares.append(np.sum((_tips(moved, readings, rows) - tips[0]) ** 2, axis=1))
@@ -72,10 +70,6 @@ def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Arra
     beta, alpha = robot.joints_of_table(readings.beta[rows], readings.alpha[rows])
     answer = Model(robot).predict(beta, alpha, readings.force[rows])
     return base_to_tracker(robot.tracker, answer.position, answer.quaternion)[0]
-
-
-def _moved(fit, values: Array):
-    return fit.moved(values) if hasattr(fit, "moved") else replace(fit, values=values)
 
 
 def _difference_covariance(first, second) -> Array:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.audit import sensor_roll
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
@@ -24,11 +25,6 @@ from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
-
-FOLDS = 4
-REJECTED = 0.01  # chance below which noise does not explain the residual
-NEARLY = 1.5  # reduced chi-square up to which the tracker's smooth error is still taken for the noise
-MOST_ROWS_FOLDED = 5000  # beyond, one part is held out instead of each in turn
 
 
 @dataclass(frozen=True)
@@ -149,7 +145,7 @@ def calibrate(
         names = [name for name in names if name not in frame or name == sensor_roll.NAME]
     parts = _held_out_split(readings, lever, hold_out)
     judged = range(parts.parts) if parts else []
-    if hold_out or len(readings) > MOST_ROWS_FOLDED:
+    if hold_out or len(readings) > settings.CROSS_VALIDATION_ROWS:
         judged = judged[1:2]
     both = parts_of(readings, lever, 2) if halves else None
     engine = _engine(robot, readings, usable, frame_per_run, fields.in_si(sd or {}, robot))
@@ -178,9 +174,9 @@ def calibrate(
         fitted=fields.fitted(fit),
         stages=stages,
         held_out=held_out,
-        floor=Stage("noise floor", fit.floor_mm(usable), fit.floor_deg(usable)),
+        floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
-        frames=getattr(fit, "frames", None),
+        frames=fit.frames,
         notices=[*map(checks.sentence, notices), *repeated, *checks.notices(after, readings, fit, frame_per_run)],
     )
 
@@ -225,8 +221,12 @@ def _chosen(fitted, names: Sequence[str], noises: list, parts: Split | None, jud
     tried = []
     for noise in noises:
         tried.append(fitted(names, noise=noise))
-        near = noise is noises[-1] and noise.position_field > 0 and tried[-1].reduced_chi_square < NEARLY
-        if tried[-1].p_value > REJECTED or near:
+        near = (
+            noise is noises[-1]
+            and noise.position_field > 0
+            and tried[-1].reduced_chi_square < settings.NEARLY_EXPLAINED
+        )
+        if tried[-1].p_value > settings.SIGNIFICANCE or near:
             tried = tried[-1:]
             break
     if not judged:
@@ -247,7 +247,7 @@ def _as_in(fit) -> dict[str, Any]:
 def _held_out_split(readings: Measurements, lever: float, hold_out: int | None) -> Split | None:
     if hold_out == 0:
         return None
-    return runs_left_out(readings, hold_out) if hold_out else parts_of(readings, lever, FOLDS)
+    return runs_left_out(readings, hold_out) if hold_out else parts_of(readings, lever, settings.FOLDS)
 
 
 def _stage(name: str, residual: Array) -> Stage:

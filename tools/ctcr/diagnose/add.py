@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.audit.preparation import prepared
 from ctcr.calibrate.checks import sentence
 from ctcr.diagnose import outliers, segment_delays, smooth_field
@@ -33,7 +34,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 PLACES = 2  # of an effect that are tried, the best by their slopes, with outliers and without
-SAYS_NOTHING = 0.9  # posterior over prior standard deviation
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def add(
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
         varies.append(smooth_field.message(smooth))
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
-    stages.append(Stage("noise_floor", *joint.noise_floor(fit, fit.noise, stage.engine.positions)))
+    stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     return Added(
         _applied(stage.robot, fit),
         list(ids),
@@ -147,8 +147,7 @@ def write_added(
     before: Robot, added: Added, target: str | Path, measurements: str | Path, in_place: bool = False
 ) -> Robot:
     """Writes the robot with its effects and an entry of the ledger."""
-    fit = _only(added.fit, lambda name: not name.startswith("effects."))
-    changes = fields.changes(fit, before, added.robot)
+    changes = fields.changes(added.fit, before, added.robot)
     figures: dict[str, Any] = {"added": added.ids, "rms_mm": added.rms("rms_mm")}
     if np.isfinite([stage.rms_deg for stage in added.stages]).all():
         figures["rms_deg"] = added.rms("rms_deg")
@@ -265,8 +264,7 @@ class _Fitter:
             likely = engine.fit_with_field(own, values_of(likely))
         # The robot is to predict; how sure its values are is another question.
         fit = fit_to_predict(engine, likely, {}, tolerance=engine.tolerance)
-        fit = replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
-        return replace(fit, units=[fields.field_of(name).unit for name in fit.names])
+        return replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
 
     def places(self, identity: str, before: joint.Fit, ids: Sequence[str]) -> list[dict[str, float]]:
         """Where slopes at the fit before, of all rows, say that an effect may be: a plane, a piece of metal.
@@ -294,10 +292,10 @@ class _Fitter:
         first, *others = [dict(values) for values in begins]
         if not others:
             return first
-        fit = self.engine.fit(own, start=first, near=True, tolerance=joint.COARSE)
+        fit = self.engine.fit(own, start=first, near=True, tolerance=settings.COARSE)
         fits = [fit]
         for other in others:
-            fits.append(self.engine.fit_like(fit, own, start=other, near=True, tolerance=joint.COARSE))
+            fits.append(self.engine.fit_like(fit, own, start=other, near=True, tolerance=settings.COARSE))
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
 
 
@@ -323,12 +321,6 @@ def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
     return made
 
 
-def _only(fit: joint.Fit, kept) -> joint.Fit:
-    """Names, values and deviations of some parameters of a fit."""
-    places = [i for i, name in enumerate(fit.names) if kept(name)]
-    return replace(fit, names=[fit.names[i] for i in places], values=fit.values[places], sd=fit.sd[places])
-
-
 def _stage(name: str, residual: Array, rows: Mask) -> Stage:
     return Stage(name, 1e3 * rms(residual[:, :3], rows), float(np.degrees(rms(residual[:, 3:], rows))))
 
@@ -341,7 +333,7 @@ def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str]) -> list[str]:
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)
         mine = [name for name in effect.amplitudes if name in place]
-        if mine and all(fit.ratio[place[name]] > SAYS_NOTHING for name in mine):
+        if mine and all(fit.ratio[place[name]] > settings.SAYS_NOTHING for name in mine):
             said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
         elif mine and all(abs(fit.values[place[name]]) < 2 * fit.sd[place[name]] for name in mine):
             said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")

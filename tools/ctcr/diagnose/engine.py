@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.diagnose.linearised import Linear
-from ctcr.effects import catalogue
 from ctcr.fit import folds, joint, one_sided
+from ctcr.fit.result import Priors
 from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -42,7 +42,7 @@ class Engine:
     _friction_path: _core.Recording | None = field(init=False, default=None)  # of the last fit with friction
 
     def __post_init__(self) -> None:
-        self.positions = joint.places_of(self.robot, self.measurements)
+        self.positions = joint.sensor_positions(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
         self.measured = folds.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
@@ -54,13 +54,7 @@ class Engine:
 
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of parameters of the robot and of effects."""
-        found: dict[str, tuple[float, ...]] = {}
-        for source, is_effect in ((parameters, False), (catalogue, True)):
-            own = [name for name in names if name.startswith("effects.") == is_effect]
-            if own:
-                found |= zip(own, zip(*source.priors(self.robot, own), strict=True), strict=True)
-        mean, sd, low, high = np.array([found[name] for name in names]).reshape(-1, 4).T
-        return mean, sd, low, high
+        return parameters.priors(self.robot, names)
 
     def recording(self, names: Sequence[str], fixed: dict[str, float] | None = None) -> Any:
         return user_recording.recording_of(
@@ -87,35 +81,28 @@ class Engine:
         the fit: where the model is wrong, the noise is inflated so that calibration stays plausible.
         """
         names = [*self.base, *added]
-        mean, sd, low, high = self.priors(names)
-        mean_of = dict(zip(names, mean, strict=True))
-        at = np.clip([(start or {}).get(name, mean_of[name]) for name in names], low, high)
+        priors = Priors.of(self.robot, names, self.measurements.beta[self.rows])
+        at = dict(zip(names, priors.mean, strict=True)) | (start or {})
+        at = np.clip([at[name] for name in names], priors.low, priors.high)
         table = self.recording(names, fixed)
-        _begin_at(table, self._friction_path)
+        if self._friction_path is not None:
+            table.begin_at(self._friction_path)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
-        fitted = joint.identify_rows(
+        fitted = joint.fit_joint(
             table,
-            self.fitted,
-            names,
-            mean,
-            sd,
-            low,
-            high,
+            priors,
             noise or self.noise,
             self.positions,
-            robust=weights is None,
-            weights=weights,
-            admit_model_error=inflation is None,
-            inflation=inflation,
+            self.fitted,
             start=at,
+            weights=weights,
+            inflation=inflation,
             max_iterations=max_iterations,
             tolerance=tolerance or self.tolerance,
             few_first=not near,
-            known=parameters.known_directions(self.robot, names),
-            within=parameters.admissible(self.robot, self.measurements.beta[self.rows], names),
         )
-        if isinstance(table, _core.Recording) and table.is_wound:
+        if table.is_wound:
             self._friction_path = table
         return fitted
 
@@ -132,7 +119,7 @@ class Engine:
             from_there = dict(zip(full.names, map(float, values), strict=True))
             if like is None:
                 return self.fit(added, start=from_there, fixed=fixed, near=True)
-            return self.fit_like(like, added, start=from_there, fixed=fixed, near=True, tolerance=joint.COARSE)
+            return self.fit_like(like, added, start=from_there, fixed=fixed, near=True, tolerance=settings.COARSE)
 
         full = self.fit(added, start=start, fixed=fixed, near=bool(start))
         full = one_sided.crossed(full, again)
@@ -148,42 +135,19 @@ class Engine:
         """Whether the readings say that the robot came to its first row otherwise than assumed: straight from home, or
         at rest there. If so, all later fits assume that."""
         other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
-        there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=joint.COARSE)
+        there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=settings.COARSE)
         if there.log_evidence - fit.log_evidence < SAID:
             return False
         self.measurements = other.measurements
         return True
 
-    def linear_fit(
-        self,
-        at: joint.Fit,
-        *,
-        noise: Any = None,
-        weights: Array | None = None,
-        inflation: Array | None = None,
-        max_iterations: int = 50,
-        more: Array | float = 0.0,
-    ) -> joint.Fit:
-        """As fit() with the same parameters, but of the model linearised at a fit: other noise or weights are cheap,
-        and so is `more` (M, 6) residual."""
-        _, _, low, high = self.priors(at.names)
-        return joint.linear_fit(
-            at,
-            low,
-            high,
-            self.positions,
-            noise=noise,
-            rows=self.rows,
-            weights=weights,
-            inflation=inflation,
-            max_iterations=max_iterations,
-            more=more,
-        )
+    def linear_fit(self, at: joint.Fit, **options: Any) -> joint.Fit:
+        """joint.linear_fit() of the rows of this engine."""
+        return joint.linear_fit(at, rows=self.rows, **options)
 
     def likeliest_noise(self, fit: joint.Fit) -> Any:
         """The noise of a fit with that part of its field error which makes the readings likeliest."""
-        _, _, low, high = self.priors(fit.names)
-        return joint.likeliest_field(fit, low, high, self.positions)
+        return joint.likeliest_field(fit)
 
     def thinned(self, fit: joint.Fit, least: int = SCREENING_ROWS) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
@@ -215,7 +179,8 @@ class Engine:
         neutral, sd, _, _ = self.priors(everything)
         at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
         table = self.recording(everything, fixed)
-        _begin_at(table, fit.predict)
+        if isinstance(fit.model, _core.Recording):
+            table.begin_at(fit.model)
         table.activate(self.fitted.tolist())
         values = np.array([at[name] for name in everything])
         # A part of the table, scaled in place: with many rows it is the largest array of a diagnosis.
@@ -223,12 +188,6 @@ class Engine:
         columns *= sd[len(everything) - len(names) :]
         columns[~np.isfinite(columns)] = 0.0
         return columns.reshape(len(self.measurements), 6, len(names))
-
-
-def _begin_at(table: Any, other: Any) -> None:
-    """Begins at the friction path that another recording solved: it is close to this one's."""
-    if isinstance(table, _core.Recording) and isinstance(other, _core.Recording):
-        table.begin_at(other)
 
 
 def effects_in(fit: joint.Fit) -> list[str]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ctcr import settings
 from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
 from ctcr.fit import folds, joint
+from ctcr.model.noise import with_field
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -50,7 +51,7 @@ def predicts_better(engine: Engine, before: joint.Fit, after: joint.Fit) -> bool
 
 
 def fit_to_predict(
-    engine: Engine, fit: joint.Fit, fixed: dict[str, float], tolerance: float = joint.COARSE
+    engine: Engine, fit: joint.Fit, fixed: dict[str, float], tolerance: float = settings.COARSE
 ) -> joint.Fit:
     """The same parameters fitted under the noise that predicts best; `fixed` are values of effects that are held."""
     noise = _noise_that_predicts(engine, fit)
@@ -67,7 +68,7 @@ def _noise_that_predicts(engine: Engine, fit: joint.Fit) -> Any:
 
     A field error that is not there lets calibration stay wrong; one that is there and left out biases it.
     """
-    tried = {part: joint.with_field(engine.noise, part) for part in joint.FIELDS}
+    tried = {part: with_field(engine.noise, part) for part in settings.FIELD_PARTS}
     errors = {part: typical(cross_validated(engine, fit, noise)) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
     usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))

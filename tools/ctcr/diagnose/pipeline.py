@@ -81,7 +81,7 @@ class Diagnosis:
 
         Far above the noise floor where these rows are unlike those that were fitted.
         """
-        return max(self.with_effects.floor_mm(self.judged), self.noise_floor_mm)
+        return max(self.with_effects.expected_mm(self.judged), self.noise_floor_mm)
 
     def rms_mm_after(self, accepted: Accepted) -> float:
         """RMS error of the judged rows with this effect and those accepted before."""
@@ -246,7 +246,7 @@ def _diagnose(
         calibrated=calibrated,
         with_effects=one_sided.widened(with_effects),
         final=segment_delays.widened(engine, one_sided.widened(fit)),
-        noise_floor_mm=joint.noise_floor(with_effects, floor_noise, engine.positions)[0],
+        noise_floor_mm=joint.tracker_error(with_effects, floor_noise)[0],
         rounds=chosen.rounds,
         accepted=accepted,
         residual=residual,

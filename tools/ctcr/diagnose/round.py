@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.diagnose import contact, jump, metal, segment_delays
 from ctcr.diagnose.candidates import Candidate, is_of_metal
 from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
@@ -155,7 +156,9 @@ def run_round(
     progress("screening all candidates")
     names, fixed = parameters_of(accepted)
     if accepted:  # what a refit without a further effect finds too is no gain of one
-        again = engine.fit_like(before, names, start=values_of(before), fixed=fixed, near=True, tolerance=joint.COARSE)
+        again = engine.fit_like(
+            before, names, start=values_of(before), fixed=fixed, near=True, tolerance=settings.COARSE
+        )
         before = max(before, again, key=lambda fit: fit.log_evidence)
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
@@ -280,7 +283,7 @@ def _refit(
                 start=start,
                 fixed=fixed | dict(candidate.shape),
                 max_iterations=iterations,
-                tolerance=joint.COARSE,
+                tolerance=settings.COARSE,
                 near=one.fit is not None,
             )
             break
@@ -330,7 +333,7 @@ def _without_candidate(
     best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
     if best is None:
         return before, tried
-    there = engine.fit_like(before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=joint.COARSE)
+    there = engine.fit_like(before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=settings.COARSE)
     found = there.log_evidence - before.log_evidence
     if found <= 0:
         return before, tried

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.diagnose import segment_delays
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import FITS, Engine, values_of
@@ -176,7 +177,7 @@ class Selection:
             start = values_of(self.fit)
             for iterations in (ITERATIONS, END):  # a fit that is far behind need not converge
                 without = self.engine.fit_like(
-                    self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=joint.COARSE
+                    self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=settings.COARSE
                 )
                 evidence = segment_delays.log_evidence
                 a.log_evidence = evidence(self.engine, self.fit) - evidence(self.engine, without)
@@ -196,7 +197,7 @@ def select_effects(engine: Engine, pool: list[Candidate], progress: Progress) ->
     start_plain, start = {}, {}
     if few is not None:
         progress("a part of the readings first")
-        chosen.engine = replace(engine, rows=few, tolerance=joint.COARSE)
+        chosen.engine = replace(engine, rows=few, tolerance=settings.COARSE)
         chosen.fit = chosen.calibrate([], {})
         start_plain = values_of(chosen.fit)
         chosen.grow(pool, more=np.sum(engine.fitted) / np.sum(few))

@@ -10,7 +10,8 @@ import numpy as np
 
 from ctcr import _core
 from ctcr.diagnose.engine import Engine
-from ctcr.fit.joint import Fit, with_field
+from ctcr.fit.joint import Fit
+from ctcr.model.noise import with_field
 
 EFFECT = "effects.field_distortion."
 LENGTHS = (0.025, 0.04, 0.07)  # correlation lengths that are tried [m]

@@ -1,78 +1,34 @@
-"""Joint identification: any set of parameters fitted to a table of readings, with what the readings cannot say.
+"""The joint fit: any parameters, all together, to a table of readings.
 
-Positions in m, rotations in rad, tracker axes. Residuals are measured - predicted: position, then rotation vector.
+It maximises the posterior density: normal priors within bounds, normal readings with the tracker's jitter and smooth
+field error, robust weights for outliers, and inflated jitter where the model misses what the noise cannot explain. The
+Laplace approximation about the maximum gives covariance and log marginal likelihood. Positions are in m, rotations in
+rad, tracker axes; residuals are measured - predicted: position, then rotation vector.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import nan
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, messages, one_sided
-from ctcr.fit.result import Fit, rms
+from ctcr.fit.result import Fit, Priors, rms
 from ctcr.frames import base_to_tracker
-from ctcr.model import parameters, recording, user_recording
+from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
-from ctcr.model.noise import Noise, noise_of_readings
+from ctcr.model.noise import Noise, noise_of_readings, with_field
+from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-COARSE = 0.5  # tolerance of fits that only find a start, or tell models apart [of log evidence]
-WOUND = 0.005  # a fit is repeated until rubbing tubes are wound up as its values say, so nearly [rad]
-WINDINGS = 10  # and at most so often
-BETWEEN = 2  # iterations in between, as long as the twist still changes much
-FIELDS = (1.0, 0.3, 0.1, 0.0)  # parts of the tracker's stated field error that are tried
-
-
-def noise_floor(fit: Fit, noise: Noise, places: Array) -> tuple[float, float]:
-    """RMS of position [mm] and rotation [deg] that the tracker's noise leaves of a right model.
-
-    The jitter as stated, and what the tracker's smooth error may be of the residual of the fitted readings, at
-    `places` (M, 3) [m], tracker frame.
-    """
-    used = np.repeat((fit.weights > 0) & np.isfinite(fit.residual[:, ::3]), 3, axis=1)
-    residual = np.where(used, fit.residual, nan).ravel()
-    nothing, one = np.zeros((residual.size, 1)), np.ones(1)
-    field = identify_with(
-        lambda _x, _derivatives: (residual, nothing),
-        ["nothing"],
-        0 * one,
-        one,
-        -one,
-        one,
-        noise,
-        places,
-        robust=False,
-        weights=fit.weights,
-        admit_model_error=False,
-        inflation=np.ones(2),
-        start=0 * one,
-        starts=1,
-    ).field
-    smooth = [rms(np.where(used, field, nan)[:, kind : kind + 3], None) for kind in (0, 3)]
-    floors = np.hypot(np.sqrt(3) * np.array([noise.position_jitter, noise.rotation_jitter]), np.nan_to_num(smooth))
-    return 1e3 * float(floors[0]), float(np.rad2deg(floors[1])) if used[:, 3:].any() else nan
-
-
-def places_of(robot: Robot, measurements: Measurements) -> Array:
-    """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
-    places = np.full((len(measurements), 3), nan) if measurements.position is None else measurements.position.copy()
-    missing = np.isnan(places).any(axis=1)
-    if missing.any():
-        beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
-        tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
-        places[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
-    return places
 
 
 def fit(
@@ -83,289 +39,253 @@ def fit(
     rows: Mask | None = None,
     sd: Mapping[str, float] | None = None,
     noise: Noise | None = None,
-    robust: bool = True,
-    admit_model_error: bool = True,
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
-    starts: int = 3,
+    starts: int = settings.STARTS,
     steps: int | None = None,
     threads: int = 0,
 ) -> Fit:
-    """The most probable values of the named parameters (see `expand`), given the readings and the robot file's priors.
+    """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
     noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
-    robust   whether outliers count for little; `weights` (M, 2) of another fit freezes theirs
-    admit_model_error   whether jitter is added where the model misses what the noise cannot explain; `inflation` (2,)
-             of another fit freezes it. Compare evidences of models at frozen weights and inflation.
-    starts   how many starts to compare
     steps    of integration per segment; as many as the readings call for by default (recording.steps_for)
     threads  as in Model
-    Raises InputError where no fit is possible.
+    Other options as in `fit_joint`. Raises InputError where no fit is possible.
     """
     began = perf_counter()
     robot, measurements, said = sensor_roll.usable(robot, measurements)
     names = sensor_roll.with_roll(free, robot)
-    mean, width, low, high = parameters.priors(robot, names, sd)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    rows, places = folds.measured_rows(measurements) & chosen, places_of(robot, measurements)
-    warnings = [*said, *messages.doubts(measurements, rows)]
+    rows, positions = folds.measured_rows(measurements) & chosen, sensor_positions(robot, measurements)
+    priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = steps or recording.steps_for(robot, measurements, noise)
-    table = user_recording.recording_of(robot, measurements, names, steps=steps, threads=threads)
-    options = {"robust": robust, "admit_model_error": admit_model_error, "weights": weights, "inflation": inflation}
-    within = parameters.admissible(robot, measurements.beta[chosen], names)
+    given = {"weights": weights, "inflation": inflation}
 
-    def fitted_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
-        frozen = {} if like is None else {"weights": like.weights, "inflation": like.inflation}
-        own = user_recording.recording_of(robot, measurements, names, steps=steps, threads=threads)
-        return identify_rows(
-            own,
-            rows,
-            names,
-            mean,
-            width,
-            low,
-            high,
-            noise,
-            places,
-            **options | frozen,
-            starts=starts,
-            start=np.clip(start, low, high),
-            known=parameters.known_directions(robot, names),
-            within=within,
-        )
+    def model() -> ResidualModel:
+        return user_recording.recording_of(robot, measurements, names, steps=steps, threads=threads)
 
-    start = np.clip(table.nominal(), low, high)
-    start = _with_frame(start, table, rows, names, (mean, width, low, high), noise, places, options)
-    fitted = one_sided.crossed(fitted_from(start, starts=starts), fitted_from)
-    units = parameters.units_with_effects(robot)
-    fitted = one_sided.widened(replace(fitted, units=[units[name] for name in names]))
-    return replace(fitted, warnings=warnings + fitted.warnings, seconds=perf_counter() - began)
+    def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
+        frozen = {"weights": like.weights, "inflation": like.inflation} if like else given
+        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **frozen)
+
+    start = _with_frame(model(), priors, noise, positions, rows, **given)
+    fitted = one_sided.widened(one_sided.crossed(fit_from(start, starts=starts), fit_from))
+    warnings = [*said, *messages.doubts(measurements, rows), *fitted.warnings]
+    return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
 
 
-def _with_frame(
-    start: Array,
-    table: Any,
-    rows: Mask,
-    names: Sequence[str],
-    priors: Sequence[Array],
+def fit_joint(
+    model: ResidualModel,
+    priors: Priors,
     noise: Noise,
-    places: Array,
-    options: Mapping[str, Any],
-) -> Array:
-    """The start with the tracker frame that fits the other values best, where both are free.
-
-    A frame that is far off would drag the others along.
-    """
-    frame = np.array([name.startswith("tracker.") for name in names])
-    if not frame.any() or frame.all() or not rows.any():
-        return start
-    few = folds.few_of(rows)
-    table.activate((rows if few is None else few).tolist())
-
-    def predict(x: Array, derivatives: bool) -> tuple[Array, Array]:
-        values = start.copy()
-        values[frame] = x
-        residual, jacobian, _ = table.residual(values, derivatives)
-        return residual, jacobian[:, frame] if derivatives else jacobian
-
-    chosen = [name for name, free in zip(names, frame, strict=True) if free]
-    fitted = identify_with(
-        predict, chosen, *(part[frame] for part in priors), noise, places, **options, start=start[frame], starts=1
-    )
-    start = start.copy()
-    start[frame] = fitted.values
-    return start
-
-
-def identify_rows(
-    table: Any,
-    rows: Mask,
-    *arguments: Any,
-    start: Array,
-    starts: int = 1,
-    few_first: bool = True,
+    positions: Array,
+    rows: Mask | None = None,
+    *,
+    start: Array | None = None,
     weights: Array | None = None,
-    **options: Any,
+    inflation: ArrayLike | None = None,
+    starts: int = 1,
+    max_iterations: int = settings.ITERATIONS,
+    tolerance: float = settings.TOLERANCE,
+    few_first: bool = True,
 ) -> Fit:
-    """identify_with() of some rows of a Recording. Where they are many, the starts are compared on a few of them, with
-    few_first."""
-    options["weights"] = weights
+    """Fits a model to its readings, which the sensor took at `positions` (M, 3) [m], tracker frame.
+
+    rows       (M,) that are fitted, all by default
+    start      (n,), the priors' mean by default
+    weights    (M, 2) robust weights of another fit, kept as they are; by default outliers are found. 0: not fitted
+    inflation  (2,) of another fit, kept as it is; by default jitter is added where the model misses what the noise
+               cannot explain. Log evidences of models can be compared at the same weights and inflation
+    starts     how many starts to compare, all but the first drawn from the priors
+    tolerance  of log evidence
+    few_first  whether, of many rows, a fit to a few finds the start and compares the starts
+    Raises InputError where no fit is possible.
+    """
+    options = {"weights": weights, "inflation": inflation, "max_iterations": max_iterations}
+    arguments = model, priors, noise, positions
+    rows = np.ones(len(positions), bool) if rows is None else rows
     if weights is not None:
         rows = rows & (weights > 0).any(axis=1)
     few = folds.few_of(rows) if few_first else None
     if few is None:
-        table.activate(rows.tolist())
-        return identify_with(table, *arguments, start=start, starts=starts, **options)
-    table.activate(few.tolist())
-    first = identify_with(table, *arguments, start=start, starts=starts, **options | {"tolerance": COARSE})
-    table.activate(rows.tolist())
-    fitted = identify_with(table, *arguments, start=first.values, starts=1, **options)
+        model.activate(rows.tolist())
+        return _fit_active(*arguments, start=start, starts=starts, tolerance=tolerance, **options)
+    model.activate(few.tolist())
+    first = _fit_active(*arguments, start=start, starts=starts, tolerance=settings.COARSE, **options)
+    model.activate(rows.tolist())
+    fitted = _fit_active(*arguments, start=first.values, starts=1, tolerance=tolerance, **options)
     return replace(fitted, starts=first.starts)
 
 
-def identify_with(
-    predict: Any,
-    names: Sequence[str],
-    mean: Array,
-    sd: Array,
-    low: Array,
-    high: Array,
+def _fit_active(
+    model: ResidualModel,
+    priors: Priors,
     noise: Noise,
-    places: Array,
+    positions: Array,
     *,
-    robust: bool = True,
-    admit_model_error: bool = True,
-    weights: Array | None = None,
-    inflation: ArrayLike | None = None,
-    start: Array | None = None,
-    starts: int = 3,
-    max_iterations: int = 50,
-    tolerance: float = 0.02,
-    known: Sequence[tuple[str, Array]] = (),
-    within: Sequence[tuple[str, Array, float]] = (),
+    start: Array | None,
+    weights: Array | None,
+    inflation: ArrayLike | None,
+    starts: int,
+    max_iterations: int,
+    tolerance: float,
 ) -> Fit:
-    """As `fit`, for any predictor: a Recording (whose active rows are fitted), or a function
-    (x, derivatives: bool) -> (residual (6 M,), its derivative (6 M, n) or anything), or None where it fails; NaN in the
-    residual means not measured. Nominal is where x is `mean`. Raises InputError where no fit is possible."""
+    """As fit_joint(), of the active rows. With distributed friction the friction path depends on the parameters: fits
+    and solutions of the path alternate until the path hardly changes."""
     began = perf_counter()
-    wind_up = getattr(predict, "wind_up", lambda x: 0.0)
+    start = np.asarray(priors.mean if start is None else start, dtype=float)
     try:
-        moved = wind_up(start) if start is not None else 0.0
+        moved = model.wind_up(start)
         evidence, found = -np.inf, None
-        for left in reversed(range(WINDINGS if moved > 0 and tolerance < COARSE else 1)):
-            whole = not left or moved < WOUND
+        alternates = moved > 0 and tolerance < settings.COARSE
+        for left in reversed(range(settings.FRICTION_PATH_ROUNDS if alternates else 1)):
+            to_the_end = not left or moved < settings.FRICTION_PATH_CHANGE
             core, excluded = _core.identify(
-                predict=predict,
-                names=list(names),
-                mean=mean,
-                sd=sd,
-                low=low,
-                high=high,
+                predict=model if isinstance(model, _core.Recording) else _as_function(model),
+                names=priors.names,
+                mean=priors.mean,
+                sd=priors.sd,
+                low=priors.low,
+                high=priors.high,
+                known=list(priors.gauges),
+                within=list(priors.limits),
                 noise=noise,
-                places=np.asarray(places, dtype=float),
-                robust=robust,
-                admit_model_error=admit_model_error,
+                places=np.asarray(positions, dtype=float),
                 weights=weights,
                 inflation=None if inflation is None else np.asarray(inflation, dtype=float),
                 start=start,
                 first_weights=found,
                 starts=starts,
-                max_iterations=max_iterations if whole else min(max_iterations, BETWEEN),
-                tolerance=tolerance if whole else max(tolerance, COARSE),
-                known=list(known),
-                within=list(within),
+                max_iterations=max_iterations if to_the_end else min(max_iterations, settings.FRICTION_PATH_ITERATIONS),
+                tolerance=tolerance if to_the_end else max(tolerance, settings.COARSE),
             )
             start, starts, found = core.values, 1, core.weights
             gained, evidence = core.log_evidence - evidence, core.log_evidence
             if not left:
                 break
-            moved = wind_up(start)
-            if core.converged and (abs(gained) < COARSE or (whole and moved < WOUND)):
+            moved = model.wind_up(start)
+            settled = abs(gained) < settings.COARSE
+            if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
     return Fit(
-        names=list(names),
-        units=[""] * len(names),
-        prior_mean=np.asarray(mean),
-        prior_sd=np.asarray(sd),
-        correlations=[(names[c.first], names[c.second], c.coefficient) for c in core.correlations],
-        excluded=excluded,
-        noise=noise,
-        seconds=perf_counter() - began,
-        core=core,
-        predict=predict,
+        priors,
+        noise,
+        positions,
+        core,
+        model,
+        excluded,
+        values=core.values,
+        sd=core.sd,
+        covariance=core.covariance,
+        ratio=core.ratio,
+        starts=core.starts,
         warnings=[*core.warnings, *messages.left_out(excluded)],
-        **{
-            name: getattr(core, name)
-            for name in (
-                "values",
-                "sd",
-                "covariance",
-                "shift",
-                "ratio",
-                "directions",
-                "chi_square",
-                "admitted_chi_square",
-                "shift_square",
-                "observations",
-                "bulk_observations",
-                "effective_parameters",
-                "reduced_chi_square",
-                "log_evidence",
-                "inflation",
-                "weights",
-                "converged",
-                "status",
-                "starts",
-                "iterations",
-                "evaluations",
-            )
-        },
+        seconds=perf_counter() - began,
     )
+
+
+def _as_function(model: ResidualModel):
+    """(x, derivatives) -> (residual, its derivative), or None where the prediction fails: for the compiled fit."""
+
+    def predict(x: Array, derivatives: bool) -> tuple[Array, Array] | None:
+        residual, jacobian, usable = model.residual(x, derivatives)
+        return (residual, jacobian) if usable else None
+
+    return predict
+
+
+class _FrameAlone(ResidualModel):
+    """A model of which only some parameters are free, the others keep their value; unsolved rows are left out."""
+
+    def __init__(self, model: ResidualModel, values: Array, free: Mask):
+        self._model, self._values, self._free = model, values, free
+
+    def activate(self, rows) -> None:
+        self._model.activate(rows)
+
+    def residual(self, x: Array, derivatives: bool = False) -> tuple[Array, Array, bool]:
+        values = self._values.copy()
+        values[self._free] = x
+        residual, jacobian, _ = self._model.residual(values, derivatives)
+        return residual, jacobian[:, self._free] if derivatives else jacobian, True
+
+
+def _with_frame(
+    model: ResidualModel, priors: Priors, noise: Noise, positions: Array, rows: Mask, **options: Array | None
+) -> Array:
+    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free.
+
+    A frame that is far off would drag the others along.
+    """
+    start = np.clip(model.nominal(), priors.low, priors.high)
+    frame = np.array([name.startswith("tracker.") for name in priors.names])
+    if frame.any() and not frame.all() and rows.any():
+        few, alone = folds.few_of(rows), _FrameAlone(model, start, frame)
+        rows = rows if few is None else few
+        found = fit_joint(
+            alone, priors.some(frame), noise, positions, rows, start=start[frame], few_first=False, **options
+        )
+        start[frame] = found.values
+    return start
 
 
 def linear_fit(
     at: Fit,
-    low: Array,
-    high: Array,
-    places: Array,
     *,
     noise: Noise | None = None,
     rows: Mask | None = None,
-    weights: Array | None = None,
-    inflation: ArrayLike | None = None,
-    max_iterations: int = 50,
     more: ArrayLike = 0.0,
+    weights: Array | None = None,
+    **options,
 ) -> Fit:
-    """As identify_with() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or
-    weights (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any. `more` (M, 6) is added
-    to the residual."""
-    shown = at.residual + more
+    """As fit_joint() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or weights
+    (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any. `more` (M, 6) is added to the
+    residual."""
+    residual = at.residual + more
     if weights is None and rows is not None:
-        shown = np.where(rows[:, None], shown, nan)
-    residual = shown.ravel()
-
-    def predict(x: Array, _: bool) -> tuple[Array, Array]:
-        return residual + at.jacobian_all @ (x - at.values), at.jacobian_all
-
-    return identify_with(
-        predict,
-        at.names,
-        at.prior_mean,
-        at.prior_sd,
-        low,
-        high,
-        noise or at.noise,
-        places,
-        robust=weights is None,
-        weights=weights,
-        admit_model_error=inflation is None,
-        inflation=inflation,
-        start=at.values,
-        starts=1,
-        max_iterations=max_iterations,
-    )
+        residual = np.where(rows[:, None], residual, nan)
+    model = LinearModel(residual.ravel(), at.jacobian_all, at.values, at.prior_mean)
+    priors = replace(at.priors, gauges=(), limits=())
+    options |= {"start": at.values, "few_first": False}
+    return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
 
 
-def with_field(noise: Noise, part: float) -> Noise:
-    """The tracker's noise with a part of its stated field error."""
-    return Noise(
-        position_jitter=noise.position_jitter,
-        rotation_jitter=noise.rotation_jitter,
-        position_field=part * noise.position_field,
-        rotation_field=part * noise.rotation_field,
-        correlation_length=noise.correlation_length,
-    )
-
-
-def likeliest_field(fit: Fit, low: Array, high: Array, places: Array) -> Noise:
-    """The noise of a fit with the part of its field error that makes the readings likeliest, by the fit's slopes."""
-    others = [
-        linear_fit(fit, low, high, places, noise=with_field(fit.noise, part), weights=fit.weights)
-        for part in FIELDS[1:]
+def likeliest_field(fit: Fit) -> Noise:
+    """The noise of a fit with that part of its field error which makes the readings likeliest, by linearised fits."""
+    parts = [
+        linear_fit(fit, noise=with_field(fit.noise, part), weights=fit.weights) for part in settings.FIELD_PARTS[1:]
     ]
-    return max([fit, *others], key=lambda tried: tried.log_evidence).noise
+    return max([fit, *parts], key=lambda tried: tried.log_evidence).noise
+
+
+def tracker_error(fit: Fit, noise: Noise) -> tuple[float, float]:
+    """RMS of position [mm] and rotation [deg] that the tracker alone leaves of a right model: its jitter as stated, and
+    its smooth field error as the residual of the fitted readings shows it."""
+    used = np.repeat((fit.weights > 0) & np.isfinite(fit.residual[:, ::3]), 3, axis=1)
+    residual, zero = np.where(used, fit.residual, nan).ravel(), np.zeros(1)
+    still = LinearModel(residual, np.zeros((residual.size, 1)), zero, zero)  # one parameter without any effect
+    priors = Priors(["nothing"], zero, zero + 1, zero - 1, zero + 1)
+    options = {"weights": fit.weights, "inflation": np.ones(2), "few_first": False}
+    field = fit_joint(still, priors, noise, fit.positions, **options).field
+    smooth = [rms(np.where(used, field, nan)[:, kind : kind + 3]) for kind in (0, 3)]
+    error = np.hypot(np.sqrt(3) * np.array([noise.position_jitter, noise.rotation_jitter]), np.nan_to_num(smooth))
+    return 1e3 * float(error[0]), float(np.rad2deg(error[1])) if used[:, 3:].any() else nan
+
+
+def sensor_positions(robot: Robot, measurements: Measurements) -> Array:
+    """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
+    if measurements.position is None:
+        positions = np.full((len(measurements), 3), nan)
+    else:
+        positions = measurements.position.copy()
+    missing = np.isnan(positions).any(axis=1)
+    if missing.any():
+        beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
+        tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
+        positions[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
+    return positions

@@ -1,15 +1,20 @@
-"""What a joint fit found."""
+"""What a joint fit found: the maximum a posteriori estimate and its Laplace approximation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import nan
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
+from ctcr import _core
 from ctcr.model import parameters
+from ctcr.model.noise import Noise
+from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
@@ -17,41 +22,82 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Fit:
-    """Fitted parameters and what is known of them. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows."""
+class Priors:
+    """What is known of n parameters before the readings, SI: independent normal distributions within bounds."""
 
     names: list[str]
-    units: list[str]
-    prior_mean: Array  # (n,)
-    prior_sd: Array  # (n,)
+    mean: Array  # (n,)
+    sd: Array  # (n,); inf: nothing is known
+    low: Array  # (n,)
+    high: Array  # (n,)
+    gauges: Sequence[tuple[str, Array]] = ()  # changes (n,) that leave the readings nearly as they are, with words
+    limits: Sequence[tuple[str, Array, float]] = ()  # least values of row @ change, row (n,), with words
+
+    @classmethod
+    def of(cls, robot: Robot, names: Sequence[str], beta: Array, sd: Any = None) -> "Priors":
+        """From the robot file, for joints beta (M, N) [m] that must stay possible; `sd` as of parameters.priors."""
+        gauges, limits = parameters.known_directions(robot, names), parameters.admissible(robot, beta, names)
+        return cls(list(names), *parameters.priors(robot, names, sd), gauges, limits)
+
+    def some(self, chosen: Mask) -> "Priors":
+        """Those of some parameters (n,), without gauges and limits, which combine several."""
+        names = [name for name, kept in zip(self.names, chosen, strict=True) if kept]
+        return Priors(names, *(part[chosen] for part in (self.mean, self.sd, self.low, self.high)))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Fitted parameters and their uncertainty. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows.
+
+    All attributes of the compiled fit (`_core.Identification`) are attributes of this one:
+    shift, ratio     (n,) (value - mean) / prior sd, and posterior over prior sd: 1 means that the readings say nothing
+    directions       undetermined combinations: .text, .ratio, .coefficients in prior sd
+    weights          (M, 2) robust weights of position and rotation: 1 plain, less for outliers, 0 not fitted
+    inflation        (2,) factor on the jitter of positions and rotations by which the fit admits model error; 1: none
+    chi_square       under the noise as stated; admitted_chi_square: under the inflated noise
+    shift_square     of the prior; observations: numbers fitted
+    bulk_observations    without outliers: degrees of freedom of chi_square + shift_square
+    reduced_chi_square, effective_parameters, converged, status, iterations, evaluations
+    log_evidence     log marginal likelihood (Laplace) at these weights and inflation; NaN where a prior is infinite
+    """
+
+    priors: Priors
+    noise: Noise
+    positions: Array | None  # (M, 3) [m] of the sensor, tracker frame
+    core: Any  # _core.Identification
+    model: ResidualModel | None  # that was fitted
+    excluded: list[int]  # rows that the model cannot solve
     values: Array  # (n,)
     sd: Array  # (n,) posterior; inf: not determined at all
     covariance: Array  # (n, n)
-    shift: Array  # (n,) (value - mean) / prior sd; NaN without a prior
-    ratio: Array  # (n,) posterior / prior sd: 1 means that the readings say nothing
-    correlations: list[tuple[str, str, float]]  # beyond 0.9, strongest first
-    directions: list[Any]  # undetermined combinations: .text, .ratio, .coefficients in prior sd
-    chi_square: float  # under the noise as stated
-    admitted_chi_square: float  # under the noise as the fit had to admit it
-    shift_square: float
-    observations: int
-    bulk_observations: float  # without outliers: degrees of freedom of chi_square + shift_square
-    effective_parameters: float
-    reduced_chi_square: float
-    log_evidence: float  # Laplace, under this fit's weights and inflation; NaN where a prior is infinite
-    inflation: Array  # (2,) factor on the jitter of positions and rotations that the fit had to admit; 1: none
-    weights: Array  # (M, 2) 1 plain, less for outliers, 0 not fitted
-    excluded: list[int]  # rows that the model cannot solve
-    converged: bool
-    status: str
+    ratio: Array  # (n,)
+    starts: list[Any]  # that were compared: .cost, .distance from the result in posterior sd, .converged
     warnings: list[str]
-    starts: list[Any]  # .cost, .distance from the result in posterior sd, .converged
-    noise: Any  # _core.Noise
-    iterations: int
-    evaluations: int
     seconds: float
-    core: Any  # the compiled fit
-    predict: Any  # what was fitted
+
+    frames = None  # RunFrames, of a fit that has them
+
+    def __getattr__(self, name: str):
+        if name.startswith("__") or name == "core":
+            raise AttributeError(name)
+        return getattr(self.core, name)
+
+    @property
+    def names(self) -> list[str]:
+        return self.priors.names
+
+    @property
+    def prior_mean(self) -> Array:
+        return self.priors.mean
+
+    @property
+    def prior_sd(self) -> Array:
+        return self.priors.sd
+
+    @property
+    def correlations(self) -> list[tuple[str, str, float]]:
+        """Pairs of parameters whose posterior correlation is beyond 0.9, the strongest first."""
+        return [(self.names[c.first], self.names[c.second], c.coefficient) for c in self.core.correlations]
 
     @property
     def used(self) -> Mask:
@@ -59,34 +105,35 @@ class Fit:
         return (self.weights > 0).any(axis=1)
 
     def without_readings(self) -> "Fit":
-        """Its values and what is known of them alone: small, however many rows there are. It has no residual."""
-        return replace(self, core=None, predict=None)
+        """Its values and statistics alone: small, however many rows there are. It has no residual."""
+        public = (name for name in dir(self.core) if not name.startswith("_"))
+        found = {name: getattr(self.core, name) for name in public}
+        core = SimpleNamespace(**{name: value for name, value in found.items() if not callable(value)})
+        return replace(self, core=core, model=None, positions=None)
 
     def at_rest(self) -> "Fit":
         """Itself without what it can compute again of its readings."""
         return replace(self)
 
-    @property
-    def _every_row(self) -> Any:
-        """The predictor, of rows that were not fitted too."""
-        if hasattr(self.predict, "activate"):
-            active = np.ones(len(self.weights), bool)
-            active[self.excluded] = False
-            self.predict.activate(active.tolist())
-        return self.predict
+    def _activate_all(self) -> None:
+        """Activates all rows but the excluded ones: those that were not fitted, too."""
+        solved = np.ones(len(self.weights), bool)
+        solved[self.excluded] = False
+        self.model.activate(solved.tolist())
 
     @cached_property
     def _report(self) -> tuple[Array, Array, Array, Array]:
-        return self.core.report(self._every_row)
+        self._activate_all()
+        compiled = isinstance(self.model, _core.Recording)
+        return self.core.report(self.model if compiled else lambda x, wanted: self.model.residual(x, wanted)[:2])
 
     @cached_property
     def _of_used(self) -> tuple[Array, Array]:
         """`residual` (6 M,) and `jacobian_all` in the rows that were fitted; in others they may be missing."""
-        if "_report" in self.__dict__ or not hasattr(self.predict, "residual"):
+        if "_report" in self.__dict__:
             return self._report[:2]
-        self.predict.activate(self.used.tolist())
-        residual, slopes, _ = self.predict.residual(self.values, True)
-        return residual, slopes
+        self.model.activate(self.used.tolist())
+        return self.model.residual(self.values, True)[:2]
 
     @property
     def residual(self) -> Array:
@@ -100,26 +147,24 @@ class Fit:
 
     @property
     def field(self) -> Array:
-        """(M, 6) posterior mean of the tracker's smooth error, a part of the residual."""
+        """(M, 6) posterior mean of the tracker's smooth field error, a part of the residual."""
         return self._report[2].reshape(-1, 6)
 
     @property
     def expected_square(self) -> Array:
-        """(M, 2) of position [m^2] and rotation [rad^2]: noise and what the parameters leave open, also to a side that
-        the readings do not bound (see open_side)."""
+        """(M, 2) expected square of the error of position [m^2] and rotation [rad^2]: jitter, field error and posterior
+        uncertainty of the parameters, one-sided ones included (see one_sided)."""
         wider = self.covariance - self.core.covariance
         if not wider.any():
             return self._report[3]
-        slopes = self.jacobian_all.reshape(len(self.weights), 2, 3, -1)
-        return self._report[3] + np.einsum("mkai,ij,mkaj->mk", slopes, wider, slopes)
+        jacobian = self.jacobian_all.reshape(len(self.weights), 2, 3, -1)
+        return self._report[3] + np.einsum("mkai,ij,mkaj->mk", jacobian, wider, jacobian)
 
     @cached_property
     def nominal_residual(self) -> Array:
         """(M, 6) at the robot file's values."""
-        every = self._every_row
-        if not hasattr(every, "nominal"):
-            return np.asarray(every(self.prior_mean, False)[0]).reshape(-1, 6)
-        return np.asarray(every.residual(every.nominal())[0]).reshape(-1, 6)
+        self._activate_all()
+        return self.model.residual(self.model.nominal())[0].reshape(-1, 6)
 
     @cached_property
     def p_value(self) -> float:
@@ -127,7 +172,7 @@ class Fit:
         return float(chi2.sf(self.chi_square + self.shift_square, self.bulk_observations))
 
     def rms_mm(self, rows: Mask | None = None) -> float:
-        """RMS length of the position residual of some rows, all by default."""
+        """RMS length of the position residual of some rows (M,), all by default."""
         return 1e3 * rms(self.residual[:, :3], rows)
 
     def rms_deg(self, rows: Mask | None = None) -> float:
@@ -139,12 +184,16 @@ class Fit:
     def nominal_rms_deg(self, rows: Mask | None = None) -> float:
         return float(np.rad2deg(rms(self.nominal_residual[:, 3:], rows)))
 
-    def floor_mm(self, rows: Mask | None = None) -> float:
-        """RMS position residual that noise alone would leave, the uncertainty of the parameters included."""
-        return 1e3 * self._floor(0, rows)
+    def expected_mm(self, rows: Mask | None = None) -> float:
+        """RMS position error to be expected of a right model: see `expected_square`."""
+        return 1e3 * self._expected(0, rows)
 
-    def floor_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(self._floor(1, rows)))
+    def expected_deg(self, rows: Mask | None = None) -> float:
+        return float(np.rad2deg(self._expected(1, rows)))
+
+    def _expected(self, kind: int, rows: Mask | None) -> float:
+        known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
+        return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
 
     def apply(self, robot: Robot) -> Robot:
         """A copy of the robot with the fitted values."""
@@ -158,8 +207,8 @@ class Fit:
 
     def whitened(self) -> tuple[Array, Array]:
         """Whitened residual (K,) and its derivative (K, n) by the parameters; the prior is not in it."""
-        residual, slopes = self._of_used
-        both = self.whiten(np.column_stack([residual, slopes]).reshape(len(self.weights), 6, -1))
+        residual, jacobian = self._of_used
+        both = self.whiten(np.column_stack([residual, jacobian]).reshape(len(self.weights), 6, -1))
         return both[:, 0], both[:, 1:]
 
     def slope_where_used(self, name: str) -> Array:
@@ -171,12 +220,9 @@ class Fit:
     def _fitted_numbers(self) -> NDArray[np.int64]:
         return np.flatnonzero(np.repeat(self.weights > 0, 3, axis=1))
 
-    def _floor(self, kind: int, rows: Mask | None) -> float:
-        known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
-        return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
 
-
-def rms(residual: Array, rows: Mask | None) -> float:
-    square = np.sum(residual**2, axis=1)
+def rms(vectors: Array, rows: Mask | None = None) -> float:
+    """RMS length of vectors (M, k) in some rows (M,), all by default; NaN does not count."""
+    square = np.sum(vectors**2, axis=1)
     known = np.isfinite(square) & (True if rows is None else rows)
     return float(np.sqrt(square[known].mean())) if known.any() else nan

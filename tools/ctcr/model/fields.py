@@ -4,14 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite, pi
 
+from ctcr import settings
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.robot.description import MAX_TUBES, Robot, Tube
 from ctcr.robot.ledger import Change
 from ctcr.robot.yaml_document import FieldPath
-
-SAYS_NOTHING = 0.9  # posterior over prior standard deviation from which on the data say nothing
-FAR = 2.0  # prior standard deviations that a value may move before it is doubted
 
 _TUBE = {
     "youngs_modulus": ("youngs_modulus_GPa", "GPa", 1e-9),
@@ -58,12 +56,12 @@ class Fitted:
     @property
     def moved_far(self) -> bool:
         """Whether what the file says of it can hardly be true."""
-        return isfinite(self.shift) and abs(self.shift) > FAR
+        return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR
 
     @property
     def says_nothing(self) -> bool:
         """Whether the data leave it as unknown as it was."""
-        return self.ratio > SAYS_NOTHING
+        return self.ratio > settings.SAYS_NOTHING
 
     @property
     def flag(self) -> str:
@@ -79,8 +77,8 @@ def doubts(items: list[Fitted]) -> list[str]:
     far = [f"{item.name} ({item.shift:+.1f})" for item in items if item.moved_far]
     if far:
         said.append(
-            f"Moved more than {FAR:g} standard deviations of what the robot file says, so either that is wrong or they "
-            f"stand in for something else: {', '.join(far)}."
+            f"Moved more than {settings.MOVED_FAR:g} standard deviations of what the robot file says, so either that "
+            f"is wrong or they stand in for something else: {', '.join(far)}."
         )
     silent = [item.name for item in items if item.says_nothing]
     if silent:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -13,7 +13,10 @@ Noise = _core.Noise
 
 
 def noise_of(
-    robot: Robot, correlation_length: float = 0.1, field: bool = True, kinds: Sequence[str] = ("position", "rotation")
+    robot: Robot,
+    correlation_length: float = settings.CORRELATION_LENGTH,
+    field: bool = True,
+    kinds: Sequence[str] = ("position", "rotation"),
 ) -> Noise:
     """The tracker's noise: its jitter, and with `field` the smooth error that its 95 % accuracy implies.
 
@@ -39,6 +42,17 @@ def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = Tr
     """noise_of() what the table holds: who measured no orientations need not state their jitter."""
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     return noise_of(robot, field=field, kinds=kinds)
+
+
+def with_field(noise: Noise, part: float) -> Noise:
+    """The same jitter with a part of the smooth field error."""
+    return Noise(
+        position_jitter=noise.position_jitter,
+        rotation_jitter=noise.rotation_jitter,
+        position_field=part * noise.position_field,
+        rotation_field=part * noise.rotation_field,
+        correlation_length=noise.correlation_length,
+    )
 
 
 def _is_measured(measurements: Measurements, kind: str) -> bool:

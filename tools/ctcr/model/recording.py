@@ -5,18 +5,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
-
-STEPS = 2  # integration steps per segment
-MOST_STEPS = 16
-UNSEEN = 0.25  # chi-square of integration errors that shifts no parameter by more than half its standard deviation
-SAMPLE = 300  # rows from which that is told
 
 
 def names_of(n_tubes: int) -> tuple[str, ...]:
@@ -39,20 +34,23 @@ def session_part(measurements: Measurements) -> Array:
     return (t - t.min()) / max(np.ptp(t), np.finfo(float).tiny)
 
 
-def steps_for(robot: Robot, measurements: Measurements, noise: _core.Noise, chi_square: float = UNSEEN) -> int:
+def steps_for(
+    robot: Robot, measurements: Measurements, noise: _core.Noise, chi_square: float = settings.INTEGRATION_ERROR
+) -> int:
     """The fewest integration steps per segment whose errors, of all rows against the tracker's jitter, stay below that.
 
     Integration errors are systematic: what one reading hides, many show. They fall with the fourth power of the steps.
     """
-    sample = np.zeros(len(measurements), bool)
-    sample[np.linspace(0, len(measurements) - 1, min(len(measurements), SAMPLE)).astype(np.int64)] = True
-    coarse, fine = (_residual(robot.standard, measurements, steps, sample) for steps in (STEPS, 2 * STEPS))
+    count, least = len(measurements), settings.STEPS
+    sample = np.zeros(count, bool)
+    sample[np.linspace(0, count - 1, min(count, settings.INTEGRATION_SAMPLE)).astype(np.int64)] = True
+    coarse, fine = (_residual(robot.standard, measurements, steps, sample) for steps in (least, 2 * least))
     error = (coarse - fine) * 16 / 15 / np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
     known = np.isfinite(error).any(axis=1)
     if not known.any():
-        return STEPS
-    missed = np.nansum(error[known] ** 2) * len(measurements) / np.sum(known)
-    return int(np.clip(np.ceil(STEPS * (missed / chi_square) ** 0.125), STEPS, MOST_STEPS))
+        return least
+    missed = np.nansum(error[known] ** 2) * count / np.sum(known)
+    return int(np.clip(np.ceil(least * (missed / chi_square) ** 0.125), least, settings.MOST_STEPS))
 
 
 def recording_of(
@@ -61,7 +59,7 @@ def recording_of(
     names: Sequence[str] = (),
     *,
     fixed: Mapping[str, float] | None = None,
-    steps: int = STEPS,
+    steps: int = settings.STEPS,
     threads: int = 0,
     profiles: Array | None = None,
 ) -> _core.Recording:

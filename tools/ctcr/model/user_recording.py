@@ -9,34 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ctcr import settings
 from ctcr.effects import catalogue, user_effects
 from ctcr.effects.user_effects import Effect, Rows
 from ctcr.effects.user_hooks import PROFILES, Hooks
 from ctcr.errors import InputError, Problem
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector
 from ctcr.model import recording
+from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-STEP = 1e-4  # of central differences, in a parameter's sigma
-POSITION_STEP, ROTATION_STEP = 1e-6, 1e-5  # of the sensor's pose [m], [rad]
-PROFILE_STEP = 1e-3  # of differences through the model, in a parameter's sigma
-FINE_STEPS = 16  # per segment, at least, where tubes have profiles: these change within a segment
-
 
 def recording_of(robot: Robot, measurements: Measurements, names: Sequence[str] = (), **options: Any) -> Any:
     """As `recording.recording_of`, also where the robot or the names have effects of loaded files."""
     own = user_effects.used_by(robot, names)
     if own:
-        return Predictor(robot, measurements, names, own, **options)
+        return UserRecording(robot, measurements, names, own, **options)
     return recording.recording_of(robot, measurements, names, **options)
 
 
-class Predictor:
-    """Stands wherever a compiled Recording does, and is a function (x, derivatives) for `identify.identify_with`.
+class UserRecording(ResidualModel):
+    """The recording of a robot with `own_effects` of the user's.
 
     x holds the parameters `names`, of the robot, of the library's effects (effects.softening.gamma.2) and of
     `own_effects` (effects.<id>.<parameter>[.<tube>]); `fixed` gives others another value than the robot's. Derivatives
@@ -54,14 +51,14 @@ class Predictor:
         own_effects: Sequence[Effect],
         *,
         fixed: Mapping[str, float] | None = None,
-        steps: int = recording.STEPS,
+        steps: int = settings.STEPS,
         threads: int = 0,
     ):
         self._robot, self._table = robot, measurements
         self._effects, self._names = list(own_effects), list(names)
         self._hooks = Hooks(robot, Rows.of(measurements), own_effects)
         known = catalogue.names_of(robot.n_tubes)
-        self._options = {"steps": max(steps, FINE_STEPS) if self._hooks.has(*PROFILES) else steps}
+        self._options = {"steps": max(steps, settings.PROFILE_STEPS) if self._hooks.has(*PROFILES) else steps}
         self._options["threads"] = threads
         self._options["fixed"] = {name: value for name, value in (fixed or {}).items() if name in known}
         self._own_sigma = {
@@ -99,9 +96,6 @@ class Predictor:
     def activate(self, rows: Sequence[bool]) -> None:
         """Rows to solve from now on."""
         self._active = np.array(rows, bool)
-
-    def active(self) -> list[bool]:
-        return self._active.tolist()
 
     def wind_up(self, x: Array) -> float:
         """As Recording.wind_up."""
@@ -142,10 +136,6 @@ class Predictor:
         jacobian = _by_prediction(error) @ total
         jacobian[~np.isfinite(error).any(axis=1)] = 0.0
         return error.ravel(), np.nan_to_num(jacobian).reshape(error.size, -1), solved
-
-    def __call__(self, x: Array, derivatives: bool):
-        error, jacobian, solved = self.residual(x, derivatives)
-        return (error, jacobian) if solved else None
 
     # ---- before and behind the model
 
@@ -200,7 +190,7 @@ class Predictor:
             return total
         through = np.empty((len(position), 6, 6))
         for i in range(6):
-            step = POSITION_STEP if i < 3 else ROTATION_STEP
+            step = settings.POSITION_STEP if i < 3 else settings.ROTATION_STEP
             shift = step * np.eye(3)[i % 3]
             sides = [
                 self._outer(position + sign * shift, rotation, values)
@@ -220,7 +210,7 @@ class Predictor:
         """What the profiles do, by differences of whole predictions."""
         x = np.array([values[name] for name in self._inner])
         for k, name in enumerate(self._names):
-            step, sides = PROFILE_STEP * self._own_sigma.get(name, 0.0), []
+            step, sides = settings.PROFILE_STEP * self._own_sigma.get(name, 0.0), []
             for sign in (1, -1):
                 moved = self._hooks.profiles(values | {name: values[name] + sign * step})
                 if np.array_equal(moved, self._inputs[3]):
@@ -235,7 +225,7 @@ class Predictor:
 
     def _two_sides(self, function, values: dict[str, float], name: str):
         """function at one parameter a little more and a little less, and the distance between."""
-        step = STEP * self._own_sigma.get(name, 1e-2)
+        step = settings.DIFFERENCE_STEP * self._own_sigma.get(name, 1e-2)
         return (*(function(values | {name: values[name] + sign * step}) for sign in (1, -1)), 2 * step)
 
     def _ratios(self, values: dict[str, float]) -> list[float]:
