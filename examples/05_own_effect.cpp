@@ -2,7 +2,7 @@
 #include <cstdio>
 #include <ctcr/ctcr.hpp>
 #include <ctcr/effects/softening.hpp>
-#include <ctcr/pipeline/recorded_derivatives.hpp>
+#include <ctcr/recording/derivatives.hpp>
 
 namespace pickup {
 

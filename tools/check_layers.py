@@ -1,5 +1,6 @@
 """Checks the rooms: a header includes only its own layer and lower ones, a Python module imports only its own room and
-lower ones, without circles. The umbrella headers may include everything.
+lower ones, without circles. The table in the README of each tree says which rooms there are, the lowest first; rooms in
+one row do not see each other. The umbrella headers may include everything. Tables of headers name all of their folder.
 """
 
 import ast
@@ -7,59 +8,50 @@ import re
 import sys
 from pathlib import Path
 
-LAYERS = {
-    "core": 0,
-    "math": 1,
-    "robot": 2,
-    "effects": 3,
-    "mechanics": 4,
-    "derivatives": 5,
-    "actuation": 6,
-    "sensing": 6,
-    "pipeline": 7,
-    "parallel": 8,
-    "control": 9,
-    "simulation": 10,
-    "calibration": 11,
-    "io": 12,
-}
-# Devices know the robot, not how it is solved: they see the layers below this one, and themselves.
-HIGHEST_SEEN = {"actuation": 2, "sensing": 2}
+ROW = re.compile(r"\| ((?:`\w+`(?:, )?)+) \|")
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"](?:\.\./)*(?:ctcr/)?(\w+)/(?:\w+/)*\w+\.hpp[>"]')
+HEADER_TABLE = re.compile(r"`(\w+)`[^`\n]*:\n\n\| header \|.*\n\|[-|]+\|\n((?:\|.*\n)+)")
 
 
-def may_include(own: str, other: str) -> bool:
-    return own == other or LAYERS[other] <= HIGHEST_SEEN.get(own, LAYERS[own] - 1)
+def rooms_of(readme: Path, heading: str) -> dict[str, int]:
+    """The rooms of the table under a heading of a README, each with its row in that table."""
+    text = readme.read_text(encoding="utf-8").partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    rows = [match[1] for line in text.splitlines() if (match := ROW.match(line))]
+    return {room: height for height, row in enumerate(rows) for room in re.findall(r"\w+", row)}
 
 
-def problems(include: Path) -> list[str]:
-    """What is wrong under the folder `include`, as `file:line: sentence`."""
-    found = []
-    for header in sorted((include / "ctcr").rglob("*.hpp")):
-        own, *rest = header.relative_to(include / "ctcr").parts
+def may_see(rooms: dict[str, int], own: str, other: str) -> bool:
+    return own == other or rooms[other] < rooms[own]
+
+
+def header_problems(include: Path) -> list[str]:
+    """What is wrong with the headers under the folder `include`, as `file:line: sentence`."""
+    root = include / "ctcr"
+    readme = root / "README.md"
+    layers = rooms_of(readme, "Layers")
+    found = [f"{readme}:1: layer '{layer}' has no folder" for layer in layers if not (root / layer).is_dir()]
+    for header in sorted(root.rglob("*.hpp")):
+        own, *rest = header.relative_to(root).parts
         if not rest:
             continue
-        if own not in LAYERS:
-            found.append(f"{header}:1: folder '{own}' is not a layer")
+        if own not in layers:
+            found.append(f"{header}:1: layer '{own}' is missing in the table of {readme}")
             continue
         for number, line in enumerate(header.read_text(encoding="utf-8").splitlines(), start=1):
             match = INCLUDE.match(line)
-            other = match[1] if match else own
-            if other in LAYERS and not may_include(own, other):
-                found.append(f"{header}:{number}: layer '{own}' must not include layer '{other}'")
+            if match and match[1] in layers and not may_see(layers, own, match[1]):
+                found.append(f"{header}:{number}: layer '{own}' must not include layer '{match[1]}'")
+    for match in HEADER_TABLE.finditer(readme.read_text(encoding="utf-8")):
+        named = {name for row in match[2].splitlines() for name in re.findall(r"`(\w+\.hpp)`", row.split("|")[1])}
+        there = {header.name for header in (root / match[1]).glob("*.hpp")}
+        found += [f"{readme}:1: '{match[1]}/{name}' is missing in its table" for name in sorted(there - named)]
+        found += [f"{readme}:1: '{match[1]}/{name}' does not exist" for name in sorted(named - there)]
     return found
 
 
 PACKAGE = "ctcr"
-ROOM = re.compile(r"\| `(\w+)` \|")
 OPTIONAL = {"distributed", "mcap", "pysoem", "serial"}  # packages that a module may import late: it loads without them
 MAY_IMPORT_LATE = {"commands", "cli", "__init__"}
-
-
-def rooms_of(readme: Path) -> list[str]:
-    """The rooms of the table in a README, the lowest first."""
-    text = readme.read_text(encoding="utf-8").partition("## Rooms")[2]
-    return [match[1] for line in text.splitlines() if (match := ROOM.match(line))]
 
 
 def imports_of(module: str, path: Path, modules: set[str]) -> list[tuple[str, int, bool]]:
@@ -83,7 +75,7 @@ def imports_of(module: str, path: Path, modules: set[str]) -> list[tuple[str, in
 def python_problems(tools: Path) -> list[str]:
     """What is wrong with the imports of the Python package under `tools`, as `file:line: sentence`."""
     root = tools / PACKAGE
-    rooms = rooms_of(root / "README.md")
+    rooms = rooms_of(root / "README.md", "Rooms")
     files = {
         ".".join((PACKAGE, *path.relative_to(root).with_suffix("").parts)).removesuffix(".__init__"): path
         for path in sorted(root.rglob("*.py"))
@@ -102,7 +94,7 @@ def python_problems(tools: Path) -> list[str]:
                 continue
             graph[module][name] = line
             other = name.split(".")[1] if name.count(".") > 0 else ""
-            if own in rooms and other in rooms and rooms.index(other) > rooms.index(own):
+            if own in rooms and other in rooms and not may_see(rooms, own, other):
                 found.append(f"{path}:{line}: room '{own}' must not import room '{other}', which stands below it")
     for circle in circles(graph):
         found.append(f"{files[circle[0]]}:1: modules import each other: {' -> '.join([*circle, circle[0]])}")
@@ -128,6 +120,6 @@ def circles(graph: dict[str, dict[str, int]]) -> list[list[str]]:
 
 if __name__ == "__main__":
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
-    found = problems(root / "include") + python_problems(root / "tools")
+    found = header_problems(root / "include") + python_problems(root / "tools")
     print(*found, sep="\n", end="\n" if found else "")
     sys.exit(bool(found))

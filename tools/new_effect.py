@@ -56,7 +56,7 @@ TEST = """\
 
 #include <gtest/gtest.h>
 
-#include "ctcr/pipeline/recorded_derivatives.hpp"
+#include "ctcr/recording/derivatives.hpp"
 #include "support/laws.hpp"
 
 namespace ctcr {

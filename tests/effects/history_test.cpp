@@ -4,8 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "ctcr/friction/frictionless_torsion.hpp"
+#include "ctcr/friction/solve_friction.hpp"
 #include "ctcr/mechanics/shape.hpp"
-#include "ctcr/parallel/wind_up.hpp"
 #include "support/walk.hpp"
 
 namespace ctcr {

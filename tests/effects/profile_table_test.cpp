@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ctcr/pipeline/recorded_derivatives.hpp"
+#include "ctcr/recording/derivatives.hpp"
 
 namespace ctcr {
 namespace profile_table_test {

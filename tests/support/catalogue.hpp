@@ -2,7 +2,7 @@
 // Models with every effect of the catalogue, compiled once for all tests. Link ctcr_test_catalogue (catalogue.cmake).
 #include "ctcr/effects/catalogue.hpp"
 #include "ctcr/mechanics/shape.hpp"
-#include "ctcr/pipeline/recorded_derivatives.hpp"
+#include "ctcr/recording/derivatives.hpp"
 
 #define CTCR_TEST_CATALOGUE_SOLVER(kind, D, N)                                                                  \
   kind Status solve<Derivatives::D, MagnusRk4, N>(const Model<N, Catalogue>&, const Joints<N>&, const TipLoad&, \

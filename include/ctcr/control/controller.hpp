@@ -8,7 +8,7 @@
 #include "ctcr/control/limits.hpp"
 #include "ctcr/control/live_effects.hpp"
 #include "ctcr/control/task_list.hpp"
-#include "ctcr/pipeline/predict.hpp"
+#include "ctcr/system/predict.hpp"
 
 namespace ctcr {
 

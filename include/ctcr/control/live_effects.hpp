@@ -2,7 +2,7 @@
 // A system's effects while it moves: what the past left behind in them, period after period.
 #include <array>
 
-#include "ctcr/pipeline/twist_balance.hpp"
+#include "ctcr/friction/torsion_solver.hpp"
 
 namespace ctcr {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ctcr/mechanics/neighbours.hpp"
-#include "ctcr/pipeline/parameters.hpp"
+#include "ctcr/system/parameters.hpp"
 
 namespace ctcr {
 

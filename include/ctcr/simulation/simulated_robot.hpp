@@ -5,7 +5,7 @@
 #include "ctcr/control/device.hpp"
 #include "ctcr/control/live_effects.hpp"
 #include "ctcr/math/frame_algebra.hpp"
-#include "ctcr/pipeline/predict.hpp"
+#include "ctcr/system/predict.hpp"
 
 namespace ctcr {
 

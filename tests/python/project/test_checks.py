@@ -29,25 +29,63 @@ def plant(root: Path, path: str, content: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize("own", layers.LAYERS)
-@pytest.mark.parametrize("other", layers.LAYERS)
+LAYERS = ["low", "left", "right", "high"]
+TABLES = """\
+## Layers
+
+| folder | what it knows |
+|---|---|
+| `low` | a |
+| `left`, `right` | b |
+| `high` | c |
+
+In `low`, from the outside in:
+
+| header | its one idea |
+|---|---|
+| `x.hpp`, `y.hpp` | beside `z.hpp` |
+"""
+
+
+def library(root: Path, **headers: str) -> Path:
+    """Headers in the layers low, left and right beside each other, and high; `headers` are texts by name: low__x."""
+    plant(root, "ctcr/README.md", TABLES)
+    plant(root, "ctcr/ctcr.hpp", "#include <ctcr/high/x.hpp>\n")
+    for name in ("low__x", "low__y", "left__x", "right__x", "high__x", *headers):
+        plant(root, f"ctcr/{name.replace('__', '/')}.hpp", headers.get(name, "#pragma once\n"))
+    return root
+
+
+@pytest.mark.parametrize(
+    ("own", "seen"), [("low", ["low"]), ("left", ["low", "left"]), ("right", ["low", "right"]), ("high", LAYERS)]
+)
 @pytest.mark.parametrize("form", ["<ctcr/{}/x.hpp>", '"ctcr/{}/x.hpp"', '"../{}/x.hpp"'])
-def test_an_include_is_wrong_exactly_when_it_points_upwards(tmp_path, own, other, form):
-    header = plant(tmp_path, f"ctcr/{own}/y.hpp", f"#pragma once\n#include {form.format(other)}\n")
-    device = own in ("actuation", "sensing")
-    allowed = own == other or layers.LAYERS[other] < (3 if device else layers.LAYERS[own])
-    expected = [] if allowed else [f"{header}:2: layer '{own}' must not include layer '{other}'"]
-    assert layers.problems(tmp_path) == expected
+def test_layers(tmp_path, own, seen, form):
+    """A header includes its own layer and those above it in the table, and no other one."""
+    for other in LAYERS:
+        library(tmp_path, **{f"{own}__x": f"#pragma once\n#include {form.format(other)}\n"})
+        wrong = f"{tmp_path}/ctcr/{own}/x.hpp:2: layer '{own}' must not include layer '{other}'"
+        assert layers.header_problems(tmp_path) == ([] if other in seen else [wrong])
 
 
-def test_a_folder_that_is_no_layer_is_named(tmp_path):
-    header = plant(tmp_path, "ctcr/utilities/x.hpp", "#pragma once\n")
-    assert layers.problems(tmp_path) == [f"{header}:1: folder 'utilities' is not a layer"]
+@pytest.mark.parametrize(
+    ("planted", "found"),
+    [("shed__x", "layer 'shed' is missing"), ("low__new", "'low/new.hpp' is missing in its table"), ("high__new", "")],
+)
+def test_tables_of_layers(tmp_path, planted, found):
+    """A folder without a row, and a header without one in the table of its folder, if it has a table."""
+    said = layers.header_problems(library(tmp_path, **{planted: "#pragma once\n"}))
+    assert len(said) == bool(found) and all(found in text for text in said)
 
 
-def test_umbrella_headers_include_any_layer(tmp_path):
-    plant(tmp_path, "ctcr/ctcr.hpp", "#include <ctcr/control/gdls.hpp>\n")
-    assert layers.problems(tmp_path) == []
+def test_tables_name_what_exists(tmp_path):
+    """Names in a table whose header or folder was removed."""
+    library(tmp_path)
+    (tmp_path / "ctcr/low/y.hpp").unlink()
+    for path in ("x.hpp", ""):
+        getattr(tmp_path / "ctcr/high" / path, "unlink" if path else "rmdir")()
+    said = layers.header_problems(tmp_path)
+    assert len(said) == 2 and "layer 'high' has no folder" in said[0] and "'low/y.hpp' does not exist" in said[1]
 
 
 def package(root: Path, **modules: str) -> Path:

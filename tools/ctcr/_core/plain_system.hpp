@@ -1,6 +1,6 @@
 #pragma once
 // A system without effects from the values of its parameters.
-#include <ctcr/pipeline/parameters.hpp>
+#include <ctcr/system/parameters.hpp>
 
 namespace ctcr::python {
 

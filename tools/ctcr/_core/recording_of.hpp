@@ -2,6 +2,7 @@
 // Recordings of a robot of N tubes behind AnyRecording. Each N is compiled in a file of its own.
 #include <algorithm>
 #include <ctcr/calibration/identification/recording.hpp>
+#include <ctcr/friction/frictionless_torsion.hpp>
 #include <stdexcept>
 
 #include "all_effects.hpp"

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "ctcr/friction/solve_friction.hpp"
 #include "ctcr/parallel/batch.hpp"
-#include "ctcr/parallel/wind_up.hpp"
-#include "ctcr/pipeline/recorded_derivatives.hpp"
+#include "ctcr/recording/derivatives.hpp"
 
 namespace ctcr {
 

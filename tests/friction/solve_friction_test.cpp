@@ -1,11 +1,12 @@
 // Tubes that rub wind each other up.
-#include "ctcr/parallel/wind_up.hpp"
+#include "ctcr/friction/solve_friction.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "ctcr/calibration/identification/recording.hpp"
+#include "ctcr/friction/frictionless_torsion.hpp"
 #include "support/walk.hpp"
 
 namespace ctcr {

@@ -3,7 +3,8 @@
 #include <numbers>
 #include <span>
 
-#include "ctcr/pipeline/recorded_path.hpp"
+#include "ctcr/recording/path.hpp"
+#include "ctcr/system/parameters.hpp"
 
 namespace ctcr::detail {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "ctcr/math/frame_algebra.hpp"
-#include "ctcr/pipeline/predict.hpp"
-#include "ctcr/pipeline/variables.hpp"
-#include "ctcr/pipeline/winding.hpp"
+#include "ctcr/recording/linearised_torsion.hpp"
+#include "ctcr/recording/variables.hpp"
+#include "ctcr/system/predict.hpp"
 
 namespace ctcr {
 

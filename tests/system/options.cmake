@@ -1,3 +1,2 @@
 include(${CMAKE_CURRENT_LIST_DIR}/../support/solver.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/../support/no_alloc.cmake)
-include(${CMAKE_CURRENT_LIST_DIR}/../support/catalogue.cmake)

@@ -2,9 +2,9 @@
 // Who walks along a recording and winds up tubes that rub, place after place.
 #include <optional>
 
-#include "ctcr/pipeline/recorded.hpp"
-#include "ctcr/pipeline/twist_balance.hpp"
-#include "ctcr/pipeline/variables.hpp"
+#include "ctcr/friction/torsion_solver.hpp"
+#include "ctcr/recording/predict.hpp"
+#include "ctcr/recording/variables.hpp"
 
 namespace ctcr::detail {
 

@@ -1,3 +1,5 @@
+#include "ctcr/recording/derivatives.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -5,7 +7,6 @@
 #include <numeric>
 #include <string>
 
-#include "ctcr/pipeline/recorded_derivatives.hpp"
 #include "support/catalogue_cases.hpp"
 #include "support/no_alloc.hpp"
 

@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <utility>
 
-#include "ctcr/mechanics/contact_twist.hpp"
+#include "ctcr/friction/relative_torsion.hpp"
 
 namespace ctcr {
 

@@ -1,8 +1,8 @@
 #pragma once
 #include <optional>
 
-#include "ctcr/pipeline/recorded_path.hpp"
-#include "ctcr/pipeline/variables.hpp"
+#include "ctcr/recording/path.hpp"
+#include "ctcr/recording/variables.hpp"
 
 namespace ctcr::detail {
 

@@ -2,7 +2,8 @@
 // All named numbers of a system as one vector: those of ParameterVector<N>, then those of its effects.
 #include <string>
 
-#include "ctcr/pipeline/system.hpp"
+#include "ctcr/robot/parameters.hpp"
+#include "ctcr/system/system.hpp"
 
 namespace ctcr {
 

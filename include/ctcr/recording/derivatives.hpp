@@ -2,8 +2,8 @@
 // Derivatives of what the tracker reads in a recorded row, along the way of recorded.hpp: exact ones of the discretised
 // model. (Where nothing loads the rod and no effect acts on it they are those of the unloaded equations, which differ
 // by their discretisation error.)
-#include "ctcr/pipeline/past_slopes.hpp"
-#include "ctcr/pipeline/recorded.hpp"
+#include "ctcr/recording/history_sensitivities.hpp"
+#include "ctcr/recording/predict.hpp"
 
 namespace ctcr {
 

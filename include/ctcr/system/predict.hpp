@@ -3,8 +3,8 @@
 //
 //   motor angles theta --transmission--> joints q --model--> tube tips --T_ref--> reading --> residual
 #include "ctcr/derivatives/parameters.hpp"
-#include "ctcr/pipeline/system.hpp"
 #include "ctcr/sensing/residual.hpp"
+#include "ctcr/system/system.hpp"
 
 namespace ctcr {
 

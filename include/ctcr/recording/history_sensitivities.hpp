@@ -4,7 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "ctcr/pipeline/winding.hpp"
+#include "ctcr/recording/history_propagation.hpp"
+#include "ctcr/recording/linearised_torsion.hpp"
 
 namespace ctcr {
 

@@ -1,4 +1,4 @@
-#include "ctcr/pipeline/predict.hpp"
+#include "ctcr/system/predict.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "ctcr/system/parameters.hpp"
 #include "support/laws.hpp"
 #include "support/no_alloc.hpp"
 
@@ -72,6 +73,7 @@ std::pair<double, double> scale(const ParameterKind& kind) {
 template <int N>
 void expect_derivatives_of_the_residual(bool loaded, int cases) {
   using P = ParameterVector<N>;
+  using Parameters = SystemParameters<N, Standard>;
   test::Random random(std::uint64_t(10 * N + loaded));
   for (int n = 0; n < cases; ++n) {
     const auto [system, theta, load] = random_command<N>(loaded, n % N, random);
@@ -89,6 +91,7 @@ void expect_derivatives_of_the_residual(bool loaded, int cases) {
           (8 * (residual_at(h) - residual_at(-h)) - (residual_at(2 * h) - residual_at(-2 * h))) / (12 * h);
       EXPECT_LE((column - slope).norm(), 1e-6 * (slope.norm() + 1e-2 / magnitude)) << what << ", case " << n;
     };
+    const Eigen::VectorXd values = Parameters::values(system);
     for (int p = 0; p < P::count; ++p) {
       const auto [kind, i] = P::entry(p);
       if (kind == Parameter::bending_stiffness) continue;  // not given
@@ -96,7 +99,9 @@ void expect_derivatives_of_the_residual(bool loaded, int cases) {
       expect(
           exact.by_parameters.col(p),
           [&, index = p](double x) {
-            return residual(measured, predicted(changed(system, index, x), theta, load).reading);
+            Eigen::VectorXd moved = values;
+            moved[index] += x;
+            return residual(measured, predicted(Parameters::with_values(system, moved), theta, load).reading);
           },
           size, h, std::string(P::name(p)));
     }

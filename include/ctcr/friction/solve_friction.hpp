@@ -5,8 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "ctcr/friction/path_solver.hpp"
+#include "ctcr/friction/torsion_sensitivities.hpp"
 #include "ctcr/parallel/thread_pool.hpp"
-#include "ctcr/pipeline/winder.hpp"
 
 namespace ctcr {
 

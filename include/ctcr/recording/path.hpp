@@ -1,8 +1,11 @@
 #pragma once
+#include <algorithm>
+#include <cmath>
+#include <span>
 #include <vector>
 
-#include "ctcr/pipeline/parameters.hpp"
-#include "ctcr/pipeline/recorded_row.hpp"
+#include "ctcr/recording/row.hpp"
+#include "ctcr/robot/parameters.hpp"
 
 namespace ctcr::detail {
 

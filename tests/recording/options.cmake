@@ -1,0 +1,2 @@
+include(${CMAKE_CURRENT_LIST_DIR}/../support/catalogue.cmake)
+include(${CMAKE_CURRENT_LIST_DIR}/../support/no_alloc.cmake)
