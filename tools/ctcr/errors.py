@@ -1,4 +1,4 @@
-"""What is wrong with an input, told so that its author can mend it."""
+"""Faults of an input, with messages that help its author to correct it."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from difflib import get_close_matches
 
 @dataclass(frozen=True)
 class Problem:
-    """One fault: what is wrong, and where. `line` counts from 1; in a table it is the row a spreadsheet shows."""
+    """One fault and its position. `line` counts from 1; in a table it is the row that a spreadsheet shows."""
 
     message: str
     file: str | None = None
@@ -39,6 +39,12 @@ def did_you_mean(name: str, choices: Iterable[str]) -> str | None:
     """The choice nearest in spelling to `name`, if any is near."""
     near = get_close_matches(name.lower(), [choice.lower() for choice in choices], n=1, cutoff=0.6)
     return next((choice for choice in choices if near and choice.lower() == near[0]), None)
+
+
+def suggestion(name: str, choices: Iterable[str], otherwise: str) -> str:
+    """The end of a message on an unknown name: the choice that was probably meant, or another hint."""
+    meant = did_you_mean(name, choices)
+    return f"did you mean {meant}?" if meant else otherwise
 
 
 def shown(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Motion that a table leaves out is seen where readings return to joints; and only there."""
+"""Motion that a table leaves out is found where readings return to joints, and only there."""
 
 from dataclasses import fields, replace
 from pathlib import Path
@@ -54,13 +54,14 @@ def rubbing(robot):
 
 @pytest.fixture(scope="module")
 def left_out(rubbing, plan):
-    """Readings of a robot with friction whose way round was not recorded, and the whole table."""
+    """Readings of a robot with friction whose detours were not recorded, and the whole table."""
     whole, hidden = sweeps(plan)
     made = simulation.simulate(rubbing, whole, "realistic", seed=2)
     return rows_of(made, ~hidden), made
 
 
-def test_the_way_is_put_back(robot, left_out):
+def test_completed(robot, left_out):
+    """Every detour without a reading is added to the table as rows without a pose."""
     table, whole = left_out
     found, said = missing_motion.completed(robot, table)
     assert len(said) == 1
@@ -77,8 +78,8 @@ def test_the_way_is_put_back(robot, left_out):
     assert not nothing
 
 
-def test_the_error_is_that_of_the_whole_table(robot, left_out):
-    """Without the way the readings at its end miss by millimetres."""
+def test_fit(robot, left_out):
+    """A fit is as good as that of the whole table; without the detours, readings at their end miss by millimetres."""
     table, whole = left_out
     added = add.add(robot, table, ["friction"])
     assert any("without a reading" in notice for notice in added.notices)
@@ -86,27 +87,31 @@ def test_the_error_is_that_of_the_whole_table(robot, left_out):
     assert rms["friction"] < 1.15 * add.add(robot, whole, ["friction"]).rms("rms_mm")["friction"]
 
 
-def test_a_diagnosis_says_so(robot, left_out):
+def test_diagnosis(robot, left_out):
+    """A diagnosis reports the added motion and finds friction."""
     result = diagnose(robot, left_out[0])
     assert result.accepted[0].ids[0] == "friction"
     assert any("without a reading" in notice for notice in result.notices)
-    assert 0 < result.judged.sum() < result.held_out.sum()  # a way that was put back is no reading
+    assert 0 < result.judged.sum() < result.held_out.sum()  # an added row is no reading
 
 
 @pytest.mark.parametrize("noise", ["jitter", "realistic"])
-def test_what_came_straight_is_left_alone(robot, rubbing, plan, noise):
+def test_direct_motion(robot, rubbing, plan, noise):
+    """Readings that were reached directly stay."""
     whole, hidden = sweeps(plan)
     table = simulation.simulate(rubbing, rows_of(whole, ~hidden), noise, seed=3)
     assert missing_motion.completed(robot, table) == (table, [])
 
 
-def test_without_memory_there_is_nothing_to_see(robot, plan):
+def test_without_history(robot, plan):
+    """A robot without history shows no missing motion."""
     whole, hidden = sweeps(plan)
     table = rows_of(simulation.simulate(robot, whole, "realistic", seed=4), ~hidden)
     assert missing_motion.completed(robot, table) == (table, [])
 
 
-def test_a_table_without_poses_or_times_is_no_obstacle(robot, left_out):
+def test_incomplete_tables(robot, left_out):
+    """Tables without poses, times or a stated jitter."""
     table = left_out[0]
     silent = robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"jitter_mm": None})})
     assert missing_motion.completed(silent, table) == (table, [])

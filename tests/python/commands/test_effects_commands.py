@@ -47,7 +47,8 @@ def run(capsys):
 # ---- ctcr effects
 
 
-def test_the_list_has_every_effect(run):
+def test_list(run):
+    """`ctcr effects` lists every effect of the library."""
     code, out, _ = run("effects")
     assert code == 0
     assert all(identity in out for identity in catalogue.catalogue(3))
@@ -56,7 +57,8 @@ def test_the_list_has_every_effect(run):
 
 
 @pytest.mark.parametrize("name", ["friction", "softening", "frame_jump"])
-def test_an_effect_is_told_in_full(run, name):
+def test_one_effect(run, name):
+    """`ctcr effects ID` shows title, reference and parameters."""
     effect = catalogue.get(name, 3)
     code, out, _ = run("effects", name)
     told = " ".join(out.split())
@@ -109,7 +111,7 @@ def test_faults_of_settings(text, message, robot):
     assert message in str(error.value)
 
 
-# ---- laws
+# ---- models
 
 
 def test_neutral_effects_change_nothing(robot, plan):
@@ -119,7 +121,8 @@ def test_neutral_effects_change_nothing(robot, plan):
     np.testing.assert_allclose(with_them.residual(np.empty(0))[0], without.residual(np.empty(0))[0], atol=1e-12)
 
 
-def test_the_model_without_path_is_the_recording(robot, plan, hidden):
+def test_model_and_recording(robot, plan, hidden):
+    """Without history a model of single poses equals the recording."""
     model = ctcr.Model(robot, steps=4).predict(plan.beta, plan.alpha, plan.force)
     read = effect_model.readings(robot, plan, steps=4)
     np.testing.assert_allclose(read.position, model.position, atol=1e-9)
@@ -130,13 +133,14 @@ def test_the_model_without_path_is_the_recording(robot, plan, hidden):
     assert np.linalg.norm(with_effects.position - read.position, axis=1).max() > 1e-4
 
 
-def test_a_model_uses_the_tube_not_the_sensor(robot, plan, hidden):
+def test_model_has_no_sensor(robot, plan, hidden):
+    """Effects of the sensor do not change the pose of the tube."""
     off = hidden(robot, sensor_offset__x="0.003")
     a, b = (ctcr.Model(r).predict(plan.beta, plan.alpha).position for r in (off, robot))
     np.testing.assert_array_equal(a, b)
 
 
-def test_a_model_refuses_what_it_cannot_use(robot, hidden):
+def test_refusals_of_a_model(robot, hidden):
     with pytest.raises(InputError, match="friction, delay need the rows in their order"):
         ctcr.Model(hidden(robot, friction__coefficient="0.01", delay="0.05"))
     model = ctcr.Model(hidden(robot, softening="0.01"))
@@ -180,7 +184,8 @@ def test_add_without_measurements(run, tmp_path, robot):
     assert written == {"softening": {"gamma": [0, 0.01, 0], "plateau": 0.25, "sharpness": 2}}
 
 
-def test_add_what_a_diagnosis_found(run, tmp_path, robot):
+def test_add_diagnosis(run, tmp_path, robot):
+    """`--diagnosis` adds the effects of an answer, with held choices and neutral amplitudes."""
     answer, target = tmp_path / "diagnosis.json", tmp_path / "new.yaml"
     found = [
         {"class": ["friction", "backlash_rotation"], "parameters": {"law": 1.0, "coefficient.1": 0.3}},
@@ -195,8 +200,8 @@ def test_add_what_a_diagnosis_found(run, tmp_path, robot):
     assert not any(written["friction"]["coefficient"])  # an amplitude is fitted, not taken over
 
 
-def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, plan, hidden):
-    """Two laws of friction beside each other would share what one of them explains."""
+def test_fit_of_a_diagnosis(run, tmp_path, robot, plan, hidden):
+    """Only parameters of the answer are fitted: two laws of friction would share what one of them explains."""
     data, answer, target = tmp_path / "m.csv", tmp_path / "diagnosis.json", tmp_path / "new.yaml"
     simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data, 3)
     parameters = {"law": 1.0, **{f"coefficient.{i}": 0.01 for i in (1, 2, 3)}}
@@ -212,8 +217,8 @@ def test_what_a_diagnosis_did_not_ask_for_is_not_fitted(run, tmp_path, robot, pl
     ("text", "message"),
     [
         (None, "cannot be read"),
-        ("[]", "is not what ctcr diagnose writes"),
-        ("{", "is not what"),
+        ("[]", "is not an answer of ctcr diagnose"),
+        ("{", "is not an answer"),
         ('{"effects": []}', "nothing was found to add"),
     ],
 )
@@ -246,12 +251,13 @@ def test_faults_of_add(arguments, message, run, table, tmp_path, monkeypatch):
     assert ROBOT.read_bytes() == before and not (tmp_path / "x.yaml").exists()
 
 
-def test_remove_what_is_not_there(run, tmp_path):
+def test_remove_absent_effect(run, tmp_path):
     code, _, err = run("remove", ROBOT, "friction", "-o", tmp_path / "x.yaml")
     assert code == 1 and "has no effect friction" in err
 
 
-def test_commands_use_the_effects(run, robot, plan, table, tmp_path):
+def test_effects_of_a_robot(run, robot, plan, table, tmp_path):
+    """predict, compare and shape use the effects of the robot file."""
     true, made, poses = tmp_path / "true.yaml", tmp_path / "made.csv", tmp_path / "poses.csv"
     assert run("add", ROBOT, "friction", "--set", "coefficient=0.02", "-o", true)[0] == 0
     assert run("simulate", ROBOT, table, "--hide", "friction.coefficient=0.02", "--noise", "none", "-o", made)[0] == 0
@@ -266,7 +272,8 @@ def test_commands_use_the_effects(run, robot, plan, table, tmp_path):
     assert "Left out, as it depends on how the joints were reached: friction" in run("shape", true, *joints)[1]
 
 
-def test_simulated_noise_is_that_of_the_tracker(robot, plan):
+def test_simulated_noise(robot, plan):
+    """Simulated noise has the size of the tracker and follows its seed."""
     exact = simulation.simulate(robot, plan, "none")
     noisy = [simulation.simulate(robot, plan, "jitter", seed) for seed in range(6)]
     error = np.concatenate([made.position - exact.position for made in noisy])
@@ -280,7 +287,8 @@ def test_simulated_noise_is_that_of_the_tracker(robot, plan):
     assert 0.22e-3 < inliers.std() < 0.40e-3  # 0.31 mm of the field, correlated over the whole table
 
 
-def test_simulate_writes_what_load_reads(run, plan, table, tmp_path, robot):
+def test_simulate_round_trip(run, plan, table, tmp_path, robot):
+    """`ctcr simulate` writes the table that `measurements.load` reads back."""
     made = tmp_path / "made.csv"
     assert run("simulate", ROBOT, table, "-o", made, "--noise", "jitter", "--seed", 7)[0] == 0
     read, expected = measurements.load(made, 3), simulation.simulate(robot, plan, "jitter", 7)
@@ -295,7 +303,8 @@ def with_history(robot, *entries):
     return robot.model_copy(update={"history": list(entries)})
 
 
-def test_the_waterfall_follows_the_ledger(robot):
+def test_waterfall(robot):
+    """Each entry begins with the error that the one before ended with."""
     ledger = [
         {"nominal": 3.0, "frame_alone": 2.5, "calibrated": 1.5, "held_out": 1.6, "noise_floor": 0.1},
         {"nominal": 1.6, "calibrated": 1.6, "friction": 0.4, "noise_floor": 0.2},
@@ -311,7 +320,8 @@ def test_the_waterfall_follows_the_ledger(robot):
     ]
 
 
-def test_a_ledger_edited_by_hand(robot):
+def test_odd_ledger(robot):
+    """Entries of another form are shown as far as they can be read."""
     odd = [{}, {"figures": 3}, {"figures": {"rms_mm": {"nominal": "x"}}}, {"sources": None, "changes": None}]
     made = with_history(robot, *odd)
     assert history.waterfall(made) == [] and len(history.entries(made)) == 4

@@ -1,5 +1,4 @@
-"""Effects of the user's own in Python: neutral values change nothing, derivatives are those of differences, fits find
-what was hidden, and what is wrong in the user's file is said."""
+"""Effects that users write in Python: neutral values, derivatives, fits, and messages on faults of their files."""
 
 import json
 from dataclasses import replace
@@ -23,7 +22,7 @@ NAMES = ["tubes.2.curvature", "tubes.1.length", "actuation.home_rotation.1", "tr
 
 
 class Everything(Effect):
-    """Acts at every place where an effect can."""
+    """Uses every hook of single rows."""
 
     id, title, physics = "everything", "t", "p"
     parameters = [Parameter("gain", sigma=0.1, per_tube=True), Parameter("size", unit="m", sigma=1e-3)]
@@ -60,8 +59,7 @@ def file(tmp_path):
         return path
 
     yield write
-    catalogue._own.clear()
-    user_effects._loaded.clear()
+    robot_file.user_effects.clear()
 
 
 def own_names(effect):
@@ -94,7 +92,9 @@ def test_derivatives(robot, readings):
         np.testing.assert_allclose(jacobian[:, k], difference, atol=2e-5 * scale, err_msg=name)
 
 
-def test_an_effect_written_again_in_python_is_that_of_the_library(robot, readings):
+def test_python_and_library(robot, readings):
+    """An effect of the library written in Python gives the same predictions."""
+
     class Offset(Effect):
         id, title, physics = "offset", "t", "p"
         parameters = [Parameter("x", unit="m", sigma=1e-3)]
@@ -138,7 +138,9 @@ def test_an_effect_written_again_in_python_is_that_of_the_library(robot, reading
         np.testing.assert_allclose(b[1][:, 0], a[1].sum(axis=1), atol=1e-5 * scale, err_msg=ours)
 
 
-def test_a_base_that_has_moved_is_another_tracker_frame(robot, readings):
+def test_base(robot, readings):
+    """A moved base equals another tracker frame."""
+
     class Moved(Effect):
         id, title, physics = "moved", "t", "p"
         parameters = [Parameter("gain", sigma=1e-3)]
@@ -163,7 +165,8 @@ def _tips(robot, readings):
     return found.position, found.quaternion
 
 
-def test_rows_that_cannot_be_solved_are_left_out(robot, readings):
+def test_unsolved_rows(robot, readings):
+    """Rows without a solution are left out."""
     beta = readings.beta.copy()
     beta[5] = beta[5][::-1]  # tubes out of order
     mine = UserRecording(robot, replace(readings, beta=beta), own_names(Everything()), [Everything()])
@@ -176,7 +179,8 @@ def test_rows_that_cannot_be_solved_are_left_out(robot, readings):
     assert (np.isfinite(residual).all(axis=1) == wanted).all()
 
 
-def test_a_hidden_effect_is_found(robot, readings, file):
+def test_fit(robot, readings, file):
+    """A hidden effect of a user is fitted within its uncertainty."""
     (effect,) = user_effects.load(EXAMPLE)
     truth = {f"effects.rotation_pickup.gain.{i + 1}": value for i, value in enumerate((2.0, -1.0, 0.5))}
     hidden = add.with_values(robot, [effect.id], truth)
@@ -194,7 +198,8 @@ def test_a_hidden_effect_is_found(robot, readings, file):
     assert np.linalg.norm(position - true, axis=1).max() < 0.05 * np.linalg.norm(plain - true, axis=1).max()
 
 
-def test_commands_take_files_of_effects(robot, readings, file, tmp_path, capsys):
+def test_commands(robot, readings, file, tmp_path, capsys):
+    """Every command that uses effects takes `--effects FILE`."""
     path = file(GOOD)
     plan, made, new, poses, old = (tmp_path / name for name in ("p.csv", "m.csv", "n.yaml", "q.csv", "o.yaml"))
     simulation.write(replace(readings, position=None, quaternion=None), plan, 3)
@@ -217,7 +222,7 @@ def test_commands_take_files_of_effects(robot, readings, file, tmp_path, capsys)
     assert "added mine" in run("history", new, *own)
     run("remove", new, "mine", "-o", old, *own)
     assert robot_file.load(old).effects == {}
-    catalogue._own.clear()
+    robot_file.user_effects.clear()
     assert cli.run(["predict", str(new), str(made), "-o", str(poses)]) == 1
     assert "unknown effect" in capsys.readouterr().err
 
@@ -231,9 +236,10 @@ class Mine(Effect):
 """
 
 
-def test_a_file_makes_its_effects_known(file, robot, tmp_path):
+def test_load(file, robot, tmp_path):
+    """A loaded file adds its effects to the catalogue and leaves no other file behind."""
     (effect,) = user_effects.load(file(GOOD))
-    assert effect.hooks == ["joints"] and "mine" in catalogue.known_effects()
+    assert effect.hooks == ["joints"] and "mine" in catalogue.all_effects(1)
     assert catalogue.get("mine", 3).amplitudes == ["effects.mine.gain"]
     assert "mine" not in catalogue.catalogue(3)
     assert not list(tmp_path.glob("__pycache__"))
@@ -262,7 +268,7 @@ def test_faults_of_a_file(change, message, file):
     assert message in str(error.value) and str(path) in str(error.value)
 
 
-def test_all_faults_of_a_file_at_once(file):
+def test_all_faults(file):
     text = GOOD.replace('"mine"', '"Mine!"').replace("sigma=0.1", "sigma=-1").replace('"p"', '""')
     with pytest.raises(InputError) as error:
         user_effects.load(file(text))
@@ -289,13 +295,13 @@ def test_faults_of_a_function(body, message, file, robot, readings):
     assert message in str(error.value)
 
 
-def test_names_that_do_not_exist(robot, readings):
+def test_unknown_name(robot, readings):
     with pytest.raises(InputError, match="no parameter is named effects.everything.gian"):
         UserRecording(robot, readings, ["effects.everything.gian"], [Everything()])
 
 
 class Profile(Effect):
-    """What the data sheet says too: a curvature over the curved part, another stiffness."""
+    """A curvature over the curved part and another stiffness, as the robot file may have them."""
 
     id, title, physics = "profile", "t", "p"
     parameters = [Parameter("bend", unit="1/m", sigma=0.5, per_tube=True), Parameter("stiff", sigma=0.1, per_tube=True)]
@@ -309,7 +315,8 @@ class Profile(Effect):
         return np.full(len(along), 1 + values.stiff[tube - 1])
 
 
-def test_profiles_along_the_tubes_are_those_of_the_data_sheet(robot, readings):
+def test_profiles(robot, readings):
+    """Constant profiles equal another curvature and stiffness of the robot file."""
     mine = UserRecording(robot, readings, own_names(Profile()), [Profile()])
     kinds = ("curvature", "youngs_modulus", "poisson_ratio")
     library = recording.recording_of(
@@ -348,7 +355,7 @@ def test_derivatives_by_profiles(robot, readings):
         ("curvature", "np.zeros(len(along))", "must be (201, 2)"),
         ("curvature", "np.ones((len(along), 2))", "changes a tube by 1 at its neutral values"),
         ("stiffness", "0 * along + values.gain", "factor that is not above 0"),
-        ("stiffness", "1 / along", "first in place 1 along the tube"),
+        ("stiffness", "1 / along", "first in sample 1 along the tube"),
     ],
 )
 def test_faults_of_a_profile(hook, answer, message, file, robot, readings):

@@ -11,12 +11,14 @@ RNG = np.random.default_rng(4)
 VECTORS = np.concatenate([np.zeros((1, 3)), 1e-9 * RNG.normal(size=(20, 3)), RNG.normal(size=(200, 3))])
 
 
-def test_matrices_agree_with_scipy():
+def test_matrices():
+    """Matrices of rotation vectors agree with scipy."""
     expected = Rotation.from_rotvec(VECTORS).as_matrix()
     np.testing.assert_allclose(frames.matrix_from_rotation_vector(VECTORS), expected, atol=1e-14)
 
 
-def test_quaternions_are_unit_and_compose_as_matrices_do():
+def test_quaternions():
+    """Quaternions are unit and compose as matrices do."""
     first = frames.quaternion_from_rotation_vector(VECTORS)
     second = first[::-1]
     np.testing.assert_allclose(np.linalg.norm(first, axis=1), 1, atol=1e-14)
@@ -27,7 +29,8 @@ def test_quaternions_are_unit_and_compose_as_matrices_do():
     np.testing.assert_allclose(nothing, np.tile([1.0, 0, 0, 0], (len(first), 1)), atol=1e-14)
 
 
-def test_angle_between_is_the_length_of_the_rotation_vector_whatever_the_sign():
+def test_angle():
+    """The angle is the length of the rotation vector, for q and -q."""
     short = VECTORS[np.linalg.norm(VECTORS, axis=1) < np.pi]
     base = frames.quaternion_from_rotation_vector(RNG.normal(size=(len(short), 3)))
     turned = frames.product(base, frames.quaternion_from_rotation_vector(short))
@@ -36,7 +39,8 @@ def test_angle_between_is_the_length_of_the_rotation_vector_whatever_the_sign():
         np.testing.assert_allclose(angle, np.linalg.norm(short, axis=1), atol=1e-14)
 
 
-def test_base_to_tracker_is_t_ref():
+def test_tracker_frame():
+    """base_to_tracker applies T_ref, and tracker_to_base inverts it."""
     vector, offset = RNG.normal(size=3), RNG.normal(size=3)
     rotation = Rotation.from_rotvec(vector)
     tracker = SimpleNamespace(rotation=rotation.as_matrix(), position=offset, rotation_vector_rad=vector, roll=0.4)

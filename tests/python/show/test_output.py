@@ -15,7 +15,8 @@ from ctcr.show import output
 from rich.console import Console
 
 
-def test_a_file_appears_whole_and_replaces_the_old_one(tmp_path):
+def test_write(tmp_path):
+    """A file appears whole and replaces the old one."""
     path = tmp_path / "a.txt"
     for content in ("first", "second"):
         with output.atomic_writer(path) as file:
@@ -25,7 +26,8 @@ def test_a_file_appears_whole_and_replaces_the_old_one(tmp_path):
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
-def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path):
+def test_write_error(tmp_path):
+    """An error leaves the old file and nothing else."""
     path = tmp_path / "a.txt"
     path.write_text("old")
     with pytest.raises(ZeroDivisionError), output.atomic_writer(path) as file:
@@ -35,7 +37,8 @@ def test_an_error_leaves_the_old_file_and_nothing_else(tmp_path):
     assert path.read_text() == "old" and os.listdir(tmp_path) == ["a.txt"]
 
 
-def test_a_full_disk_is_one_sentence_and_nothing_half_written(tmp_path):
+def test_full_disk(tmp_path):
+    """A full disk is one sentence, and no part of the file stays."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))  # the disk takes no more than this
     try:
@@ -47,7 +50,8 @@ def test_a_full_disk_is_one_sentence_and_nothing_half_written(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_a_pipe_is_written_never_replaced(tmp_path):
+def test_pipe(tmp_path):
+    """A pipe is written, never replaced."""
     os.mkfifo(tmp_path / "pipe")
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     with output.atomic_writer(tmp_path / "pipe") as file:
@@ -57,7 +61,7 @@ def test_a_pipe_is_written_never_replaced(tmp_path):
     os.close(reader)
 
 
-def test_a_folder_that_may_not_be_written():
+def test_read_only_folder():
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o555)
         user = os.geteuid()
@@ -72,13 +76,14 @@ def test_a_folder_that_may_not_be_written():
         assert os.listdir(folder) == []
 
 
-def test_folders_that_are_absent_or_in_the_way(tmp_path):
+def test_absent_folder(tmp_path):
+    """A folder that is absent, or stands where the file should."""
     for path in (tmp_path / "absent" / "a.txt", tmp_path):
         with pytest.raises(InputError, match="cannot write it"), output.atomic_writer(path) as file:
             file.write("x")
 
 
-def test_a_link_stays_a_link(tmp_path):
+def test_link(tmp_path):
     (tmp_path / "real").write_text("old")
     (tmp_path / "link").symlink_to("real")
     with output.atomic_writer(tmp_path / "link") as file:
@@ -86,14 +91,16 @@ def test_a_link_stays_a_link(tmp_path):
     assert (tmp_path / "link").is_symlink() and (tmp_path / "real").read_text() == "new"
 
 
-def test_results_have_usual_permissions(tmp_path):
+def test_permissions(tmp_path):
+    """Results have the permissions of other new files."""
     with output.atomic_writer(tmp_path / "a") as file:
         file.write("x")
     (tmp_path / "b").write_text("x")
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
 
 
-def test_json_holds_numpy_and_no_nan(tmp_path, capsys):
+def test_json(tmp_path, capsys):
+    """Arrays become lists, numbers that are not finite null."""
     data = {"a": np.array([[1.5, np.nan], [np.inf, 2]]), "b": np.int64(3), "c": (True, None, "x"), 4: float("nan")}
     expected = {"a": [[1.5, None], [None, 2.0]], "b": 3, "c": [True, None, "x"], "4": None}
     output.write_json(data, str(tmp_path / "a.json"))
@@ -101,7 +108,8 @@ def test_json_holds_numpy_and_no_nan(tmp_path, capsys):
     assert json.loads((tmp_path / "a.json").read_text()) == expected == json.loads(capsys.readouterr().out)
 
 
-def test_a_narrow_table_breaks_sentences_and_cuts_no_word_or_number():
+def test_narrow_table():
+    """A narrow table breaks sentences, and cuts no word or number."""
     sentence, number = "floor of a model without any history", "0.034 ± 0.006"
     made = output.table("", ["", "id", "what", "p"], [[sentence, "precurvature_profile", sentence, number]], 3)
     narrow = Console(width=80, file=io.StringIO())
@@ -113,7 +121,9 @@ def test_a_narrow_table_breaks_sentences_and_cuts_no_word_or_number():
         assert word in text
 
 
-def test_the_bar_waits_a_second_and_needs_a_terminal(monkeypatch):
+def test_progress(monkeypatch):
+    """The bar waits a second and needs a terminal."""
+
     class Terminal(io.StringIO):
         def isatty(self):
             return True

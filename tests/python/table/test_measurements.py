@@ -56,7 +56,8 @@ def faults(load):
 
 
 @pytest.mark.parametrize("block", [64, 1000, csv_table.BLOCK_BYTES])
-def test_what_is_written_is_read_exactly(load, monkeypatch, block):
+def test_round_trip(load, monkeypatch, block):
+    """Numbers are read exactly as they were written, for any block size."""
     monkeypatch.setattr(csv_table, "BLOCK_BYTES", block)
     rng = np.random.default_rng(3)
     for _ in range(30):
@@ -107,7 +108,8 @@ PLANTED = [
 
 
 @pytest.mark.parametrize("column, value, message, field", PLANTED)
-def test_a_planted_fault_is_found_in_its_row(faults, monkeypatch, column, value, message, field):
+def test_fault(faults, monkeypatch, column, value, message, field):
+    """A planted fault is reported with its row and column."""
     monkeypatch.setattr(csv_table, "BLOCK_BYTES", 700)
     rng = np.random.default_rng(11)
     for _ in range(5):
@@ -121,7 +123,8 @@ def test_a_planted_fault_is_found_in_its_row(faults, monkeypatch, column, value,
         assert message in problem.message and "table.csv, row" in str(problem)
 
 
-def test_faults_of_all_kinds_are_told_together_and_counted(load):
+def test_all_faults(load):
+    """Faults of all kinds are reported together and counted."""
     rng = np.random.default_rng(5)
     lines = as_text(random_table(rng, 500, 3), 3).splitlines()
     column = lines[0].split(",").index("alpha1_rad")
@@ -152,13 +155,14 @@ def test_faults_of_all_kinds_are_told_together_and_counted(load):
         (lambda h: h + ",", "(no name)", "unknown column"),
     ],
 )
-def test_faults_of_the_header(faults, change, field, message):
+def test_header(faults, change, field, message):
     header, rest = as_text(random_table(np.random.default_rng(1), 3, 3), 3).split("\n", 1)
     assert any(p.field == field and message in p.message and p.line == 1 for p in faults(change(header) + "\n" + rest))
 
 
 @pytest.mark.parametrize("table_tubes, robot_tubes", [(3, 2), (2, 3)])
-def test_a_table_of_another_robot(faults, table_tubes, robot_tubes):
+def test_other_robot(faults, table_tubes, robot_tubes):
+    """A table of a robot with another number of tubes."""
     text = as_text(random_table(np.random.default_rng(1), 3, table_tubes), table_tubes)
     assert all(f"the robot has {robot_tubes} tubes" in problem.message for problem in faults(text, robot_tubes))
 
@@ -183,17 +187,19 @@ HEADER = ",".join(name for names in group_columns(1).values() for name in names)
         (b"beta1_m" * 20000, "first row without end"),
     ],
 )
-def test_what_is_no_table_gets_one_clear_sentence(faults, content, message):
+def test_other_files(faults, content, message):
+    """A file that is no table is one clear sentence."""
     (problem,) = faults(content, 1)
     assert message in problem.message and "\n" not in str(problem)
 
 
-def test_binary_below_a_good_header(faults):
+def test_binary(faults):
     problems = faults(HEADER.encode() + b"\n" + bytes(range(256)), 1)
     assert problems and all(problem.line >= 2 for problem in problems)
 
 
-def test_time_that_runs_backwards_and_split_runs_are_warnings(load):
+def test_warnings(load):
+    """Time that runs backwards and interrupted runs are warnings."""
     table = random_table(np.random.default_rng(2), 6, 2)
     table["run"][:, 0] = [0, 0, 0, 1, 1, 0]
     table["t"][:, 0] = [0, 2, 1, 0, 1, 9]
@@ -202,14 +208,16 @@ def test_time_that_runs_backwards_and_split_runs_are_warnings(load):
     assert "stand together" in split.message
 
 
-def test_slack_of_recorded_joints(load, faults):
+def test_rounded_joints(load, faults):
+    """Joints may be out of order by their rounding, and no more."""
     table = random_table(np.random.default_rng(2), 1, 2)
     for excess, good in ((0.5e-6, True), (2e-6, False)):
         table["beta"][0] = [-0.1 + excess, -0.1]
         (load if good else faults)(as_text(table, 2), 2)
 
 
-def test_a_long_table_needs_little_more_than_its_numbers(load):
+def test_memory(load):
+    """Reading a long table needs little more memory than its numbers."""
     import tracemalloc
 
     rng = np.random.default_rng(0)

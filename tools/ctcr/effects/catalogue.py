@@ -1,9 +1,9 @@
-"""The catalogue of physical effects that the standard model leaves out, and the values of those that a robot has.
+"""The catalogue of physical effects that the standard model leaves out, and their values in a robot.
 
 Parameters are named as in the library: effects.softening.gamma.2 (tube 2), effects.delay.delay. SI units.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import _core
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import InputError, Problem, suggestion
+from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
+NEEDS = ("order", "time", "orientation", "loads", "gravity")  # that data must have for some effects
 
 
 @dataclass(frozen=True)
@@ -22,8 +24,7 @@ class EffectParameter:
     """A parameter of an effect.
 
     Its kind: an amplitude changes nothing at its neutral value, nor does a detail, which is fitted after the
-    amplitudes. A shape changes the form of an effect that acts. A choice selects one of several forms and is never
-    fitted.
+    amplitudes. A shape sets the form of an effect. A choice selects a constitutive law and is never fitted.
     """
 
     name: str
@@ -46,10 +47,10 @@ class Effect:
     physics: str
     signature: str
     measure: str
-    look_alikes: tuple[str, ...]
+    look_alikes: tuple[str, ...]  # effects that look alike in the data
     reference: str
-    needs: frozenset[str]  # of order, time, orientation, loads, gravity
-    acts_on: frozenset[str]  # of joints, rod, tip, reading
+    needs: frozenset[str]  # some of NEEDS
+    acts_on: frozenset[str]  # some of joints, rod, tip, reading
     parameters: tuple[EffectParameter, ...]
     variants: tuple[tuple[str, ...], ...] = ()  # names of parameters of each way to act; none: all amplitudes
     starts: tuple[dict[str, float], ...] = ()  # values of further starting points, by name
@@ -58,14 +59,18 @@ class Effect:
         """Full names of all its parameters, or of the given ones."""
         return [name for p in self.parameters if not parameters or p.name in parameters for name in p.full_names]
 
+    def of_kind(self, *kinds: str) -> list[str]:
+        """Full names of its parameters of some kinds."""
+        return [name for p in self.parameters if p.kind in kinds for name in p.full_names]
+
     @property
     def amplitudes(self) -> list[str]:
-        return [name for p in self.parameters if p.kind == "amplitude" for name in p.full_names]
+        return self.of_kind("amplitude")
 
     @property
     def shapes(self) -> list[str]:
-        """Shapes and details: what is fitted once the amplitudes are."""
-        return [name for p in self.parameters if p.kind in ("detail", "shape") for name in p.full_names]
+        """Shapes and details: parameters that are fitted after the amplitudes."""
+        return self.of_kind("detail", "shape")
 
     def names_with(self, quantity: str) -> list[str]:
         """Full names of the parameters with this quantity, in the order that it defines."""
@@ -73,8 +78,14 @@ class Effect:
 
     @property
     def choices(self) -> list[str]:
-        """Which of several laws: none where it has one."""
-        return [name for p in self.parameters if p.kind == "choice" for name in p.full_names]
+        """Selectors of a constitutive law."""
+        return self.of_kind("choice")
+
+
+def full_names(effect: str, parameter: str, per_tube: bool, n_tubes: int) -> tuple[str, ...]:
+    """One name, or one a tube."""
+    name = f"effects.{effect}.{parameter}"
+    return tuple(f"{name}.{i + 1}" for i in range(n_tubes)) if per_tube else (name,)
 
 
 @cache
@@ -82,62 +93,34 @@ def catalogue(n_tubes: int) -> dict[str, Effect]:
     """All effects of the library by id, in the order in which they act."""
     parameters: dict[str, list[EffectParameter]] = {}
     for p in _core.effect_parameters(n_tubes):
-        stem = f"effects.{p.effect}.{p.name}"
+        kept = {name: getattr(p, name) for name in ("name", "unit", "meaning", "neutral", "sigma", "per_tube")}
         described = EffectParameter(
-            name=p.name,
-            unit=p.unit,
-            meaning=p.meaning,
-            neutral=p.neutral,
-            sigma=p.sigma,
+            **kept,
             soft=(p.soft_low, p.soft_high),
             hard=(p.hard_low, p.hard_high),
-            per_tube=p.per_tube,
             kind="amplitude" if p.kind == "strength" else p.kind,  # a module built before the word changed
-            full_names=tuple(f"{stem}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem,),
+            full_names=full_names(p.effect, p.name, p.per_tube, n_tubes),
             quantity=getattr(p, "quantity", "other"),
         )
         parameters.setdefault(p.effect, []).append(described)
-    needs = ("order", "time", "orientation", "loads", "gravity")
-    return {
-        e.id: Effect(
-            id=e.id,
-            title=e.title,
-            physics=e.physics,
-            signature=e.signature,
-            measure=e.measure,
+    effects = {}
+    for e in _core.effect_catalogue():
+        kept = {name: getattr(e, name) for name in ("id", "title", "physics", "signature", "measure", "reference")}
+        effects[e.id] = Effect(
+            **kept,
             look_alikes=tuple(e.look_alikes.split()),
-            reference=e.reference,
-            needs=frozenset(name for name in needs if getattr(e, name)),
+            needs=frozenset(need for need in NEEDS if getattr(e, need)),
             acts_on=frozenset(getattr(e, "acts_on", ())),
             parameters=tuple(parameters[e.id]),
             variants=tuple(map(tuple, getattr(e, "variants", ()))),
             starts=tuple(getattr(e, "starts", ())),
         )
-        for e in _core.effect_catalogue()
-    }
-
-
-_own: dict[str, Callable[[int], Effect]] = {}  # effects of the user's files, by id, for a number of tubes
-
-
-def register(identity: str, described: Callable[[int], Effect]) -> None:
-    """Makes an effect of a user's file known; see `user_effects.load`."""
-    _own[identity] = described
-
-
-def own_effects(n_tubes: int) -> dict[str, Effect]:
-    """Effects of the user's files by id."""
-    return {identity: described(n_tubes) for identity, described in _own.items()}
+    return effects
 
 
 def all_effects(n_tubes: int) -> dict[str, Effect]:
-    """The effects of the library, then those of the user's files."""
-    return catalogue(n_tubes) | own_effects(n_tubes)
-
-
-def known_effects() -> list[str]:
-    """Ids of all effects."""
-    return list(all_effects(1))
+    """The effects of the library, then those of users' files."""
+    return catalogue(n_tubes) | {e.id: e.described(n_tubes) for e in robot_file.user_effects.values()}
 
 
 @cache
@@ -152,17 +135,15 @@ def parameter_of(n_tubes: int) -> dict[str, EffectParameter]:
 
 
 def get(name: str, n_tubes: int = 1) -> Effect:
-    """An effect by its id; raises InputError that names the nearest."""
+    """An effect by its id; raises InputError that suggests the nearest."""
     effects = all_effects(n_tubes)
     if name not in effects:
-        meant = did_you_mean(name, effects)
-        hint = f": did you mean {meant}?" if meant else ": see `ctcr effects`"
-        raise InputError([Problem(f"no effect is named {name}{hint}")])
+        raise InputError(Problem(f"no effect is named {name}: {suggestion(name, effects, 'see `ctcr effects`')}"))
     return effects[name]
 
 
 def neutral(robot: Robot) -> dict[str, float]:
-    """The value of every parameter that changes nothing; periods follow from the robot's transmission."""
+    """The neutral value of every parameter; periods follow from the robot's transmission."""
     values = {name: p.neutral for name, p in parameter_of(robot.n_tubes).items()}
     if robot.actuation.translation_mm_per_rev:
         values["effects.periodic_translation.pitch"] = 1e-3 * abs(robot.actuation.translation_mm_per_rev)
@@ -187,17 +168,15 @@ def value_of(robot: Robot) -> dict[str, float]:
         effect = get(identity, robot.n_tubes)
         known = {p.name: p for p in effect.parameters}
         for name, value in given.items():
-            where = f"effects.{identity}.{name}"
-            if name not in known:
-                meant = did_you_mean(name, known)
-                hint = f"did you mean {meant}?" if meant else f"its parameters are {', '.join(known)}"
-                problems.append(Problem(f"unknown parameter: {hint}", field=where))
-                continue
+            names = known[name].full_names if name in known else ()
             numbers = value if isinstance(value, list) else [value]
-            if len(numbers) != len(known[name].full_names):
-                problems.append(Problem(f"needs {len(known[name].full_names)} number(s)", field=where))
-                continue
-            found.update(zip(known[name].full_names, map(float, numbers), strict=True))
+            if not names:
+                hint = suggestion(name, known, f"its parameters are {', '.join(known)}")
+                problems.append(Problem(f"unknown parameter: {hint}", field=f"effects.{identity}.{name}"))
+            elif len(numbers) != len(names):
+                problems.append(Problem(f"needs {len(names)} number(s)", field=f"effects.{identity}.{name}"))
+            else:
+                found.update(zip(names, map(float, numbers), strict=True))
     if problems:
         raise InputError(problems)
     return found
@@ -207,26 +186,19 @@ def as_section(
     names: Iterable[str], fitted: Iterable[float], robot: Robot
 ) -> dict[str, dict[str, float | list[float]]]:
     """Values by full name as the `effects:` section of a robot file, over the robot's own."""
-    now = value_of(robot)
     changed = dict(zip(names, map(float, fitted), strict=True))
-    now |= changed
-    ids = [*robot.effects, *(name.split(".")[1] for name in changed)]
-    return {
-        identity: {
-            p.name: [float(now[name]) for name in p.full_names] if p.per_tube else float(now[p.full_names[0]])
-            for p in get(identity, robot.n_tubes).parameters
-        }
-        for identity in dict.fromkeys(ids)
-    }
+    now = value_of(robot) | changed
+    section = {}
+    for identity in dict.fromkeys([*robot.effects, *(name.split(".")[1] for name in changed)]):
+        parameters = get(identity, robot.n_tubes).parameters
+        numbers = {p.name: [float(now[name]) for name in p.full_names] for p in parameters}
+        section[identity] = {p.name: numbers[p.name] if p.per_tube else numbers[p.name][0] for p in parameters}
+    return section
 
 
 def priors(robot: Robot, names: Iterable[str]) -> tuple[Array, Array, Array, Array]:
     """Mean (neutral), standard deviation, lowest and highest value of parameters of effects."""
     known, mean = parameter_of(robot.n_tubes), neutral(robot)
-    chosen = [(name, known[name]) for name in names]
-    return (
-        np.array([mean[name] for name, _ in chosen]),
-        np.array([p.sigma for _, p in chosen]),
-        np.array([p.hard[0] for _, p in chosen]),
-        np.array([p.hard[1] for _, p in chosen]),
-    )
+    rows = [(mean[name], known[name].sigma, *known[name].hard) for name in names]
+    mean, sigma, low, high = np.array(rows, float).reshape(-1, 4).T
+    return mean, sigma, low, high

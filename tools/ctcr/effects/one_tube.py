@@ -1,13 +1,13 @@
-"""One tube of a robot alone out of the plate, with the sensor on it: a robot of one tube."""
+"""A robot of one tube: a tube of a robot that alone stands out of the front plate, with the sensor on it."""
 
 from ctcr.effects import catalogue
 from ctcr.robot.description import Robot
 
 
 def one_tube(robot: Robot, tube: int) -> Robot:
-    """The robot of which this tube (0: innermost) alone stands out of the plate, with the effects that it has then.
+    """The robot whose tube of this index (0: innermost) alone stands out of the plate, with its effects.
 
-    Behind the plate the others are straight: they do not act on it.
+    The other tubes are straight behind the plate and do not act on it.
     """
     actuation = {
         name: [value[tube]] if isinstance(value, list) else value for name, value in vars(robot.actuation).items()

@@ -1,4 +1,4 @@
-"""Values of effects' parameters as the command line gives them: friction.coefficient.1=0.02, delay=0.05."""
+"""Values of the parameters of effects, as texts of the command line (delay=0.05) or in the answer of a diagnosis."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ctcr.effects import catalogue
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot.description import Robot
 
 
@@ -15,8 +15,7 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
     """Values by full name, SI, from texts such as EFFECT.PARAMETER.TUBE=VALUE.
 
     Without a tube the value is that of all tubes, or a list, one value a tube. Without a parameter it is that of the
-    effect's only amplitude. With a single effect in `ids` its name may be left out. Raises InputError with all that is
-    wrong.
+    effect's only amplitude. With a single effect in `ids` its name may be left out. Raises InputError with all faults.
     """
     found, problems = {}, []
     for text in given:
@@ -36,12 +35,14 @@ def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, floa
     except OSError as error:
         raise InputError(Problem(f"cannot be read: {error.strerror}", path)) from None
     except (ValueError, LookupError, TypeError):
-        raise InputError(Problem("is not what ctcr diagnose writes with --json", path)) from None
+        raise InputError(Problem("is not an answer of ctcr diagnose --json", path)) from None
 
 
 def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
-    """The effects of a diagnosis (its as_json()), the first of each class, the values of what it held (choices, and
-    what the data did not ask for, at its neutral value), and of what it fitted."""
+    """Effects of a diagnosis (its as_json()), the first of each class, then their held and their fitted values.
+
+    Choices are held, and so are parameters without a fitted value, at their neutral value.
+    """
     ids, held, values = [], {}, {}
     for entry in answer["effects"]:
         effect, parameters = catalogue.get(entry["class"][0], robot.n_tubes), dict(entry["parameters"])
@@ -49,10 +50,8 @@ def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[
         for parameter in effect.parameters:
             for name in parameter.full_names:
                 value = parameters.get(name.removeprefix(f"effects.{effect.id}."))
-                if value is None:
-                    held[name] = parameter.neutral
-                else:
-                    (held if parameter.kind == "choice" else values)[name] = float(value)
+                to = held if value is None or parameter.kind == "choice" else values
+                to[name] = parameter.neutral if value is None else float(value)
     return ids, held, values
 
 
@@ -76,8 +75,7 @@ def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
     parameter = next((p for p in effect.parameters if p.name == parts[1]), None)
     if parameter is None:
         names = [p.name for p in effect.parameters]
-        meant = did_you_mean(parts[1], names)
-        hint = f"did you mean {meant}?" if meant else f"its parameters are {', '.join(names)}"
+        hint = suggestion(parts[1], names, f"its parameters are {', '.join(names)}")
         raise _fault(text, f"{effect.id} has no parameter {parts[1]}: {hint}")
     names = list(parameter.full_names)
     if len(parts) > 2:

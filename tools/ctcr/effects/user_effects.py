@@ -1,4 +1,4 @@
-"""Effects of one's own, in a Python file that needs no compiler: `--effects my_effects.py`.
+"""Effects that users write in a Python file, which needs no compiler: `--effects my_effects.py`.
 
     from ctcr.user_effects import Effect, Parameter
 
@@ -15,24 +15,25 @@ Values are SI: a number, or an array (N,) where a parameter is per tube, innermo
 amplitudes an effect must change nothing. Hooks, any of them; M rows in the order measured, N tubes:
 
     joints(rows, values) -> beta (M, N) [m], alpha (M, N) [rad]
-        what the tubes get where the controller asks for rows.beta and rows.alpha
+        the joints that the tubes reach where the controller asks for rows.beta and rows.alpha
     force(rows, values) -> (M, 3) [N]
-        at the robot tip, added to the known one, base frame
+        force at the robot tip, base frame, added to the known one
     base(rows, values) -> position (M, 3) [m], rotation vector (M, 3) [rad]
-        of the base in the base frame of the file; the weight of the tubes themselves does not turn with it
+        pose of the base in the base frame of the file; the weight of the tubes themselves does not turn with it
     curvature(tube, along, values) -> (K, 2) [1/m]
-        of the free tube (1: innermost) about its x and y axes, added to the data sheet's, at `along` (K,) [m] from the
-        grasped point; smooth over some millimetres
+        curvature of the free tube (1: innermost) about its x and y axes, added to that of the robot file, at the arc
+        lengths `along` (K,) [m] from the grasped point; smooth over some millimetres
     stiffness(tube, along, values) -> (K,)
-        factor on the tube's bending stiffness at the same places
+        factor on the tube's bending stiffness at the same arc lengths
     reading(position, rotation, rows, values) -> position, rotation
-        what the tracker makes of the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
+        pose that the tracker reads for the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
 """
 
 import importlib.util
 import re
 import sys
 import traceback
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
@@ -45,6 +46,7 @@ from numpy.typing import NDArray
 
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, shown
+from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -59,13 +61,12 @@ ACTS_ON = {  # where each hook acts
     "stiffness": "rod",
 }
 HOOKS = tuple(ACTS_ON)
-NEEDS = ("order", "time", "orientation", "loads", "gravity")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect, SI. `sigma`: how large it plausibly is; beyond `bounds` it is impossible.
+    """A parameter of an effect, SI. `sigma`: prior standard deviation; values beyond `bounds` are impossible.
 
     A `shape` parameter changes nothing by itself: it is fitted once the effect has been accepted.
     """
@@ -77,13 +78,13 @@ class Parameter:
     neutral: float = 0.0
     per_tube: bool = False
     shape: bool = False
-    usual: tuple[float, float] | None = None  # beyond: hardly this physics; by default 5 sigma
+    usual: tuple[float, float] | None = None  # values beyond suggest another cause; by default 5 sigma
     meaning: str = ""
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows that a hook sees: as the table has them, in the order measured."""
+    """Rows of the table that a hook gets, in the order measured."""
 
     t: Array  # (M,) [s], NaN where unknown
     run: NDArray[np.int64]  # (M,)
@@ -97,7 +98,7 @@ class Rows:
 
 
 class Effect:
-    """To derive from; see the top of this file."""
+    """Base class of users' effects; see the top of this file."""
 
     id: ClassVar[str] = ""
     title: ClassVar[str] = ""
@@ -114,65 +115,55 @@ class Effect:
         return [name for name in HOOKS if callable(getattr(self, name, None))]
 
     def described(self, n_tubes: int) -> catalogue.Effect:
-        """As the catalogue describes its own."""
-        stem = f"effects.{self.id}."
-
-        def full(p: Parameter) -> tuple[str, ...]:
-            return tuple(f"{stem}{p.name}.{i + 1}" for i in range(n_tubes)) if p.per_tube else (stem + p.name,)
-
-        def usual(p: Parameter) -> tuple[float, float]:
-            return p.usual or (p.neutral - 5 * p.sigma, p.neutral + 5 * p.sigma)
-
+        """The description as that of the library's effects in the catalogue."""
+        parameters = [
+            catalogue.EffectParameter(
+                name=p.name,
+                unit=p.unit,
+                meaning=p.meaning,
+                neutral=float(p.neutral),
+                sigma=float(p.sigma),
+                soft=p.usual or (p.neutral - 5 * p.sigma, p.neutral + 5 * p.sigma),
+                hard=p.bounds,
+                per_tube=p.per_tube,
+                kind="shape" if p.shape else "amplitude",
+                full_names=catalogue.full_names(self.id, p.name, p.per_tube, n_tubes),
+            )
+            for p in self.parameters
+        ]
         return catalogue.Effect(
-            self.id,
-            self.title or self.id,
-            self.physics,
-            self.signature,
-            self.measure,
-            tuple(self.look_alikes),
-            self.reference,
-            frozenset(self.needs),
-            frozenset(ACTS_ON[hook] for hook in self.hooks),
-            tuple(
-                catalogue.EffectParameter(
-                    p.name,
-                    p.unit,
-                    p.meaning,
-                    float(p.neutral),
-                    float(p.sigma),
-                    usual(p),
-                    p.bounds,
-                    p.per_tube,
-                    "shape" if p.shape else "amplitude",
-                    full(p),
-                )
-                for p in self.parameters
-            ),
+            id=self.id,
+            title=self.title or self.id,
+            physics=self.physics,
+            signature=self.signature,
+            measure=self.measure,
+            look_alikes=tuple(self.look_alikes),
+            reference=self.reference,
+            needs=frozenset(self.needs),
+            acts_on=frozenset(ACTS_ON[hook] for hook in self.hooks),
+            parameters=tuple(parameters),
         )
 
     def values(self, n_tubes: int, given: dict[str, float]) -> SimpleNamespace:
-        """What hooks get: neutral values, but for those `given` by full name."""
-        made = SimpleNamespace()
+        """The values that hooks get: those `given` by full name, else neutral ones."""
+        made = {}
         for p in self.described(n_tubes).parameters:
             numbers = np.array([given.get(name, p.neutral) for name in p.full_names])
-            setattr(made, p.name, numbers if p.per_tube else float(numbers[0]))
-        return made
+            made[p.name] = numbers if p.per_tube else float(numbers[0])
+        return SimpleNamespace(**made)
 
     def call(self, hook: str, *arguments: Any) -> Any:
-        """What a hook returns. Raises InputError that says where in the user's file it failed."""
+        """The answer of a hook. Raises InputError with the line of the user's file where it failed."""
         try:
             return getattr(self, hook)(*arguments)
         except Exception as error:
             raise InputError(_fault(error, _file_of(type(self)), f"{type(self).__name__}.{hook} fails: ")) from error
 
 
-_loaded: dict[str, Effect] = {}  # by id: those of the files loaded so far
-
-
 def load(path: str | Path) -> list[Effect]:
     """The effects of a Python file, which is run; from then on robot files may hold them.
 
-    Raises InputError with everything that is wrong in the file.
+    Raises InputError with all faults of the file.
     """
     module = _module(Path(path))
     classes = [
@@ -181,21 +172,18 @@ def load(path: str | Path) -> list[Effect]:
         if isinstance(found, type) and issubclass(found, Effect) and found.__module__ == module.__name__
     ]
     if not classes:
-        text = "holds no effect: a class derived from ctcr.user_effects.Effect"
-        raise InputError(Problem(text, str(path)))
+        raise InputError(Problem("holds no effect: a class derived from ctcr.user_effects.Effect", str(path)))
     problems = [problem for found in classes for problem in _faults(found, str(path))]
-    names = [found.id for found in classes]
+    ids = Counter(found.id for found in classes)
     problems += [
         Problem("two effects of the file have this id", str(path), field=name)
-        for name in dict.fromkeys(names)
-        if name and names.count(name) > 1
+        for name, count in ids.items()
+        if name and count > 1
     ]
     if problems:
         raise InputError(problems)
     made = [found() for found in classes]
-    for effect in made:
-        _loaded[effect.id] = effect
-        catalogue.register(effect.id, effect.described)
+    robot_file.user_effects.update((effect.id, effect) for effect in made)
     return made
 
 
@@ -205,13 +193,14 @@ def load_all(paths: tuple[str, ...] | list[str]) -> list[Effect]:
 
 
 def used_by(robot: Robot, names: Sequence[str] = ()) -> list[Effect]:
-    """The effects of loaded files that a robot has or that parameters are named of."""
+    """The effects of loaded files that a robot has or that some of the parameters belong to."""
+    loaded = robot_file.user_effects
     wanted = [*robot.effects, *(name.split(".")[1] for name in names if name.startswith("effects."))]
-    return [_loaded[identity] for identity in dict.fromkeys(wanted) if identity in _loaded]
+    return [loaded[identity] for identity in dict.fromkeys(wanted) if identity in loaded]
 
 
 def _module(path: Path) -> ModuleType:
-    """The file as a module of its own name."""
+    """The file, run as a module of its own name."""
     if not path.is_file():
         raise InputError(Problem("no such file" if not path.exists() else "is not a file", str(path)))
     name = f"ctcr_user_effects_{re.sub(r'[^0-9a-zA-Z_]', '_', str(path.resolve()))}"
@@ -233,7 +222,7 @@ def _module(path: Path) -> ModuleType:
 
 
 def _faults(found: type[Effect], file: str) -> list[Problem]:
-    """What is wrong with a class of the file."""
+    """Faults of a class of the file."""
     where, problems = found.id or found.__name__, []
 
     def say(text: str, field: str = "") -> None:
@@ -246,9 +235,8 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
     for name in ("title", "physics"):
         if not isinstance(getattr(found, name), str) or not getattr(found, name).strip():
             say("needs a text", name)
-    strange = [need for need in found.needs if need not in NEEDS]
-    if strange:
-        say(f"{shown(strange[0])} is none of {', '.join(NEEDS)}", "needs")
+    for need in [need for need in found.needs if need not in catalogue.NEEDS][:1]:
+        say(f"{shown(need)} is none of {', '.join(catalogue.NEEDS)}", "needs")
     if not any(callable(getattr(found, name, None)) for name in HOOKS):
         say(f"needs at least one of the functions {', '.join(HOOKS)}")
     if not found.parameters or not all(isinstance(p, Parameter) for p in found.parameters):
@@ -259,9 +247,8 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
     for p in found.parameters:
         for text in _parameter_faults(p):
             say(text, f"parameters.{p.name}")
-    names = [p.name for p in found.parameters]
-    for name in dict.fromkeys(names):
-        if names.count(name) > 1:
+    for name, count in Counter(p.name for p in found.parameters).items():
+        if count > 1:
             say("two parameters have this name", f"parameters.{name}")
     return problems
 

@@ -1,4 +1,4 @@
-"""The functions of the user's own effects, called with checked answers: see `user_effects`."""
+"""The functions of users' effects, called together, with checks of their answers: see `user_effects`."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,13 +17,13 @@ Values = Mapping[str, float]  # of all parameters by full name
 
 PROFILES = ("curvature", "stiffness")
 NODES = 201  # of a profile along a tube, linear between them
-NOTHING = 1e-12  # what an effect may change at its neutral values [m], [rad], [N]
+NOTHING = 1e-12  # largest change by an effect at its neutral values [m], [rad], [N]
 
 
 class Hooks:
     """All functions of some effects together, on the rows of one table.
 
-    Raises InputError where one fails, returns other than it should, or acts at its neutral values.
+    Raises InputError where one fails, returns a wrong shape or kind, or acts at its neutral values.
     """
 
     def __init__(self, robot: Robot, rows: Rows, own_effects: Sequence[Effect]):
@@ -33,7 +33,7 @@ class Hooks:
         return any(hook in effect.hooks for effect in self.effects for hook in hooks)
 
     def inputs(self, values: Values) -> tuple[Array, Array, Array]:
-        """The joints (M, N) that the model gets, and the force (M, 3)."""
+        """Joints (M, N) [m], [rad] and force (M, 3) [N] for the model."""
         rows, shape = self.rows, self.rows.beta.shape
         beta, alpha, force = rows.beta.copy(), rows.alpha.copy(), rows.force.copy()
         for effect, given in self._with("joints", values):
@@ -47,7 +47,7 @@ class Hooks:
         return beta, alpha, force
 
     def profiles(self, values: Values) -> Array | None:
-        """What the tubes have along them (NODES, 3 N), as `recording.recording_of` takes it; None without profiles."""
+        """Profiles (NODES, 3 N) along the tubes, as `recording.recording_of` takes them; None without any."""
         if not self.has(*PROFILES):
             return None
         made = np.zeros((NODES, self.robot.n_tubes, 3))
@@ -67,7 +67,7 @@ class Hooks:
     def outer(
         self, position: Array, rotation: Array, values: Values, frame: tuple[Array, Array], solved: Mask
     ) -> tuple[Array, Array]:
-        """What the tracker reads of the sensor's pose (M, 3), (M, 3, 3); `frame`: origin and axes of the base frame."""
+        """Pose (M, 3) [m], (M, 3, 3) that the tracker reads; `frame`: origin and axes of the base frame."""
         origin, axes = frame
         for shift, turn in self._bases(values):
             turning = axes @ turn @ axes.T
@@ -79,7 +79,7 @@ class Hooks:
         return position, rotation
 
     def check_neutral(self, values: Values) -> None:
-        """Refuses an effect that acts where its amplitudes are neutral."""
+        """Raises InputError for an effect that acts at neutral amplitudes."""
         count = len(self.rows.run)
         position, rotation = np.full((count, 3), 0.1), np.tile(np.eye(3), (count, 1, 1))
         frame, everywhere = (np.zeros(3), np.eye(3)), np.ones(count, bool)
@@ -87,18 +87,11 @@ class Hooks:
         names = ("beta", "alpha", "the force", "the position", "the orientation", "a tube")
         for effect in self.effects:
             alone = Hooks(self.robot, self.rows, [effect])
-            neutral = dict(values) | {
-                name: p.neutral
-                for p in effect.described(self.robot.n_tubes).parameters
-                if p.kind == "amplitude"
-                for name in p.full_names
-            }
+            amplitudes = [p for p in effect.described(self.robot.n_tubes).parameters if p.kind == "amplitude"]
+            neutral = dict(values) | {name: p.neutral for p in amplitudes for name in p.full_names}
             profiles = alone.profiles(neutral)
-            after = (
-                *alone.inputs(neutral),
-                *alone.outer(position, rotation, neutral, frame, everywhere),
-                0.0 if profiles is None else profiles,
-            )
+            outer = alone.outer(position, rotation, neutral, frame, everywhere)
+            after = (*alone.inputs(neutral), *outer, 0.0 if profiles is None else profiles)
             for what, old, new in zip(names, before, after, strict=True):
                 change = float(np.max(np.abs(new - old), initial=0.0))
                 if change > NOTHING:
@@ -106,7 +99,7 @@ class Hooks:
                     raise InputError(Problem(text, field=effect.id))
 
     def _with(self, hook: str, values: Values):
-        """The effects that have a hook, with what it gets."""
+        """The effects that have a hook, with the values for it."""
         for effect in self.effects:
             if hook in effect.hooks:
                 yield effect, effect.values(self.robot.n_tubes, values)
@@ -128,7 +121,7 @@ def _pair(effect: Effect, hook: str, answer: Any, first: tuple, second: tuple, f
 
 
 def _array(effect: Effect, hook: str, answer: Any, shape: tuple, free: Mask | None = None) -> Array:
-    """What a hook returned as numbers of the right shape, finite but in `free` rows."""
+    """The answer of a hook as numbers of this shape, finite but in `free` rows."""
     where = f"{effect.id}.{hook}"
     try:
         array = np.asarray(answer, dtype=float)
@@ -141,6 +134,6 @@ def _array(effect: Effect, hook: str, answer: Any, shape: tuple, free: Mask | No
     bad = bad if free is None else bad & ~free
     if bad.any():
         which = int(np.flatnonzero(bad)[0])
-        place = f"place {which + 1} along the tube" if hook in PROFILES else f"row {which + 2}"
+        place = f"sample {which + 1} along the tube" if hook in PROFILES else f"row {which + 2}"
         raise InputError(Problem(f"returned a number that is not finite, first in {place}", field=where))
     return array

@@ -1,4 +1,4 @@
-"""What is wrong with a robot description: single fields, relations between fields, and what only looks wrong."""
+"""Faults of a robot description, in single fields and between fields, and possible values that look wrong."""
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
@@ -19,7 +19,7 @@ _MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
 
 
 def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
-    """Every fault of a parsed file, each told once. `errors`: what pydantic found field by field."""
+    """Every fault of a parsed file, each once. `errors`: those that pydantic found, field by field."""
     tubes = _tubes(data)
     missing = [error["loc"] for error in errors if error["type"] == "missing"]
     missing += _missing_of_tubes(tubes, weighed=_has_weight(data.get("gravity")))
@@ -40,26 +40,27 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
 
 
 def doubts(robot: Robot) -> Iterator[Fault]:
-    """What is possible but looks wrong, or leaves the model without something it could use."""
+    """Values that are possible but look wrong, and unknown ones that the model could use."""
     yield from _unusual(robot, ())
     for i, tube in enumerate(robot.tubes):
         yield from _unusual(tube, ("tubes", i))
-        if tube.straightened_strain > _MAX_STRAIN:
-            text = f"straightening this tube strains it by {100 * tube.straightened_strain:.1f} %: it would yield"
-            yield ("tubes", i, "curvature_per_m"), text
+        if (strain := tube.straightened_strain) > _MAX_STRAIN:
+            yield (
+                ("tubes", i, "curvature_per_m"),
+                f"straightening this tube strains it by {100 * strain:.1f} %: it yields",
+            )
         if (tube.curved_length == 0) != (tube.curvature == 0):
-            text = "curvature and curved length are zero together or not at all: this tube counts as straight"
+            text = "only one of curvature and curved length is zero: this tube counts as straight"
             yield ("tubes", i, "curved_length_mm"), text
     for i, (tube, around) in enumerate(pairwise(robot.tubes)):
         if around.inner_diameter > 0 and tube.outer_diameter > around.inner_diameter:
-            text = _too_narrow(around.inner_diameter_mm, i, tube.outer_diameter_mm)
-            yield ("tubes", i + 1, "inner_diameter_mm"), text
+            yield _too_narrow(around.inner_diameter_mm, i, tube.outer_diameter_mm)
     for name in ("actuation", "tracker", "uncertainty"):
         yield from _unusual(getattr(robot, name), (name,))
     if robot.gravity is None:
         yield ("gravity",), "not known: the tubes' own weight is left out"
-    elif 0 < np.linalg.norm(robot.gravity) < 9.7:
-        yield ("gravity",), f"its size is {np.linalg.norm(robot.gravity):.2f} m/s^2: on Earth it is 9.8"
+    elif 0 < (size := np.linalg.norm(robot.gravity)) < 9.7:
+        yield ("gravity",), f"its size is {size:.2f} m/s^2: on Earth it is 9.8"
     for unit in ("mm", "deg"):
         jitter, accuracy = (getattr(robot.tracker, f"{kind}_{unit}") for kind in ("jitter", "accuracy_95"))
         if jitter and accuracy and jitter > accuracy:
@@ -79,7 +80,7 @@ def path_text(path: FieldPath) -> str:
 
 
 def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
-    """Faults between fields; a field that is faulty by itself is passed over."""
+    """Faults between fields; fields that are faulty by themselves are skipped."""
     for i, tube in enumerate(tubes):
         yield from _relations_in_tube(("tubes", i), tube)
     yield from _nesting(tubes)
@@ -95,8 +96,7 @@ def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
 
 def _relations_in_tube(path: FieldPath, tube: dict) -> Iterator[Fault]:
     if tube.get("bending_stiffness_Nm2") is not None and tube.get("youngs_modulus_GPa") is not None:
-        text = "the stiffness is given twice: keep this or bending_stiffness_Nm2"
-        yield (*path, "youngs_modulus_GPa"), text
+        yield (*path, "youngs_modulus_GPa"), "the stiffness is given twice: keep this or bending_stiffness_Nm2"
     inner, outer = _number(tube, "inner_diameter_mm"), _number(tube, "outer_diameter_mm")
     if inner is not None and outer is not None and inner >= outer:
         yield (*path, "outer_diameter_mm"), f"{outer:g} mm is not above the inner diameter, {inner:g} mm"
@@ -112,18 +112,19 @@ def _nesting(tubes: list[dict]) -> Iterator[Fault]:
         return
     for i, (tube, around) in enumerate(pairwise(tubes)):
         inner = _number(around, "inner_diameter_mm")
-        # Published diameters are often fitted: a tube that dips into the wall around it is a doubt, one that is past
-        # the middle of that wall a fault.
+        # Published diameters are often fitted: a tube that reaches into the wall around it is a doubt, one that reaches
+        # past the middle of that wall a fault.
         if None not in (outer[i], inner, outer[i + 1]) and outer[i] > (inner + outer[i + 1]) / 2:
-            yield ("tubes", i + 1, "inner_diameter_mm"), _too_narrow(inner, i, outer[i])
+            yield _too_narrow(inner, i, outer[i])
         length, length_around = _number(tube, "length_mm"), _number(around, "length_mm")
         if length is not None and length_around is not None and length_around > length:
-            text = f"{length_around:g} mm is more than tube {i + 1} inside it, {length:g} mm: no joints fit both"
+            text = f"{length_around:g} mm is longer than tube {i + 1} inside it, {length:g} mm: no joints fit both"
             yield ("tubes", i + 1, "length_mm"), text
 
 
-def _too_narrow(inner_mm: float, tube_inside: int, outer_mm: float) -> str:
-    return f"{inner_mm:g} mm is too narrow for tube {tube_inside + 1} inside it, outer diameter {outer_mm:g} mm"
+def _too_narrow(inner_mm: float, inside: int, outer_mm: float) -> Fault:
+    text = f"{inner_mm:g} mm is too narrow for tube {inside + 1} inside it, outer diameter {outer_mm:g} mm"
+    return ("tubes", inside + 1, "inner_diameter_mm"), text
 
 
 def _missing_of_tubes(tubes: list[dict], weighed: bool) -> list[FieldPath]:

@@ -1,4 +1,4 @@
-"""The robot of a robot.yaml: the fields are the file's own, the properties give SI units.
+"""The robot of a robot.yaml: fields as in the file, with the unit in the name; properties in SI units.
 
 Tubes go from the innermost outwards. Base frame: origin where the tubes leave the front plate, z along insertion.
 """
@@ -16,10 +16,13 @@ from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
-AT_PLATE = 10e-6  # [m] in front of the plate: a calibration of a tube that never moves from it ends there
+AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
 
 Array = NDArray[np.float64]
 Three = Annotated[list[float], Len(3, 3)]
+TRANSLATIONS = Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
+ROTATIONS = Quantity("deg", usual=(0, 360), count="one number a tube,")
+BELOW = "its fields, indented below it"
 
 
 class Section(BaseModel):
@@ -35,7 +38,7 @@ class Section(BaseModel):
 
     @classmethod
     def expected(cls, field: str) -> str:
-        """What a field must hold, in words."""
+        """The value that a field needs, for messages."""
         info, quantity = cls.model_fields[field], cls.quantity(field)
         may_be_null = info.is_required() and type(None) in get_args(info.annotation)
         return (quantity.expected if quantity else info.description) + (" (null: not known)" if may_be_null else "")
@@ -68,12 +71,12 @@ class Tube(Section):
 
     @property
     def length(self) -> float:
-        """From the grasped point to the tip [m]."""
+        """Length from the grasped point to the tip [m]."""
         return 1e-3 * self.length_mm
 
     @property
     def curved_length(self) -> float:
-        """The precurved part, which ends at the tip [m]."""
+        """Length of the precurved part, which ends at the tip [m]."""
         return 1e-3 * self.curved_length_mm
 
     @property
@@ -83,34 +86,34 @@ class Tube(Section):
 
     @property
     def youngs_modulus(self) -> float:
-        """E [Pa]; 0 where the file gives the bending stiffness instead."""
+        """Young's modulus [Pa]; 0 where the file gives the bending stiffness instead."""
         return 1e9 * (self.youngs_modulus_GPa or 0.0)
 
     @property
     def inner_diameter(self) -> float:
-        """[m]; 0 where unknown."""
+        """Inner diameter [m]; 0 where unknown."""
         return 1e-3 * (self.inner_diameter_mm or 0.0)
 
     @property
     def outer_diameter(self) -> float:
-        """[m]; 0 where unknown."""
+        """Outer diameter [m]; 0 where unknown."""
         return 1e-3 * (self.outer_diameter_mm or 0.0)
 
     @property
     def bending_stiffness(self) -> float:
-        """EI [N m^2]."""
+        """Bending stiffness EI [N m^2]."""
         if self.bending_stiffness_Nm2 is not None:
             return self.bending_stiffness_Nm2
         return self.youngs_modulus * pi * (self.outer_diameter**4 - self.inner_diameter**4) / 64
 
     @property
     def torsional_stiffness(self) -> float:
-        """GJ = EI / (1 + nu) [N m^2], true of every annulus."""
+        """Torsional stiffness GJ = EI / (1 + nu) [N m^2], as for every annulus."""
         return self.bending_stiffness / (1 + self.poisson_ratio)
 
     @property
     def mass_per_length(self) -> float:
-        """[kg/m]; 0 where density or diameters are unknown."""
+        """Mass per length [kg/m]; 0 where density or diameters are unknown."""
         return (self.density_kg_m3 or 0.0) * pi * (self.outer_diameter**2 - self.inner_diameter**2) / 4
 
     @property
@@ -122,30 +125,26 @@ class Tube(Section):
 class Actuation(Section):
     """Transmission: q = rho * theta_motor + Delta. The homes, Delta, hold one value a tube.
 
-    Joints in a table are those of the controller that recorded it. Where a calibration has found other homes since,
-    the homes of that controller are kept as the recorded ones; without them both are the same.
+    A table holds the joints of the controller that recorded it. Once a calibration finds other homes, the recorded
+    ones keep those of that controller; without recorded ones both are the same.
     """
 
     translation_mm_per_rev: Annotated[float | None, Quantity("mm", usual=(0.01, 100))]
     rotation_rev_per_rev: Annotated[float | None, Quantity("", usual=(1e-4, 10))]
-    home_translation_mm: Annotated[list[float], Quantity("mm", usual=(0.1, 2000), count="one number a tube,")]
-    home_rotation_deg: Annotated[list[float], Quantity("deg", usual=(0, 360), count="one number a tube,")]
-    recorded_home_translation_mm: Annotated[
-        list[float] | None, Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
-    ] = None
-    recorded_home_rotation_deg: Annotated[
-        list[float] | None, Quantity("deg", usual=(0, 360), count="one number a tube,")
-    ] = None
+    home_translation_mm: Annotated[list[float], TRANSLATIONS]
+    home_rotation_deg: Annotated[list[float], ROTATIONS]
+    recorded_home_translation_mm: Annotated[list[float] | None, TRANSLATIONS] = None
+    recorded_home_rotation_deg: Annotated[list[float] | None, ROTATIONS] = None
 
     @property
     def translation_correction(self) -> Array:
-        """What the joints beta of a table lack (N,) [m]."""
+        """Correction (N,) [m] to add to the joints beta of a table."""
         recorded = self.recorded_home_translation_mm or self.home_translation_mm
         return 1e-3 * (np.array(self.home_translation_mm) - np.array(recorded))
 
     @property
     def rotation_correction(self) -> Array:
-        """What the joints alpha of a table lack (N,) [rad]."""
+        """Correction (N,) [rad] to add to the joints alpha of a table."""
         recorded = self.recorded_home_rotation_deg or self.home_rotation_deg
         return np.deg2rad(np.array(self.home_rotation_deg) - np.array(recorded))
 
@@ -153,8 +152,8 @@ class Actuation(Section):
 class Tracker(Section):
     """The sensor, and T_ref, the pose of the robot base frame in the tracker frame.
 
-    `sensor_roll_deg` is how far the sensor's axes are turned against those of the tip, about their common z axis;
-    without it they agree. Where `sensor_roll` is unknown, fits find it.
+    `sensor_roll_deg` is the rotation of the sensor's axes against those of the tip about their common z axis; without
+    it they agree. Where `sensor_roll` is unknown, fits estimate it.
     """
 
     sensor_on_tube: Annotated[int, Field(ge=1, description="the number of a tube, innermost 1")]
@@ -180,7 +179,7 @@ class Tracker(Section):
 
     @property
     def roll(self) -> float:
-        """Of the sensor's axes against those of the tip, about their common z axis [rad]."""
+        """Rotation of the sensor's axes against those of the tip about their common z axis [rad]."""
         return np.deg2rad(self.sensor_roll_deg or 0.0)
 
     @property
@@ -190,7 +189,7 @@ class Tracker(Section):
 
 
 class Uncertainty(Section):
-    """One standard deviation of what calibration may move, independent per tube and per axis."""
+    """Prior standard deviations of calibration parameters, independent per tube and per axis."""
 
     tracker_frame_mm: Annotated[float, Quantity("mm", usual=(1e-3, 100), least=0)]
     tracker_frame_deg: Annotated[float, Quantity("deg", usual=(1e-3, 90), least=0)]
@@ -212,15 +211,15 @@ class Robot(Section):
     name: str = Field(description="text")
     gravity: Annotated[Three | None, Quantity("m/s^2", usual=(0, 9.9), count="three numbers")]
     tubes: Annotated[list[Tube], Len(1, MAX_TUBES)] = Field(description=f"a list of 1 to {MAX_TUBES} tubes")
-    actuation: Actuation = Field(description="its fields, indented below it")
-    tracker: Tracker = Field(description="its fields, indented below it")
-    uncertainty: Uncertainty = Field(description="its fields, indented below it")
+    actuation: Actuation = Field(description=BELOW)
+    tracker: Tracker = Field(description=BELOW)
+    uncertainty: Uncertainty = Field(description=BELOW)
     effects: dict[str, dict[str, float | list[float]]] = Field(
         default_factory=dict, description="the name of each effect with its parameters, indented below it"
     )
     history: list[dict[str, Any]] = Field(default_factory=list, description="a list of what was changed, oldest first")
 
-    _source: Any = PrivateAttr(None)  # what robot_file loaded it from: lines for warnings, layout for saving
+    _source: Any = PrivateAttr(None)  # file, text and lines that robot_file loaded it from
 
     @property
     def n_tubes(self) -> int:
@@ -237,28 +236,20 @@ class Robot(Section):
         return np.array(self.gravity or (0.0, 0.0, 0.0))
 
     def joints_of_table(self, beta: Array, alpha: Array) -> tuple[Array, Array]:
-        """The joints beta [m], alpha [rad] (M, N) of this robot where a table holds those of its controller.
+        """The joints beta [m], alpha [rad] (M, N) of this robot for the joints of its controller in a table.
 
-        What a correction puts in front of the plate by less than AT_PLATE is at the plate.
+        A tube that the correction puts less than AT_PLATE in front of the plate is at the plate.
         """
         beta = beta + self.actuation.translation_correction
         beta = np.where((beta > 0) & (beta < AT_PLATE), 0.0, beta)
         return beta, alpha + self.actuation.rotation_correction
 
     def core_parameters(self) -> dict[str, Array]:
-        """What the compiled model needs, in SI units: one array (N,) a tube property, and gravity (3,).
+        """Parameters of the compiled model in SI units: arrays (N,) of tube properties, and gravity (3,).
 
         `bending_stiffness` is 0 where it follows from Young's modulus and the diameters.
         """
-        names = (
-            "youngs_modulus",
-            "poisson_ratio",
-            "inner_diameter",
-            "outer_diameter",
-            "length",
-            "curved_length",
-            "curvature",
-        )
+        names = "youngs_modulus poisson_ratio inner_diameter outer_diameter length curved_length curvature".split()
         parameters = {name: np.array([float(getattr(tube, name)) for tube in self.tubes]) for name in names}
         parameters["density"] = np.array([tube.density_kg_m3 or 0.0 for tube in self.tubes])
         parameters["bending_stiffness"] = np.array([tube.bending_stiffness_Nm2 or 0.0 for tube in self.tubes])

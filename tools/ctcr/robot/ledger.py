@@ -1,21 +1,20 @@
 """Writes a changed robot file: the comments, order and layout of the old one, the new values, and a ledger.
 
-The ledger, `history`, holds an entry a change: when, by which command, from which measurements, what each value was and
-is, and how large the error was. Old values are never lost.
+The ledger, `history`, holds an entry a change: its date, command and measurements, the old and the new value of each
+field, and the error before and after. Old values are never lost.
 """
 
 import hashlib
-import io
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr.errors import InputError, Problem, file_fault
 from ctcr.robot import robot_file
@@ -24,7 +23,6 @@ from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show.output import atomic_writer
 
-LINE_WIDTH = 1000  # a row of the ledger stays one line
 _RECORDED = {"home_translation_mm": "recorded_home_translation_mm", "home_rotation_deg": "recorded_home_rotation_deg"}
 _RECORDED_NOTE = "of the controller that recorded the tables; remove once it uses the homes above"
 
@@ -42,7 +40,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Entry:
-    """What the ledger keeps beside the values. `figures`: plain numbers with the unit in the name, such as `rms_mm`."""
+    """An entry of the ledger, but for the values. `figures`: numbers with the unit in the name, such as `rms_mm`."""
 
     command: str
     sources: Sequence[str | Path] = ()
@@ -68,16 +66,19 @@ def write(
     source = robot._source
     if source and not in_place and os.path.realpath(target) == os.path.realpath(source.file):
         raise InputError(Problem("is the input: give another name to -o, or --in-place to change it", str(target)))
-    yaml, document = _document(robot)
+    yaml, document = robot_file.layout(robot)
     rows = [_apply(document, change) for change in changes]
     if effects is not None:
         _set_effects(document, effects)
     document.setdefault("history", CommentedSeq()).append(_ledger_entry(entry, rows))
-    text = io.StringIO()
-    yaml.dump(document, text)
-    updated = _checked(text.getvalue(), str(target))
+    text = robot_file.dumped(yaml, document)
+    try:
+        updated = robot_file.parse(text.encode(), str(target))
+    except InputError as error:
+        found = [Problem(f"the new value {p.message}", str(target), field=p.field) for p in error.problems]
+        raise InputError(found, error.omitted) from None
     with atomic_writer(target) as file:
-        file.write(text.getvalue())
+        file.write(text)
     return updated
 
 
@@ -90,31 +91,14 @@ def sha256(path: str | Path) -> str:
         raise file_fault(error, path, "read") from None
 
 
-def _document(robot: Robot) -> tuple[YAML, CommentedMap]:
-    """The robot's document with its layout, and a writer that keeps the layout."""
-    yaml = YAML(typ="rt", pure=True)
-    yaml.preserve_quotes = True
-    yaml.width = LINE_WIDTH
-    if robot._source is None:
-        text = io.StringIO()
-        yaml.dump(robot.model_dump(exclude_unset=True), text)
-        return yaml, yaml.load(text.getvalue())
-    _, indent, offset = load_yaml_guess_indent(robot._source.text)
-    if indent is not None:
-        yaml.indent(mapping=2, sequence=indent, offset=offset or 0)
-    return yaml, yaml.load(robot._source.text)
-
-
 def _apply(document: CommentedMap, change: Change) -> CommentedMap:
     """Sets one value; returns its row of the ledger."""
     *parents, last = change.path
-    place = document
-    for step in parents:
-        place = place[step]
-    old, new = place.get(last) if isinstance(place, dict) else place[last], _shortest(change.new)
+    parent = reduce(getitem, parents, document)
+    old, new = parent.get(last) if isinstance(parent, dict) else parent[last], _shortest(change.new)
     if change.path[0] == "actuation" and change.path[1] in _RECORDED:
         _keep_recorded(document["actuation"], change.path[1])
-    place[last] = new
+    parent[last] = new
     row = {"field": path_text(change.path), "unit": change.unit, "old": _plain(old), "new": new}
     if change.deviation is not None:
         row["sd"] = _shortest(change.deviation, 3)
@@ -122,6 +106,7 @@ def _apply(document: CommentedMap, change: Change) -> CommentedMap:
 
 
 def _keep_recorded(actuation: CommentedMap, key: str) -> None:
+    """Keeps homes that are about to change as the recorded ones, unless there are such already."""
     kept = _RECORDED[key]
     if actuation.get(kept) is not None:
         return
@@ -155,18 +140,8 @@ def _ledger_entry(entry: Entry, rows: list[CommentedMap]) -> CommentedMap:
     return made
 
 
-def _checked(text: str, target: str) -> Robot:
-    try:
-        return robot_file.parse(text.encode(), target)
-    except InputError as error:
-        problems = [
-            Problem(f"the new value {problem.message}", target, field=problem.field) for problem in error.problems
-        ]
-        raise InputError(problems, error.omitted) from None
-
-
 def _tidy(value: Any) -> Any:
-    """What the file shows of a mapping: numbers not longer than they mean, lists on one line."""
+    """A value in the layout of the file: numbers of eight digits, lists and mappings of numbers on one line."""
     if isinstance(value, Mapping):
         made = CommentedMap({str(key): _tidy(each) for key, each in value.items()})
         if made and all(isinstance(each, int | float) for each in made.values()):
@@ -181,7 +156,7 @@ def _tidy(value: Any) -> Any:
     return _shortest(value) if isinstance(value, float) else value
 
 
-def _one_line(row: dict[str, Any]) -> CommentedMap:
+def _one_line(row: Mapping[str, Any]) -> CommentedMap:
     made = CommentedMap(row)
     made.fa.set_flow_style()
     return made

@@ -1,25 +1,29 @@
 """Reads and writes robot.yaml.
 
-`load` reports every error of a file at once, `warnings` what looks wrong; `save` keeps the comments and the layout of
-the file that the robot came from.
+`load` reports every error of a file at once, `warnings` values that are possible but look wrong. `save` keeps the
+comments and the layout of the file that the robot came from.
 """
 
 import io
-from collections.abc import Collection
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.util import load_yaml_guess_indent
 
-from ctcr.errors import InputError, Problem, did_you_mean, file_fault
+from ctcr import _core
+from ctcr.errors import InputError, Problem, file_fault, suggestion
 from ctcr.robot import checks, yaml_document
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
 
 MAX_BYTES = 1 << 20  # a robot file is a few kB: anything bigger is something else, often the table
+LINE_WIDTH = 1000  # a row of the ledger stays one line
+
+user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
 
 class _Source(NamedTuple):
@@ -29,7 +33,7 @@ class _Source(NamedTuple):
 
 
 def load(path: str | Path) -> Robot:
-    """The robot described by a file. Raises InputError with all the faults of the file."""
+    """The robot described by a file. Raises InputError with all faults of the file."""
     try:
         with open(path, "rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -57,7 +61,7 @@ def parse(content: bytes, file: str = "robot.yaml") -> Robot:
 
 
 def warnings(robot: Robot) -> list[Problem]:
-    """What is possible but looks wrong, with unit and place."""
+    """Values that are possible but look wrong, with unit, field and line."""
     source = robot._source
     line_of = source.document.line if source else lambda path: None
     return checks.problems(list(checks.doubts(robot)), source.file if source else None, line_of)
@@ -65,36 +69,46 @@ def warnings(robot: Robot) -> list[Problem]:
 
 def save(robot: Robot, path: str | Path) -> None:
     """Writes a robot; where it was loaded from a file, only the values that changed differ from that file."""
+    yaml, document = layout(robot)
+    with atomic_writer(path) as file:
+        file.write(dumped(yaml, _updated(document, robot.model_dump(exclude_unset=True))))
+
+
+def layout(robot: Robot) -> tuple[YAML, CommentedMap]:
+    """The document of a robot with the comments and order of its file, and a writer that keeps indents and quotes."""
     yaml = YAML(typ="rt", pure=True)
     yaml.preserve_quotes = True
-    values = robot.model_dump(exclude_unset=True)
-    document = _updated(yaml.load(robot._source.text), values) if robot._source else values
+    yaml.width = LINE_WIDTH
+    if robot._source is None:
+        return yaml, yaml.load(dumped(yaml, robot.model_dump(exclude_unset=True)))
+    _, indent, offset = load_yaml_guess_indent(robot._source.text)
+    if indent is not None:
+        yaml.indent(mapping=2, sequence=indent, offset=offset or 0)
+    return yaml, yaml.load(robot._source.text)
+
+
+def dumped(yaml: YAML, document: Any) -> str:
+    """The text of a document."""
     text = io.StringIO()
     yaml.dump(document, text)
-    with atomic_writer(path) as file:
-        file.write(text.getvalue())
+    return text.getvalue()
 
 
-def known_effects() -> Collection[str] | None:
-    """Ids of the effects that a file may hold; None where there is no catalogue, and any id passes."""
-    try:
-        return import_module("ctcr.effects.catalogue").known_effects()
-    except ModuleNotFoundError:
-        return None
+def known_effects() -> list[str]:
+    """Ids of the effects that a file may hold."""
+    return [effect.id for effect in _core.effect_catalogue()] + list(user_effects)
 
 
 def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
     effects = data.get("effects")
-    known = known_effects() if isinstance(effects, dict) and effects else None
-    if known is None:
+    if not isinstance(effects, dict):
         return []
-    found = []
-    for name in effects:
-        if name not in known:
-            meant = did_you_mean(str(name), known)
-            hint = f": did you mean {meant}?" if meant else ": `ctcr effects` lists those there are"
-            found.append((("effects", name), f"unknown effect{hint}"))
-    return found
+    known, hint = known_effects(), "`ctcr effects` lists those there are"
+    return [
+        (("effects", name), f"unknown effect: {suggestion(str(name), known, hint)}")
+        for name in effects
+        if name not in known
+    ]
 
 
 def _text(content: bytes, file: str) -> str:

@@ -1,11 +1,11 @@
-"""A physical quantity of an input file: its unit, what is possible, what is usual, and which unit was meant."""
+"""A physical quantity of an input file: its unit, possible and usual values, and a guess of the unit that was meant."""
 
 from dataclasses import dataclass
 from math import pi
 
-LARGEST = 1e15  # no quantity of ours, in no unit that people write, goes beyond
+LARGEST = 1e15  # beyond any quantity here in any unit that people write
 
-# unit -> (unit that people write instead, what one of those is in our unit)
+# unit -> (unit that people write instead, its size in our unit)
 _OTHER_UNITS = {
     "m": (("mm", 1e-3), ("um", 1e-6)),
     "mm": (("m", 1e3), ("um", 1e-3)),
@@ -27,9 +27,9 @@ _OTHER_UNITS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """Values are possible above `above` (exclusive), from `least` to `most`; `usual` bounds their size, zero aside.
+    """Values are possible above `above` (exclusive), from `least` to `most`; `usual` bounds their size unless zero.
 
-    `count` says in words how many values there are.
+    `count` names the number of values in messages.
     """
 
     unit: str
@@ -41,12 +41,9 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """What a value must be, in words."""
-        bounds = [
-            f"{sign} {bound:g}"
-            for sign, bound in ((">", self.above), (">=", self.least), ("<=", self.most))
-            if bound is not None
-        ]
+        """The value needed, for messages."""
+        signs = {">": self.above, ">=": self.least, "<=": self.most}
+        bounds = [f"{sign} {bound:g}" for sign, bound in signs.items() if bound is not None]
         unit = f"in {self.unit}" if self.unit else "without unit"
         return f"{self.count} {unit}" + (f", {' and '.join(bounds)}" if bounds else "")
 
@@ -61,7 +58,7 @@ class Quantity:
         return self.usual is None or value == 0 or self.usual[0] <= abs(value) <= self.usual[1]
 
     def doubt(self, value: float) -> str:
-        """Why an unusual value looks wrong, with the unit that was probably meant."""
+        """Message on an unusual value, with the unit that was probably meant."""
         text = f"{value:g} {self.unit}".rstrip()
         for unit, factor in _OTHER_UNITS.get(self.unit, ()):
             if self.is_usual(value * factor) and self.is_possible(value * factor):
