@@ -1,4 +1,4 @@
-"""What a calibration procedure found, and how it is given back: table, JSON, robot file."""
+"""The result of a calibration procedure, and how it is given back: table, JSON, report, robot file."""
 
 import html
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from ctcr.calibrate.procedure_figures import WIDTH
 from ctcr.errors import InputError, Problem
 from ctcr.robot import ledger
 from ctcr.robot.ledger import Change, Entry
+from ctcr.robot.yaml_document import FieldPath
 from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, figure, table
 from ctcr.show.output import atomic_writer
@@ -29,7 +30,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Picture:
-    """What a report draws: plot(figure, subject)."""
+    """A picture of the report: plot(figure, subject)."""
 
     plot: Callable
     subject: Any
@@ -39,7 +40,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The rows to show, what to say about them, and what changes in the robot file."""
+    """The rows to show, notices about them, and the changes of the robot file."""
 
     title: str
     rows: list[Row]
@@ -59,11 +60,20 @@ class Outcome:
 
 
 def computed(procedure: Callable, file: str, **arguments):
-    """Calls a procedure of the compiled core; what it refuses becomes the fault of the file."""
+    """Calls a procedure of the compiled core; its ValueError becomes a fault of the file."""
     try:
         return procedure(**arguments)
     except ValueError as error:
         raise InputError(Problem(str(error), file)) from None
+
+
+def in_file(robot, path: FieldPath) -> float:
+    """The number at a path such as ("tubes", 0, "length_mm"); NaN without a robot, or where the file has none."""
+    value = robot
+    for step in path:
+        if value is not None:
+            value = value[step] if isinstance(step, int) else getattr(value, step)
+    return nan if value is None else value
 
 
 def check_target(robot, target: str | None, in_place: bool, needed: bool = False) -> str | None:
@@ -120,7 +130,7 @@ def digits(deviation: float) -> int:
 
 
 def write(outcome: Outcome, target: str | Path, source: str, command: str, robot=None) -> None:
-    """Writes the report; source says what was measured. Raises InputError where the file cannot be written."""
+    """Writes the report; `source` names the table. Raises InputError where the file cannot be written."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
     sections = [f"<h1>{html.escape(title)}</h1>"]
     if outcome.notices:

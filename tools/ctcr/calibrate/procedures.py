@@ -1,9 +1,10 @@
-"""The procedures that measure one thing of the robot at a time: from a small table to an Outcome.
+"""The procedures that measure one quantity of the assembled robot each: from a small table to an Outcome.
 
 The numbers come from the core.
 """
 
-from math import degrees, isfinite, nan
+from collections.abc import Sequence
+from math import degrees, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import _core
 from ctcr.calibrate import procedure_figures as figures_of
-from ctcr.calibrate.outcome import Outcome, Picture, Row, computed
+from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
@@ -23,7 +24,7 @@ Array = NDArray[np.float64]
 SIGMAS_AT_95 = 2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
 AXES = "xyz"
 
-SCATTER = (  # of a reading that is the mean of several: their standard deviation per axis, and how many
+SCATTER = (  # where a row is a mean: the standard deviation of one reading per axis, and their number
     Column("scatter", "length", needed=False, filled=False),
     Column("readings", "count", needed=False, filled=False),
 )
@@ -46,9 +47,9 @@ HOME = (
 
 
 def tracker_noise(robot: Robot | None, table: Table | None = None) -> dict[str, float]:
-    """Jitter and smooth error of a reading per axis [m], as the robot file states them; 0: not known.
+    """Jitter and smooth field error of a reading per axis [m], as the robot file states them; 0: not known.
 
-    The jitter of a table whose readings are means is that of their scatter.
+    Where the rows of the table are means, their jitter follows from their scatter.
     """
     noise = {}
     if robot is not None:
@@ -68,38 +69,37 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
     ratio = _rotation_ratio(robot, ratio)
     rows, notices, changes, details, circles = [], [], [], {}, []
     for tube in np.unique(tubes).tolist():
-        mine = np.flatnonzero(tubes == tube)
+        mine, name = np.flatnonzero(tubes == tube), f"tube {tube}"
         check_tube(tube, robot, table.file, int(table.row[mine[0]]))
+        position, angle = np.ascontiguousarray(table.stacked(*AXES)[mine]), table["motor_angle"][mine]
+        direction = table["direction"][mine].astype(np.int8) if "direction" in table else None
         fit = computed(
             _core.fit_rotation_offset,
             table.file,
-            motor_angle=table["motor_angle"][mine],
-            position=np.ascontiguousarray(table.stacked(*AXES)[mine]),
-            direction=table["direction"][mine].astype(np.int8) if "direction" in table else None,
+            motor_angle=angle,
+            position=position,
+            direction=direction,
             ratio=ratio,
             T_ref=_tracker_pose(robot) if robot else None,
             bend_angle=-np.pi / 2 if robot is None or robot.tubes[tube - 1].curvature >= 0 else np.pi / 2,
             **tracker_noise(robot, table),
         )
-        name = f"tube {tube}"
-        old = robot.actuation.home_rotation_deg[tube - 1] if robot else nan
-        offset = degrees(fit.offset)
+        path = ("actuation", "home_rotation_deg", tube - 1)
+        offset, old = degrees(fit.offset), in_file(robot, path)
         if robot:
-            offset += 360 * round((old - offset) / 360)  # the same angle, on the turn of the old value
-            changes.append(Change(("actuation", "home_rotation_deg", tube - 1), "deg", offset, degrees(fit.offset_sd)))
+            offset = _nearest_turn(offset, old)
+            changes.append(Change(path, "deg", offset, degrees(fit.offset_sd)))
         rows.append(Row(f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), old))
         for way in ("forward", "backward"):
             value, sd = getattr(fit, f"offset_{way}"), getattr(fit, f"offset_{way}_sd")
             if isfinite(value):
-                turned = degrees(value) + 360 * round((offset - degrees(value)) / 360)
-                rows.append(Row(f"    turning {way}", "deg", turned, degrees(sd)))
+                rows.append(Row(f"    turning {way}", "deg", _nearest_turn(degrees(value), offset), degrees(sd)))
         rows.append(Row("    radius of the circle", "mm", 1e3 * fit.radius, 1e3 * fit.radius_sd))
         rows.append(Row("    distance from the circle, RMS", "mm", 1e3 * fit.rms))
         notices += [f"{name}: {notice.text}" for notice in fit.notices]
-        notices += left_out(name, [int(table.row[mine[i]]) for i in fit.outliers])
-        position, angle = table.stacked(*AXES)[mine], table["motor_angle"][mine]
-        moved = np.diff(angle)
-        forward = table["direction"][mine] > 0 if "direction" in table else np.append(moved[:1], moved) > 0
+        notices += outliers(name, table.row[mine[list(fit.outliers)]])
+        turned = np.diff(angle)
+        forward = (np.append(turned[:1], turned) if direction is None else direction) > 0
         circles.append(figures_of.circle_of(name, position, ratio * angle, forward, fit, robot))
         details[f"tube_{tube}"] = {
             "centre_mm": 1e3 * np.asarray(fit.centre),
@@ -113,140 +113,111 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         }
     figures = {f"radius_rms_mm_{name}": detail["rms_mm"] for name, detail in details.items()}
     caption = (
-        "Left: the readings on the circle fitted to them. Right: how far the tip is from where its motor says; where "
-        "the two ways differ, friction or backlash holds it back."
+        "Left: the readings on the circle fitted to them. Right: the angle of the tip less that of its motor; where "
+        "the two directions differ, friction or backlash holds the tip back."
     )
     picture = Picture(figures_of.circles, circles, caption, figures_of.ROW_HEIGHT * len(circles))
     return Outcome("Rotation offsets", rows, notices, changes, figures, {"tubes": details}, picture)
+
+
+def _nearest_turn(angle: float, other: float) -> float:
+    """The same angle [deg], on the turn nearest to the other."""
+    return angle + 360 * round((other - angle) / 360)
 
 
 def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> Outcome:
     """T_ref from named points: CAD coordinates in the base frame, probe readings in the tracker frame."""
     names = list(dict.fromkeys(table["point"]))
     cad, reading = table.stacked(*(f"cad_{axis}" for axis in AXES)), table.stacked(*AXES)
-    first = np.array([table["point"].index(name) for name in names])
-    place = cad[first]
-    _check_same_place(table, names, cad, place)
+    point = cad[[table["point"].index(name) for name in names]]
+    _check_points(table, names, cad, point)
     measured = np.isfinite(reading).all(axis=1)
     read = [name for name, there in zip(table["point"], measured, strict=True) if there]
-    targets = np.array([name not in read for name in names])
+    targets = [i for i, name in enumerate(names) if name not in read]
+    fiducials = [i for i, name in enumerate(names) if name in read]
     fit = computed(
         _core.register_points,
         table.file,
-        names=[name for name, target in zip(names, targets, strict=True) if not target],
-        cad=np.ascontiguousarray(place[~targets]),
+        names=[names[i] for i in fiducials],
+        cad=np.ascontiguousarray(point[fiducials]),
         reading_names=read,
         readings=np.ascontiguousarray(reading[measured]),
-        targets=np.ascontiguousarray(place[targets]) if targets.any() else None,
+        targets=np.ascontiguousarray(point[targets]) if targets else None,
         placement_sd=1e-3 * placement_sd_mm,
         **tracker_noise(robot, table),
     )
     position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
-    old_position = robot.tracker.position_mm if robot else [nan] * 3
-    old_turn = robot.tracker.rotation_vector_rad if robot else [nan] * 3
-    rows = [
-        Row(f"origin of the base frame, {axis}", "mm", position[i], 1e3 * fit.position_sd[i], old_position[i])
-        for i, axis in enumerate(AXES)
-    ]
-    rows += [
-        Row(f"rotation vector, {axis}", "rad", turn[i], fit.rotation_sd[i], old_turn[i]) for i, axis in enumerate(AXES)
-    ]
+    rows, changes = [], []
+    for field, text, unit, values, sds in (
+        ("position_mm", "origin of the base frame", "mm", position, 1e3 * np.asarray(fit.position_sd)),
+        ("rotation_vector_rad", "rotation vector", "rad", turn, fit.rotation_sd),
+    ):
+        for i, axis in enumerate(AXES):
+            path = ("tracker", field, i)
+            rows.append(Row(f"{text}, {axis}", unit, values[i], sds[i], in_file(robot, path)))
+            changes.append(Change(path, unit, values[i], sds[i] if unit == "mm" else None))
     rows.append(Row("error at the points, RMS", "mm", 1e3 * fit.fre))
-    names_of_targets = [name for name, target in zip(names, targets, strict=True) if target]
-    rows += [
-        Row(f"expected error at {name}, RMS", "mm", 1e3 * tre)
-        for name, tre in zip(names_of_targets, fit.tre, strict=True)
-    ]
-    changes = [Change(("tracker", "position_mm", i), "mm", position[i], 1e3 * fit.position_sd[i]) for i in range(3)]
-    changes += [Change(("tracker", "rotation_vector_rad", i), "rad", turn[i]) for i in range(3)]
-    residual = 1e3 * np.linalg.norm(fit.residuals, axis=1)
-    figures = {"fiducial_error_rms_mm": 1e3 * fit.fre, "rotation_sd_deg": np.degrees(fit.rotation_sd)}
+    expected = zip(targets, fit.tre, strict=True)
+    rows += [Row(f"expected error at {names[i]}, RMS", "mm", 1e3 * tre) for i, tre in expected]
+    columns = (fit.names, 1e3 * fit.residuals, 1e3 * np.linalg.norm(fit.residuals, axis=1), fit.counts)
+    keys = ("name", "residual_mm", "distance_mm", "readings")
+    points = [dict(zip(keys, values, strict=True)) for values in zip(*columns, strict=True)]
     details = {
-        "points": [
-            {
-                "name": name,
-                "residual_mm": 1e3 * vector,
-                "distance_mm": size,
-                "readings": count,
-                "outlier": name in fit.outliers,
-            }
-            for name, vector, size, count in zip(fit.names, fit.residuals, residual, fit.counts, strict=True)
-        ],
+        "points": [one | {"outlier": one["name"] in fit.outliers} for one in points],
         "T_ref_m": fit.T_ref,
         "degrees_of_freedom": fit.degrees_of_freedom,
         "repeatability_mm": 1e3 * fit.repeatability_sd,
     }
-    where = 1e3 * np.array([place[names.index(name)] for name in fit.names])
-    caption = "Left: where the readings lie against the CAD points. Right: how far."
+    figures = {"fiducial_error_rms_mm": 1e3 * fit.fre, "rotation_sd_deg": np.degrees(fit.rotation_sd)}
+    where = 1e3 * point[[names.index(name) for name in fit.names]]
+    caption = "Left: displacement of the readings from the CAD points. Right: its size."
     picture = Picture(figures_of.points, (where, fit), caption, 4.4)
     return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], changes, figures, details, picture)
 
 
 def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict[str, float]) -> Outcome:
-    """Home translations and effective lengths, from what is measured by hand and by the encoders."""
+    """Home translations and effective lengths, from distances by hand and angles by the encoders."""
     tubes = _all_tubes(table, robot)
     pitch = robot.actuation.translation_mm_per_rev if robot and pitch_mm is None else pitch_mm
     if pitch is None:
         raise InputError(Problem("give --pitch-mm, how far a tube moves in one turn of its motor, or --robot"))
 
     def values(tube: int, name: str) -> list[float]:
-        if name not in table:
-            return []
-        mine = table[name][table["tube"] == tube]
+        mine = table[name][table["tube"] == tube] if name in table else np.empty(0)
         return mine[np.isfinite(mine)].tolist()
 
-    measured = []
-    for tube in tubes:
-        angles = values(tube, "home_angle")
-        measured.append(
-            _core.TubeHome(
-                home_angle=float(np.mean(angles)) if angles else 0.0,
-                distances=values(tube, "distance"),
-                flush_angles=values(tube, "flush_angle"),
-                lengths=values(tube, "length"),
-            )
+    measured = [
+        _core.TubeHome(
+            home_angle=float(np.mean(values(tube, "home_angle") or 0.0)),
+            distances=values(tube, "distance"),
+            flush_angles=values(tube, "flush_angle"),
+            lengths=values(tube, "length"),
         )
-    fit = computed(
-        _core.home_offsets,
-        table.file,
-        translation_ratio=1e-3 * pitch / (2 * np.pi),
-        tubes=measured,
-        **{name: 1e-3 * sd for name, sd in sds_mm.items()},
-    )
-    rows, changes = [], []
-    for i, tube in enumerate(tubes):
-        for name, path, value, sd, old in (
-            (
-                "home translation",
-                ("actuation", "home_translation_mm", i),
-                fit.offset[i],
-                fit.offset_sd[i],
-                robot.actuation.home_translation_mm[i] if robot else nan,
-            ),
-            (
-                "length",
-                ("tubes", i, "length_mm"),
-                fit.length[i],
-                fit.length_sd[i],
-                robot.tubes[i].length_mm if robot else nan,
-            ),
-        ):
-            rows.append(Row(f"tube {tube}: {name}", "mm", 1e3 * value, 1e3 * sd, old))
-            changes.append(Change(path, "mm", 1e3 * value, 1e3 * sd))
-        rows.append(Row("    deployed at home", "mm", 1e3 * fit.deployed[i], 1e3 * fit.deployed_sd[i]))
-    old = [
-        [robot.actuation.home_translation_mm[i], robot.actuation.home_translation_mm[i] + robot.tubes[i].length_mm]
-        if robot
-        else [nan, nan]
-        for i in range(len(tubes))
+        for tube in tubes
     ]
-    ends = (1e3 * np.array(fit.offset), 1e3 * np.array(fit.deployed))
-    sd = 1e3 * np.column_stack([fit.offset_sd, fit.deployed_sd])
-    caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
-    picture = Picture(figures_of.homes, (tubes, *ends, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
-    return Outcome(
-        "Home", rows, [notice.text for notice in fit.notices], changes, {}, {"correlation": fit.correlation}, picture
+    sds, ratio = {name: 1e-3 * sd for name, sd in sds_mm.items()}, 1e-3 * pitch / (2 * np.pi)
+    fit = computed(_core.home_offsets, table.file, translation_ratio=ratio, tubes=measured, **sds)
+    offset, offset_sd, length, length_sd, deployed, deployed_sd = (
+        1e3 * np.asarray(getattr(fit, name))
+        for name in ("offset", "offset_sd", "length", "length_sd", "deployed", "deployed_sd")
     )
+    rows, changes, old = [], [], []
+    for i, tube in enumerate(tubes):
+        before = []
+        for name, path, value, sd in (
+            ("home translation", ("actuation", "home_translation_mm", i), offset[i], offset_sd[i]),
+            ("length", ("tubes", i, "length_mm"), length[i], length_sd[i]),
+        ):
+            before.append(in_file(robot, path))
+            rows.append(Row(f"tube {tube}: {name}", "mm", value, sd, before[-1]))
+            changes.append(Change(path, "mm", value, sd))
+        rows.append(Row("    deployed at home", "mm", deployed[i], deployed_sd[i]))
+        old.append(np.cumsum(before))  # grasped point and tip
+    sd = np.column_stack([offset_sd, deployed_sd])
+    caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
+    picture = Picture(figures_of.homes, (tubes, offset, deployed, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
+    notices, details = [notice.text for notice in fit.notices], {"correlation": fit.correlation}
+    return Outcome("Home", rows, notices, changes, {}, details, picture)
 
 
 def _tracker_pose(robot: Robot) -> Array:
@@ -279,23 +250,20 @@ def _all_tubes(table: Table, robot: Robot | None) -> list[int]:
     return there
 
 
-def _check_same_place(table: Table, names: list[str], cad: Array, place: Array) -> None:
+def _check_points(table: Table, names: list[str], cad: Array, point: Array) -> None:
+    """Raises InputError where rows of one point differ in CAD coordinates, or a reading is not whole."""
     problems = []
-    for name, there in zip(names, place, strict=True):
-        for i, (other, point) in enumerate(zip(table["point"], cad, strict=True)):
-            if other == name and np.max(np.abs(point - there)) > 1e-6:
-                text = f"the CAD coordinates of {name} differ from those in another row"
-                problems.append(Problem(text, table.file, int(table.row[i]), "cad_x", line_name="row"))
-    partly = np.isfinite(table.stacked(*AXES)).sum(axis=1)
-    for row in table.row[(partly > 0) & (partly < 3)]:
-        text = "some of x, y, z are empty: fill in all or none"
-        problems.append(Problem(text, table.file, int(row), line_name="row"))
+    for row, name, xyz in zip(table.row.tolist(), table["point"], cad, strict=True):
+        if np.max(np.abs(xyz - point[names.index(name)])) > 1e-6:
+            text = f"the CAD coordinates of {name} differ from those in another row"
+            problems.append(Problem(text, table.file, row, "cad_x", line_name="row"))
+    known = np.isfinite(table.stacked(*AXES)).sum(axis=1)
+    for row in table.row[(known > 0) & (known < 3)].tolist():
+        problems.append(Problem("some of x, y, z are empty: fill in all or none", table.file, row, line_name="row"))
     if problems:
         raise InputError(problems)
 
 
-def left_out(name: str, rows: list[int]) -> list[str]:
+def outliers(name: str, rows: Sequence[int]) -> list[str]:
     """A notice of outliers, by their rows of the file."""
-    if not rows:
-        return []
-    return [f"{name}: outliers, not used: rows {listed(rows, 10)}".removeprefix(": ")]
+    return [f"{name}: outliers, not used: rows {listed(rows, 10)}".removeprefix(": ")] if len(rows) else []

@@ -1,4 +1,4 @@
-"""What is measured of a tube before it is in the robot: its stiffness on a bench, its shape in a picture."""
+"""The procedures that measure a single tube: its stiffness as a cantilever, its shape in a picture."""
 
 from math import nan
 
@@ -7,7 +7,7 @@ import numpy as np
 from ctcr import _core
 from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed
-from ctcr.calibrate.procedures import check_tube, left_out
+from ctcr.calibrate.procedures import check_tube, outliers
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
@@ -50,32 +50,15 @@ def cantilever(
         **{name: 1e-3 * sd for name, sd in sds_mm.items()},
     )
     given_EI = described is not None and described.bending_stiffness_Nm2 is not None
-    old = described.youngs_modulus_GPa if described is not None and not given_EI else None
-    rows = [
-        Row(
-            "Young's modulus",
-            "GPa",
-            1e-9 * fit.youngs_modulus,
-            1e-9 * fit.youngs_modulus_sd,
-            nan if old is None else old,
-        ),
-        Row(
-            "bending stiffness EI",
-            "N m^2",
-            fit.bending_stiffness,
-            fit.bending_stiffness_sd,
-            described.bending_stiffness if described else nan,
-        ),
-        Row("distance from the readings, RMS", "mm", 1e3 * fit.rms),
-    ]
+    gpa = [1e-9 * x for x in (fit.youngs_modulus, fit.youngs_modulus_sd)]
+    old = nan if given_EI else _old(described, "youngs_modulus_GPa")
+    modulus = Row("Young's modulus", "GPa", *gpa, old)
+    ei = (fit.bending_stiffness, fit.bending_stiffness_sd, _old(described, "bending_stiffness"))
+    stiffness = Row("bending stiffness EI", "N m^2", *ei)
+    rows = [modulus, stiffness, Row("distance from the readings, RMS", "mm", 1e3 * fit.rms)]
     if fit_zero:
         rows.append(Row("zero of the readings", "mm", 1e3 * fit.zero, 1e3 * fit.zero_sd))
-    changes = []
-    if described is not None:
-        path, unit, row = (
-            ("bending_stiffness_Nm2", "N m^2", rows[1]) if given_EI else ("youngs_modulus_GPa", "GPa", rows[0])
-        )
-        changes.append(Change(("tubes", tube - 1, path), unit, row.value, row.sd))
+    written = {"bending_stiffness_Nm2": stiffness} if given_EI else {"youngs_modulus_GPa": modulus}
     details = {
         "rows": [
             {"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
@@ -86,8 +69,8 @@ def cantilever(
     read = 1e3 * table["deflection"]
     caption = "What was read and what the fitted modulus gives; right, the difference."
     picture = Picture(figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption)
-    said = [notice.text for notice in fit.notices]
-    return Outcome("Cantilever", rows, said, changes, {"deflection_rms_mm": 1e3 * fit.rms}, details, picture)
+    notices, changes = [notice.text for notice in fit.notices], _changes(described, tube, written)
+    return Outcome("Cantilever", rows, notices, changes, {"deflection_rms_mm": 1e3 * fit.rms}, details, picture)
 
 
 def curvature(
@@ -104,16 +87,15 @@ def curvature(
     unit = table.unit["x"]
     if table.unit["y"] != unit:
         raise InputError(Problem(f"x is in {unit} but y in {table.unit['y']}: give both in one unit", table.file))
-    scale = {"scale": 1.0} if unit != "px" else {}
-    if unit == "px":
-        if (scale_mm is None) == (reference is None):
-            raise InputError(Problem("points in px need their scale: give --mm-per-px, or --reference, not both"))
-        if scale_mm is not None:
-            scale = {"scale": 1e-3 * scale_mm}
-        else:
-            scale = {"reference": np.array(reference[:4]).reshape(2, 2), "reference_length": 1e-3 * reference[4]}
-    elif scale_mm is not None or reference is not None:
+    given = (scale_mm is not None) + (reference is not None)
+    if unit == "px" and given != 1:
+        raise InputError(Problem("points in px need their scale: give --mm-per-px, or --reference, not both"))
+    if unit != "px" and given:
         raise InputError(Problem(f"points in {unit} have their scale: leave out --mm-per-px and --reference"))
+    if reference is not None:
+        scale = {"reference": np.array(reference[:4]).reshape(2, 2), "reference_length": 1e-3 * reference[4]}
+    else:
+        scale = {"scale": 1.0 if scale_mm is None else 1e-3 * scale_mm}
     fit = computed(
         _core.fit_tube_shape,
         table.file,
@@ -123,34 +105,38 @@ def curvature(
         **scale,
     )
     sign = -1.0 if described is not None and described.curvature < 0 else 1.0  # a picture does not tell it
+    curve = (sign * fit.curvature, fit.curvature_sd, _old(described, "curvature"))
+    bent = (1e3 * fit.curved_length, 1e3 * fit.curved_length_sd, _old(described, "curved_length_mm"))
+    written = {
+        "curvature_per_m": Row("curvature", "1/m", *curve),
+        "curved_length_mm": Row("curved length", "mm", *bent),
+    }
     rows = [
-        Row("curvature", "1/m", sign * fit.curvature, fit.curvature_sd, described.curvature if described else nan),
-        Row(
-            "curved length",
-            "mm",
-            1e3 * fit.curved_length,
-            1e3 * fit.curved_length_sd,
-            described.curved_length_mm if described else nan,
-        ),
+        *written.values(),
         Row("radius", "mm", 1e3 * fit.radius),
         Row("straight length seen", "mm", 1e3 * fit.straight_length),
         Row("distance from the points, RMS", "mm", 1e3 * fit.rms),
     ]
-    changes = []
-    if described is not None:
-        for key, row in (("curvature_per_m", rows[0]), ("curved_length_mm", rows[1])):
-            changes.append(Change(("tubes", tube - 1, key), row.unit, row.value, row.sd))
-    notices = [notice.text for notice in fit.notices] + left_out("", [int(table.row[i]) for i in fit.outliers])
+    notices = [notice.text for notice in fit.notices] + outliers("", table.row[list(fit.outliers)])
     details = {"correlation": fit.correlation, "junction": fit.junction, "tip": fit.tip, "points_unit": unit}
-    ends = (np.asarray(fit.junction), np.asarray(fit.tip))
-    bend = fit.curved_length / abs(fit.radius)
-    picture = Picture(
-        figures_of.outline,
-        (table.stacked("x", "y"), *ends, bend, list(fit.outliers)),
-        "The points on the tube that was fitted to them; the mark is where its curve starts.",
-        5.0,
-    )
-    return Outcome("Shape of the tube", rows, notices, changes, {"shape_rms_mm": 1e3 * fit.rms}, details, picture)
+    ends, bend = (np.asarray(fit.junction), np.asarray(fit.tip)), fit.curved_length / abs(fit.radius)
+    caption = "The points on the fitted tube; the mark is where its curve starts."
+    picture = Picture(figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)), caption, 5.0)
+    changes, figures = _changes(described, tube, written), {"shape_rms_mm": 1e3 * fit.rms}
+    return Outcome("Shape of the tube", rows, notices, changes, figures, details, picture)
+
+
+def _old(described, name: str) -> float:
+    """A value of the tube in the robot file; NaN where there is none."""
+    value = getattr(described, name, None)
+    return nan if value is None else value
+
+
+def _changes(described, tube: int | None, written: dict[str, Row]) -> list[Change]:
+    """Changes of the tube's fields, where it is one of a robot file."""
+    if described is None:
+        return []
+    return [Change(("tubes", tube - 1, name), row.unit, row.value, row.sd) for name, row in written.items()]
 
 
 def _described_tube(robot: Robot | None, tube: int | None):
