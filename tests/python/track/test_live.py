@@ -13,9 +13,8 @@ from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.person import Person
 from ctcr.bench.record.row_file import RowFile
 from ctcr.calibrate import tables
-from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table
+from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table, still_reading
 from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
-from ctcr.calibrate.still_reading import still_reading
 from ctcr.calibrate.tables import Column
 from ctcr.effects.one_tube import one_tube
 from ctcr.errors import InputError

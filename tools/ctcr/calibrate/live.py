@@ -1,5 +1,7 @@
-"""The tables of the calibration procedures, made on the bench: row by row as read, and gone on with where they end."""
+"""The tables of the calibration procedures, measured on the bench: written row by row, and resumed where they end."""
 
+import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
@@ -9,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.bench.devices.bench_file import Bench
+from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person
-from ctcr.bench.devices.tracker import Tracker
+from ctcr.bench.devices.tracker import RATE_HZ, Tracker
 from ctcr.bench.record.row_file import RowFile
 from ctcr.bench.shared.transmission import turns_of_joints
-from ctcr.calibrate.still_reading import StillReading, still_reading
 from ctcr.calibrate.tables import Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
@@ -22,18 +24,18 @@ from ctcr.robot.description import Robot
 Array = NDArray[np.float64]
 
 PATIENCE_S = 30.0
-STILL_M = 0.5e-3  # what a hand and the tracker's noise move a probe that is held still
+STILL_M = 0.5e-3  # motion of a probe that a hand holds still, with the tracker's noise
 POSITION_COLUMNS = ("x_mm", "y_mm", "z_mm", "scatter_mm", "readings")
 ROTATION_COLUMNS = ("tube", "motor_angle_deg", "direction", *POSITION_COLUMNS)
 POINT_COLUMNS = ("point", "cad_x_mm", "cad_y_mm", "cad_z_mm", *POSITION_COLUMNS)
 FLUSH_M = 0.2e-3  # a tip that stands out no farther is flush
 OTHER_DEG = 3.0  # of a motor, between rows that are meant to be at one angle
-RUN_UP = np.deg2rad(10.0)  # a way comes to its first angle already turning
+RUN_UP = np.deg2rad(10.0)  # a turn reaches its first angle already turning
 
 
 @dataclass(frozen=True)
 class Circles:
-    """How the tubes turn."""
+    """The motion of the tubes."""
 
     step: float  # [rad] of a tube, between readings
     frames: int  # of a reading
@@ -42,7 +44,7 @@ class Circles:
 
 @dataclass(frozen=True)
 class Desk:
-    """Who and what works at a bench; `place`: where its processes meet."""
+    """The devices of a bench, its person, and the folder `place` where its processes meet."""
 
     bench: Bench
     place: Path
@@ -97,13 +99,41 @@ def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds
         for name, where in left:
             desk.person.touch(name, where)
             reading = still_reading(tracker, frames, STILL_M)
-            rows.append([[name, *1e3 * where, *_fields(reading)]])
+            rows.append([[name, *1e3 * where, *reading.fields()]])
             x, y, z = 1e3 * reading.position
             desk.say(f"{name}: {x:.2f}, {y:.2f}, {z:.2f} mm, scatter {1e3 * reading.scatter:.3f} mm")
 
 
-def _fields(reading: StillReading) -> list[float]:
-    return [*1e3 * reading.position, 1e3 * reading.scatter, reading.frames]
+@dataclass(frozen=True)
+class StillReading:
+    """The mean of some frames of a sensor at rest; `scatter`: standard deviation of one frame, per axis [m]."""
+
+    position: NDArray[np.float64]  # (3,) [m], tracker frame
+    scatter: float
+    frames: int
+
+    def fields(self) -> list[float]:
+        """Of POSITION_COLUMNS."""
+        return [*1e3 * self.position, 1e3 * self.scatter, self.frames]
+
+
+def still_reading(tracker: Tracker, frames: int, within: float) -> StillReading:
+    """The first `frames` frames in a row that all lie `within` [m] of their mean.
+
+    Raises DeviceFault where the tracker does not see the sensor, or it does not rest, for its patience.
+    """
+    tracker.discard()
+    last: deque[tuple[float, float, float]] = deque(maxlen=frames)
+    end = time.monotonic() + tracker.patience_s
+    while True:
+        last.append(tracker.seen().reading.position)
+        mean = np.mean(last, axis=0)
+        off = np.array(last) - mean
+        if len(last) == frames and np.linalg.norm(off, axis=1).max() <= within:
+            return StillReading(mean, float(np.sqrt((off**2).sum() / (3 * max(1, frames - 1)))), frames)
+        if time.monotonic() > end + frames / RATE_HZ:
+            text = f"it has not rested within {1e3 * within:g} mm for {tracker.patience_s:g} s"
+            raise DeviceFault("tracker", text, "hold it still, or find the cause of its motion")
 
 
 class _Turner:
@@ -114,7 +144,7 @@ class _Turner:
         self._worn: int | None = None  # the tube with the sensor on it
 
     def _jobs(self) -> list[tuple[float, int]]:
-        """Angles [rad] with the direction in which they are come to: one turn forward, one backward."""
+        """Angles [rad], each with the direction of approach: one turn forward, one backward."""
         low, high = self._limits.rotation[:, 0].max() + RUN_UP, self._limits.rotation[:, 1].min() - RUN_UP
         low, high = max(low, -np.pi), min(high, np.pi)
         angles = np.linspace(low, high, 1 + max(2, round((high - low) / self._circles.step)))
@@ -138,29 +168,26 @@ class _Turner:
         number, motor, sign = (float(field) for field in rows.last[:3])
         if tube < self._robot.n_tubes:
             angle, wanted = self.jobs[job]
-            if (
-                number == tube + 1
-                and sign == wanted
-                and abs(motor - self._motor_deg(tube, self._alone(tube, angle))) < OTHER_DEG
-            ):
+            off = abs(motor - self._motor_deg(tube, self._alone(tube, angle)))
+            if (number, sign) == (tube + 1, wanted) and off < OTHER_DEG:
                 return
         text = "holds rows at other angles: choose another name, or the --step-deg and limits of those rows"
         raise InputError(Problem(text, str(rows.path), rows.groups + 1, line_name="row"))
 
     def _motor_deg(self, tube: int, joints: Array) -> float:
-        """What the rotation motor of a tube has turned since home."""
+        """Angle of the rotation motor of a tube since home [deg]."""
         return 360 * float(turns_of_joints(self._robot, joints)[self._robot.n_tubes + tube])
 
     def look(self) -> None:
-        """Which tube has the sensor: the one that is out alone, or else its usual one."""
+        """Finds the tube with the sensor: the one that is out alone, or else its usual one."""
         tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
         out = np.flatnonzero(tips > FLUSH_M)
         self._worn = int(out[0]) if len(out) == 1 else self._robot.tracker.sensor_on_tube - 1 if len(out) else None
 
     def take_out(self, tube: int) -> None:
-        """This tube alone out of the plate with the sensor on it. The sensor does not fit into another tube."""
+        """Brings this tube alone out of the plate, with the sensor on it, which does not fit into another tube."""
         tips = self._motors.joints[: self._robot.n_tubes] + self._limits.length
-        ordered = tube == 0 or (np.delete(tips, tube) <= FLUSH_M).all()  # the straight way keeps to the limits
+        ordered = tube == 0 or (np.delete(tips, tube) <= FLUSH_M).all()  # a straight move keeps to the limits
         if self._worn != tube or not ordered:
             if self._worn is not None:
                 self._person.fasten(None)
@@ -172,7 +199,7 @@ class _Turner:
         self._worn = tube
 
     def turn(self, tube: int, rows: RowFile, done: int) -> None:
-        """Both ways, without the first `done` angles."""
+        """Turns and reads both ways, without the first `done` angles."""
         before = 0
         for angle, sign in self.jobs[done:]:
             if sign != before:
@@ -181,7 +208,7 @@ class _Turner:
             self._go(self._alone(tube, angle))
             reading = still_reading(self._tracker, self._circles.frames, STILL_M)
             motor = self._motor_deg(tube, self._motors.joints)
-            rows.append([[str(tube + 1), motor, sign, *_fields(reading)]])
+            rows.append([[str(tube + 1), motor, sign, *reading.fields()]])
         self._go(self._alone(tube))
 
     def _go(self, joints: Array) -> None:

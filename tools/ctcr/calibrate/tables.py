@@ -4,7 +4,7 @@ A column may come in any unit of its kind: `x_mm` or `x_m`, `motor_angle_deg` or
 """
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -24,7 +24,6 @@ UNITS = {
     "load": {"N": 1.0, "mN": 1e-3, "g": 9.80665e-3},
     "picture": {"px": 1.0, "mm": 1e-3, "m": 1.0},
 }
-_WITHOUT_UNIT = {"count": "a whole number from 1", "sign": "1 or -1"}
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,14 @@ class Column:
     filled: bool = True
 
     @property
-    def headings(self) -> tuple[str, ...]:
-        """How the column may be called, the usual one first."""
-        if self.kind in UNITS:
-            return tuple(f"{self.name}_{unit}" for unit in UNITS[self.kind])
-        return (self.name,)
+    def headings(self) -> dict[str, str]:
+        """The possible headings with their unit, the usual one first; without unit the name alone."""
+        return {f"{self.name}_{unit}": unit for unit in UNITS[self.kind]} if self.kind in UNITS else {self.name: ""}
+
+    @property
+    def usual(self) -> str:
+        """The usual heading."""
+        return next(iter(self.headings))
 
 
 @dataclass(frozen=True)
@@ -72,117 +74,106 @@ class Table:
 
 def read(path: str | Path, columns: Sequence[Column]) -> Table:
     """Reads a table. Raises InputError with every fault: row, column, and the unit that is needed."""
-    lines = _lines(path)
-    file, header = str(path), [name.strip() for name in lines[0]]
+    header, *lines = _lines(path)
+    file, header = str(path), [name.strip() for name in header]
     found = _find(header, columns, file)
-    faults = Faults(file)
-    rows = [(number, fields) for number, fields in enumerate(lines[1:], start=2) if any(map(str.strip, fields))]
-    if not rows:
+    numbered = [(number, fields) for number, fields in enumerate(lines, start=2) if any(map(str.strip, fields))]
+    if not numbered:
         raise InputError(Problem("has no rows below the header", file))
-    for number, fields in rows:
+    faults = Faults(file)
+    for number, fields in numbered:
         if len(fields) != len(header):
             faults.add(number, None, f"has {len(fields)} fields: the header has {len(header)}", "fields")
     faults.raise_any()
-    data, units = {}, {}
-    for column, heading in found.items():
-        place = header.index(heading)
-        texts = [fields[place].strip() for _, fields in rows]
-        values = _values(column, heading, texts, [number for number, _ in rows], faults)
-        units[column.name] = heading.removeprefix(column.name).removeprefix("_")
-        data[column.name] = values
+    row, texts = zip(*numbered, strict=True)
+    by_heading = dict(zip(header, zip(*texts, strict=True), strict=True))
+    data = {
+        column.name: _values(column, heading, [text.strip() for text in by_heading[heading]], row, faults)
+        for column, heading in found.items()
+    }
     faults.raise_any()
-    return Table(file, np.array([number for number, _ in rows]), data, units)
+    return Table(file, np.array(row), data, {one.name: one.headings[heading] for one, heading in found.items()})
 
 
 def _lines(path: str | Path) -> list[list[str]]:
+    """The fields of each line, the header first."""
     try:
         with open(path, "rb") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise file_fault(error, path, "read") from None
+    text = content.decode("utf-8-sig", "replace")
+    first = text.partition("\n")[0]
     fault = None
     if len(content) > MAX_BYTES:
         fault = f"is over {MAX_BYTES >> 20} MB: this is not a table of a calibration procedure"
     elif content.startswith(b"PK"):
         fault = "is a spreadsheet, not text: save it as CSV"
-    else:
-        try:
-            text = content.decode("utf-8-sig")
-            if "\0" in text:
-                fault = "is not text"
-        except UnicodeDecodeError:
-            fault = "is not text in UTF-8"
-    if not fault and not text.strip():
+    elif "\ufffd" in text:
+        fault = "is not text in UTF-8"
+    elif "\0" in text:
+        fault = "is not text"
+    elif not text.strip():
         fault = "is empty"
+    elif "," not in first and (";" in first or "\t" in first):
+        fault = "separates its columns by semicolons or tabs: use commas, and points for decimals"
     if fault:
         raise InputError(Problem(fault, str(path)))
-    rows = text.splitlines()
-    if "," not in rows[0] and (";" in rows[0] or "\t" in rows[0]):
-        raise InputError(
-            Problem("separates its columns by semicolons or tabs: use commas, and points for decimals", str(path))
-        )
-    return list(csv.reader(rows))
+    return list(csv.reader(text.splitlines()))
 
 
 def _find(header: list[str], columns: Sequence[Column], file: str) -> dict[Column, str]:
     """The heading of each column that is there; raises InputError with all faults of the header."""
     known = {heading: column for column in columns for heading in column.headings}
+    absent = [column for column in columns if not any(name in header for name in column.headings)]
     found: dict[Column, str] = {}
     problems, meant = [], set()
     for heading in header:
         column = known.get(heading)
         if column is None:
-            free = [other for other in columns if not any(name in header for name in other.headings)]
-            near = did_you_mean(heading, [other.headings[0] for other in free])
-            meant |= {other for other in free if other.headings[0] == near}
-            text = "unknown column" + (f": did you mean {near}?" if near else f": those known are {_names(columns)}")
-            problems.append(Problem(text, file, 1, heading or "(no name)", line_name="row"))
+            near = did_you_mean(heading, [other.usual for other in absent])
+            meant.add(near)
+            hint = f"did you mean {near}?" if near else f"those known are {', '.join(c.usual for c in columns)}"
+            problems.append(Problem(f"unknown column: {hint}", file, 1, heading or "(no name)", "row"))
         elif column in found:
             problems.append(Problem(f"this column is there twice, also as {found[column]}", file, 1, heading, "row"))
         else:
             found[column] = heading
     for column in columns:
-        if column.needed and column not in found and column not in meant:
-            text = (
-                f"this column is missing (or as {', '.join(column.headings[1:])})"
-                if column.headings[1:]
-                else ("this column is missing")
-            )
-            problems.append(Problem(text, file, 1, column.headings[0], line_name="row"))
+        if column.needed and column not in found and column.usual not in meant:
+            others = ", ".join(list(column.headings)[1:])
+            text = "this column is missing" + (f" (or as {others})" if others else "")
+            problems.append(Problem(text, file, 1, column.usual, "row"))
     if problems:
         raise InputError(problems)
     return found
 
 
-def _names(columns: Sequence[Column]) -> str:
-    return ", ".join(column.headings[0] for column in columns)
-
-
-def _values(column: Column, heading: str, texts: list[str], rows: list[int], faults: Faults):
-    if column.kind == "text":
-        for row, text in zip(rows, texts, strict=True):
-            if not text:
-                faults.add(row, heading, "is empty: needs a name")
-        return texts
-    unit = heading.removeprefix(column.name).removeprefix("_")
-    needs = f": needs a number in {unit}" if unit else f": needs {_WITHOUT_UNIT[column.kind]}"
+def _values(column: Column, heading: str, texts: list[str], rows: Sequence[int], faults: Faults):
+    """The fields in SI units (M,), or as text."""
+    unit, needs = column.headings[heading], {"text": "a name", "count": "a whole number from 1", "sign": "1 or -1"}
+    needed = f": needs {f'a number in {unit}' if unit else needs[column.kind]}"
     values = np.full(len(texts), np.nan)
     for i, (row, text) in enumerate(zip(rows, texts, strict=True)):
         if not text:
             if column.filled:
-                faults.add(row, heading, f"is empty{needs}", "empty")
-            continue
-        try:
-            values[i] = float(text)
-        except ValueError:
-            faults.add(row, heading, f"{shown(text)} is not a number{needs}", "number")
-            continue
-        if not np.isfinite(values[i]):
-            faults.add(row, heading, f"is not finite{needs}", "finite")
-        elif (column.kind == "count" and (values[i] < 1 or values[i] != round(values[i]))) or (
-            column.kind == "sign" and abs(values[i]) != 1
-        ):
-            faults.add(row, heading, f"{shown(text)} does not fit{needs}", "kind")
-    if not unit:
-        return np.nan_to_num(values).astype(np.int64)
-    return values * UNITS[column.kind][unit]
+                faults.add(row, heading, f"is empty{needed}", "empty")
+        elif column.kind != "text":
+            values[i] = _number(column.kind, text, needed, lambda *fault, row=row: faults.add(row, heading, *fault))
+    if column.kind == "text":
+        return texts
+    return values * UNITS[column.kind][unit] if unit else np.nan_to_num(values).astype(np.int64)
+
+
+def _number(kind: str, text: str, needed: str, fault: Callable[[str, str], None]) -> float:
+    """The number of a field; fault(message, kind) is called where it is none, and where it does not fit."""
+    try:
+        value = float(text)
+    except ValueError:
+        fault(f"{shown(text)} is not a number{needed}", "number")
+        return np.nan
+    if not np.isfinite(value):
+        fault(f"is not finite{needed}", "finite")
+    elif (kind == "count" and (value < 1 or value != round(value))) or (kind == "sign" and abs(value) != 1):
+        fault(f"{shown(text)} does not fit{needed}", "kind")
+    return value
