@@ -1,1 +1,1 @@
-"""What a table says about itself before any physics: outliers, missing motion, an unknown sensor roll."""
+"""Checks of a table before any fit: spikes, missing motion, an unknown sensor roll."""

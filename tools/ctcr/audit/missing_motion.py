@@ -1,7 +1,7 @@
-"""Motion that a table of measurements leaves out, seen by effects that remember it.
+"""Motion that a table of measurements leaves out, which matters to effects with history.
 
-Whoever returns to joints to measure them again often drives past them first, to come from the same side as before, and
-records the reading alone. By the table the robot came from the other side.
+To measure at the same joints again, a robot is often driven past them first, so that it comes from the same side as
+before, and only the reading is recorded. By the table it came from the other side.
 """
 
 from dataclasses import replace
@@ -13,7 +13,6 @@ from scipy.stats import binomtest
 from ctcr import settings
 from ctcr.robot.description import Robot
 from ctcr.show.output import listed
-from ctcr.table.joint_space import joint_places
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
@@ -22,11 +21,12 @@ SHOWN = 6
 
 
 def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The table with the joints that the robot must have passed, as rows without a pose, and what to say about them.
+    """The table with rows without a pose for motion that it leaves out, and a notice if there are any.
 
-    A reading at the end of a long step that was visited from both sides before in its run agrees with one of these
-    two visits, wherever they differ. If it is always the one from the other side than that of the recorded motion, the
-    robot came on the way of that visit: straight from where it last turned. Compares readings, not a model.
+    A reading at the end of a long step, whose joints were visited from both sides before in its run, agrees with one
+    of these two visits, wherever they differ. If the readings agree with the visits from the other side than that of
+    the recorded motion, the robot came the way of these visits: straight from where it last turned. This compares
+    readings, not a model.
     """
     jitter, returns = robot.tracker.jitter_mm, _returns(measurements)
     if measurements.position is None or not jitter or not returns:
@@ -42,20 +42,21 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     if not visible.any() or binomtest(agree, len(part), alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
-    rows = listed(measurements.row[here], SHOWN)
-    said = (
-        f"{len(here)} readings return to joints after a long step (rows {rows}). They agree with the "
-        f"earlier visit from the other side than that of the recorded motion ({apart[0]:.2f} mm apart, the other one "
-        f"{apart[1]:.2f} mm): the robot moved in between without a reading. They are taken as reached on the way of "
-        "that visit"
+    notice = (
+        f"{len(here)} readings return to joints after a long step (rows {listed(measurements.row[here], SHOWN)}). They "
+        f"agree with the earlier visit from the other side than that of the recorded motion ({apart[0]:.2f} mm apart, "
+        f"the visit from this side {apart[1]:.2f} mm): the robot moved in between without a reading. The path of that "
+        "visit is taken for them"
     )
-    return _with_way(measurements, dict(zip(here.tolist(), turn.tolist(), strict=True))), [said]
+    return _with_detours(measurements, here, turn), [notice]
 
 
 def _returns(m: Measurements) -> list[tuple[int, int, int, int]]:
-    """Rows that return after a long step: themselves, the last visit from the same side, that from the other side, and
-    where the robot turned before it."""
-    q, found = joint_places(m), []
+    """Rows that return after a long step, with three earlier rows for each.
+
+    These are the last visit from the same side, the last one from the other side, and the turn before the latter.
+    """
+    q, found = m.joint_space, []
     for run in np.unique(m.run):
         rows = np.flatnonzero(m.run == run)
         step, pause = np.diff(q[rows], axis=0), np.diff(m.t[rows])
@@ -76,28 +77,24 @@ def _returns(m: Measurements) -> list[tuple[int, int, int, int]]:
 
 
 def _turn(towards: Array, visit: int) -> int:
-    """Where the straight way to a visit begins."""
+    """Where the straight path to a visit begins."""
     start = visit - 1
     while start > 0 and towards[start - 1] @ towards[visit - 1] > settings.STRAIGHT_ON:
         start -= 1
     return start
 
 
-def _with_way(m: Measurements, past: dict[int, int]) -> Measurements:
-    """The table with the joints of row past[k] before each row k, on the way to it."""
-    added = np.array(sorted(past))
-    joints = np.array([past[k] for k in added])
-    fill = {
-        "t": 0.5 * (m.t[added - 1] + m.t[added]),
-        "run": m.run[added],
-        "beta": m.beta[joints],
-        "alpha": m.alpha[joints],
-        "force": m.force[added],
-        "position": np.full((len(added), 3), np.nan),
-        "quaternion": np.full((len(added), 4), np.nan),
-        "row": m.row[added - 1],
+def _with_detours(m: Measurements, rows: NDArray[np.int64], turn: NDArray[np.int64]) -> Measurements:
+    """The table with a row in front of each of `rows` that has the joints of the row `turn` and no pose."""
+    columns = {
+        "t": 0.5 * (m.t[rows - 1] + m.t[rows]),
+        "run": m.run[rows],
+        "beta": m.beta[turn],
+        "alpha": m.alpha[turn],
+        "force": m.force[rows],
+        "position": np.nan,
+        "quaternion": np.nan,
+        "row": m.row[rows - 1],
     }
-    columns = {name: getattr(m, name) for name in fill}
-    return replace(
-        m, **{name: np.insert(old, added, fill[name], axis=0) for name, old in columns.items() if old is not None}
-    )
+    old = {name: getattr(m, name) for name in columns if getattr(m, name) is not None}
+    return replace(m, **{name: np.insert(values, rows, columns[name], axis=0) for name, values in old.items()})

@@ -1,4 +1,4 @@
-"""What becomes of a table of readings before effects are fitted to it."""
+"""Changes to a table of readings before effects are fitted to it."""
 
 from ctcr.audit import missing_motion, sensor_roll, spikes
 from ctcr.robot.description import Robot
@@ -6,9 +6,9 @@ from ctcr.table.measurements import Measurements
 
 
 def prepared(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The table without what says nothing of the robot, with the motion that it leaves out, and what to say of both."""
-    said = []
+    """The table without spikes and unusable orientations, with the motion that it left out; notices on the changes."""
+    notices = []
     for step in (sensor_roll.positions_alone, spikes.left_out, missing_motion.completed):
-        measurements, notices = step(robot, measurements)
-        said += notices
-    return measurements, said
+        measurements, more = step(robot, measurements)
+        notices += more
+    return measurements, notices

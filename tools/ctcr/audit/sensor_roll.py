@@ -1,4 +1,4 @@
-"""The roll of the sensor about the axis of the tip, where the robot file does not know it: first found, then fitted."""
+"""The roll of the sensor about the axis of the tip: estimated, then fitted, where the robot file does not know it."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -16,50 +16,43 @@ NAME = "tracker.sensor_roll"
 
 
 def usable(robot: Robot, measurements: Measurements) -> tuple[Robot, Measurements, list[str]]:
-    """The robot with a first value of an unknown roll, the readings that say something of it, and what to say of both.
+    """The robot with a starting value of an unknown roll, the usable readings, and notices on both.
 
-    Where each reading has a roll of its own, as of a sensor that does not measure it, orientations are left out.
+    Where the rolls of the readings do not agree, as with a sensor that does not measure them, orientations are dropped.
     """
-    tracker = robot.tracker
-    if tracker.sensor_roll == "known" or (tracker.sensor_roll_deg is not None and _turned(measurements).any()):
+    tracker, oriented = robot.tracker, measurements.oriented.any()
+    if tracker.sensor_roll == "known" or (tracker.sensor_roll_deg is not None and oriented):
         return robot, measurements, []
-    if not _turned(measurements).any():
+    if not oriented:
         return _with(robot, None), measurements, []
     rolls = np.exp(1j * _rolls(robot, measurements))
     mean = rolls[np.isfinite(rolls)].mean() if np.isfinite(rolls).any() else 0.0
     if abs(mean) < settings.ONE_ROLL:
-        said = "the sensor's roll is unknown and differs from reading to reading: orientations are not used"
-        return robot, replace(measurements, quaternion=None), [said]
+        notice = "the sensor's roll is unknown and differs from reading to reading: orientations are not used"
+        return robot, replace(measurements, quaternion=None), [notice]
     roll = float(np.degrees(np.angle(mean)))
-    said = f"the sensor's roll is unknown: it is fitted from {roll:.1f} deg, where the readings put it"
-    return _with(robot, roll), measurements, [said]
+    notice = f"the sensor's roll is unknown: its fit starts at {roll:.1f} deg, the mean over the readings"
+    return _with(robot, roll), measurements, [notice]
 
 
 def positions_alone(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The readings without the orientations of a sensor whose roll is not known, and what to say about it.
+    """The readings without orientations where the sensor's roll is not known, and a notice.
 
-    Such a sensor may be tilted too: where effects are judged, that would count as what the robot does.
+    Such a sensor may be tilted too, which would be taken for an effect of the robot.
     """
-    if robot.tracker.sensor_roll == "known" or not _turned(measurements).any():
+    if robot.tracker.sensor_roll == "known" or not measurements.oriented.any():
         return measurements, []
-    said = "the sensor's roll is unknown: orientations are not used (write sensor_roll: known once it is)"
-    return replace(measurements, quaternion=None), [said]
+    notice = "the sensor's roll is unknown: orientations are not used (write sensor_roll: known once it is)"
+    return replace(measurements, quaternion=None), [notice]
 
 
 def with_roll(free: str | Iterable[str], robot: Robot) -> list[str]:
-    """The parameters that names stand for (`free_parameters.expand`), and the roll where it must be fitted too."""
+    """The parameters that names stand for (`parameters.expand`), with the roll where it must be fitted too."""
     names = parameters.expand(free, robot)
     tracker = robot.tracker
     if tracker.sensor_roll == "unknown" and tracker.sensor_roll_deg is not None and NAME not in names:
         names = parameters.expand([*names, NAME], robot)
     return names
-
-
-def _turned(measurements: Measurements) -> np.ndarray:
-    """Rows with an orientation (M,)."""
-    if measurements.quaternion is None:
-        return np.zeros(len(measurements), bool)
-    return np.isfinite(measurements.quaternion).all(axis=1)
 
 
 def _with(robot: Robot, roll_deg: float | None) -> Robot:
@@ -68,10 +61,9 @@ def _with(robot: Robot, roll_deg: float | None) -> Robot:
 
 
 def _rolls(robot: Robot, measurements: Measurements) -> np.ndarray:
-    """Of each reading against the tip as predicted (M,) [rad]; NaN where not measured or not solved."""
+    """Roll of each reading against the predicted tip (M,) [rad]; NaN where not measured or not solved."""
     beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
     tips = Model(robot.standard).predict(beta, alpha, measurements.force)
     _, orientation = base_to_tracker(_with(robot, None).tracker, tips.position, tips.quaternion)
     turn = product(conjugate(orientation), measurements.quaternion)
-    rolls = 2 * np.arctan2(turn[:, 3], turn[:, 0])
-    return np.where(tips.solved, rolls, np.nan)
+    return np.where(tips.solved, 2 * np.arctan2(turn[:, 3], turn[:, 0]), np.nan)

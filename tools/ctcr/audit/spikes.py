@@ -1,4 +1,4 @@
-"""Readings that leap away and back: spikes of the tracker, told by the readings around them and not by a fit."""
+"""Spikes of the tracker: readings that leap away and back, found by the readings around them and not by a fit."""
 
 from dataclasses import replace
 
@@ -9,7 +9,6 @@ from ctcr import settings
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show.output import listed
-from ctcr.table.joint_space import loaded_places
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
@@ -18,29 +17,28 @@ SHOWN = 6
 
 
 def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The table without the poses of spikes, and what to say about them.
+    """The table without the poses of spikes, and a notice if there are any.
 
-    What a robot does to its tip shows in more than one reading of a path that goes on, or moves the tip no farther than
-    its joints and load do. The model is that of the robot file: no fit decides which readings it is judged by.
+    An effect of the robot shows in more than one reading along a path, or moves the tip no farther than its joints and
+    load do. The model is that of the robot file: no fit selects the readings by which it is judged.
     """
     leap = leaps(robot, measurements)
     spikes = np.isfinite(leap)
     if not spikes.any():
         return measurements, []
-    rows = listed(measurements.row[spikes], SHOWN)
-    what = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
-    said = (
-        f"{what} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {rows}), at least {settings.SPIKE_LEAP:g} "
-        "times as far as the joints and the load move the tip: spikes of the tracker, left out of all fits and errors"
+    count = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
+    notice = (
+        f"{count} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {listed(measurements.row[spikes], SHOWN)}), "
+        f"at least {settings.SPIKE_LEAP:g} times as far as the joints and the load move the tip: spikes of the "
+        "tracker, left out of all fits and errors"
     )
-    poses = {name: getattr(measurements, name) for name in ("position", "quaternion")}
-    return replace(
-        measurements, **{name: np.where(spikes[:, None], np.nan, old) for name, old in poses.items() if old is not None}
-    ), [said]
+    poses = {"position": measurements.position, "quaternion": measurements.quaternion}
+    kept = {name: np.where(spikes[:, None], np.nan, old) for name, old in poses.items() if old is not None}
+    return replace(measurements, **kept), [notice]
 
 
 def leaps(robot: Robot, measurements: Measurements) -> Array:
-    """How far each spike (M,) leaps [m]; NaN where a reading is none."""
+    """Distance (M,) [m] that each spike leaps; NaN for other readings."""
     leap, jitter = np.full(len(measurements), np.nan), robot.tracker.jitter_mm
     if measurements.position is None or not jitter:
         return leap
@@ -48,15 +46,15 @@ def leaps(robot: Robot, measurements: Measurements) -> Array:
     beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
     predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
     measured, run = measurements.position[read], measurements.run[read]
-    step = np.diff(loaded_places(measurements)[read], axis=0)
+    step = np.diff(measurements.load_space[read], axis=0)
     measured_step, predicted_step = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (measured, predicted))
     leaped = np.minimum(measured_step[:-1], measured_step[1:])
-    moved = np.maximum(predicted_step[:-1], predicted_step[1:])
-    goes_on = np.sum(step[:-1] * step[1:], axis=1) >= 0  # else a leap is one step that the model misses
+    moved = np.maximum(predicted_step[:-1], predicted_step[1:])  # NaN, where the model has no solution, finds nothing
+    onward = np.sum(step[:-1] * step[1:], axis=1) >= 0  # at a turn, a leap may be one step that the model misses
     found = (
-        goes_on
+        onward
         & (run[:-2] == run[2:])
-        & (leaped > settings.SPIKE_LEAP * moved)  # NaN, where the model has no solution, says nothing
+        & (leaped > settings.SPIKE_LEAP * moved)
         & (leaped > settings.SPIKE_VISIBLE * np.sqrt(6) * 1e-3 * jitter)
         & (np.linalg.norm(measured[2:] - measured[:-2], axis=1) < settings.SPIKE_RETURN * leaped)
     )

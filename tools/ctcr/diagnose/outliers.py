@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 from scipy.stats import binom
 
 from ctcr.diagnose.engine import OUTLIER
-from ctcr.table.joint_space import loaded_places
 from ctcr.table.measurements import Measurements
 
 Mask = NDArray[np.bool_]
@@ -83,7 +82,7 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
 
 def _nearest(measurements: Measurements, read: NDArray[np.int64]) -> NDArray[np.int64]:
     """Index, among the rows `read`, of the one nearest to each in joints and load."""
-    place = loaded_places(measurements)[read]
+    place = measurements.load_space[read]
     near = cKDTree(place).query(place, k=2)[1]
     return np.where(near[:, 0] == np.arange(len(read)), near[:, 1], near[:, 0])
 

@@ -17,7 +17,7 @@ from ctcr.errors import InputError, Problem, file_fault, shown
 BLOCK_BYTES = 4 << 20
 MAX_HEADER_BYTES = 1 << 16
 SHOWN_PER_KIND = 3  # rows shown of each kind of fault; the others are counted
-SHOWN = 20
+SHOWN = 20  # faults shown of a table
 
 _NUMBER_BYTES = b"0123456789+-.eE, "
 _NUMBER = re.compile(r" *[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)? *")
@@ -31,7 +31,7 @@ class Faults:
     _kinds: dict[tuple[str, str], tuple[int, list[Problem]]] = field(default_factory=dict)
 
     def add(self, row: int, column: str | None, message: str, kind: str | None = None, count: int = 1) -> None:
-        """`count` faults of one kind (told by `kind`, else by the message), the first of them in `row`."""
+        """`count` faults of one kind (`kind`, else the message), the first of them in `row`."""
         key = (column or "", kind or message)
         total, examples = self._kinds.get(key, (0, []))
         if len(examples) < SHOWN_PER_KIND:
@@ -86,10 +86,8 @@ class NumberTable:
                 numbers = _numbers(lines, len(self.columns))
                 if numbers is None:
                     readable = [_is_readable(line, self.columns, row + i, faults) for i, line in enumerate(lines)]
-                    numbers = _numbers(
-                        [line for line, good in zip(lines, readable, strict=True) if good], len(self.columns)
-                    )
                     rows = rows[readable]
+                    numbers = _numbers([lines[i - row] for i in rows], len(self.columns))
                 yield rows, numbers, len(raw)
                 row += len(lines)
 
@@ -98,8 +96,7 @@ def read_columns(path: str | Path, columns: Sequence[str]) -> NDArray[np.float64
     """The numbers (M, columns) of a table that has just these columns. Raises InputError with its faults."""
     table, faults = open_table(path), Faults(str(path))
     if table.columns != tuple(columns):
-        text = f"holds other columns than {','.join(columns)}"
-        raise InputError(Problem(text, str(path), 1, line_name="row"))
+        raise InputError(Problem(f"holds other columns than {','.join(columns)}", str(path), 1, line_name="row"))
     numbers = np.vstack([block for _, block, _ in table.blocks(faults)])
     faults.raise_any()
     return numbers
@@ -127,24 +124,19 @@ def _columns(header: bytes, file: str) -> tuple[str, ...]:
     except UnicodeDecodeError:
         text = "\0"
     names = tuple(name.strip() for name in text.split(","))
-    fault = None
-    if header.startswith((b"\xff\xfe", b"\xfe\xff")):
-        fault = "is text in UTF-16: save it as UTF-8"
-    elif header.startswith(b"PK"):
-        fault = "is a spreadsheet, not text: save it as CSV"
-    elif any(ord(letter) < 32 and letter not in "\t\r" for letter in text):
-        fault = "is not text"
-    elif not text:
-        fault = "is empty" if not header else "has an empty first row: it must name the columns"
-    elif "\r" in text:
-        fault = "ends its lines with CR alone: save it with LF or CR LF"
-    elif len(header) == MAX_HEADER_BYTES:
-        fault = "has a first row without end: this is not a table"
-    elif len(names) == 1 and len(re.split("[;\t]", text)) > 1:
-        fault = "separates its columns by semicolons or tabs: use commas, and points for decimals"
-    elif all(_NUMBER.fullmatch(name) for name in names):
-        fault = "has no header: its first row must name the columns"
-    if fault:
+    faults = {
+        "is text in UTF-16: save it as UTF-8": header.startswith((b"\xff\xfe", b"\xfe\xff")),
+        "is a spreadsheet, not text: save it as CSV": header.startswith(b"PK"),
+        "is not text": any(ord(letter) < 32 and letter not in "\t\r" for letter in text),
+        "is empty": not header,
+        "has an empty first row: it must name the columns": not text,
+        "ends its lines with CR alone: save it with LF or CR LF": "\r" in text,
+        "has a first row without end: this is not a table": len(header) == MAX_HEADER_BYTES,
+        "separates its columns by semicolons or tabs: use commas, and points for decimals": len(names) == 1
+        and len(re.split("[;\t]", text)) > 1,
+        "has no header: its first row must name the columns": all(_NUMBER.fullmatch(name) for name in names),
+    }
+    if fault := next((fault for fault, found in faults.items() if found), None):
         raise InputError(Problem(fault, file))
     return names
 
@@ -170,7 +162,7 @@ def _count_lines(file: BinaryIO, start: int, end: int) -> int:
 
 
 def _numbers(lines: list[bytes], n_columns: int) -> NDArray[np.float64] | None:
-    """The numbers (lines, columns), or None where a line is faulty: speed first, `_is_readable` finds out which."""
+    """The numbers (lines, columns), or None where any line is faulty: fast; `_is_readable` then finds the line."""
     if any(line.count(b",") != n_columns - 1 for line in lines):
         return None
     text = b",".join(lines)
@@ -187,7 +179,7 @@ def _numbers(lines: list[bytes], n_columns: int) -> NDArray[np.float64] | None:
 
 
 def _is_readable(line: bytes, columns: tuple[str, ...], row: int, faults: Faults) -> bool:
-    """Whether `_numbers` can read the line; `faults` learns why not."""
+    """Whether `_numbers` can read the line; adds its faults to `faults`."""
     fields = line.decode("utf-8", "replace").split(",")
     if not line.strip():
         faults.add(row, None, "is empty")
@@ -195,10 +187,8 @@ def _is_readable(line: bytes, columns: tuple[str, ...], row: int, faults: Faults
     if len(fields) != len(columns):
         faults.add(row, None, f"has {len(fields)} fields: the header has {len(columns)}", "fields")
         return False
-    wrong = [
-        (column, text) for column, text in zip(columns, fields, strict=True) if text and not _NUMBER.fullmatch(text)
-    ]
-    for column, text in wrong:
+    wrong = {column: text for column, text in zip(columns, fields, strict=True) if text and not _NUMBER.fullmatch(text)}
+    for column, text in wrong.items():
         faults.add(row, column, f"{shown(text)} is not a number{_hint(text)}", "number")
     return not wrong
 

@@ -20,10 +20,12 @@ from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
 JOINT_ORDER_SLACK_M = 1e-6  # rounding of recorded joints
 UNIT_QUATERNION_SLACK = 1e-3
 _MAX_RUN = 1e15  # whole numbers that a float holds exactly
+LEVER = 0.02  # [m] of insertion that moves the tip about as far as one radian of rotation
+OTHER_LOAD = 1e-3  # [N] that counts as much as a radian: readings under other loads are never near
 
 Array = NDArray[np.float64]
 
-QUANTITIES = {  # what lies outside the usual is in another unit, or garbage
+QUANTITIES = {  # values outside the usual range are in another unit, or garbage
     "beta": Quantity("m", usual=(1e-9, 5)),
     "alpha": Quantity("rad", usual=(1e-12, 1000)),
     "force": Quantity("N", usual=(1e-12, 1000)),
@@ -34,7 +36,7 @@ _MAY_BE_EMPTY = ("t", "position", "quaternion")
 
 @dataclass(frozen=True)
 class Measurements:
-    """M readings of a robot with N tubes. What was not measured is NaN, or None where its columns are absent."""
+    """M readings of a robot with N tubes. Values that were not measured are NaN, or None where columns are absent."""
 
     t: Array  # (M,) [s]
     run: NDArray[np.int64]  # (M,) the path that the reading belongs to
@@ -49,6 +51,21 @@ class Measurements:
 
     def __len__(self) -> int:
         return len(self.run)
+
+    @property
+    def oriented(self) -> NDArray[np.bool_]:
+        """Whether the orientation was measured (M,)."""
+        return np.zeros(len(self), bool) if self.quaternion is None else np.isfinite(self.quaternion).all(axis=1)
+
+    @property
+    def joint_space(self) -> Array:
+        """Joints as one vector (M, 2 N) [rad], in which distances are comparable."""
+        return np.column_stack([self.beta / LEVER, self.alpha])
+
+    @property
+    def load_space(self) -> Array:
+        """Joints and load as one vector (M, 2 N + 3) [rad]."""
+        return np.column_stack([self.joint_space, self.force / OTHER_LOAD])
 
 
 def load(path: str | Path, n_tubes: int) -> Measurements:
@@ -88,45 +105,40 @@ def group_columns(n_tubes: int) -> dict[str, tuple[str, ...]]:
 
 def _groups(table: NumberTable, n_tubes: int) -> dict[str, list[int]]:
     """Indices of the columns of each group that is present; raises InputError with all faults of the header."""
-    expected = group_columns(n_tubes)
-    faults = [*_unknown_columns(table.columns, expected, n_tubes)]
-    meant = {near for _, _, near in faults}
-    faults += [fault for fault in _missing_columns(table.columns, expected, n_tubes) if fault[0] not in meant]
+    groups, file = group_columns(n_tubes), str(table.path)
+    unknown = {column: _unknown(column, table.columns, n_tubes) for column in table.columns}
+    meant = {near for _, near in unknown.values()}
+    missing = {column: text for column, text in _missing(table.columns, groups, n_tubes) if column not in meant}
+    faults = {column or "(no name)": text for column, (text, _) in unknown.items() if text} | missing
     if faults:
-        problems = [Problem(text, str(table.path), 1, column, line_name="row") for column, text, _ in faults]
+        problems = [Problem(text, file, 1, column, line_name="row") for column, text in faults.items()]
         raise InputError(problems[:SHOWN], omitted=max(0, len(problems) - SHOWN))
-    return {
-        name: [table.columns.index(column) for column in columns]
-        for name, columns in expected.items()
-        if columns[0] in table.columns
-    }
+    present = {name: names for name, names in groups.items() if names[0] in table.columns}
+    return {name: [table.columns.index(column) for column in names] for name, names in present.items()}
 
 
-def _unknown_columns(present: tuple[str, ...], expected: dict[str, tuple[str, ...]], n_tubes: int):
-    """(column, what is wrong, the column that was meant), for columns that are unknown or doubled."""
-    known = [name for names in expected.values() for name in names]
-    for column in dict.fromkeys(present):
-        joint = re.match(r"(?:beta|alpha)([0-9]+)_", column)
-        near = did_you_mean(column, [name for name in known if name not in present])
-        if column in known:
-            if present.count(column) > 1:
-                yield column, "this column is there more than once", None
-        elif joint and int(joint[1][:9]) > n_tubes:
-            yield column, f"unknown column: the robot has {n_tubes} tubes", None
-        elif near and near.partition("_")[0] == column.partition("_")[0]:
-            yield column, f"unknown column: did you mean {near}? Columns are in SI units", near
-        else:
-            yield column or "(no name)", "unknown column" + (f": did you mean {near}?" if near else ""), near
+def _unknown(column: str, present: tuple[str, ...], n_tubes: int) -> tuple[str, str | None]:
+    """The fault of a column that is unknown or doubled, "" if none, and the column that was probably meant."""
+    known = column_names(n_tubes)
+    if column in known:
+        return "this column is there more than once" if present.count(column) > 1 else "", None
+    joint = re.match(r"(?:beta|alpha)([0-9]+)_", column)
+    if joint and int(joint[1][:9]) > n_tubes:
+        return f"unknown column: the robot has {n_tubes} tubes", None
+    near = did_you_mean(column, [name for name in known if name not in present])
+    other_unit = near and near.partition("_")[0] == column.partition("_")[0]
+    hint = f": did you mean {near}?" + (" Columns are in SI units" if other_unit else "") if near else ""
+    return f"unknown column{hint}", near
 
 
-def _missing_columns(present: tuple[str, ...], expected: dict[str, tuple[str, ...]], n_tubes: int):
-    for name, columns in expected.items():
+def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tubes: int) -> Iterator[tuple[str, str]]:
+    """Missing columns with the fault of each."""
+    for name, columns in groups.items():
         absent = [column for column in columns if column not in present]
-        if name in ("beta", "alpha"):
-            yield from ((column, f"this column is missing: the robot has {n_tubes} tubes", None) for column in absent)
-        elif len(absent) < len(columns):
-            text = f"this column is missing: {', '.join(columns)} come together"
-            yield from ((column, text, None) for column in absent)
+        joints = name in ("beta", "alpha")
+        reason = f"the robot has {n_tubes} tubes" if joints else f"{', '.join(columns)} come together"
+        if joints or len(absent) < len(columns):
+            yield from ((column, f"this column is missing: {reason}") for column in absent)
 
 
 def _check(name: str, block: Array, rows: NDArray[np.int64], columns: list[str], faults: Faults) -> None:
@@ -171,23 +183,14 @@ def _check_joint_order(beta: Array, rows: NDArray[np.int64], columns: list[str],
 
 
 def _measurements(data: dict[str, Array], table: NumberTable) -> Measurements:
-    n = table.n_rows
-    t = data["t"][:, 0] if "t" in data else np.full(n, np.nan)
-    run = data["run"][:, 0].astype(np.int64) if "run" in data else np.zeros(n, np.int64)
-    quaternion = data.get("quaternion")
-    if quaternion is not None:
-        quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return Measurements(
-        t=t,
-        run=run,
-        beta=data["beta"],
-        alpha=data["alpha"],
-        force=data["force"] if "force" in data else np.zeros((n, 3)),
-        position=data.get("position"),
-        quaternion=quaternion,
-        row=np.arange(2, n + 2),
-        warnings=list(_warnings(t, run, str(table.path))),
-    )
+    absent = {"t": [[np.nan]], "run": [[0]], "force": [[0.0] * 3]}
+    absent = {name: np.repeat(row, table.n_rows, axis=0) for name, row in absent.items()}
+    data = absent | {"position": None, "quaternion": None} | data
+    data["t"], data["run"] = data["t"][:, 0], data["run"][:, 0].astype(np.int64)
+    if data["quaternion"] is not None:
+        data["quaternion"] /= np.linalg.norm(data["quaternion"], axis=1, keepdims=True)
+    warnings = list(_warnings(data["t"], data["run"], str(table.path)))
+    return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings)
 
 
 def _warnings(t: Array, run: NDArray[np.int64], file: str) -> Iterator[Problem]:
@@ -198,4 +201,4 @@ def _warnings(t: Array, run: NDArray[np.int64], file: str) -> Iterator[Problem]:
         yield Problem(text, file, int(late[0]) + 3, "t_s", line_name="row")
     starts = run[np.flatnonzero(np.concatenate([[True], ~same_run]))]
     if len(np.unique(starts)) < len(starts):
-        yield Problem("a run goes on after another one: its rows must stand together", file, field="run")
+        yield Problem("a run continues after another one: its rows must stand together", file, field="run")
