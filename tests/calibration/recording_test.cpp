@@ -260,7 +260,8 @@ TEST(IdentifyReadings, NamesTheGaugesOfARobot) {
   for (int i = 0; i < 3; ++i) yaw[at(Parameter::tracker_rotation, i)] = -axis[i];
   options.known.push_back({"yaw", yaw});
   std::vector<int> excluded;
-  const Identification fit = identify_with_exclusions(readings, free.parameters, noise, places(table), options, excluded);
+  const Identification fit =
+      identify_with_exclusions(readings, free.parameters, noise, places(table), options, excluded);
   ASSERT_FALSE(fit.directions.empty());
   EXPECT_EQ(fit.directions[0].text.substr(0, 4), "yaw ");
   EXPECT_NEAR(fit.directions[0].ratio, 1, 1e-3);

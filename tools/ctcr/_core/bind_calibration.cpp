@@ -137,8 +137,8 @@ BoundRegistration registration_of(const std::vector<std::string>& names, const T
   for (std::size_t i = 0; i < reading_names.size(); ++i) {
     const auto point =
         std::find_if(points.begin(), points.end(), [&](const Fiducial& p) { return p.name == reading_names[i]; });
-    require(point != points.end(),
-            sentence("reading %zu is of '%s', which no point of the CAD is named", i + 1, reading_names[i].c_str()));
+    require(point != points.end(), "reading %zu is of '%s', which no point of the CAD is named", i + 1,
+            reading_names[i].c_str());
     point->readings.push_back(row(readings, i));
   }
   BoundRegistration bound{.result = register_points(points, {.noise = position_noise(jitter, field_error, field_length),

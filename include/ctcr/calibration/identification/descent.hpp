@@ -10,7 +10,8 @@ namespace detail {
 struct Linearised {
   double chi_square = 0, cost = 0;
   Eigen::VectorXd gradient;
-  Eigen::MatrixXd information;  ///< J^T J of the whitened residual; with the prior the Gauss-Newton Hessian
+  Eigen::MatrixXd information;  ///< J^T J of the whitened residual
+  Eigen::MatrixXd hessian;      ///< Gauss-Newton: information and prior
 };
 
 /// A posterior in scaled parameters z, x = origin + scale z.
@@ -30,7 +31,8 @@ public:
   const Eigen::VectorXd& prior() const { return prior_; }  ///< precision, 1 or 0
   int evaluations() const { return evaluations_; }
 
-  void set_whitening(const Whitening& whitening) { whitening_ = &whitening; }
+  void set_whitening(Whitening whitening) { whitening_ = std::move(whitening); }
+  const Whitening& whitening() const { return whitening_; }
 
   /// What is predicted at z.
   struct Point {
@@ -62,7 +64,7 @@ public:
     const Point* point = at(z);
     if (!point) return std::numeric_limits<double>::infinity();
     Eigen::VectorXd residual = point->residual;
-    whitening_->apply(residual);
+    whitening_.apply(residual);
     const double cost = 0.5 * (residual.squaredNorm() + prior_.dot(z.cwiseAbs2()));
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
   }
@@ -71,19 +73,21 @@ public:
     if (!point) return false;
     Eigen::VectorXd residual = point->residual;
     Eigen::MatrixXd jacobian = point->jacobian * scale_.asDiagonal();
-    whitening_->apply(residual);
-    whitening_->apply(jacobian);
+    whitening_.apply(residual);
+    whitening_.apply(jacobian);
     out.chi_square = residual.squaredNorm();
     out.cost = 0.5 * (out.chi_square + prior_.dot(z.cwiseAbs2()));
     out.gradient = jacobian.transpose() * residual + prior_.cwiseProduct(z);
     out.information = transposed_product(jacobian, jacobian);
+    out.hessian = out.information;
+    out.hessian.diagonal() += prior_;
     return std::isfinite(out.cost) && out.information.allFinite();
   }
 
 private:
   const Predictor& predict_;
   Eigen::VectorXd scale_, origin_, prior_;
-  const Whitening* whitening_ = nullptr;
+  Whitening whitening_;
   Point point_, held_;
   int evaluations_ = 0;
 };
@@ -156,14 +160,11 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
   Linearised here, there;
   if (!objective.linearise(z, here)) return out;
   objective.hold(z);
-  const auto hessian = [&](const Linearised& at) {
-    return Eigen::MatrixXd(at.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
-  };
   out.cost = here.cost;
   double damping = 1e-8;
   for (bool moved = true; moved && out.iterations < max_iterations; ++out.iterations) {
     moved = false;
-    Quadratic model{0, here.gradient, hessian(here)};
+    Quadratic model{0, here.gradient, here.hessian};
     const Eigen::VectorXd diagonal = model.hessian.diagonal();
     out.converged =
         bounds.step_left(z, here.gradient, model.hessian) < settled || (goal && goal->distance(z) < arrived);
@@ -179,7 +180,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
         }
         // What looks like a kink may be a cost that is not convex: short steps on this side tell.
         doubted = true;
-        model = {0, here.gradient, hessian(here)};
+        model = {0, here.gradient, here.hessian};
         damping = std::max(damping, 1.0), growth = 15;
         continue;
       }
@@ -187,10 +188,10 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
       if (!(gain > 0.1)) {
         if (doubted || !objective.linearise(z + step, there)) continue;
         kinked = true;
-        const Eigen::MatrixXd H = hessian(there);
-        const Eigen::VectorXd slope = there.gradient - H * step;
-        model = upper(model, {there.cost - here.cost - step.dot(slope + 0.5 * (H * step)), slope, H}, bounds, z,
-                      damping * diagonal);
+        // The model of the other side, about z.
+        Quadratic beyond{0, there.gradient - there.hessian * step, there.hessian};
+        beyond.value = there.cost - here.cost - beyond(step);
+        model = upper(model, beyond, bounds, z, damping * diagonal);
         continue;
       }
       z += step;

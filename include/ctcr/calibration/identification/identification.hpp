@@ -29,12 +29,6 @@ struct IdentifyOptions {
   double strong_correlation = 0.9;         ///< correlations beyond it are listed
 };
 
-/// Two parameters that the readings hardly tell apart.
-struct Correlation {
-  int first, second;
-  double coefficient;
-};
-
 /// Where one of several starts led.
 struct Start {
   double cost;      ///< -log posterior density there, up to the constant that all starts share

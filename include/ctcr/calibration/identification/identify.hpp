@@ -1,10 +1,11 @@
 #pragma once
-// Parameters identified together from a table of readings: the most probable values given Gaussian priors and the noise
-// of the tracker, how certain they are, and what the readings cannot say.
+// The joint fit of parameters to a table of readings: the maximum a posteriori (MAP) estimate under Gaussian priors and
+// the tracker's noise, its covariance, and the combinations of parameters that the readings do not determine.
 #include <numbers>
 #include <random>
 
 #include "ctcr/calibration/identification/descent.hpp"
+#include "ctcr/calibration/identification/fitted_rows.hpp"
 #include "ctcr/calibration/identification/messages.hpp"
 #include "ctcr/calibration/identification/outliers.hpp"
 
@@ -19,244 +20,283 @@ inline RowWeights measured(const Eigen::VectorXd& residual) {
   return use;
 }
 
-/// Rows that count, an outlier by the share of it that is none.
-inline double bulk_rows(const RowWeights& weights, int kind) { return weights.col(kind).array().min(1.0).sqrt().sum(); }
+/// Number of rows, an outlier counted by its inlier fraction.
+inline double inlier_rows(const RowWeights& weights, int kind) {
+  return weights.col(kind).array().min(1.0).sqrt().sum();
+}
 
-/// Rows of a table that are fitted, taken out of columns of six entries a row: the others may be many.
-class FittedRows {
-public:
-  explicit FittedRows(const RowWeights& use) {
-    for (Eigen::Index i = 0; i < use.rows(); ++i)
-      if ((use.row(i).array() > 0).any()) rows_.push_back(i);
-    for (const Eigen::Index i : rows_)
-      for (Eigen::Index entry = 6 * i; entry < 6 * i + 6; ++entry) entries_.push_back(entry);
-  }
-
-  [[nodiscard]] Predictor predictor(const Predictor& predict) const {
-    return [this, &predict, residual = Eigen::VectorXd(), jacobian = Eigen::MatrixXd()](
-               const Eigen::VectorXd& x, Eigen::VectorXd& some, Eigen::MatrixXd* slopes) mutable {
-      if (!predict(x, residual, slopes ? &jacobian : nullptr)) return false;
-      some = of(residual);
-      if (slopes) *slopes = of(jacobian);
-      return true;
-    };
-  }
-  [[nodiscard]] Eigen::MatrixXd of(const Eigen::MatrixXd& columns) const { return columns(entries_, Eigen::all); }
-  [[nodiscard]] SmoothField field(const SmoothField& field) const {
-    return {field.factor(rows_, Eigen::all), field.rest(rows_)};
-  }
-  [[nodiscard]] RowWeights weights(const RowWeights& weights) const { return weights(rows_, Eigen::all); }
-  /// Weights of all rows, 0 where they are not fitted.
-  [[nodiscard]] RowWeights among(Eigen::Index rows, const RowWeights& weights) const {
-    RowWeights all = RowWeights::Zero(rows, 2);
-    all(rows_, Eigen::all) = weights;
-    return all;
-  }
-
-private:
-  std::vector<Eigen::Index> rows_, entries_;
-};
-
-/// The factor of the field error at the places of a table, fine enough for its noise.
-inline SmoothField field_at(const Eigen::MatrixX3d& places, const Noise& noise) {
+/// The field error at the positions (rows, 3) of a table, with a rank that is high enough for its noise.
+inline SmoothField field_at(const Eigen::MatrixX3d& positions, const Noise& noise) {
+  if (!(noise.position_field > 0 || noise.rotation_field > 0))
+    return {Eigen::MatrixXd(positions.rows(), 0), Eigen::VectorXd::Zero(positions.rows())};
   constexpr double negligible = 0.01;  // of the jitter's variance
   const auto tolerance = [](double jitter, double field) { return negligible * jitter * jitter / (field * field); };
-  return smooth_field(places, noise.correlation_length,
+  return smooth_field(positions, noise.correlation_length,
                       std::min(tolerance(noise.position_jitter, noise.position_field),
                                tolerance(noise.rotation_jitter, noise.rotation_field)));
 }
+
+/// The prediction at the starting values, and which rows it can be compared with.
+struct FirstPrediction {
+  Eigen::VectorXd x, residual;
+  Eigen::MatrixXd jacobian;
+  RowWeights use;  ///< of all rows: 0 where nothing was measured, or the caller leaves a row out
+
+  FirstPrediction(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::Index rows,
+                  const IdentifyOptions& options)
+    : x(Eigen::Index(parameters.size())) {
+    for (Eigen::Index k = 0; k < x.size(); ++k) {
+      const FreeParameter& p = parameters[std::size_t(k)];
+      x[k] = std::clamp(options.start ? (*options.start)[k] : p.mean, p.low, p.high);
+    }
+    if (!predict(x, residual, &jacobian))
+      throw std::invalid_argument("the readings cannot be predicted at the starting values");
+    if (residual.size() != 6 * rows || jacobian.rows() != residual.size() || jacobian.cols() != x.size())
+      throw std::invalid_argument("the predictor, the parameters and the positions do not fit together");
+    use = measured(residual);
+    if (options.weights) use = use.cwiseProduct(*options.weights);
+    if (!(use.array() > 0).any())
+      throw std::invalid_argument("no reading is left to fit: nothing was measured or solved");
+  }
+};
+
+/// A joint fit: the posterior in scaled parameters z, and the row weights and jitter inflation that belong to it.
+class JointFit {
+public:
+  JointFit(const Predictor& predict, const std::vector<FreeParameter>& parameters, const Noise& noise,
+           const Eigen::MatrixX3d& positions, const IdentifyOptions& options, FirstPrediction first)
+    : parameters_(parameters),
+      noise_(noise),
+      options_(options),
+      finds_weights_(options.robust && !options.weights),
+      finds_inflation_(options.admit_model_error && !options.inflation),
+      rows_(first.use),
+      predict_(rows_.predictor(predict)),
+      use_(rows_.weights(first.use)),
+      weights_(use_),
+      inflation_(options.inflation.value_or(Eigen::Array2d::Ones())),
+      field_everywhere_(field_at(positions, noise)),
+      field_(rows_.field(field_everywhere_)),
+      scale_(scale_for(rows_.of(first.jacobian))),
+      objective_(predict_, parameters, scale_),
+      bounds_(parameters, options.within, scale_),
+      z_(objective_.z(first.x)) {
+    objective_.know(z_, rows_.of(first.residual), rows_.of(first.jacobian));
+    if (finds_weights_ && options.first_weights) weights_ = use_.cwiseProduct(rows_.weights(*options.first_weights));
+    // The first descent takes all misfit at the start for noise: far from the solution, details mislead.
+    if (finds_inflation_) set_inflation(objective_.at(z_)->residual);
+    objective_.set_whitening(whitening());
+  }
+
+  /// Descends to the nearest minimum; weights and inflation are updated between descents until they stay the same.
+  void descend_reweighted() {
+    constexpr int rounds = 8;
+    const double coarse = std::max(0.5, options_.tolerance);
+    for (int round = 0; (finds_weights_ || finds_inflation_) && round < rounds; ++round) {
+      descend(coarse);
+      if (!objective_.at(z_) || !reweight()) break;
+    }
+    descend(options_.tolerance);
+    linearise();
+  }
+
+  /// Descends from starts drawn from the prior, under the weights found; goes on from there where the cost is lower.
+  void try_other_starts() {
+    std::mt19937_64 random(1);
+    for (int start = 1; start < options_.starts; ++start) {
+      Eigen::VectorXd other = drawn_from_prior(random);
+      for (int halving = 0; halving < 5 && !objective_.at(other); ++halving) other = 0.5 * (other + z_);
+      if (!objective_.at(other)) continue;
+      const Goal goal{z_, here_.hessian};
+      const Descent there =
+          detail::descend(objective_, bounds_, options_.max_iterations, options_.tolerance, other, &goal);
+      iterations_ += there.iterations;
+      starts_.push_back({there.cost, goal.distance(other), there.converged});
+      if (there.cost < descent_.cost - 0.5 && goal.distance(other) > 0.5) {
+        warnings_.push_back("a start drawn from the prior led to a better minimum than the first one");
+        z_ = other;
+        descend_reweighted();
+      }
+    }
+  }
+
+  /// The Laplace approximation of the posterior at the minimum, in the parameters' units.
+  [[nodiscard]] Identification result() {
+    const Posterior posterior(here_.information, objective_.prior());
+    Identification out;
+    out.starts = starts_, out.warnings = warnings_;
+    out.weights = weights_, out.inflation = inflation_;
+    report_estimate(posterior, out);
+    report_goodness(posterior, out);
+    report_convergence(out);
+    add_warnings(parameters_, posterior, here_.information.diagonal(), bounds_.reached(z_), use_, out);
+    const Eigen::Index rows = field_everywhere_.factor.rows();
+    out.weights = rows_.expanded(rows, weights_);
+    out.whitening = Whitening(noise_, field_everywhere_, rows_.expanded(rows, inflated_weights()));
+    return out;
+  }
+
+private:
+  [[nodiscard]] RowWeights inflated_weights() const {
+    RowWeights weights = weights_;
+    for (int kind = 0; kind < 2; ++kind) weights.col(kind) /= inflation_[kind] * inflation_[kind];
+    return weights;
+  }
+  [[nodiscard]] Whitening whitening() const { return {noise_, field_, inflated_weights()}; }
+
+  /// Prior sd of each parameter; without a prior, the sd that the readings alone would give it at the start.
+  [[nodiscard]] Eigen::VectorXd scale_for(const Eigen::MatrixXd& jacobian) const {
+    const Whitening first = whitening();
+    Eigen::VectorXd scale(jacobian.cols());
+    for (Eigen::Index k = 0; k < scale.size(); ++k) {
+      scale[k] = parameters_[std::size_t(k)].sd;
+      if (std::isfinite(scale[k])) continue;
+      Eigen::VectorXd column = jacobian.col(k);
+      first.apply(column);
+      scale[k] = column.norm() > 0 ? 1 / column.norm() : 1.0;
+    }
+    return scale;
+  }
+
+  void descend(double tolerance) {
+    descent_ = detail::descend(objective_, bounds_, options_.max_iterations, tolerance, z_);
+    iterations_ += descent_.iterations;
+  }
+  void linearise() {
+    if (!objective_.linearise(z_, here_))
+      throw std::invalid_argument("the readings cannot be predicted at the fitted values");
+  }
+
+  /// The inflation with which a residual would have the chi-square that its inliers should have.
+  void set_inflation(const Eigen::VectorXd& residual) {
+    const Whitening stated(noise_, field_, weights_);
+    for (int kind = 0; kind < 2; ++kind) {
+      const double expected = 3 * inlier_rows(weights_, kind);
+      inflation_[kind] = std::sqrt(stated.axes(kind).inflation(Whitening::gathered(residual, kind), expected));
+    }
+  }
+
+  /// Iterates weights and inflation together with the minimum of the model linearised at z, which needs no predictions.
+  /// @return whether they changed
+  bool reweight() {
+    constexpr int rounds = 20;
+    const double settled = std::max(0.5, 1e-3 * double(field_everywhere_.factor.rows()));  // rows
+    for (int round = 0; round < rounds; ++round) {
+      linearise();
+      const auto* point = objective_.at(z_);
+      const Eigen::VectorXd step = bounds_.step(z_, here_.gradient, here_.hessian);
+      const Eigen::VectorXd residual = point->residual + point->jacobian * scale_.cwiseProduct(step);
+      const RowWeights weights = weights_;
+      const Eigen::Array2d inflation = inflation_;
+      if (finds_weights_) weights_ = outlier_weights(noise_, inflation_, objective_.whitening(), residual, use_);
+      if (finds_inflation_) set_inflation(residual);
+      const double changed = (weights - weights_).cwiseAbs().sum();
+      if (changed < settled && (inflation_ / inflation).log().abs().maxCoeff() < 0.02) {
+        weights_ = weights, inflation_ = inflation;  // those that the objective's whitening has
+        return round > 0;
+      }
+      objective_.set_whitening(whitening());
+    }
+    return true;
+  }
+
+  /// The current z with new values of the parameters that have a prior, within the bounds.
+  Eigen::VectorXd drawn_from_prior(std::mt19937_64& random) {
+    Eigen::VectorXd other = z_;
+    for (Eigen::Index k = 0; k < other.size(); ++k) {
+      const FreeParameter& p = parameters_[std::size_t(k)];
+      const double drawn = normal_(random);
+      if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn, p.low, p.high) - p.mean) / p.sd;
+    }
+    return bounds_.clamped(other);
+  }
+
+  void report_estimate(const Posterior& posterior, Identification& out) const {
+    out.values = objective_.x(z_);
+    out.sd = scale_.cwiseProduct(posterior.sd());
+    out.covariance = scale_.asDiagonal() * posterior.covariance() * scale_.asDiagonal();
+    const auto has_prior = objective_.prior().array() > 0;
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    out.shift = has_prior.select(z_, nan);
+    out.ratio = has_prior.select(posterior.sd(), nan);
+    out.correlations = strong_correlations(posterior, options_.strong_correlation);
+    out.directions = undetermined_directions(posterior, parameters_, options_.known);
+  }
+
+  /// Chi-square, degrees of freedom and the log marginal likelihood.
+  void report_goodness(const Posterior& posterior, Identification& out) {
+    Eigen::VectorXd residual = objective_.at(z_)->residual;
+    Whitening(noise_, field_, weights_).apply(residual);
+    const Whitening& whitening = objective_.whitening();
+    out.chi_square = residual.squaredNorm();
+    out.admitted_chi_square = here_.chi_square;
+    out.shift_square = z_.cwiseProduct(objective_.prior()).squaredNorm();
+    out.observations = whitening.observations();
+    out.effective_parameters = posterior.effective_parameters();
+    out.bulk_observations = 3 * (inlier_rows(weights_, 0) + inlier_rows(weights_, 1));
+    out.reduced_chi_square = out.chi_square / (out.bulk_observations - out.effective_parameters);
+    out.log_evidence = -0.5 * (here_.chi_square + out.shift_square + posterior.log_determinant() +
+                               whitening.log_determinant() + double(out.observations) * std::log(2 * std::numbers::pi));
+    if ((objective_.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
+  }
+
+  void report_convergence(Identification& out) const {
+    constexpr double close = 0.05;  // posterior sd
+    const double remaining = bounds_.step_left(z_, here_.gradient, here_.hessian);
+    out.converged = remaining < close || descent_.converged;
+    out.iterations = iterations_;
+    out.evaluations = objective_.evaluations() + 1;
+    out.status = !out.converged ? "not converged after " + std::to_string(descent_.iterations) +
+                                      " iterations: a step of " + number(remaining) + " standard deviations is left"
+                 : descent_.at_kink && remaining >= close ? "converged, at a kink of the model"
+                                                          : "converged";
+  }
+
+  const std::vector<FreeParameter>& parameters_;
+  const Noise& noise_;
+  const IdentifyOptions& options_;
+  const bool finds_weights_, finds_inflation_;
+  const FittedRows rows_;
+  const Predictor predict_;  ///< of the fitted rows
+  const RowWeights use_;     ///< weights before outliers are found
+  RowWeights weights_;       ///< without the inflation
+  Eigen::Array2d inflation_;
+  const SmoothField field_everywhere_, field_;  ///< of all rows, of the fitted ones
+  const Eigen::VectorXd scale_;
+  Objective objective_;
+  const Bounds bounds_;
+  Eigen::VectorXd z_;
+  Descent descent_;  ///< the last one from z
+  Linearised here_;  ///< at z
+  std::normal_distribution<double> normal_;
+  std::vector<Start> starts_;
+  std::vector<std::string> warnings_;
+  int iterations_ = 0;
+};
 
 }  // namespace detail
 
 /// Finds the most probable parameters given readings, priors and the tracker's noise.
 ///
-/// Damped Gauss-Newton on the whitened residuals and the prior, repeated with lower weights for outliers; then from
-/// other starts. Linear in the rows; memory for two matrices of 6 rows x parameters and the field's factors.
-/// Deterministic for a deterministic predictor.
-/// @param places  (rows, 3) where the sensor was, tracker frame [m]: field errors are alike where places are near
-/// @throws std::invalid_argument where no fit is possible, in words, one sentence a line. Real time: no.
-/// Ref: effects of the prior and of the noise as in Tarantola, "Inverse Problem Theory", 2005, sect. 3.
+/// Iteratively reweighted, damped Gauss-Newton on the whitened residuals and the prior, then the same from other starts.
+/// Linear in the rows; memory for two matrices of 6 rows x parameters and the field's factors. Deterministic for a
+/// deterministic predictor.
+/// @param positions  (rows, 3) of the sensor, tracker frame [m]: field errors of near positions are alike
+/// @throws std::invalid_argument where no fit is possible, with one sentence a line. Real time: no.
+/// Ref: roles of the prior and of the noise as in Tarantola, "Inverse Problem Theory", 2005, sect. 3.
 inline Identification identify(const Predictor& predict, const std::vector<FreeParameter>& parameters,
-                               const Noise& noise, const Eigen::MatrixX3d& places,
+                               const Noise& noise, const Eigen::MatrixX3d& positions,
                                const IdentifyOptions& options = {}) {
-  detail::check(parameters, noise, places, options);
-  const auto n = Eigen::Index(parameters.size());
-  Eigen::VectorXd x(n), sd(n), residual;
-  Eigen::MatrixXd jacobian;
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const FreeParameter& p = parameters[std::size_t(k)];
-    x[k] = std::clamp(options.start ? (*options.start)[k] : p.mean, p.low, p.high);
-    sd[k] = p.sd;
-  }
-  if (!predict(x, residual, &jacobian))
-    throw std::invalid_argument("the readings cannot be predicted at the starting values");
-  if (residual.size() != 6 * places.rows() || jacobian.rows() != residual.size() || jacobian.cols() != n)
-    throw std::invalid_argument("the predictor, the parameters and the places do not fit together");
-  const RowWeights is_measured = detail::measured(residual);
-  const RowWeights given = options.weights ? is_measured.cwiseProduct(*options.weights) : is_measured;
-  if (!(given.array() > 0).any())
-    throw std::invalid_argument("no reading is left to fit: nothing was measured or solved");
-  const detail::FittedRows fitted(given);
-  const RowWeights use = fitted.weights(given);
-  const Predictor predict_fitted = fitted.predictor(predict);
-  residual = fitted.of(residual), jacobian = fitted.of(jacobian);
-
-  const bool smooth = noise.position_field > 0 || noise.rotation_field > 0;
-  const SmoothField field_everywhere =
-      smooth ? detail::field_at(places, noise)
-             : SmoothField{Eigen::MatrixXd(places.rows(), 0), Eigen::VectorXd::Zero(places.rows())};
-  const SmoothField field = fitted.field(field_everywhere);
-  Identification out;
-  out.weights = use;
-  if (options.inflation) out.inflation = *options.inflation;
-  const auto inflated = [&] {
-    RowWeights weights = out.weights;
-    for (int kind = 0; kind < 2; ++kind) weights.col(kind) /= out.inflation[kind] * out.inflation[kind];
-    return weights;
-  };
-  const auto set_whitening = [&] { out.whitening = Whitening(noise, field, inflated()); };
-  set_whitening();
-  // Without a prior a parameter is scaled by what the readings say of it.
-  for (Eigen::Index k = 0; k < n; ++k)
-    if (!std::isfinite(sd[k])) {
-      Eigen::VectorXd slope = jacobian.col(k);
-      out.whitening.apply(slope);
-      sd[k] = slope.norm() > 0 ? 1 / slope.norm() : 1.0;
-    }
-  detail::Objective objective(predict_fitted, parameters, sd);
-  objective.set_whitening(out.whitening);
-  const detail::Bounds bounds(parameters, options.within, sd);
-
-  Eigen::VectorXd z = objective.z(x);
-  objective.know(z, residual, std::move(jacobian));
-  detail::Descent best;
-  detail::Linearised here;
-  const auto precision = [&] {
-    return Eigen::MatrixXd(here.information + Eigen::MatrixXd(objective.prior().asDiagonal()));
-  };
-  const auto linearise = [&] {
-    if (!objective.linearise(z, here))
-      throw std::invalid_argument("the readings cannot be predicted at the fitted values");
-  };
-  const bool finds_weights = options.robust && !options.weights;
-  const bool finds_inflation = options.admit_model_error && !options.inflation;
-  if (finds_weights && options.first_weights) out.weights = use.cwiseProduct(fitted.weights(*options.first_weights));
-  // The inflation with which a residual would be no surprise.
-  const auto inflate = [&](const Eigen::VectorXd& left) {
-    const Whitening stated(noise, field, out.weights);
-    for (int kind = 0; kind < 2; ++kind) {
-      const double rows = detail::bulk_rows(out.weights, kind);
-      out.inflation[kind] = std::sqrt(stated.axes(kind).inflation(Whitening::gathered(left, kind), 3 * rows));
-    }
-  };
-  // Weights and inflation that belong to the best parameters of the model linearised at z, found without predictions.
-  // Returns whether they are others than before.
-  const auto settle = [&] {
-    constexpr int rounds = 20;
-    const double settled = std::max(0.5, 1e-3 * double(places.rows()));  // rows
-    for (int round = 0; round < rounds; ++round) {
-      linearise();
-      const auto* point = objective.at(z);
-      const Eigen::VectorXd step = bounds.step(z, here.gradient, precision());
-      const Eigen::VectorXd left = point->residual + point->jacobian * sd.cwiseProduct(step);
-      const RowWeights weights = out.weights;
-      const Eigen::Array2d inflation = out.inflation;
-      if (finds_weights) out.weights = outlier_weights(noise, out.inflation, out.whitening, left, use);
-      if (finds_inflation) inflate(left);
-      const double changed = (weights - out.weights).cwiseAbs().sum();
-      if (changed < settled && (out.inflation / inflation).log().abs().maxCoeff() < 0.02) {
-        out.weights = weights, out.inflation = inflation;  // those that the whitening has
-        return round > 0;
-      }
-      set_whitening();
-    }
-    return true;
-  };
-  const auto descend = [&](double tolerance) {
-    best = detail::descend(objective, bounds, options.max_iterations, tolerance, z);
-    out.iterations += best.iterations;
-  };
-  const auto descend_robustly = [&] {
-    constexpr int rounds = 8;
-    const double round_tolerance = std::max(0.5, options.tolerance);
-    for (int round = 0; (finds_weights || finds_inflation) && round < rounds; ++round) {
-      descend(round_tolerance);
-      if (!objective.at(z) || !settle()) break;
-    }
-    descend(options.tolerance);
-  };
-  // The first descent takes all that is wrong at the start for noise: far from the truth, details mislead.
-  if (finds_inflation) inflate(residual);
-  set_whitening();
-  descend_robustly();
-  linearise();
-
-  std::mt19937_64 random(1);
-  std::normal_distribution<double> normal;
-  for (int start = 1; start < options.starts; ++start) {
-    Eigen::VectorXd other = z;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const FreeParameter& p = parameters[std::size_t(k)];
-      const double drawn = normal(random);
-      if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn, p.low, p.high) - p.mean) / p.sd;
-    }
-    other = bounds.clamped(other);
-    for (int halving = 0; halving < 5 && !objective.at(other); ++halving) other = 0.5 * (other + z);
-    if (!objective.at(other)) continue;
-    const detail::Goal goal{z, precision()};
-    const detail::Descent there =
-        detail::descend(objective, bounds, options.max_iterations, options.tolerance, other, &goal);
-    out.iterations += there.iterations;
-    out.starts.push_back({there.cost, goal.distance(other), there.converged});
-    if (there.cost < best.cost - 0.5 && goal.distance(other) > 0.5) {
-      out.warnings.push_back("a start drawn from the prior led to a better place than the first one");
-      z = other;
-      descend_robustly();
-      linearise();
-    }
-  }
-
-  const Posterior posterior(here.information, objective.prior());
-  out.values = objective.x(z);
-  out.sd = sd.cwiseProduct(posterior.sd());
-  out.covariance = sd.asDiagonal() * posterior.covariance() * sd.asDiagonal();
-  out.shift = out.ratio = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
-  for (Eigen::Index k = 0; k < n; ++k)
-    if (objective.prior()[k] > 0) out.shift[k] = z[k], out.ratio[k] = posterior.sd()[k];
-  for (Eigen::Index a = 0; a < n; ++a)
-    for (Eigen::Index b = a + 1; b < n; ++b) {
-      const double r = posterior.covariance()(a, b) / (posterior.sd()[a] * posterior.sd()[b]);
-      if (std::abs(r) > options.strong_correlation) out.correlations.push_back({int(a), int(b), r});
-    }
-  std::sort(out.correlations.begin(), out.correlations.end(), [](const Correlation& a, const Correlation& b) {
-    return std::abs(a.coefficient) > std::abs(b.coefficient);
-  });
-  out.directions = undetermined_directions(posterior, parameters, options.known);
-
-  residual = objective.at(z)->residual;
-  Whitening(noise, field, out.weights).apply(residual);
-  out.chi_square = residual.squaredNorm();
-  out.admitted_chi_square = here.chi_square;
-  out.shift_square = z.cwiseProduct(objective.prior()).squaredNorm();
-  out.observations = out.whitening.observations();
-  out.effective_parameters = posterior.effective_parameters();
-  out.bulk_observations = 3 * (detail::bulk_rows(out.weights, 0) + detail::bulk_rows(out.weights, 1));
-  out.reduced_chi_square = out.chi_square / (out.bulk_observations - out.effective_parameters);
-  out.log_evidence =
-      -0.5 * (here.chi_square + out.shift_square + posterior.log_determinant() + out.whitening.log_determinant() +
-              double(out.observations) * std::log(2 * std::numbers::pi));
-  if ((objective.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
-
-  const double left = bounds.step_left(z, here.gradient, precision());
-  out.converged = left < 0.05 || best.converged;
-  out.evaluations = objective.evaluations() + 1;
-  out.status = out.converged ? (best.at_kink && left >= 0.05 ? "converged, at a kink of the model" : "converged")
-                             : "not converged after " + std::to_string(best.iterations) + " iterations: a step of " +
-                                   detail::number(left) + " standard deviations is left";
-  detail::add_warnings(parameters, posterior, here.information.diagonal(), bounds.reached(z), use, out);
-  out.whitening = Whitening(noise, field_everywhere, fitted.among(places.rows(), inflated()));
-  out.weights = fitted.among(places.rows(), out.weights);
-  return out;
+  detail::check(parameters, noise, positions, options);
+  // Predict once to find the rows that can be fitted and the scale of each parameter.
+  detail::JointFit fit(predict, parameters, noise, positions, options,
+                       detail::FirstPrediction(predict, parameters, positions.rows(), options));
+  // Find the nearest minimum, with the weights of outliers and the inflation of the jitter that belong to it.
+  fit.descend_reweighted();
+  // Look for a better minimum elsewhere within the prior.
+  fit.try_other_starts();
+  // Approximate the posterior there: standard deviations, undetermined directions, log evidence, warnings.
+  return fit.result();
 }
 
 }  // namespace ctcr

@@ -17,7 +17,8 @@ namespace ctcr {
 /// @return and throws as identify(); on return the table's active rows are those that were fitted
 template <class Table>
 Identification identify_with_exclusions(Table& table, const std::vector<FreeParameter>& parameters, const Noise& noise,
-                                 const Eigen::MatrixX3d& places, IdentifyOptions options, std::vector<int>& excluded) {
+                                        const Eigen::MatrixX3d& places, IdentifyOptions options,
+                                        std::vector<int>& excluded) {
   constexpr int rounds = 4;
   const auto exclude = [&](const std::vector<int>& rows) {
     std::vector<bool> active = table.active();

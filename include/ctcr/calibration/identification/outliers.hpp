@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ctcr/calibration/identification/whitening.hpp"
+#include "ctcr/calibration/statistics.hpp"
 
 namespace ctcr {
 
@@ -39,9 +40,7 @@ inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& infl
     for (Eigen::Index i = 0; i < square.size(); ++i)
       if (use(i, kind) > 0) used.push_back(square[i]);
     if (used.empty()) continue;
-    const auto middle = used.begin() + std::ptrdiff_t(used.size() / 2);
-    std::nth_element(used.begin(), middle, used.end());
-    const double usual = std::max(1.0, *middle / median_of_chi_square);
+    const double usual = std::max(1.0, median(used) / median_of_chi_square);
     for (Eigen::Index i = 0; i < square.size(); ++i)
       if (use(i, kind) > 0) weights(i, kind) = use(i, kind) * std::pow(bulk_share(square[i] / usual), 2);
   }

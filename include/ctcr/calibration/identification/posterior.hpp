@@ -4,7 +4,9 @@
 // Parameters are scaled by their prior sd, so that the prior's precision is 1 (0 without a prior) and every number below
 // compares what is known after the readings with what was known before.
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
@@ -116,6 +118,24 @@ inline std::string combination(const Eigen::VectorXd& v, const std::vector<FreeP
 }
 
 }  // namespace detail
+
+/// Two parameters that the readings hardly tell apart.
+struct Correlation {
+  int first, second;
+  double coefficient;
+};
+
+/// Posterior correlations beyond `threshold`, the strongest first.
+inline std::vector<Correlation> strong_correlations(const Posterior& posterior, double threshold) {
+  std::vector<Correlation> found;
+  for (Eigen::Index a = 0; a < posterior.sd().size(); ++a)
+    for (Eigen::Index b = a + 1; b < posterior.sd().size(); ++b) {
+      const double r = posterior.covariance()(a, b) / (posterior.sd()[a] * posterior.sd()[b]);
+      if (std::abs(r) > threshold) found.push_back({int(a), int(b), r});
+    }
+  std::ranges::sort(found, std::greater(), [](const Correlation& c) { return std::abs(c.coefficient); });
+  return found;
+}
 
 /// Directions along which the posterior is wider than `limit` times the prior: first those of `known` for which that
 /// holds, with their words, then the rest, each with as few parameters as possible.

@@ -6,7 +6,7 @@
 // (I + A A^T)^(-1/2) = I - A V diag(1 / (1 + t + sqrt(1 + t))) V^T A^T.
 #include <Eigen/Eigenvalues>
 #include <array>
-#include <type_traits>
+#include <numeric>
 #include <vector>
 
 #include "ctcr/calibration/dense.hpp"
@@ -18,13 +18,6 @@ namespace ctcr {
 using RowWeights = Eigen::MatrixX2d;
 
 namespace detail {
-
-/// Every sixth of the numbers that start at `first`.
-template <class Scalar>
-auto every_sixth(Scalar* first, Eigen::Index rows) {
-  using Vector = std::conditional_t<std::is_const_v<Scalar>, const Eigen::VectorXd, Eigen::VectorXd>;
-  return Eigen::Map<Vector, 0, Eigen::InnerStride<6>>(first, rows);
-}
 
 /// The three axes of a position or of a rotation, which share one covariance.
 class ThreeAxes {
@@ -46,15 +39,16 @@ public:
     field_ = product(field_, to_posterior);
     scaled_field_ = product(A, to_posterior);
     shrink_ = (1 + t).sqrt() / (1 + (1 + t).sqrt());
-    strength_ = t;
+    eigenvalues_ = t;
     log_determinant_ += (1 + t).log().sum();
   }
 
   /// @param y  (rows of weight above 0, any)
-  void whiten(Eigen::MatrixXd& y) const {
+  [[nodiscard]] Eigen::MatrixXd whitened(Eigen::MatrixXd y) const {
     y = scale_(rows_).asDiagonal() * y;
-    if (scaled_field_.cols() == 0) return;
-    y -= product(scaled_field_, shrink_.matrix().asDiagonal() * transposed_product(scaled_field_, y));
+    if (scaled_field_.cols() > 0)
+      y -= product(scaled_field_, shrink_.matrix().asDiagonal() * transposed_product(scaled_field_, y));
+    return y;
   }
   /// Posterior mean of the field error at every row, given residuals (rows, any).
   [[nodiscard]] Eigen::MatrixXd field_mean(const Eigen::MatrixXd& residual) const {
@@ -67,9 +61,9 @@ public:
     const double all = y.squaredNorm();
     Eigen::ArrayXd smooth;  // what of it the field can explain, by eigenvector of A A^T
     if (field_.cols() > 0)
-      smooth = (1 + strength_) * transposed_product(field_, scale_.asDiagonal() * y).rowwise().squaredNorm().array();
+      smooth = (1 + eigenvalues_) * transposed_product(field_, scale_.asDiagonal() * y).rowwise().squaredNorm().array();
     const auto chi_square = [&](double s2) {
-      return (all - (smooth.size() > 0 ? (smooth / (s2 + strength_)).sum() : 0.0)) / s2;
+      return (all - (smooth.size() > 0 ? (smooth / (s2 + eigenvalues_)).sum() : 0.0)) / s2;
     };
     double low = 1, high = 1;
     if (!(expected > 0) || chi_square(1) <= expected + 4 * std::sqrt(2 * expected)) return 1;
@@ -92,7 +86,7 @@ private:
   Eigen::MatrixXd field_;         ///< its posterior covariance is field_ field_^T
   Eigen::MatrixXd scaled_field_;  ///< its rows of weight above 0, scaled
   Eigen::VectorXd scale_;
-  Eigen::ArrayXd shrink_, strength_;
+  Eigen::ArrayXd shrink_, eigenvalues_;
   double jitter_variance_ = 0, variance_ = 0, log_determinant_ = 0;
   std::vector<Eigen::Index> rows_;
 };
@@ -116,13 +110,11 @@ public:
     constexpr Eigen::Index panel = 16;  // columns at a time: bounds the memory
     for (Eigen::Index first = 0; first < columns.cols(); first += panel) {
       auto some = columns.middleCols(first, std::min(panel, columns.cols() - first));
-      std::array<Eigen::MatrixXd, 2> y;
-      for (int kind = 0; kind < 2; ++kind) {
-        y[std::size_t(kind)] = gathered(some, kind, axes(kind).rows());
-        axes(kind).whiten(y[std::size_t(kind)]);
-      }
+      const Eigen::MatrixXd position = axes_[0].whitened(gathered(some, 0, axes_[0].rows())),
+                            rotation = axes_[1].whitened(gathered(some, 1, axes_[1].rows()));
       some.setZero();
-      for (int kind = 0; kind < 2; ++kind) scatter(y[std::size_t(kind)], kind, axes(kind).rows(), some);
+      scatter(position, 0, axes_[0].rows(), some);
+      scatter(rotation, 1, axes_[1].rows(), some);
     }
   }
   /// log |Sigma| of the rows of weight above 0.
@@ -136,48 +128,37 @@ public:
   [[nodiscard]] Eigen::VectorXd field(const Eigen::VectorXd& residual) const {
     Eigen::VectorXd out(residual.size());
     for (int kind = 0; kind < 2; ++kind)
-      scatter(axes_[std::size_t(kind)].field_mean(gathered(residual, kind)), kind, out);
+      scatter(axes(kind).field_mean(gathered(residual, kind)), kind, all_of(out), out);
     return out;
   }
   /// 0: position, 1: rotation.
   [[nodiscard]] const detail::ThreeAxes& axes(int kind) const { return axes_[std::size_t(kind)]; }
 
-  /// Three columns for each of `columns`: the axes of a kind, row by row. Whatever is not finite counts as 0.
+  /// Three columns for each of `columns` (6 rows, any): the axes of a kind, row by row. Not finite numbers count as 0.
   static Eigen::MatrixXd gathered(const Eigen::Ref<const Eigen::MatrixXd>& columns, int kind) {
-    const Eigen::Index rows = columns.rows() / 6;
-    Eigen::MatrixXd y(rows, 3 * columns.cols());
-    for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      for (int a = 0; a < 3; ++a) {
-        const auto axis = detail::every_sixth(columns.col(k).data() + 3 * kind + a, rows);
-        y.col(3 * k + a) = axis.array().isFinite().select(axis, 0.0);
-      }
-    return y;
+    return gathered(columns, kind, all_of(columns));
   }
 
 private:
+  using Rows = std::vector<Eigen::Index>;
+  static Rows all_of(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
+    Rows rows(std::size_t(columns.rows() / 6));
+    std::iota(rows.begin(), rows.end(), 0);
+    return rows;
+  }
   /// The same of some rows, and back.
-  static Eigen::MatrixXd gathered(const Eigen::Ref<const Eigen::MatrixXd>& columns, int kind,
-                                  const std::vector<Eigen::Index>& some) {
-    Eigen::MatrixXd y(Eigen::Index(some.size()), 3 * columns.cols());
-    for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      for (int a = 0; a < 3; ++a)
-        for (Eigen::Index i = 0; i < y.rows(); ++i) {
-          const double x = columns(6 * some[std::size_t(i)] + 3 * kind + a, k);
-          y(i, 3 * k + a) = std::isfinite(x) ? x : 0.0;
-        }
+  static Eigen::MatrixXd gathered(const Eigen::Ref<const Eigen::MatrixXd>& columns, int kind, const Rows& rows) {
+    Eigen::MatrixXd y(Eigen::Index(rows.size()), 3 * columns.cols());
+    for (Eigen::Index k = 0; k < y.cols(); ++k)
+      for (Eigen::Index i = 0; i < y.rows(); ++i) {
+        const double x = columns(6 * rows[std::size_t(i)] + 3 * kind + k % 3, k / 3);
+        y(i, k) = std::isfinite(x) ? x : 0.0;
+      }
     return y;
   }
-  static void scatter(const Eigen::MatrixXd& y, int kind, const std::vector<Eigen::Index>& some,
-                      Eigen::Ref<Eigen::MatrixXd> columns) {
-    for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      for (int a = 0; a < 3; ++a)
-        for (Eigen::Index i = 0; i < y.rows(); ++i)
-          columns(6 * some[std::size_t(i)] + 3 * kind + a, k) = y(i, 3 * k + a);
-  }
-  static void scatter(const Eigen::MatrixXd& y, int kind, Eigen::Ref<Eigen::MatrixXd> columns) {
-    for (Eigen::Index k = 0; k < columns.cols(); ++k)
-      for (int a = 0; a < 3; ++a)
-        detail::every_sixth(columns.col(k).data() + 3 * kind + a, y.rows()) = y.col(3 * k + a);
+  static void scatter(const Eigen::MatrixXd& y, int kind, const Rows& rows, Eigen::Ref<Eigen::MatrixXd> columns) {
+    for (Eigen::Index k = 0; k < y.cols(); ++k)
+      for (Eigen::Index i = 0; i < y.rows(); ++i) columns(6 * rows[std::size_t(i)] + 3 * kind + k % 3, k / 3) = y(i, k);
   }
 
   std::array<detail::ThreeAxes, 2> axes_;

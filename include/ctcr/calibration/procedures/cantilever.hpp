@@ -1,6 +1,7 @@
 #pragma once
 // Young's modulus of a tube from how far it deflects when it is clamped at one end and loaded across.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -9,7 +10,7 @@
 #include "ctcr/calibration/procedures/elastica.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
-#include "ctcr/calibration/procedures/significance.hpp"
+#include "ctcr/calibration/statistics.hpp"
 #include "ctcr/robot/tube.hpp"
 
 namespace ctcr {
@@ -38,13 +39,8 @@ enum class CantileverNotice {
 };
 
 /// The notice's name.
-constexpr const char* to_string(CantileverNotice kind) noexcept {
-  switch (kind) {
-    case CantileverNotice::load_dependent: return "load_dependent";
-    case CantileverNotice::deflection_small: return "deflection_small";
-    case CantileverNotice::residuals_large: return "residuals_large";
-  }
-  return "unknown";
+constexpr const char* to_string(CantileverNotice kind) {
+  return std::array{"load_dependent", "deflection_small", "residuals_large"}.at(std::size_t(kind));
 }
 
 struct Cantilever {
@@ -55,7 +51,7 @@ struct Cantilever {
   std::vector<double> residuals;                   ///< measured - elastica [m]
   std::vector<double> end_angle;                   ///< of the tube where the deflection is read [rad]
   std::vector<double> row_modulus;                 ///< E from each row alone, zero taken off [Pa]
-  std::vector<Notice<CantileverNotice>> notices;
+  Notices<CantileverNotice> notices;
 };
 
 namespace cantilever {
@@ -102,16 +98,16 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
     const std::size_t n = i + 1;
     require(std::isfinite(row.load) && std::isfinite(row.deflection) && std::isfinite(row.free_length) &&
                 std::isfinite(row.load_distance),
-            sentence("row %zu: a value is not a finite number", n));
-    require(row.load != 0, sentence("row %zu: a load of 0 N says nothing of stiffness", n));
-    require(row.free_length > 0, sentence("row %zu: the free length must be positive [m]", n));
+            "row %zu: a value is not a finite number", n);
+    require(row.load != 0, "row %zu: a load of 0 N says nothing of stiffness", n);
+    require(row.free_length > 0, "row %zu: the free length must be positive [m]", n);
     require(row.load_distance >= 0 && row.load_distance <= row.free_length,
-            sentence("row %zu: the load must act between the clamp and where the deflection is read", n));
-    require(row.deflection * row.load > 0,
-            sentence("row %zu: the tube must deflect along the load: both of one sign, and not 0", n));
+            "row %zu: the load must act between the clamp and where the deflection is read", n);
+    require(row.deflection * row.load > 0, "row %zu: the tube must deflect along the load: both of one sign, and not 0",
+            n);
     require(std::abs(row.deflection) < 0.95 * row.free_length,
-            sentence("row %zu: a deflection of %.1f mm is no less than the free length allows: is the unit m?", n,
-                     1e3 * std::abs(row.deflection)));
+            "row %zu: a deflection of %.1f mm is no less than the free length allows: is the unit m?", n,
+            1e3 * std::abs(row.deflection));
   }
   const std::size_t unknowns = options.fit_zero ? 2 : 1;
   require(rows.size() >= unknowns, "two loads or more are needed to find the zero as well");
@@ -125,7 +121,6 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
 /// @throws std::invalid_argument naming the row and what is wrong. Real time: no.
 [[nodiscard]] inline Cantilever fit_cantilever(std::span<const Deflection> rows, const CantileverOptions& options) {
   using namespace cantilever;
-  constexpr double surprising = 3.5;
   check(rows, options);
   const Eigen::Index n = Eigen::Index(rows.size()), unknowns = options.fit_zero ? 2 : 1;
   // Gauss-Newton by (ln EI, zero) from the mean of what each row says alone.
@@ -194,19 +189,17 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
     largest = std::max(largest, load);
   }
 
-  const auto tell = [&](CantileverNotice kind, double value, double limit, std::string text) {
-    result.notices.push_back({kind, value, limit, std::move(text)});
-  };
   using enum CantileverNotice;
   const double readings_sd = std::sqrt(covariance(0, 0));
   if (readings_sd > 0.1)
-    tell(deflection_small, readings_sd, 0.1,
-         sentence("the deflections are small for their error: %.0f %% of the modulus; use a longer piece or more load",
-                  100 * readings_sd));
+    result.notices.add(
+        deflection_small, readings_sd, 0.1,
+        "the deflections are small for their error: %.0f %% of the modulus; use a longer piece or more load",
+        100 * readings_sd);
   if (stated > 0 && degrees > 0 && chi_square_score(sum / stated, degrees) > surprising)
-    tell(residuals_large, std::sqrt(sum / degrees), options.deflection_sd,
-         sentence("deflections scatter by %.3f mm about the elastica, more than the %.3f mm stated",
-                  1e3 * std::sqrt(sum / degrees), 1e3 * options.deflection_sd));
+    result.notices.add(residuals_large, std::sqrt(sum / degrees), options.deflection_sd,
+                       "deflections scatter by %.3f mm about the elastica, more than the %.3f mm stated",
+                       1e3 * std::sqrt(sum / degrees), 1e3 * options.deflection_sd);
   if (degrees < 3 || !(largest > 1.01 * least)) return result;
   const Eigen::VectorXd x = least_squares(wide, error);
   const double remaining = (error - wide * x).squaredNorm(), saved = sum - remaining;
@@ -216,10 +209,11 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
                            : variance_ratio_score(saved / std::max(remaining / (degrees - 1), floor), 1, degrees - 1);
   const double change = x[unknowns] * (largest - least);
   if (score > surprising && std::abs(change) > 0.02)
-    tell(load_dependent, change, 0.02,
-         sentence("the modulus changes by %.0f %% from the least to the largest load: the material is not linear, or a "
-                  "length or the zero is wrong",
-                  100 * change));
+    result.notices.add(
+        load_dependent, change, 0.02,
+        "the modulus changes by %.0f %% from the least to the largest load: the material is not linear, or a "
+        "length or the zero is wrong",
+        100 * change);
   return result;
 }
 

@@ -2,12 +2,14 @@
 // Translational offsets and effective lengths: what a ruler, the motors and tips flush with the front plate tell.
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "ctcr/calibration/procedures/notice.hpp"
+#include "ctcr/calibration/statistics.hpp"
 #include "ctcr/core/types.hpp"
 
 namespace ctcr {
@@ -33,12 +35,8 @@ enum class HomeNotice {
 };
 
 /// The notice's name.
-constexpr const char* to_string(HomeNotice kind) noexcept {
-  switch (kind) {
-    case HomeNotice::inconsistent: return "inconsistent";
-    case HomeNotice::out_of_order: return "out_of_order";
-  }
-  return "unknown";
+constexpr const char* to_string(HomeNotice kind) {
+  return std::array{"inconsistent", "out_of_order"}.at(std::size_t(kind));
 }
 
 /// Of one tube. Offset and length share the error of the ruler: their sum, and so the tip, is known to that of the flush
@@ -52,7 +50,7 @@ struct HomeOffset {
 
 struct Home {
   std::vector<HomeOffset> tubes;  ///< innermost first
-  std::vector<Notice<HomeNotice>> notices;
+  Notices<HomeNotice> notices;
 };
 
 namespace home {
@@ -71,17 +69,17 @@ inline Mean mean_of(const std::vector<double>& values, double sd) {
 
 inline void check(const TubeHome& tube, std::size_t number) {
   const int kinds = !tube.distances.empty() + !tube.flush_angles.empty() + !tube.lengths.empty();
-  require(kinds >= 2, sentence("tube %zu: two of home distance, flush reading and length are needed, here is %s",
-                               number, kinds == 1 ? "one" : "none"));
+  require(kinds >= 2, "tube %zu: two of home distance, flush reading and length are needed, here is %s", number,
+          kinds == 1 ? "one" : "none");
   bool is_finite = std::isfinite(tube.home_angle);
   for (const auto* list : {&tube.distances, &tube.flush_angles, &tube.lengths})
     for (const double value : *list) is_finite = is_finite && std::isfinite(value);
-  require(is_finite, sentence("tube %zu: a measurement is not a finite number", number));
+  require(is_finite, "tube %zu: a measurement is not a finite number", number);
   for (const auto* list : {&tube.distances, &tube.lengths})
     for (const double value : *list)
       require(value > 0 && value < 10,
-              sentence("tube %zu: %g m is no distance from plate to grasp and no tube length: give metres, positive",
-                       number, value));
+              "tube %zu: %g m is no distance from plate to grasp and no tube length: give metres, positive", number,
+              value);
 }
 
 }  // namespace home
@@ -92,7 +90,7 @@ inline void check(const TubeHome& tube, std::size_t number) {
 /// Ref: Boyer et al., Section V.
 [[nodiscard]] inline Home home_offsets(std::span<const TubeHome> tubes, const HomeOptions& options) {
   using namespace home;
-  constexpr double mm = 1e-3, surprising = 3.5;
+  constexpr double mm = 1e-3;
   require(!tubes.empty(), "no tube is given");
   require(std::isfinite(options.translation_ratio) && options.translation_ratio != 0,
           "the translation ratio [m/rad] must be finite and not 0");
@@ -131,16 +129,15 @@ inline void check(const TubeHome& tube, std::size_t number) {
                             .deployed = rho * tube.home_angle + x[0] + x[1],
                             .deployed_sd = tip_sd});
     require(x[1] > 0,
-            sentence("tube %zu: its length comes out as %.1f mm: the sign of the translation ratio or a flush "
-                     "reading is wrong",
-                     i + 1, x[1] / mm));
+            "tube %zu: its length comes out as %.1f mm: the sign of the translation ratio or a flush "
+            "reading is wrong",
+            i + 1, x[1] / mm);
     const double misfit = (A * x - b).norm();
     if (!tube.distances.empty() && !tube.flush_angles.empty() && !tube.lengths.empty() && misfit > surprising) {
       const double gap = mean_of(tube.distances, 1).value +
                          rho * (tube.home_angle - mean_of(tube.flush_angles, 1).value) - mean_of(tube.lengths, 1).value;
-      result.notices.push_back(
-          {HomeNotice::inconsistent, gap, gap * surprising / misfit,
-           sentence("tube %zu: distance and travel make it %.2f mm longer than it was measured", i + 1, gap / mm)});
+      result.notices.add(HomeNotice::inconsistent, gap, gap * surprising / misfit,
+                         "tube %zu: distance and travel make it %.2f mm longer than it was measured", i + 1, gap / mm);
     }
     if (i == 0) continue;
     const HomeOffset &inner = result.tubes[i - 1], &outer = result.tubes[i];
@@ -148,9 +145,8 @@ inline void check(const TubeHome& tube, std::size_t number) {
     const double excess = std::max(grasp, outer.deployed - inner.deployed);
     const double limit = surprising * std::hypot(inner.offset_sd, outer.offset_sd);
     if (excess > limit)
-      result.notices.push_back({HomeNotice::out_of_order, excess, limit,
-                                sentence("at home tube %zu %s tube %zu by %.2f mm", i + 1,
-                                         excess == grasp ? "is grasped behind" : "reaches beyond", i, excess / mm)});
+      result.notices.add(HomeNotice::out_of_order, excess, limit, "at home tube %zu %s tube %zu by %.2f mm", i + 1,
+                         excess == grasp ? "is grasped behind" : "reaches beyond", i, excess / mm);
   }
   return result;
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -12,7 +13,7 @@
 #include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
-#include "ctcr/calibration/procedures/significance.hpp"
+#include "ctcr/calibration/statistics.hpp"
 
 namespace ctcr {
 
@@ -22,6 +23,13 @@ struct Fiducial {
   Vec3 position = Vec3::Zero();  ///< from the CAD [m], base frame
   std::vector<Vec3> readings{};  ///< [m], tracker frame; none: the point is left out
 };
+
+/// Mean of a point's readings, of which there is at least one.
+inline Vec3 mean_reading(const Fiducial& point) {
+  Vec3 sum = Vec3::Zero();
+  for (const Vec3& reading : point.readings) sum += reading;
+  return sum / double(point.readings.size());
+}
 
 struct RegistrationOptions {
   Noise noise{};            ///< of a reading's position
@@ -39,15 +47,9 @@ enum class RegistrationNotice {
 };
 
 /// The notice's name.
-constexpr const char* to_string(RegistrationNotice kind) noexcept {
-  switch (kind) {
-    case RegistrationNotice::outliers: return "outliers";
-    case RegistrationNotice::few_points: return "few_points";
-    case RegistrationNotice::without_reading: return "without_reading";
-    case RegistrationNotice::large_residuals: return "large_residuals";
-    case RegistrationNotice::wrong_scale: return "wrong_scale";
-  }
-  return "unknown";
+constexpr const char* to_string(RegistrationNotice kind) {
+  return std::array{"outliers", "few_points", "without_reading", "large_residuals", "wrong_scale"}.at(
+      std::size_t(kind));
 }
 
 /// T_ref and how well it is known. Changes of T_ref are those of moved_frame(): displacement of the base frame's origin
@@ -61,7 +63,7 @@ struct Registration {
   double repeatability_sd;            ///< of readings of one point, per axis [m]; NaN without repeats
   std::vector<Vec3> residuals;        ///< mean reading - T_ref point [m], tracker axes; NaN: not read
   std::vector<std::string> outliers;  ///< names of the points left out
-  std::vector<Notice<RegistrationNotice>> notices;
+  Notices<RegistrationNotice> notices;
 
   /// Expected target registration error: RMS distance [m] between where T_ref takes `target` [m], base frame, and where
   /// it is. For equal points this is the formula of Fitzpatrick, West, Maurer, "Predicting error in rigid-body
@@ -77,7 +79,7 @@ struct Registration {
 
 namespace registration {
 
-inline constexpr double surprising = 3.5, mm = 1e-3;
+inline constexpr double mm = 1e-3;
 
 /// Matching points, one a column [m].
 struct Pairs {
@@ -129,31 +131,27 @@ inline Pairs check(std::span<const Fiducial> points, std::vector<int>& read) {
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Fiducial& point = points[i];
     for (std::size_t j = 0; j < i; ++j)
-      require(points[j].name != point.name, sentence("the point '%s' is given twice", point.name.c_str()));
-    require(point.position.allFinite(),
-            sentence("point '%s': its CAD position [m] is not a finite number", point.name.c_str()));
-    Vec3 sum = Vec3::Zero();
-    for (const Vec3& reading : point.readings) {
-      require(reading.allFinite(), sentence("point '%s': a reading [m] is not a finite number", point.name.c_str()));
-      sum += reading;
-    }
+      require(points[j].name != point.name, "the point '%s' is given twice", point.name.c_str());
+    require(point.position.allFinite(), "point '%s': its CAD position [m] is not a finite number", point.name.c_str());
+    for (const Vec3& reading : point.readings)
+      require(reading.allFinite(), "point '%s': a reading [m] is not a finite number", point.name.c_str());
     if (point.readings.empty()) continue;
     pairs.base.col(Eigen::Index(read.size())) = point.position;
-    pairs.tracker.col(Eigen::Index(read.size())) = sum / double(point.readings.size());
+    pairs.tracker.col(Eigen::Index(read.size())) = mean_reading(point);
     read.push_back(int(i));
   }
   pairs.base.conservativeResize(3, Eigen::Index(read.size()));
   pairs.tracker.conservativeResize(3, Eigen::Index(read.size()));
-  require(read.size() >= 3, sentence("a registration needs readings of at least 3 points, here are %zu", read.size()));
+  require(read.size() >= 3, "a registration needs readings of at least 3 points, here are %zu", read.size());
   for (const auto* side : {&pairs.base, &pairs.tracker}) {
     const Vec3 extent = extents(*side);
     require(extent[1] > 3e-3 * extent[0],
-            sentence("the %s lie on one line, so that the rotation about it is unknown: add a point beside it",
-                     side == &pairs.base ? "points of the CAD" : "readings"));
+            "the %s lie on one line, so that the rotation about it is unknown: add a point beside it",
+            side == &pairs.base ? "points of the CAD" : "readings");
   }
   const double scale = extents(pairs.tracker).norm() / extents(pairs.base).norm();
   require(scale > 0.1 && scale < 10,
-          sentence("the readings span %.3g times what the points of the CAD do: one of them has another unit", scale));
+          "the readings span %.3g times what the points of the CAD do: one of them has another unit", scale);
   return pairs;
 }
 
@@ -166,21 +164,20 @@ inline void check_correspondence(const Pairs& pairs, std::span<const Fiducial> p
   };
   const double mirrored = squares({-pairs.base, pairs.tracker});
   const double count = double(pairs.count());
-  require(
-      !is_far_better(mirrored),
-      sentence("the readings are a mirror image of the CAD's points (residual %.2f mm, mirrored %.2f mm): an axis has "
-               "the wrong sign, or left and right are exchanged",
-               std::sqrt(straight / count) / mm, std::sqrt(mirrored / count) / mm));
+  require(!is_far_better(mirrored),
+          "the readings are a mirror image of the CAD's points (residual %.2f mm, mirrored %.2f mm): an axis has "
+          "the wrong sign, or left and right are exchanged",
+          std::sqrt(straight / count) / mm, std::sqrt(mirrored / count) / mm);
   Pairs exchanged = pairs;
   for (Eigen::Index i = 0; i < pairs.count(); ++i)
     for (Eigen::Index j = 0; j < i; ++j) {
       exchanged.base.col(i).swap(exchanged.base.col(j));
       const double other = squares(exchanged);
       require(!is_far_better(other),
-              sentence("the readings of '%s' and '%s' look exchanged: so the residual is %.2f mm, otherwise %.2f mm",
-                       points[std::size_t(read[std::size_t(j)])].name.c_str(),
-                       points[std::size_t(read[std::size_t(i)])].name.c_str(), std::sqrt(straight / count) / mm,
-                       std::sqrt(other / count) / mm));
+              "the readings of '%s' and '%s' look exchanged: so the residual is %.2f mm, otherwise %.2f mm",
+              points[std::size_t(read[std::size_t(j)])].name.c_str(),
+              points[std::size_t(read[std::size_t(i)])].name.c_str(), std::sqrt(straight / count) / mm,
+              std::sqrt(other / count) / mm);
       exchanged.base.col(i).swap(exchanged.base.col(j));
     }
 }
@@ -253,17 +250,13 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   check_correspondence(pairs, points, read);
 
   Registration result{};
-  const auto tell = [&](RegistrationNotice kind, double value, double limit, std::string text) {
-    result.notices.push_back({kind, value, limit, std::move(text)});
-  };
   using enum RegistrationNotice;
 
   // Scatter of repeated readings.
   double scatter = 0, repeats = 0;
   for (const int i : read) {
     const auto& readings = points[std::size_t(i)].readings;
-    Vec3 mean = Vec3::Zero();
-    for (const Vec3& reading : readings) mean += reading / double(readings.size());
+    const Vec3 mean = mean_reading(points[std::size_t(i)]);
     for (const Vec3& reading : readings) scatter += (reading - mean).squaredNorm();
     repeats += 3 * double(readings.size() - 1);
   }
@@ -320,29 +313,29 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   const Vec3 nan = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
   std::size_t unread = 0;
   for (const Fiducial& point : points) {
-    Vec3 mean = Vec3::Zero();
-    for (const Vec3& reading : point.readings) mean += reading / double(point.readings.size());
-    result.residuals.push_back(point.readings.empty() ? nan : Vec3(mean - T.rotation * point.position - T.position));
+    result.residuals.push_back(
+        point.readings.empty() ? nan : Vec3(mean_reading(point) - T.rotation * point.position - T.position));
     unread += point.readings.empty();
   }
   if (!result.outliers.empty()) {
     std::string names;
     for (const std::string& name : result.outliers) names += (names.empty() ? "'" : "', '") + name;
-    tell(outliers, double(result.outliers.size()), 0, "left out, as the other points contradict: " + names + "'");
+    result.notices.add(outliers, double(result.outliers.size()), 0, "left out, as the other points contradict: %s'",
+                       names.c_str());
   }
-  if (n == 3) tell(few_points, 3, 4, "three points are registered whatever they are: read at least four");
-  if (unread > 0) tell(without_reading, double(unread), 0, sentence("%zu points have no reading", unread));
+  if (n == 3) result.notices.add(few_points, 3, 4, "three points are registered whatever they are: read at least four");
+  if (unread > 0) result.notices.add(without_reading, double(unread), 0, "%zu points have no reading", unread);
   const double size = extents(pairs.base).norm();
   const double limit = std::max(0.02 * size, stated > 0 ? 2 * std::sqrt(3.0) * stated : 0);
   if (result.fre > limit)
-    tell(large_residuals, result.fre, limit,
-         sentence("points lie %.2f mm from where they should: exchanged names, a wrong unit, or the robot moved",
-                  result.fre / mm));
+    result.notices.add(large_residuals, result.fre, limit,
+                       "points lie %.2f mm from where they should: exchanged names, a wrong unit, or the robot moved",
+                       result.fre / mm);
   const double scale = extents(pairs.tracker).norm() / size;
   const double scale_sd = result.fle / (size * std::sqrt(double(n)));
   if (std::abs(scale - 1) > std::max(0.01, surprising * scale_sd))
-    tell(wrong_scale, scale, 0.01,
-         sentence("the tracker sees the points %.1f %% farther apart than the CAD says", 100 * (scale - 1)));
+    result.notices.add(wrong_scale, scale, 0.01, "the tracker sees the points %.1f %% farther apart than the CAD says",
+                       100 * (scale - 1));
   return result;
 }
 

@@ -3,8 +3,8 @@
 #include <numbers>
 #include <span>
 
-#include "ctcr/calibration/procedures/circle_solution.hpp"
-#include "ctcr/calibration/procedures/significance.hpp"
+#include "ctcr/calibration/procedures/circle.hpp"
+#include "ctcr/calibration/statistics.hpp"
 #include "ctcr/math/functions.hpp"
 #include "ctcr/math/se3.hpp"
 
@@ -43,20 +43,10 @@ enum class RotationOffsetNotice {
 };
 
 /// The notice's name.
-constexpr const char* to_string(RotationOffsetNotice kind) noexcept {
-  switch (kind) {
-    case RotationOffsetNotice::one_direction: return "one_direction";
-    case RotationOffsetNotice::directions_differ: return "directions_differ";
-    case RotationOffsetNotice::arc_too_short: return "arc_too_short";
-    case RotationOffsetNotice::radius_too_small: return "radius_too_small";
-    case RotationOffsetNotice::not_round: return "not_round";
-    case RotationOffsetNotice::not_planar: return "not_planar";
-    case RotationOffsetNotice::not_uniform: return "not_uniform";
-    case RotationOffsetNotice::tilted: return "tilted";
-    case RotationOffsetNotice::noise_larger: return "noise_larger";
-    case RotationOffsetNotice::outliers: return "outliers";
-  }
-  return "unknown";
+constexpr const char* to_string(RotationOffsetNotice kind) {
+  return std::array{"one_direction", "directions_differ", "arc_too_short", "radius_too_small", "not_round",
+                    "not_planar",    "not_uniform",       "tilted",        "noise_larger",     "outliers"}
+      .at(std::size_t(kind));
 }
 
 /// Delta of alpha = rho theta + Delta for the tube that turned: its precurvature axis x stands at alpha from the base
@@ -79,12 +69,11 @@ struct RotationOffset {
   double arc;       ///< of the circle that readings cover [rad]
   std::vector<Vec3> residuals;  ///< measured - circle, all readings [m]
   std::vector<int> outliers;    ///< numbers of the readings left out
-  std::vector<Notice<RotationOffsetNotice>> notices;
+  Notices<RotationOffsetNotice> notices;
 };
 
 namespace rotation_offset {
 
-inline constexpr double surprising = 3.5;  // a notice comes by chance once in some thousand calibrations
 inline constexpr double degree = std::numbers::pi / 180, mm = 1e-3;
 
 /// Series 0 is forward, 1 backward. A motor that stands keeps its direction; what comes before it first moves gets that
@@ -120,15 +109,15 @@ inline std::pair<double, int> covered(const std::vector<CircleReading>& points) 
 }
 
 inline void check(std::span<const TurnReading> readings, const RotationOffsetOptions& options) {
-  require(readings.size() >= 6,
-          sentence("a rotation offset needs at least 6 readings of the tip, here are %zu", readings.size()));
+  require(readings.size() >= 6, "a rotation offset needs at least 6 readings of the tip, here are %zu",
+          readings.size());
   require(std::isfinite(options.ratio) && options.ratio != 0,
           "the ratio of tube to motor angle must be finite and not 0");
   require(!options.known.radius || *options.known.radius > 0, "the known radius must be positive [m]");
   require(!options.known.normal || options.known.normal->norm() > 0, "the known normal must not be a zero vector");
   for (std::size_t i = 0; i < readings.size(); ++i)
     require(std::isfinite(readings[i].motor_angle) && readings[i].position.allFinite(),
-            sentence("reading %zu: the motor angle [rad] or the position [m] is not a finite number", i + 1));
+            "reading %zu: the motor angle [rad] or the position [m] is not a finite number", i + 1);
 }
 
 /// Readings as points that turn: in the base frame, or the tracker's without T_ref.
@@ -150,17 +139,15 @@ inline Circle start_of(const std::vector<CircleReading>& points, const RotationO
   if (!options.T_tracker_base && std::abs(circle.normal.x()) > std::cos(25 * degree))
     circle = approximate_circle(points, known, Vec3::UnitY());
   const double sd = std::max(robust_sd(points, circle), options.noise.position_jitter);
-  require(
-      circle.radius > 6 * sd * std::sqrt(2.0 / double(points.size())) && circle.radius > 1e-9,
-      sentence("the tip hardly moves: a circle of radius %.3f mm in noise of %.3f mm", circle.radius / mm, sd / mm));
+  require(circle.radius > 6 * sd * std::sqrt(2.0 / double(points.size())) && circle.radius > 1e-9,
+          "the tip hardly moves: a circle of radius %.3f mm in noise of %.3f mm", circle.radius / mm, sd / mm);
   if (!options.T_tracker_base && !known.normal) return circle;
   const Vec3 seen = approximate_circle(points, {.centre = known.centre}, circle.reference).normal;
   const double cosine = seen.dot(known.normal.value_or(Vec3::UnitZ()));
-  require(
-      cosine > 0.5,
-      sentence("the tip turns about an axis %.0f deg from that of insertion: the sign of the ratio or the frame of the "
-               "tracker is wrong",
-               std::acos(std::clamp(cosine, -1.0, 1.0)) / degree));
+  require(cosine > 0.5,
+          "the tip turns about an axis %.0f deg from that of insertion: the sign of the ratio or the frame of the "
+          "tracker is wrong",
+          std::acos(std::clamp(cosine, -1.0, 1.0)) / degree);
   return circle;
 }
 
@@ -208,23 +195,21 @@ inline RotationOffset result_of(const CircleSolution& solved) {
   return result;
 }
 
-inline void tell(RotationOffset& result, RotationOffsetNotice kind, double value, double limit, std::string text) {
-  result.notices.push_back({kind, value, limit, std::move(text)});
-}
-
 /// Notices of both directions, and of how well readings like these can do.
 inline void tell_of_readings(const CircleSolution& solved, const RotationOffsetOptions& options,
                              RotationOffset& result) {
   using enum RotationOffsetNotice;
   if (!solved.has(0) || !solved.has(1))
-    tell(result, one_direction, solved.has(0) ? 1 : -1, 0,
-         "the readings are of one direction of rotation: friction and backlash are in the offset in full");
+    result.notices.add(
+        one_direction, solved.has(0) ? 1 : -1, 0,
+        "the readings are of one direction of rotation: friction and backlash are in the offset in full");
   else if (std::abs(result.difference) > surprising * result.difference_sd)
-    tell(result, directions_differ, result.difference, surprising * result.difference_sd,
-         sentence(
-             "the two directions differ by %.2f deg (sd %.2f deg): friction or backlash; the mean removes it only if "
-             "it is the same both ways",
-             result.difference / degree, result.difference_sd / degree));
+    result.notices.add(
+        directions_differ, result.difference, surprising * result.difference_sd,
+
+        "the two directions differ by %.2f deg (sd %.2f deg): friction or backlash; the mean removes it only if "
+        "it is the same both ways",
+        result.difference / degree, result.difference_sd / degree);
   // On a known circle each reading tells the angle to noise / radius.
   const double used = double(solved.used.size());
   const double backward =
@@ -233,24 +218,26 @@ inline void tell_of_readings(const CircleSolution& solved, const RotationOffsetO
   const double best_sd = result.noise_sd / result.radius * std::sqrt(inverse_count);
   const double sd = result.noise_sd * (solved.gain.transpose() * solved.mean()).norm();
   if (sd > 2 * best_sd)
-    tell(result, arc_too_short, sd / best_sd, 2,
-         sentence(
-             "the readings cover %.0f deg of the circle: the offset is %.1f times less certain than with a whole turn",
-             result.arc / degree, sd / best_sd));
+    result.notices.add(
+        arc_too_short, sd / best_sd, 2,
+
+        "the readings cover %.0f deg of the circle: the offset is %.1f times less certain than with a whole turn",
+        result.arc / degree, sd / best_sd);
   if (best_sd > options.wanted_sd)
-    tell(result, radius_too_small, result.radius, result.radius * best_sd / options.wanted_sd,
-         sentence(
-             "a radius of %.2f mm is small for noise of %.3f mm and %.0f readings: sd %.2f deg even on a whole turn",
-             result.radius / mm, result.noise_sd / mm, used, best_sd / degree));
+    result.notices.add(
+        radius_too_small, result.radius, result.radius * best_sd / options.wanted_sd,
+
+        "a radius of %.2f mm is small for noise of %.3f mm and %.0f readings: sd %.2f deg even on a whole turn",
+        result.radius / mm, result.noise_sd / mm, used, best_sd / degree);
   const double squares = solved.error.squaredNorm() - expected_field_squares(solved.fit.J, solved.gain, solved.field);
   const double stated = solved.stated;
   if (stated > 0 && chi_square_score(squares / (stated * stated), solved.degrees_of_freedom()) > surprising)
-    tell(result, noise_larger, result.noise_sd, stated,
-         sentence("readings lie %.3f mm per axis off the circle, more than the stated jitter of %.3f mm",
-                  result.noise_sd / mm, stated / mm));
+    result.notices.add(noise_larger, result.noise_sd, stated,
+                       "readings lie %.3f mm per axis off the circle, more than the stated jitter of %.3f mm",
+                       result.noise_sd / mm, stated / mm);
   if (!result.outliers.empty())
-    tell(result, outliers, double(result.outliers.size()), 0,
-         sentence("%zu readings are far off the circle and left out, %.0f are used", result.outliers.size(), used));
+    result.notices.add(outliers, double(result.outliers.size()), 0,
+                       "%zu readings are far off the circle and left out, %.0f are used", result.outliers.size(), used);
 }
 
 /// Notices of a path that is no circle in the plane where it should be.
@@ -260,11 +247,12 @@ inline void tell_of_misfit(const CircleSolution& solved, const RotationOffsetOpt
     const double tilt = std::acos(std::clamp(result.normal.z(), -1.0, 1.0));
     const double limit = std::max(2 * degree, surprising * result.tilt_sd);
     if (tilt > limit)
-      tell(result, tilted, tilt, limit,
-           sentence(
-               "the circle's plane is %.1f deg from the base frame's x-y plane: the frame of the tracker is wrong, or "
-               "the tube sags",
-               tilt / degree));
+      result.notices.add(
+          tilted, tilt, limit,
+
+          "the circle's plane is %.1f deg from the base frame's x-y plane: the frame of the tracker is wrong, or "
+          "the tube sags",
+          tilt / degree);
   }
   Eigen::MatrixXd J(solved.fit.J.rows(), solved.fit.J.cols() + 8);
   J << solved.fit.J, harmonics(solved.used, solved.fit.circle);
@@ -287,7 +275,7 @@ inline void tell_of_misfit(const CircleSolution& solved, const RotationOffsetOpt
     const double chi_square = a.dot(scaled);
     const double size = std::max(a.head<2>().norm(), a.tail<2>().norm()), limit = options.wanted_sd * result.radius;
     if (size > limit && chi_square_score(chi_square, count) > surprising)
-      tell(result, kind, size, limit, sentence("%s: an error of %.3f mm repeats with every turn", text, size / mm));
+      result.notices.add(kind, size, limit, "%s: an error of %.3f mm repeats with every turn", text, size / mm);
   }
 }
 
@@ -305,7 +293,7 @@ inline void tell_of_misfit(const CircleSolution& solved, const RotationOffsetOpt
   if (options.known.normal) options.known.normal->normalize();
   const std::vector<CircleReading> points = turning_points(readings, options);
   const auto [arc, distinct] = covered(points);
-  require(distinct >= 4, sentence("a rotation offset needs readings at 4 different angles, here are %d", distinct));
+  require(distinct >= 4, "a rotation offset needs readings at 4 different angles, here are %d", distinct);
 
   const CircleSolution solved = solve_circle(points, start_of(points, options), options.known, options.noise);
   RotationOffset result = result_of(solved);

@@ -1,6 +1,7 @@
 #pragma once
 // Curvature and curved length of a tube from points of its outline in a photo: a straight line, then an arc.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -10,7 +11,7 @@
 #include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
-#include "ctcr/calibration/procedures/significance.hpp"
+#include "ctcr/calibration/statistics.hpp"
 
 namespace ctcr {
 
@@ -30,16 +31,10 @@ enum class TubeShapeNotice {
 };
 
 /// The notice's name.
-constexpr const char* to_string(TubeShapeNotice kind) noexcept {
-  switch (kind) {
-    case TubeShapeNotice::outliers: return "outliers";
-    case TubeShapeNotice::straight_too_short: return "straight_too_short";
-    case TubeShapeNotice::arc_too_short: return "arc_too_short";
-    case TubeShapeNotice::curvature_varies: return "curvature_varies";
-    case TubeShapeNotice::straight_part_bent: return "straight_part_bent";
-    case TubeShapeNotice::residuals_large: return "residuals_large";
-  }
-  return "unknown";
+constexpr const char* to_string(TubeShapeNotice kind) {
+  return std::array{"outliers",         "straight_too_short", "arc_too_short",
+                    "curvature_varies", "straight_part_bent", "residuals_large"}
+      .at(std::size_t(kind));
 }
 
 /// Lengths in metres; places in the unit of the points.
@@ -55,12 +50,11 @@ struct TubeShapeFit {
   std::vector<double> residuals;           ///< distance of each point from the shape, with sign [m]
   std::vector<double> arc_position;        ///< of its foot, from where the curve starts; straight part < 0 [m]
   std::vector<int> outliers;               ///< numbers of the points left out
-  std::vector<Notice<TubeShapeNotice>> notices;
+  Notices<TubeShapeNotice> notices;
 };
 
 namespace tube_shape {
 
-inline constexpr double surprising = 3.5;
 using Vec2 = Eigen::Vector2d;
 
 /// Straight line that ends at `junction` with direction `heading`, then an arc that turns left for a curvature > 0.
@@ -128,9 +122,7 @@ inline Refined refined(std::span<const Vec2> points, Bend bend, double scale, do
 inline double median_distance(std::span<const Vec2> points, const Bend& bend) {
   std::vector<double> d;
   for (const Vec2& point : points) d.push_back(std::abs(distance(point, bend)));
-  const auto middle = d.begin() + std::ptrdiff_t(d.size() / 2);
-  std::nth_element(d.begin(), middle, d.end());
-  return *middle;
+  return median(d);
 }
 
 /// At most 60 of the points in their order along the tube: a walk to the nearest point not yet visited, from where it is
@@ -144,8 +136,7 @@ inline std::vector<Vec2> in_order(std::span<const Vec2> points) {
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < n; ++j)
       if (i != j) nearest[i] = std::min(nearest[i], (some[i] - some[j]).norm());
-  std::nth_element(nearest.begin(), nearest.begin() + std::ptrdiff_t(n / 2), nearest.end());
-  const double longest = 5 * nearest[n / 2];
+  const double longest = 5 * median(nearest);
 
   std::vector<Vec2> best;
   double shortest = std::numeric_limits<double>::infinity();
@@ -217,12 +208,12 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
 [[nodiscard]] inline TubeShapeFit fit_tube_shape(std::span<const Eigen::Vector2d> points,
                                                  const TubeShapeOptions& options) {
   using namespace tube_shape;
-  require(points.size() >= 8, sentence("a tube's shape needs at least 8 points, here are %zu", points.size()));
+  require(points.size() >= 8, "a tube's shape needs at least 8 points, here are %zu", points.size());
   require(options.scale > 0 && std::isfinite(options.scale), "the scale must be positive [m per unit of the points]");
   require(options.scale_sd >= 0 && options.point_sd >= 0, "standard deviations must not be negative");
   Vec2 low = points[0], high = points[0];
   for (std::size_t i = 0; i < points.size(); ++i) {
-    require(points[i].allFinite(), sentence("point %zu is not a pair of finite numbers", i + 1));
+    require(points[i].allFinite(), "point %zu is not a pair of finite numbers", i + 1);
     low = low.cwiseMin(points[i]);
     high = high.cwiseMax(points[i]);
   }
@@ -262,7 +253,7 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
     else
       used.push_back(points[i]);
   }
-  require(used.size() >= 8, sentence("only %zu points lie on one shape, 8 are needed", used.size()));
+  require(used.size() >= 8, "only %zu points lie on one shape, 8 are needed", used.size());
   const Refined fit = refined(used, bend, scale(), 0);
   bend = fit.bend;
 
@@ -318,28 +309,25 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
     result.arc_position.push_back(m * arc_position(point, bend));
   }
 
-  const auto tell = [&](TubeShapeNotice kind, double value, double limit, std::string text) {
-    result.notices.push_back({kind, value, limit, std::move(text)});
-  };
   using enum TubeShapeNotice;
   constexpr double mm = 1e-3;
   if (!result.outliers.empty())
-    tell(outliers, double(result.outliers.size()), 0,
-         sentence("%zu of %zu points are far off the shape and left out", result.outliers.size(), points.size()));
+    result.notices.add(outliers, double(result.outliers.size()), 0,
+                       "%zu of %zu points are far off the shape and left out", result.outliers.size(), points.size());
   const double straight_limit = 0.1 * result.curved_length;
   if (result.straight_length < straight_limit)
-    tell(straight_too_short, result.straight_length, straight_limit,
-         sentence("only %.1f mm of the straight part are seen: the curved length may be too short",
-                  result.straight_length / mm));
+    result.notices.add(straight_too_short, result.straight_length, straight_limit,
+                       "only %.1f mm of the straight part are seen: the curved length may be too short",
+                       result.straight_length / mm);
   if (result.curvature_sd > 0.1 * result.curvature)
-    tell(arc_too_short, result.curvature_sd / result.curvature, 0.1,
-         sentence("the curvature is uncertain by %.0f %%: take more or better points of the curved part",
-                  100 * result.curvature_sd / result.curvature));
+    result.notices.add(arc_too_short, result.curvature_sd / result.curvature, 0.1,
+                       "the curvature is uncertain by %.0f %%: take more or better points of the curved part",
+                       100 * result.curvature_sd / result.curvature);
   const double stated = options.point_sd * options.point_sd;
   if (stated > 0 && chi_square_score(error.squaredNorm() / stated, degrees) > surprising)
-    tell(residuals_large, std::sqrt(error.squaredNorm() / degrees) * m, options.point_sd * m,
-         sentence("points lie %.3f mm off the shape, more than the %.3f mm stated",
-                  std::sqrt(error.squaredNorm() / degrees) * m / mm, options.point_sd * m / mm));
+    result.notices.add(residuals_large, std::sqrt(error.squaredNorm() / degrees) * m, options.point_sd * m,
+                       "points lie %.3f mm off the shape, more than the %.3f mm stated",
+                       std::sqrt(error.squaredNorm() / degrees) * m / mm, options.point_sd * m / mm);
 
   // A curvature that grows along the arc by `change`, and a bent straight part: how they move points sideways.
   Eigen::MatrixXd wide(n, 6);
@@ -354,12 +342,12 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
   const double rest = std::max(stated, (error - wide * x).squaredNorm() / (degrees - 2));
   const Eigen::Vector2d spread = (rest * wide_gain.bottomRows(2).rowwise().squaredNorm()).cwiseSqrt();
   if (std::abs(x[4]) > std::max(0.1, surprising * spread[0]))
-    tell(curvature_varies, x[4], std::max(0.1, surprising * spread[0]),
-         sentence("the curvature changes by %.0f %% along the curved part", 100 * x[4]));
+    result.notices.add(curvature_varies, x[4], std::max(0.1, surprising * spread[0]),
+                       "the curvature changes by %.0f %% along the curved part", 100 * x[4]);
   const double bent_limit = std::max(0.02 * std::abs(k), surprising * spread[1]);
   if (std::abs(x[5]) > bent_limit)
-    tell(straight_part_bent, std::abs(x[5]) / m, bent_limit / m,
-         sentence("the straight part has a curvature of %.2f 1/m", std::abs(x[5]) / m));
+    result.notices.add(straight_part_bent, std::abs(x[5]) / m, bent_limit / m,
+                       "the straight part has a curvature of %.2f 1/m", std::abs(x[5]) / m);
   return result;
 }
 
