@@ -1,6 +1,6 @@
 #pragma once
-// What a tracker does to a pose besides measuring it: jitter of each reading, and an error that is the same for all
-// readings of a place and changes smoothly with it (a distorted field). The accuracy that a maker states is the latter.
+// The noise of a tracker: jitter of each reading, and a field error that changes smoothly with the position and is the
+// same for all readings at one position. The accuracy that a maker states is mostly the latter.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -27,22 +27,23 @@ inline double field_of_accuracy(double accuracy_95, double jitter) noexcept {
   return std::sqrt(std::max(0.0, axis * axis - jitter * jitter));
 }
 
-/// A smooth random function of place with unit variance and covariance exp(-d^2 / (2 length^2)), at given places, as a
-/// sum of few independent ones: covariance = factor factor^T + diag(rest).
+/// A smooth random function of position with unit variance and covariance exp(-d^2 / (2 length^2)), at given positions,
+/// as a sum of few independent ones: covariance = factor factor^T + diag(rest).
 struct SmoothField {
-  Eigen::MatrixXd factor;  ///< (places, rank)
-  Eigen::VectorXd rest;    ///< (places), variance that the factor leaves out
+  Eigen::MatrixXd factor;  ///< (positions, rank)
+  Eigen::VectorXd rest;    ///< (positions), variance that the factor leaves out
 };
 
-/// Pivoted Cholesky factor of the covariance: always takes the place that is explained worst, so that the rank depends
-/// on how many correlation lengths the places span, not on how many they are. Cost O(places rank^2).
-/// @param places     (places, 3) [m]; a place that is not finite gets an independent error
+/// Pivoted Cholesky factor of the covariance: always takes the position that is explained worst, so that the rank
+/// depends on how many correlation lengths they span, not on their number. Cost O(positions rank^2).
+/// @param positions     (positions, 3) [m]; one that is not finite gets an independent error
 /// @param tolerance  largest variance that may be left out
 /// @throws std::bad_alloc. Real time: no.
 /// Ref: Harbrecht, Peters, Schneider, "On the low-rank approximation by the pivoted Cholesky decomposition", 2012.
-inline SmoothField smooth_field(const Eigen::MatrixX3d& places, double length, double tolerance, int max_rank = 400) {
-  const Eigen::Index count = places.rows();
-  const Eigen::ArrayX<bool> known = places.array().isFinite().rowwise().all();
+inline SmoothField smooth_field(const Eigen::MatrixX3d& positions, double length, double tolerance,
+                                int max_rank = 400) {
+  const Eigen::Index count = positions.rows();
+  const Eigen::ArrayX<bool> known = positions.array().isFinite().rowwise().all();
   tolerance = std::max(tolerance, 1e-12);  // less is rounding
   Eigen::VectorXd left = known.cast<double>().matrix();
   Eigen::MatrixXd factor(count, 0);
@@ -51,7 +52,7 @@ inline SmoothField smooth_field(const Eigen::MatrixX3d& places, double length, d
     Eigen::Index pivot;
     if (!(left.maxCoeff(&pivot) > tolerance)) break;
     if (rank == factor.cols()) factor.conservativeResize(count, std::max<Eigen::Index>(16, 2 * rank));
-    const Eigen::ArrayXd square = (places.rowwise() - places.row(pivot)).rowwise().squaredNorm();
+    const Eigen::ArrayXd square = (positions.rowwise() - positions.row(pivot)).rowwise().squaredNorm();
     Eigen::VectorXd column = known.select((-square / (2 * length * length)).exp(), 0.0);
     column -= factor.leftCols(rank) * factor.row(pivot).head(rank).transpose();
     column /= std::sqrt(left[pivot]);

@@ -34,13 +34,13 @@ public:
   void set_whitening(Whitening whitening) { whitening_ = std::move(whitening); }
   const Whitening& whitening() const { return whitening_; }
 
-  /// What is predicted at z.
+  /// A prediction at z.
   struct Point {
     Eigen::VectorXd z, residual;
     Eigen::MatrixXd jacobian;  ///< by x
     bool predicted = false;
   };
-  /// What was predicted at z already.
+  /// Stores a prediction that was made before.
   void know(const Eigen::VectorXd& z, Eigen::VectorXd residual, Eigen::MatrixXd jacobian) {
     point_ = {z, std::move(residual), std::move(jacobian), true};
   }
@@ -55,7 +55,7 @@ public:
     }
     return point_.predicted ? &point_ : nullptr;
   }
-  /// Keeps what is predicted at z while others are tried.
+  /// Keeps the prediction at z while others are tried.
   void hold(const Eigen::VectorXd& z) {
     if (at(z) == &point_) std::swap(point_, held_);
   }
@@ -92,7 +92,7 @@ private:
   int evaluations_ = 0;
 };
 
-/// Where another descent has been, and how far is far from there.
+/// The minimum that another descent found, with the metric in which distances from it count.
 struct Goal {
   Eigen::VectorXd z;
   Eigen::MatrixXd precision;
@@ -104,11 +104,11 @@ struct Goal {
 struct Descent {
   double cost = std::numeric_limits<double>::infinity();
   bool converged = false;
-  bool at_kink = false;  ///< converged where the slopes jump: by those of this side the descent would go on
+  bool at_kink = false;  ///< converged where the derivatives jump: by those of this side the descent would go on
   int iterations = 0;
 };
 
-/// What a step changes of a cost, to second order: value + gradient . step + step^T hessian step / 2.
+/// Change of a cost by a step, to second order: value + gradient . step + step^T hessian step / 2.
 struct Quadratic {
   double value = 0;
   Eigen::VectorXd gradient;
@@ -144,9 +144,9 @@ inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bou
 /// Goes down from z to the nearest minimum within bounds: Levenberg-Marquardt, each step the exact minimum of its model
 /// within the bounds (Ceres projects its steps onto them instead, which stalls where parameters go together).
 ///
-/// Where a tube's curve begins at the plate, or a load lifts off, slopes jump, and the minimum may lie at such a kink,
-/// where they never vanish. So a step that fails brings the slopes of the other side, and the next one follows the kink or
-/// finds that nothing is left to gain.
+/// Where a tube's curve begins at the plate, or a load lifts off, derivatives jump, and the minimum may lie at such a
+/// kink, where they never vanish. So a step that fails yields the derivatives on the other side, and the next one follows
+/// the kink or finds that nothing is left to gain.
 /// @param tolerance  of the cost; it may be left to gain at a kink. Elsewhere 0.15 times as many posterior sd may
 /// @param goal       ends the descent where it is about to arrive there; or null
 /// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999; the model beyond a kink is an aggregated
@@ -178,7 +178,7 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
           out.at_kink = out.converged = true;
           return out;
         }
-        // What looks like a kink may be a cost that is not convex: short steps on this side tell.
+        // A cost that is not convex looks like a kink: short steps on this side distinguish them.
         doubted = true;
         model = {0, here.gradient, here.hessian};
         damping = std::max(damping, 1.0), growth = 15;

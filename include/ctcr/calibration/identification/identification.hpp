@@ -1,5 +1,5 @@
 #pragma once
-// What a joint identification is asked and what it answers.
+// Options and result of a joint fit.
 #include <functional>
 #include <optional>
 
@@ -8,14 +8,14 @@
 
 namespace ctcr {
 /// Residuals (6 rows) at parameters x: measured - predicted position [m] and rotation vector [rad] of each row,
-/// interleaved, NaN where not measured (at the same places for every x); and, unless null, their derivatives
+/// interleaved, NaN where not measured (in the same rows for every x); and, unless null, their derivatives
 /// (6 rows, parameters). Both are resized. Returns false where the prediction fails at x: the step is then shortened.
 using Predictor = std::function<bool(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian)>;
 
 struct IdentifyOptions {
   bool robust = true;  ///< outliers count for little; else every reading counts
-  /// Where the model misses what the noise cannot explain, that much jitter is added: else the fit would trade millimetres
-  /// that look like a field for micrometres that do not. Off: the noise is taken as stated.
+  /// Adds jitter where the residuals exceed the noise: else the fit would trade millimetres that look like a field error
+  /// for micrometres that do not. Off: the noise is taken as stated.
   bool admit_model_error = true;
   std::optional<RowWeights> weights = {};        ///< frozen; a weight of 0 leaves a position or a rotation out
   std::optional<Eigen::Array2d> inflation = {};  ///< frozen, see Identification
@@ -24,8 +24,8 @@ struct IdentifyOptions {
   int starts = 3;                                ///< the first and others drawn from the prior, compared at the end
   int max_iterations = 50;                       ///< of each descent
   double tolerance = 0.02;                 ///< of minus the log posterior: where less is to gain, a descent may end
-  std::vector<LinearBound> within = {};    ///< bounds of sums of parameters, beside those of each
-  std::vector<KnownDirection> known = {};  ///< directions that deserve their own words where they are undetermined
+  std::vector<LinearBound> within = {};    ///< bounds of sums of parameters, in addition to those of each
+  std::vector<KnownDirection> known = {};  ///< directions that are described in words where they are undetermined
   double strong_correlation = 0.9;         ///< correlations beyond it are listed
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-// The fit of a table some of whose rows the model may be unable to solve.
+// The joint fit of a table in which the model may be unable to solve some rows.
 #include <algorithm>
 #include <iterator>
 #include <vector>
@@ -10,14 +10,14 @@ namespace ctcr {
 
 /// Fits the active rows of a table such as Recording: a Predictor with unsolved(), active() and activate().
 ///
-/// Rows that cannot be solved at the start are left out of the whole fit. Few of the others do not hold up a descent: one
-/// that cannot be solved at a trial keeps the residual it had where it last could be, without slopes. Those that cannot be
-/// solved where the descent ends are left out then, and it goes on without them.
-/// @param excluded  receives the rows left out
+/// Rows that cannot be solved at the start are excluded from the whole fit. A few others do not stop a descent: a row that
+/// cannot be solved at a trial keeps its last solved residual, with derivatives of 0. Rows that cannot be solved where the
+/// descent ends are excluded then, and the fit goes on without them.
+/// @param excluded  receives the excluded rows
 /// @return and throws as identify(); on return the table's active rows are those that were fitted
 template <class Table>
 Identification identify_with_exclusions(Table& table, const std::vector<FreeParameter>& parameters, const Noise& noise,
-                                        const Eigen::MatrixX3d& places, IdentifyOptions options,
+                                        const Eigen::MatrixX3d& positions, IdentifyOptions options,
                                         std::vector<int>& excluded) {
   constexpr int rounds = 4;
   const auto exclude = [&](const std::vector<int>& rows) {
@@ -48,7 +48,7 @@ Identification identify_with_exclusions(Table& table, const std::vector<FreePara
       solved = out;
       return true;
     };
-    Identification fit = identify(predict, parameters, noise, places, options);
+    Identification fit = identify(predict, parameters, noise, positions, options);
     if (all_solved || table(fit.values, solved, nullptr) || round == rounds) {
       if (!fit.converged && blocked > 0)
         fit.status += "; " + std::to_string(blocked) + " readings cannot be solved where it leads";

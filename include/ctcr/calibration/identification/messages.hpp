@@ -1,5 +1,5 @@
 #pragma once
-// What a joint identification refuses, and what it has to say beside its numbers.
+// Messages of a joint fit: the input that it refuses, and warnings about its result.
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
@@ -21,8 +21,8 @@ inline std::string listed(const std::vector<std::string>& names) {
   return all;
 }
 
-/// All that makes a fit impossible. @throws std::invalid_argument with one sentence a line
-inline void check(const std::vector<FreeParameter>& parameters, const Noise& noise, const Eigen::MatrixX3d& places,
+/// Refuses input with which a fit is impossible. @throws std::invalid_argument with one sentence a line
+inline void check(const std::vector<FreeParameter>& parameters, const Noise& noise, const Eigen::MatrixX3d& positions,
                   const IdentifyOptions& options) {
   std::string faults;
   const auto require = [&](bool condition, const std::string& text) {
@@ -41,7 +41,7 @@ inline void check(const std::vector<FreeParameter>& parameters, const Noise& noi
           "the jitter of the tracker must be above 0, both in position and in rotation");
   require(noise.position_field >= 0 && noise.rotation_field >= 0 && noise.correlation_length > 0,
           "the tracker's field error must not be negative, and its correlation length must be above 0");
-  require(!options.weights || (options.weights->rows() == places.rows() && options.weights->allFinite() &&
+  require(!options.weights || (options.weights->rows() == positions.rows() && options.weights->allFinite() &&
                                options.weights->minCoeff() >= 0),
           "weights must be two numbers, not negative, for each row");
   require(!options.inflation || (options.inflation->allFinite() && options.inflation->minCoeff() > 0),

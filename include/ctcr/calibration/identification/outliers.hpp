@@ -1,5 +1,5 @@
 #pragma once
-// Weights that let a reading which nothing explains count for little.
+// Weights that reduce the influence of outliers, as a likelihood with Student-t tails does.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace ctcr {
 
-/// Share of a row with three residuals of squared length `square`, in sd, that belongs to the bulk of a normal
-/// distribution: 1 within its 97.5 %, falling with the square beyond. Its square is the weight, so that far rows add next
-/// to nothing to chi-square, while normal data keep theirs, and with it honest standard deviations.
-inline double bulk_share(double square) noexcept {
+/// Inlier fraction of a row with three residuals of squared length `square`, in sd: 1 within 97.5 % of a normal
+/// distribution, falling with the square beyond. Its square is the weight, so that outliers add next to nothing to
+/// chi-square, while normal data keep theirs, and with it honest standard deviations.
+inline double inlier_fraction(double square) noexcept {
   constexpr double freedom = 5, bulk = 9.348;  // 97.5 % of chi-square of three; the tail is that of Student's t
   return square <= bulk ? 1.0 : (freedom + bulk) / (freedom + square);
 }
@@ -20,9 +20,9 @@ inline double bulk_share(double square) noexcept {
 /// Weights for the next fit of residuals (6 rows) that were fitted with `whitening`.
 ///
 /// A row is judged by how far it lies from what the field error at the other rows predicts for it, in units of the
-/// usual distance of these rows: where the model itself is wrong everywhere, that is no row's fault.
+/// median distance of these rows: an error of the model everywhere makes no row an outlier.
 /// @param inflation  factor on the jitter of positions and of rotations that `whitening` has in it
-/// @param use  weights before outliers are thought of; 0 stays 0
+/// @param use  weights before outliers are found; 0 stays 0
 inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& inflation, const Whitening& whitening,
                                   const Eigen::VectorXd& residual, const RowWeights& use) {
   constexpr double median_of_chi_square = 2.366;  // of three
@@ -42,7 +42,7 @@ inline RowWeights outlier_weights(const Noise& noise, const Eigen::Array2d& infl
     if (used.empty()) continue;
     const double usual = std::max(1.0, median(used) / median_of_chi_square);
     for (Eigen::Index i = 0; i < square.size(); ++i)
-      if (use(i, kind) > 0) weights(i, kind) = use(i, kind) * std::pow(bulk_share(square[i] / usual), 2);
+      if (use(i, kind) > 0) weights(i, kind) = use(i, kind) * std::pow(inlier_fraction(square[i] / usual), 2);
   }
   return weights;
 }

@@ -1,8 +1,8 @@
 #pragma once
-// What readings and prior knowledge together say of parameters, and what they leave open.
+// The Gaussian posterior of parameters, and the combinations of them that stay undetermined.
 //
 // Parameters are scaled by their prior sd, so that the prior's precision is 1 (0 without a prior) and every number below
-// compares what is known after the readings with what was known before.
+// compares the posterior with the prior.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -26,13 +26,13 @@ struct FreeParameter {
   double high = std::numeric_limits<double>::infinity();
 };
 
-/// Change of the parameters that is known to leave all readings as they are, or nearly so.
+/// A change of the parameters that is known to leave all readings (nearly) unchanged.
 struct KnownDirection {
-  std::string text;        ///< what it is, in words
+  std::string text;        ///< its meaning in words
   Eigen::VectorXd change;  ///< in the parameters' units
 };
 
-/// Combination of parameters that the readings leave (nearly) as uncertain as they found it.
+/// A combination of parameters that the readings (nearly) do not determine.
 struct Direction {
   std::string text;
   double ratio;                  ///< posterior sd / prior sd along it

@@ -7,18 +7,18 @@
 #include "ctcr/calibration/identification/identification.hpp"
 
 namespace ctcr {
-/// What a fit says of every row that its predictor answers, rows that were not fitted included.
+/// Actual and expected residuals of all rows that a predictor gives, whether they were fitted or not.
 struct RowReport {
   Eigen::VectorXd residual;  ///< (6 rows)
   Eigen::MatrixXd jacobian;  ///< (6 rows, parameters)
   Eigen::VectorXd field;     ///< (6 rows) posterior mean of the tracker's field error, which is part of the residual
   /// (rows, 2) expected squared length of the position [m^2] and rotation residual [rad^2]: noise, less what the fit has
-  /// swallowed of it at fitted rows; noise and uncertainty of the parameters, less the field error that both share, at
-  /// others. The root of its mean is the noise floor.
+  /// absorbed of it at fitted rows; noise and uncertainty of the parameters, less the field error that both share, at
+  /// others. The root of its mean is the expected error.
   Eigen::MatrixX2d expected_square;
 };
 
-/// What the fit says of each row that `predict` answers; they are the rows of the fit, more of them may be answered.
+/// Residuals and their expected sizes at the fitted values. `predict` has the rows of the fit and may solve more.
 /// @throws std::invalid_argument where the rows are not those of the fit. Real time: no.
 inline RowReport report_rows(const Identification& fit, const Predictor& predict) {
   RowReport out;
@@ -40,11 +40,11 @@ inline RowReport report_rows(const Identification& fit, const Predictor& predict
         j.row(k) = J.row(i).segment<3>(3 * k), s.row(k) = shared.row(i).segment<3>(3 * k);
       const Eigen::MatrixXd Cj = product(fit.covariance, j);
       const double parameters = Cj.cwiseProduct(j).sum(), common = Cj.cwiseProduct(s).sum();
-      // What the fit was told of the noise is more than that where it had to admit a model error.
-      const double told = 3 * (axes.variance() + (std::pow(fit.inflation[kind], 2) - 1) * axes.jitter_variance());
+      // The variance that the fit assumed: larger where it had to admit a model error.
+      const double assumed = 3 * (axes.variance() + (std::pow(fit.inflation[kind], 2) - 1) * axes.jitter_variance());
       const bool was_fitted = fit.weights(i, kind) > 0;
       out.expected_square(i, kind) =
-          3 * axes.variance() * std::max(0.0, 1 + (was_fitted ? -parameters : parameters - 2 * common) / told);
+          3 * axes.variance() * std::max(0.0, 1 + (was_fitted ? -parameters : parameters - 2 * common) / assumed);
     }
   }
   return out;

@@ -59,7 +59,7 @@ public:
   [[nodiscard]] double inflation(const Eigen::MatrixXd& residual, double expected) const {
     const Eigen::MatrixXd y = scale_.asDiagonal() * residual;
     const double all = y.squaredNorm();
-    Eigen::ArrayXd smooth;  // what of it the field can explain, by eigenvector of A A^T
+    Eigen::ArrayXd smooth;  // the part that the field can explain, by eigenvector of A A^T
     if (field_.cols() > 0)
       smooth = (1 + eigenvalues_) * transposed_product(field_, scale_.asDiagonal() * y).rowwise().squaredNorm().array();
     const auto chi_square = [&](double s2) {
@@ -100,7 +100,7 @@ private:
 class Whitening {
 public:
   Whitening() = default;
-  /// @param field  smooth_field() at the rows' places; its factor may have no columns
+  /// @param field  smooth_field() at the rows' positions; its factor may have no columns
   Whitening(const Noise& noise, const SmoothField& field, const RowWeights& weights)
     : axes_{detail::ThreeAxes(noise.position_jitter, noise.position_field, field, weights.col(0)),
             detail::ThreeAxes(noise.rotation_jitter, noise.rotation_field, field, weights.col(1))} {}
@@ -123,7 +123,7 @@ public:
   [[nodiscard]] Eigen::Index observations() const {
     return 3 * Eigen::Index(axes_[0].rows().size() + axes_[1].rows().size());
   }
-  /// Posterior mean of the field error given a residual (6 rows): what of it the tracker's field explains. Defined at
+  /// Posterior mean of the field error given a residual (6 rows), the part of it that the field explains. Defined at
   /// rows of weight 0 too, from the others.
   [[nodiscard]] Eigen::VectorXd field(const Eigen::VectorXd& residual) const {
     Eigen::VectorXd out(residual.size());

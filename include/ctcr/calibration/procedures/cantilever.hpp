@@ -123,7 +123,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   using namespace cantilever;
   check(rows, options);
   const Eigen::Index n = Eigen::Index(rows.size()), unknowns = options.fit_zero ? 2 : 1;
-  // Gauss-Newton by (ln EI, zero) from the mean of what each row says alone.
+  // Gauss-Newton by (ln EI, zero) from the mean over the fits of each row.
   Cantilever result{};
   double log_EI = 0;
   for (const Deflection& row : rows) log_EI += std::log(stiffness_for(row, row.deflection)) / double(n);
@@ -151,7 +151,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   const Eigen::MatrixXd G = gain(J), covariance = propagated(G, variance, {});
   require(G.size() > 0 && covariance(0, 0) < 100,
           "the loads do not tell the zero from the stiffness: use loads that differ more");
-  // What a common error of the lengths does, as a relative change of EI.
+  // Effect of a common error of the lengths, as a relative change of EI.
   Eigen::VectorXd by_length(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double h = 1e-4 * rows[std::size_t(i)].free_length;

@@ -45,7 +45,7 @@ struct CircleReading {
   int series;     ///< 0 or 1
 };
 
-/// What is known of the circle and not fitted.
+/// Parameters of the circle that are known and not fitted.
 struct KnownCircle {
   std::optional<Vec3> centre{};    ///< [m]
   std::optional<double> radius{};  ///< [m]
@@ -53,7 +53,7 @@ struct KnownCircle {
 };
 
 /// The circle with both offsets equal, from linear least absolute deviations: an ellipse c + A cos + B sin is linear in
-/// its unknowns, so there is one minimum, and readings that are far off hardly matter. The reference is left alone.
+/// its unknowns, so there is one minimum, and outliers hardly matter. The reference is kept.
 inline Circle approximate_circle(const std::vector<CircleReading>& readings, const KnownCircle& known,
                                  const Vec3& reference) {
   const Eigen::Index n = Eigen::Index(readings.size()), shift = known.centre ? 0 : 1;
@@ -145,7 +145,7 @@ inline CircleFit refined_circle(const std::vector<CircleReading>& readings, cons
   return fit;
 }
 
-/// Sd per axis that the median distance of readings from a circle tells, whatever the far ones do.
+/// Robust sd per axis, from the median distance of readings from a circle.
 inline double robust_sd(const std::vector<CircleReading>& readings, const Circle& circle) {
   std::vector<double> distance;
   for (const auto& [angle, position, series] : readings)
@@ -221,14 +221,14 @@ inline CircleSolution solve_circle(const std::vector<CircleReading>& points, Cir
   for (double& offset : solved.fit.circle.offset) offset = std::remainder(offset, 2 * std::numbers::pi);
 
   solved.error.resize(3 * Eigen::Index(used.size()));
-  Eigen::MatrixX3d places(Eigen::Index(used.size()), 3);
+  Eigen::MatrixX3d positions(Eigen::Index(used.size()), 3);
   for (std::size_t i = 0; i < used.size(); ++i) {
-    places.row(Eigen::Index(i)) = used[i].position;
+    positions.row(Eigen::Index(i)) = used[i].position;
     solved.error.segment<3>(3 * Eigen::Index(i)) =
         used[i].position - solved.fit.circle.at(used[i].angle, used[i].series);
   }
   const Eigen::MatrixXd& J = solved.fit.J;
-  solved.field = field_factor(places, noise);
+  solved.field = field_factor(positions, noise);
   solved.gain = ctcr::gain(J);
   require(solved.gain.size() > 0,
           "the readings do not determine the circle: take them over a longer arc, or hold centre and radius");

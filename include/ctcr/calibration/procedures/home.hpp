@@ -1,5 +1,5 @@
 #pragma once
-// Translational offsets and effective lengths: what a ruler, the motors and tips flush with the front plate tell.
+// Translational offsets and effective lengths, from a ruler, the motors and tips flush with the front plate.
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace ctcr {
 
-/// What was measured of one tube; any two of the three lists are enough.
+/// Measurements of one tube; any two of the three lists are enough.
 struct TubeHome {
   double home_angle = 0;               ///< of its translation motor in the home position [rad]
   std::vector<double> distances{};     ///< from the front plate back to where it is grasped, at home, by hand [m], > 0
@@ -40,7 +40,7 @@ constexpr const char* to_string(HomeNotice kind) {
 }
 
 /// Of one tube. Offset and length share the error of the ruler: their sum, and so the tip, is known to that of the flush
-/// reading alone, which is what the correlation near -1 says.
+/// reading alone, hence the correlation near -1.
 struct HomeOffset {
   double offset, offset_sd;      ///< Delta of beta [m]
   double length, length_sd;      ///< effective length, from the grasp to the tip [m]

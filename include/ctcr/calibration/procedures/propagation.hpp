@@ -1,5 +1,5 @@
 #pragma once
-// What noise of points does to parameters fitted to them by least squares: the fit is a linear map near its solution.
+// Propagation of the noise of points to parameters fitted to them by least squares, a linear map near the solution.
 #include <cmath>
 
 #include "ctcr/calibration/dense.hpp"
@@ -26,9 +26,9 @@ inline Eigen::MatrixXd gain(const Eigen::MatrixXd& J) {
 
 /// The part of points' covariance that a tracker's field error makes, as factor factor^T over (points), the same for
 /// each axis [m^2].
-inline Eigen::MatrixXd field_factor(const Eigen::MatrixX3d& places, const Noise& noise) {
-  if (!(noise.position_field > 0)) return Eigen::MatrixXd(places.rows(), 0);
-  return noise.position_field * smooth_field(places, noise.correlation_length, 1e-9).factor;
+inline Eigen::MatrixXd field_factor(const Eigen::MatrixX3d& positions, const Noise& noise) {
+  if (!(noise.position_field > 0)) return Eigen::MatrixXd(positions.rows(), 0);
+  return noise.position_field * smooth_field(positions, noise.correlation_length, 1e-9).factor;
 }
 
 /// Columns 3 i + axis of G, for the points i that an axis' field moves together.
@@ -47,7 +47,7 @@ inline Eigen::MatrixXd propagated(const Eigen::MatrixXd& G, double variance, con
   return covariance;
 }
 
-/// What a field alone adds to the sum of squared residuals of a fit with Jacobian J and gain G, on average [m^2].
+/// Contribution of the field error to the sum of squared residuals of a fit with Jacobian J and gain G, on average [m^2].
 inline double expected_field_squares(const Eigen::MatrixXd& J, const Eigen::MatrixXd& G, const Eigen::MatrixXd& field) {
   if (field.cols() == 0) return 0;
   double squares = 3 * field.squaredNorm();

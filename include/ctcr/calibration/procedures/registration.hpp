@@ -1,5 +1,5 @@
 #pragma once
-// Where the tracker sees the robot's base frame: from points whose place on the robot is known, touched with a probe.
+// Registration of the base frame to the tracker: from fiducials, whose CAD positions are known, touched with a probe.
 #include <ceres/manifold.h>
 
 #include <Eigen/Eigenvalues>
@@ -34,7 +34,7 @@ inline Vec3 mean_reading(const Fiducial& point) {
 struct RegistrationOptions {
   Noise noise{};            ///< of a reading's position
   double placement_sd = 0;  ///< how far, per axis, the probe sits from the CAD's point however often it is read [m]; 0:
-                            ///< from the residuals, which need more than 3 points to be told well
+                            ///< from the residuals, for which 3 points are too few
   double loss_scale = 0;    ///< beyond which points count ever less (Cauchy) [m]; 0: least squares
 };
 
@@ -55,17 +55,17 @@ constexpr const char* to_string(RegistrationNotice kind) {
 /// T_ref and how well it is known. Changes of T_ref are those of moved_frame(): displacement of the base frame's origin
 /// [m], then rotation about it [rad], tracker axes.
 struct Registration {
-  Pose T_tracker_base;                ///< T_ref
-  Mat6 covariance;                    ///< of such a change
-  double fre;                         ///< fiducial registration error: RMS residual of points used [m]
-  double fle;                         ///< sd of a point per axis, placement and reading, used [m]
-  int degrees_of_freedom;             ///< of the residuals
-  double repeatability_sd;            ///< of readings of one point, per axis [m]; NaN without repeats
+  Pose T_tracker_base;      ///< T_ref
+  Mat6 covariance;          ///< of such a change
+  double fre;               ///< fiducial registration error (FRE): RMS residual of points used [m]
+  double fle;               ///< fiducial localisation error (FLE): sd of a point per axis, placement and reading [m]
+  int degrees_of_freedom;   ///< of the residuals
+  double repeatability_sd;  ///< of readings of one point, per axis [m]; NaN without repeats
   std::vector<Vec3> residuals;        ///< mean reading - T_ref point [m], tracker axes; NaN: not read
   std::vector<std::string> outliers;  ///< names of the points left out
   Notices<RegistrationNotice> notices;
 
-  /// Expected target registration error: RMS distance [m] between where T_ref takes `target` [m], base frame, and where
+  /// Expected target registration error (TRE): RMS distance [m] between where T_ref takes `target` [m], base frame, and where
   /// it is. For equal points this is the formula of Fitzpatrick, West, Maurer, "Predicting error in rigid-body
   /// point-based registration", 1998.
   [[nodiscard]] double target_error(const Vec3& target) const {
@@ -240,7 +240,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
 /// Registers the base frame to the tracker: closed form, then least squares on SE(3). Points that the others contradict
 /// are left out, as long as four remain.
 /// @throws std::invalid_argument for fewer than 3 points with readings, points on a line, a mirror image, two exchanged
-///         names, other units, and what is not a number. Real time: no.
+///         names, other units, and numbers that are not finite. Real time: no.
 /// Ref: Boyer et al., Section V.
 [[nodiscard]] inline Registration register_points(std::span<const Fiducial> points,
                                                   const RegistrationOptions& options = {}) {
@@ -301,7 +301,7 @@ inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_s
   const double sum = (error * weight.asDiagonal()).squaredNorm();
   result.degrees_of_freedom = int(3 * n - 6);
   const double left = (sum - expected_field_squares(J, G, field)) / result.degrees_of_freedom;
-  // A jitter alone bounds what the residuals may claim; with the placement the whole of a point's error is stated.
+  // A stated jitter bounds the variance from below; with the placement all of a point's error is stated.
   double readings_inverse = 0;
   for (const int i : read) readings_inverse += 1 / double(points[std::size_t(i)].readings.size());
   const double least = options.placement_sd > 0 ? 1 : jitter * jitter / (mm * mm) * readings_inverse / double(n);

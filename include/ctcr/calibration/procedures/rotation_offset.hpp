@@ -1,5 +1,5 @@
 #pragma once
-// The angle at which a motor holds a tube: from readings of its tip while it alone is out and turns.
+// Rotational offset of a tube: from readings of its tip while no other tube is deployed and its motor turns.
 #include <numbers>
 #include <span>
 
@@ -10,11 +10,11 @@
 
 namespace ctcr {
 
-/// A reading of the tip of a tube that is out alone.
+/// A reading of the tip of the only deployed tube.
 struct TurnReading {
   double motor_angle;  ///< theta [rad], counted on over several turns
   Vec3 position;       ///< of the tip [m], tracker frame
-  int direction = 0;   ///< in which the motor last turned, +1 or -1; 0: the order of the readings tells
+  int direction = 0;   ///< in which the motor last turned, +1 or -1; 0: from the order of the readings
 };
 
 struct RotationOffsetOptions {
@@ -52,7 +52,7 @@ constexpr const char* to_string(RotationOffsetNotice kind) {
 /// Delta of alpha = rho theta + Delta for the tube that turned: its precurvature axis x stands at alpha from the base
 /// frame's x axis, both seen on the circle's plane, right-handed about z. Without T_ref the angle is from the tracker's
 /// x axis projected on that plane (y, where x is within 25 degrees of its normal), right-handed about the direction of
-/// insertion, which the sense of rotation tells: right up to the constant that T_ref decides.
+/// insertion, which follows from the sense of rotation; a constant that depends on T_ref is then unknown.
 struct RotationOffset {
   double offset, offset_sd;                             ///< mean of both directions, in (-pi, pi] [rad]
   double forward, forward_sd, backward, backward_sd;    ///< of either direction of the motor; NaN where absent [rad]
@@ -151,7 +151,7 @@ inline Circle start_of(const std::vector<CircleReading>& points, const RotationO
   return circle;
 }
 
-/// What is found, without notices and residuals.
+/// The result without notices and residuals.
 inline RotationOffset result_of(const CircleSolution& solved) {
   const Circle& circle = solved.fit.circle;
   const auto& column = solved.fit.column;
@@ -210,7 +210,7 @@ inline void tell_of_readings(const CircleSolution& solved, const RotationOffsetO
         "the two directions differ by %.2f deg (sd %.2f deg): friction or backlash; the mean removes it only if "
         "it is the same both ways",
         result.difference / degree, result.difference_sd / degree);
-  // On a known circle each reading tells the angle to noise / radius.
+  // On a known circle each reading gives the angle to noise / radius.
   const double used = double(solved.used.size());
   const double backward =
       double(std::count_if(solved.used.begin(), solved.used.end(), [](const auto& r) { return r.series == 1; }));

@@ -37,9 +37,9 @@ constexpr const char* to_string(TubeShapeNotice kind) {
       .at(std::size_t(kind));
 }
 
-/// Lengths in metres; places in the unit of the points.
+/// Lengths in metres; positions in the unit of the points.
 struct TubeShapeFit {
-  double curvature, curvature_sd;          ///< kappa >= 0 [1/m]; which way it bends a picture does not tell
+  double curvature, curvature_sd;          ///< kappa >= 0 [1/m]; a picture does not show its sign
   double curved_length, curved_length_sd;  ///< from where the curve starts to the last point, the tip [m]
   double correlation;                      ///< of the two
   double straight_length;                  ///< of the straight part that points cover [m]
@@ -58,7 +58,7 @@ namespace tube_shape {
 using Vec2 = Eigen::Vector2d;
 
 /// Straight line that ends at `junction` with direction `heading`, then an arc that turns left for a curvature > 0.
-struct Bend {
+struct LineAndArc {
   Vec2 junction;
   double heading;    ///< [rad]
   double curvature;  ///< [1/unit]
@@ -77,7 +77,7 @@ T distance(const Vec2& point, const T* junction, const T& heading, const T& curv
 }
 
 /// Arc length of a point's foot from the junction.
-inline double arc_position(const Vec2& point, const Bend& bend) {
+inline double arc_position(const Vec2& point, const LineAndArc& bend) {
   const Vec2 d = point - bend.junction, e(std::cos(bend.heading), std::sin(bend.heading));
   const double along = e.dot(d), across = e.x() * d.y() - e.y() * d.x();
   if (along < 0 && bend.curvature * across < 1) return along;
@@ -87,7 +87,7 @@ inline double arc_position(const Vec2& point, const Bend& bend) {
   return (angle < 0 ? angle + 2 * std::numbers::pi : angle) / k;
 }
 
-struct BendResidual {
+struct LineAndArcResidual {
   Vec2 point;
   double scale;
   template <class T>
@@ -97,21 +97,21 @@ struct BendResidual {
   }
 };
 
-inline double distance(const Vec2& point, const Bend& bend) {
+inline double distance(const Vec2& point, const LineAndArc& bend) {
   return distance<double>(point, bend.junction.data(), bend.heading, bend.curvature);
 }
 
 /// Cost of the robust fit, median distance and derivative (points, 4) by junction, heading and curvature.
 struct Refined {
-  Bend bend;
+  LineAndArc bend;
   Eigen::MatrixXd J;
 };
 
-inline Refined refined(std::span<const Vec2> points, Bend bend, double scale, double loss) {
+inline Refined refined(std::span<const Vec2> points, LineAndArc bend, double scale, double loss) {
   ceres::Problem problem;
   for (const Vec2& point : points) {
-    using Cost = ceres::AutoDiffCostFunction<BendResidual, 1, 2, 1, 1>;
-    problem.AddResidualBlock(new Cost(new BendResidual{point, scale}),
+    using Cost = ceres::AutoDiffCostFunction<LineAndArcResidual, 1, 2, 1, 1>;
+    problem.AddResidualBlock(new Cost(new LineAndArcResidual{point, scale}),
                              loss > 0 ? new ceres::CauchyLoss(loss / scale) : nullptr, bend.junction.data(),
                              &bend.heading, &bend.curvature);
   }
@@ -119,14 +119,14 @@ inline Refined refined(std::span<const Vec2> points, Bend bend, double scale, do
   return {bend, scale * jacobian(problem, {bend.junction.data(), &bend.heading, &bend.curvature})};
 }
 
-inline double median_distance(std::span<const Vec2> points, const Bend& bend) {
+inline double median_distance(std::span<const Vec2> points, const LineAndArc& bend) {
   std::vector<double> d;
   for (const Vec2& point : points) d.push_back(std::abs(distance(point, bend)));
   return median(d);
 }
 
 /// At most 60 of the points in their order along the tube: a walk to the nearest point not yet visited, from where it is
-/// shortest. Points that only long steps lead to are far off and left out.
+/// shortest. Points that only long steps reach are outliers and left out.
 inline std::vector<Vec2> in_order(std::span<const Vec2> points) {
   std::vector<Vec2> some;
   const double stride = std::max(1.0, double(points.size()) / 60);
@@ -165,7 +165,7 @@ inline std::vector<Vec2> in_order(std::span<const Vec2> points) {
 }
 
 /// A start with the points [0, k) on the straight part and the others on the arc: line and circle of least squares.
-inline Bend start_at(const std::vector<Vec2>& order, std::size_t k) {
+inline LineAndArc start_at(const std::vector<Vec2>& order, std::size_t k) {
   Vec2 mean = Vec2::Zero();
   for (std::size_t i = 0; i < k; ++i) mean += order[i] / double(k);
   Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
@@ -188,10 +188,10 @@ inline Bend start_at(const std::vector<Vec2>& order, std::size_t k) {
   return {mean + along.dot(order[k] - mean) * along, std::atan2(along.y(), along.x()), std::copysign(1 / radius, side)};
 }
 
-/// Starts for places of the junction along the tube, either end of which may be the straight one.
-inline std::vector<Bend> starts(std::span<const Vec2> points) {
+/// Starts for positions of the junction along the tube, either end of which may be the straight one.
+inline std::vector<LineAndArc> starts(std::span<const Vec2> points) {
   std::vector<Vec2> order = in_order(points);
-  std::vector<Bend> all;
+  std::vector<LineAndArc> all;
   const std::size_t n = order.size();
   for (int end = 0; end < 2; ++end, std::reverse(order.begin(), order.end()))
     for (const double fraction : {0.1, 0.25, 0.4, 0.55, 0.7, 0.85})
@@ -204,7 +204,7 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
 /// Fits a straight line that goes over into an arc of constant curvature to points of a tube, in any order, and finds
 /// out which end is curved. Outliers are found with a robust loss and left out.
 /// @param points  on the middle of the tube (or all on one edge), taken up to its tip
-/// @throws std::invalid_argument for fewer than 8 points, points in one place, and what is not a number. Real time: no.
+/// @throws std::invalid_argument for fewer than 8 points, coincident points, and numbers that are not finite. Real time: no.
 [[nodiscard]] inline TubeShapeFit fit_tube_shape(std::span<const Eigen::Vector2d> points,
                                                  const TubeShapeOptions& options) {
   using namespace tube_shape;
@@ -222,10 +222,10 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
   require(size > 0, "all points are in one place");
 
   // A robust fit from every start; the best one that has points of both parts to the end, with the noise that it shows.
-  Bend bend{};
+  LineAndArc bend{};
   double best = std::numeric_limits<double>::infinity();
-  for (const Bend& start : starts(points)) {
-    const Bend found = refined(points, start, 0.01 * size, 0.01 * size).bend;
+  for (const LineAndArc& start : starts(points)) {
+    const LineAndArc found = refined(points, start, 0.01 * size, 0.01 * size).bend;
     double cost = 0;
     int straight = 0;
     for (const Vec2& point : points) {
@@ -277,7 +277,7 @@ inline std::vector<Bend> starts(std::span<const Vec2> points) {
   for (int j = 0; j < 4; ++j) {
     const double h = j < 2 ? 1e-5 * size : j == 2 ? 1e-5 : 1e-5 / size;
     const auto moved = [&](double t) {
-      Bend b = bend;
+      LineAndArc b = bend;
       (j < 2 ? b.junction[j] : j == 2 ? b.heading : b.curvature) += t;
       return arc_position(used[std::size_t(last)], b);
     };
