@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.errors import InputError
-from ctcr.robot import robot_file
+from ctcr.robot import robot_file, yaml_document
 from ctcr.robot.description import Robot
 
 ROOT = Path(__file__).parents[3]
@@ -206,7 +206,7 @@ def test_no_warnings():
         (b"\xff\xfe\x00n", "UTF-8"),
         (b"a: \x00", "not valid YAML"),
         (b"[" * 3000, "nested too deeply"),
-        (b"a" * (robot_file.MAX_BYTES + 1), "over 1 MB"),
+        (b"a" * (yaml_document.MAX_BYTES + 1), "over 1 MB"),
         (b"a: !!python/object/apply:os.getcwd []", "not valid YAML"),
     ],
 )

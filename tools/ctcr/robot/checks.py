@@ -1,6 +1,6 @@
 """Faults of a robot description, in single fields and between fields, and possible values that look wrong."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from ctcr.errors import Problem, did_you_mean, shown
 from ctcr.robot.description import Actuation, Robot, Section, Tracker, Tube, Uncertainty
 from ctcr.robot.units import LARGEST
-from ctcr.robot.yaml_document import FieldPath
+from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
 Fault = tuple[FieldPath, str]
 
@@ -68,8 +68,9 @@ def doubts(robot: Robot) -> Iterator[Fault]:
             yield ("tracker", f"jitter_{unit}"), text
 
 
-def problems(found: list[Fault], file: str, line_of: Callable[[FieldPath], int | None]) -> list[Problem]:
-    """Faults with their place in the file, in the file's order."""
+def problems(found: list[Fault], document: YamlDocument | None) -> list[Problem]:
+    """Faults with their fields and lines, in the order of the file."""
+    file, line_of = (document.file, document.line) if document else (None, lambda path: None)
     placed = [Problem(text, file, line_of(path), path_text(path)) for path, text in found]
     return sorted(placed, key=lambda problem: problem.line or 0)
 

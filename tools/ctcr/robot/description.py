@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
+from ctcr.robot.yaml_document import YamlDocument
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
@@ -219,7 +220,7 @@ class Robot(Section):
     )
     history: list[dict[str, Any]] = Field(default_factory=list, description="a list of what was changed, oldest first")
 
-    _source: Any = PrivateAttr(None)  # file, text and lines that robot_file loaded it from
+    _source: YamlDocument | None = PrivateAttr(None)  # that robot_file loaded it from
 
     @property
     def n_tubes(self) -> int:

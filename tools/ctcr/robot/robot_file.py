@@ -6,7 +6,7 @@ comments and the layout of the file that the robot came from.
 
 import io
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 from ruamel.yaml import YAML
@@ -14,57 +14,46 @@ from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr import _core
-from ctcr.errors import InputError, Problem, file_fault, suggestion
+from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import checks, yaml_document
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
 
-MAX_BYTES = 1 << 20  # a robot file is a few kB: anything bigger is something else, often the table
 LINE_WIDTH = 1000  # a row of the ledger stays one line
 
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
 
-class _Source(NamedTuple):
-    file: str
-    text: str
-    document: YamlDocument
-
-
 def load(path: str | Path) -> Robot:
     """The robot described by a file. Raises InputError with all faults of the file."""
-    try:
-        with open(path, "rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
-    return parse(content, str(path))
+    return _robot(yaml_document.load(path))
 
 
 def parse(content: bytes, file: str = "robot.yaml") -> Robot:
     """The robot described by the content of a file; `file` is its name in errors."""
-    text = _text(content, file)
-    document = yaml_document.parse(text, file)
+    return _robot(yaml_document.parse(content, file))
+
+
+def _robot(document: YamlDocument) -> Robot:
     if not isinstance(document.data, dict):
-        hint = " (is this the table of measurements?)" if "," in text.partition("\n")[0] else ""
-        raise InputError(Problem(f"does not describe a robot: no fields such as name, tubes, tracker{hint}", file))
+        hint = " (is this the table of measurements?)" if "," in document.text.partition("\n")[0] else ""
+        text = f"does not describe a robot: no fields such as name, tubes, tracker{hint}"
+        raise InputError(Problem(text, document.file))
     try:
         robot, errors = Robot.model_validate(document.data), []
     except ValidationError as error:
         robot, errors = None, error.errors(include_url=False)
     faults = checks.faults(document.data, errors) + _unknown_effects(document.data)
     if robot is None or faults:
-        raise InputError(checks.problems(faults, file, document.line))
-    robot._source = _Source(file, text, document)
+        raise InputError(checks.problems(faults, document))
+    robot._source = document
     return robot
 
 
 def warnings(robot: Robot) -> list[Problem]:
     """Values that are possible but look wrong, with unit, field and line."""
-    source = robot._source
-    line_of = source.document.line if source else lambda path: None
-    return checks.problems(list(checks.doubts(robot)), source.file if source else None, line_of)
+    return checks.problems(list(checks.doubts(robot)), robot._source)
 
 
 def save(robot: Robot, path: str | Path) -> None:
@@ -109,18 +98,6 @@ def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
         for name in effects
         if name not in known
     ]
-
-
-def _text(content: bytes, file: str) -> str:
-    if len(content) > MAX_BYTES:
-        raise InputError(Problem("is over 1 MB: this is not a robot description", file))
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(Problem("is not text in UTF-8", file)) from None
-    if not text.strip():
-        raise InputError(Problem("is empty", file))
-    return text
 
 
 def _updated(old: Any, new: Any) -> Any:

@@ -11,12 +11,15 @@ from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 from ctcr.errors import InputError, Problem, file_fault
 
 FieldPath = tuple[str | int, ...]
+MAX_BYTES = 1 << 20  # a description is a few kB: a larger file is something else, often a table
 
 
 @dataclass(frozen=True)
 class YamlDocument:
     """`data` holds plain dictionaries, lists and scalars; `root` the nodes they came from."""
 
+    file: str
+    text: str
     data: Any
     root: Node | None
 
@@ -32,21 +35,30 @@ class YamlDocument:
 
 
 def load(path: str | Path) -> YamlDocument:
-    """The document of a file. Raises InputError where it cannot be read, or names the line that is no YAML."""
+    """The document of a file. Raises InputError where it cannot be read or is no YAML."""
     try:
-        return parse(Path(path).read_text(encoding="utf-8-sig"), str(path))
+        with open(path, "rb") as file:
+            content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise file_fault(error, path, "read") from None
+    return parse(content, str(path))
+
+
+def parse(content: str | bytes, file: str) -> YamlDocument:
+    """Parses one document; `file` is its name in errors. Raises InputError that names the line."""
+    if len(content) > MAX_BYTES:
+        raise InputError(Problem(f"is over {MAX_BYTES >> 20} MB: this is not a description", file))
+    try:
+        text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     except UnicodeDecodeError:
-        raise InputError(Problem("is not text in UTF-8", str(path))) from None
-
-
-def parse(text: str, file: str) -> YamlDocument:
-    """Parses one document. Raises InputError that names the line."""
+        raise InputError(Problem("is not text in UTF-8", file)) from None
+    if not text.strip():
+        raise InputError(Problem("is empty", file))
     yaml = YAML(typ="safe", pure=True)
     try:
         root = yaml.compose(text)
-        return YamlDocument(None if root is None else yaml.constructor.construct_document(root), root)
+        data = None if root is None else yaml.constructor.construct_document(root)
+        return YamlDocument(file, text, data, root)
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
         raise InputError(Problem(f"not valid YAML: {error.problem or error.context}", file, line)) from None

@@ -14,9 +14,9 @@ from annotated_types import Len
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationError
 
-from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
+from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.robot import yaml_document
-from ctcr.robot.checks import path_text
+from ctcr.robot.checks import problems
 from ctcr.robot.description import Section, Three
 from ctcr.robot.units import Quantity
 
@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 # corner's number says at which end of axis k it lies.
 CUBE_TOUR = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
 TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stability margin", "posture")
-MOST_BYTES = 1 << 18
 NESTED = "its fields, indented below it"
 
 Lengths = Annotated[list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")]
@@ -129,12 +128,11 @@ class Scenario(Section):
     noise_mm: Annotated[float, Quantity("mm", usual=(1e-4, 5), least=0)] = 0.035
     noise_deg: Annotated[float, Quantity("deg", usual=(1e-4, 5), least=0)] = 0.0
     repetitions: Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")] = 10
-    _source: tuple[str, yaml_document.YamlDocument] | None = PrivateAttr(None)
+    _source: yaml_document.YamlDocument | None = PrivateAttr(None)
 
     def problem(self, text: str, *path: str) -> Problem:
         """A fault of a field, with file and line where it comes from a file."""
-        file, line = (self._source[0], self._source[1].line(path)) if self._source else (None, None)
-        return Problem(text, file, line, path_text(path))
+        return problems([(path, text)], self._source)[0]
 
     def force(self, mass_g: float) -> Array:
         """Pull of a weight (3,) [N], base frame."""
@@ -160,33 +158,26 @@ def shipped(name: str) -> Scenario:
 
 def load(path: str | Path, n_tubes: int) -> Scenario:
     """The scenario of a file for a robot of so many tubes. Raises InputError with all faults of the file."""
-    try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
-    if len(content) > MOST_BYTES:
-        raise InputError(Problem("is over 256 kB: this is not a scenario", str(path)))
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(Problem("is not text in UTF-8", str(path))) from None
-    return parse(text, str(path), n_tubes)
+    return _scenario(yaml_document.load(path), n_tubes)
 
 
 def parse(text: str, file: str, n_tubes: int) -> Scenario:
     """The scenario described by a text; `file` is its name in errors."""
-    document = yaml_document.parse(text, file)
+    return _scenario(yaml_document.parse(text, file), n_tubes)
+
+
+def _scenario(document: yaml_document.YamlDocument, n_tubes: int) -> Scenario:
     if not isinstance(document.data, dict):
-        raise InputError(Problem("does not describe a scenario: no fields such as name, trajectory, start", file))
+        text = "does not describe a scenario: no fields such as name, trajectory, start"
+        raise InputError(Problem(text, document.file))
     try:
         scenario = Scenario.model_validate(document.data)
         faults = [*_relations(scenario, n_tubes), *_unusual(scenario)]
     except ValidationError as error:
         faults = [_fault(item) for item in error.errors(include_url=False)]
     if faults:
-        found = [Problem(text, file, document.line(path), path_text(path)) for path, text in faults]
-        raise InputError(sorted(found, key=lambda problem: problem.line or 0))
-    scenario._source = (file, document)
+        raise InputError(problems(faults, document))
+    scenario._source = document
     return scenario
 
 
