@@ -311,7 +311,7 @@ def test_runs_with_frames_of_their_own_are_told_and_fitted(robot, readings):
     assert "The runs do not share one frame" in said(plain)
     framed = outcome(robot, moved, ["actuation.home_rotation.*", "tubes.*.curvature"], frame_per_run=True)
     assert framed.stages[-1].rms_mm < 0.5 < 10 < plain.stages[-1].rms_mm
-    found = framed.frames
+    found = framed.fit.frames
     own = (Rotation.from_rotvec(found.turn[0]) * Rotation.from_rotvec(found.turn).inv()).as_rotvec()
     true = (Rotation.from_rotvec(turn[0]) * Rotation.from_rotvec(turn).inv()).as_rotvec()
     np.testing.assert_allclose(own, true, atol=np.radians(1.0))

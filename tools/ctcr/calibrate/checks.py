@@ -10,6 +10,7 @@ from ctcr.compare.offsets import find_run_offsets
 from ctcr.compare.sample import take_sample
 from ctcr.compare.visits import find_revisits, find_stops
 from ctcr.errors import InputError, Problem
+from ctcr.fit.result import Fit
 from ctcr.fit.run_frames import error_with_frames
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
@@ -61,25 +62,23 @@ def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
     return usable, [f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."]
 
 
-def outlier_rows(fit, readings: Measurements) -> list[int]:
+def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
     """Rows of the file whose readings hardly counted."""
     small = (fit.weights > 0) & (fit.weights < settings.OUTLIER_WEIGHT)  # 0: not fitted
     return readings.row[small.any(axis=1)].tolist()
 
 
-def notices(after: Robot, readings: Measurements, fit, frame_per_run: bool) -> list[str]:
+def notices(after: Robot, readings: Measurements, fit: Fit, frame_per_run: bool) -> list[str]:
     """What the user should know of a fit, in sentences."""
-    told_as_doubts = "prior standard deviations"
-    said = [sentence(text) for text in fit.warnings if told_as_doubts not in text]
+    said_as_doubts = "prior standard deviations"
+    said = [sentence(text) for text in fit.warnings if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
-    if not frame_per_run:
-        said += _one_frame(after, readings, fit) or _run_frames(after, readings, fit)
-    return said
+    return said if frame_per_run else said + (_one_frame(after, readings, fit) or _run_frames(after, readings, fit))
 
 
 def sentence(text: str) -> str:
@@ -88,39 +87,47 @@ def sentence(text: str) -> str:
     return first + ("" if text.endswith(".") else ".")
 
 
-def _one_frame(robot: Robot, readings: Measurements, fit) -> list[str]:
-    """A sentence where an error far beyond noise goes away with another frame for all."""
-    together = replace(readings, run=np.zeros_like(readings.run))
-    before_mm, after_mm = error_with_frames(robot, together, fit.noise)
-    if before_mm < settings.FRAMES_BEYOND * fit.expected_mm() or after_mm > settings.FRAMES_LEAVE * before_mm:
+def _one_frame(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
+    """A sentence where an error far beyond the expected one disappears with another frame for all runs."""
+    found = _errors_if_framed(robot, replace(readings, run=np.zeros_like(readings.run)), fit)
+    if not found:
         return []
     return [
-        f"Another tracker frame leaves {wording.mm(after_mm)} of the {wording.mm(before_mm)} RMS error, but lies "
+        f"Another tracker frame leaves {found[1]} of the {found[0]} RMS error, but lies "
         "further off than the robot file allows: find it with `ctcr calibrate registration`, or widen "
         "tracker_frame_mm and tracker_frame_deg under uncertainty."
     ]
 
 
-def _run_frames(robot: Robot, readings: Measurements, fit) -> list[str]:
-    """A sentence where the runs do not share one frame: the same joints give other positions in other runs, or an error
-    far beyond noise goes away with a frame for each."""
+def _run_frames(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
+    """A sentence where the runs do not share one frame: an error far beyond the expected one disappears with a frame
+    for each, or the same joints give other positions in other runs."""
     if len(np.unique(readings.run)) < 2:
         return []
-    before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
-    if before_mm > settings.FRAMES_BEYOND * fit.expected_mm() and after_mm < settings.FRAMES_LEAVE * before_mm:
-        text = f"The runs do not share one frame: a frame for each leaves {wording.mm(after_mm)} of the "
-        return [f"{text}{wording.mm(before_mm)} RMS error. --frame-per-run fits them."]
+    if found := _errors_if_framed(robot, readings, fit):
+        text = f"The runs do not share one frame: a frame for each leaves {found[1]} of the {found[0]} RMS error."
+        return [f"{text} --frame-per-run fits them."]
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     sample = take_sample(robot, readings, Model(robot.standard).predict(beta, alpha, readings.force))
-    found = find_run_offsets(sample, find_revisits(find_stops(sample), sample.lever), settings.RUN_OFFSET_SIGNIFICANCE)
-    if not found.found:
+    revisits = find_revisits(find_stops(sample), sample.lever)
+    offsets = find_run_offsets(sample, revisits, settings.RUN_OFFSET_SIGNIFICANCE)
+    if not offsets.found:
         return []
-    text = f"The runs do not share one frame or homing: an offset for each explains {wording.percent(found.share)} of "
-    text += "the squared error that is left"
-    if found.outlying:
-        far = wording.join([str(run) for run in found.outlying[:8]])
-        text += f"; runs {far} lie about {wording.mm(found.outlying_mm)} from the others"
+    share = wording.percent(offsets.share)
+    text = f"The runs do not share one frame or homing: an offset for each explains {share} of the squared error that "
+    text += "is left"
+    if offsets.outlying:
+        far = wording.join([str(run) for run in offsets.outlying[:8]])
+        text += f"; runs {far} lie about {wording.mm(offsets.outlying_mm)} from the others"
     return [text + ". --frame-per-run fits a frame for each."]
+
+
+def _errors_if_framed(robot: Robot, readings: Measurements, fit: Fit) -> tuple[str, str] | None:
+    """RMS errors with one frame and with a frame for each run, in words; None where the second explains little."""
+    before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
+    if before_mm > settings.FRAMES_BEYOND * fit.expected_mm() and after_mm < settings.FRAMES_LEAVE * before_mm:
+        return wording.mm(before_mm), wording.mm(after_mm)
+    return None
 
 
 def _rows(rows: NDArray[np.int64]) -> str:

@@ -1,6 +1,6 @@
 """How far two models differ that were fitted to two halves of the data, and how far noise alone would drive them apart.
 
-A small difference beyond noise means that the model fits one part of the workspace at the cost of another.
+A difference beyond noise means that the model fits one part of the workspace at the cost of another.
 """
 
 from dataclasses import dataclass, replace
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ctcr import settings
+from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model import effect_model
 from ctcr.model.model import Model
@@ -21,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Halves:
-    """The difference of the two models' tips at K visited joints, tracker frame, and what noise makes of it."""
+    """The difference of the two models' tips at K visited joints, tracker frame, and the one that noise alone gives."""
 
     kind: str  # what the halves kept together, runs or places
     row: NDArray[np.int64]  # (K,) of the file
@@ -31,20 +32,25 @@ class Halves:
 
     @property
     def rms_mm(self) -> float:
-        return 1e3 * float(np.sqrt(np.mean(np.sum(self.difference**2, axis=1))))
+        return 1e3 * rms(self.difference)
 
     @property
     def noise_mm(self) -> float:
-        """What noise alone would give."""
-        return 1e3 * float(np.sqrt(np.mean(self.noise**2)))
+        """RMS difference that noise alone would give."""
+        return 1e3 * rms(self.noise[:, None])
 
 
-def compare_halves(robot: Robot, readings: Measurements, first, second, kind: str) -> Halves | None:
-    """Halves of two fits of one robot to two halves of a table; None where the models cannot be solved."""
-    rows = np.unique(np.linspace(0, len(readings) - 1, min(len(readings), settings.HALVES_ROWS)).astype(np.int64))
+def compare_halves(robot: Robot, readings: Measurements, first: Fit, second: Fit, kind: str) -> Halves | None:
+    """Halves of two fits of one robot to two halves of a table; None where the models cannot be solved.
+
+    The effect of noise is sampled: the second fit's values are drawn about the first one's.
+    """
+    count = len(readings)
+    rows = np.unique(np.linspace(0, count - 1, min(count, settings.HALVES_ROWS)).astype(np.int64))
     models = [fit.apply(robot) for fit in (first, second)]
     tips = [_tips(model, readings, rows) for model in models]
-    spread = _root(_difference_covariance(first, second))
+    eigenvalues, vectors = np.linalg.eigh(_difference_covariance(first, second))
+    spread = vectors * np.sqrt(np.maximum(eigenvalues, 0))
     rng = np.random.default_rng(settings.HALVES_SEED)
     squares = []
     for _ in range(settings.HALVES_DRAWS):
@@ -54,12 +60,12 @@ def compare_halves(robot: Robot, readings: Measurements, first, second, kind: st
         except ValidationError:  # a draw that no robot can have, such as a negative modulus
             continue
         squares.append(np.sum((_tips(moved, readings, rows) - tips[0]) ** 2, axis=1))
-    squares = np.mean(squares, axis=0) if squares else np.full(len(rows), np.nan)
-    solved = np.isfinite(tips[0]).all(axis=1) & np.isfinite(tips[1]).all(axis=1) & np.isfinite(squares)
+    square = np.mean(squares, axis=0) if squares else np.full(len(rows), np.nan)
+    solved = np.isfinite(tips[0]).all(axis=1) & np.isfinite(tips[1]).all(axis=1) & np.isfinite(square)
     if not solved.any():
         return None
     base = (tips[0] - models[0].tracker.position) @ models[0].tracker.rotation
-    return Halves(kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(squares[solved]))
+    return Halves(kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(square[solved]))
 
 
 def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Array:
@@ -72,17 +78,13 @@ def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Arra
     return base_to_tracker(robot.tracker, answer.position, answer.quaternion)[0]
 
 
-def _difference_covariance(first, second) -> Array:
+def _difference_covariance(first: Fit, second: Fit) -> Array:
     """Covariance of the difference of two fits that share a prior.
 
-    With posterior covariances A, B and prior information P the difference of the estimates has covariance
-    A + B - A P B - B P A: what the prior holds in both does not drive them apart.
+    With posterior covariances A, B and prior information P it is A + B - A P B - B P A: both estimates lean on the same
+    prior, which does not drive them apart.
     """
     a, b = (np.nan_to_num(fit.covariance, posinf=0.0, neginf=0.0) for fit in (first, second))
     prior = np.diag(1 / first.prior_sd**2)
-    return a + b - a @ prior @ b - b @ prior @ a
-
-
-def _root(covariance: Array) -> Array:
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
-    return vectors * np.sqrt(np.maximum(values, 0))
+    covariance = a + b - a @ prior @ b - b @ prior @ a
+    return (covariance + covariance.T) / 2

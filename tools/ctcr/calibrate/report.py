@@ -127,8 +127,8 @@ def _numbers(c: Calibration) -> str:
         ["seconds of the last fit", f"{fit.seconds:.2g}"],
     ]
     frames = ""
-    if c.frames:
-        frames = table("Frames of the runs against the typical one", list(c.frames.COLUMNS), c.frames.rows(), 0)
+    if c.fit.frames:
+        frames = table("Frames of the runs against the typical one", list(c.fit.frames.COLUMNS), c.fit.frames.rows(), 0)
     return (
         "<h2>Numbers</h2>"
         + table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1)

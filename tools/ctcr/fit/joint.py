@@ -6,7 +6,7 @@ Laplace approximation about the maximum gives covariance and log marginal likeli
 rad, tracker axes; residuals are measured - predicted: position, then rotation vector.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import nan
 from time import perf_counter
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ctcr import _core, settings
 from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
-from ctcr.fit import folds, messages, one_sided
+from ctcr.fit import folds, one_sided
 from ctcr.fit.result import Fit, Priors, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model import recording, user_recording
@@ -73,7 +73,7 @@ def fit(
 
     start = _with_frame(model(), priors, noise, positions, rows, **given)
     fitted = one_sided.widened(one_sided.crossed(fit_from(start, starts=starts), fit_from))
-    warnings = [*said, *messages.doubts(measurements, rows), *fitted.warnings]
+    warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
 
 
@@ -184,7 +184,7 @@ def _fit_active(
         covariance=core.covariance,
         ratio=core.ratio,
         starts=core.starts,
-        warnings=[*core.warnings, *messages.left_out(excluded)],
+        warnings=[*core.warnings, *_exclusion_warnings(excluded)],
         seconds=perf_counter() - began,
     )
 
@@ -289,3 +289,29 @@ def sensor_positions(robot: Robot, measurements: Measurements) -> Array:
         tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
         positions[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
     return positions
+
+
+def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
+    """Shortcomings of the fitted rows (M,)."""
+    if not rows.any():
+        return
+    joints = np.hstack([measurements.beta, measurements.alpha])[rows]
+    fixed = np.ptp(joints, axis=0) == 0
+    if fixed.all():
+        yield "all joints are the same in every row: one pose determines few of the parameters"
+    elif fixed.any():
+        n = measurements.beta.shape[1]
+        names = [f"beta{i + 1}" if i < n else f"alpha{i + 1 - n}" for i in np.flatnonzero(fixed)]
+        yield f"these joints never move: {', '.join(names)}"
+    if len(np.unique(measurements.run[rows])) < 2:
+        yield "there is only one run: readings that follow one another cannot check what was learned from them"
+    if measurements.quaternion is None or not np.isfinite(measurements.quaternion[rows]).any():
+        yield "no orientation was measured: positions alone tell the parameters apart less well"
+
+
+def _exclusion_warnings(rows: Sequence[int]) -> list[str]:
+    """Names rows without a solution, counted from 0."""
+    if not rows:
+        return []
+    shown = ", ".join(str(row + 1) for row in rows[:8]) + (" .." if len(rows) > 8 else "")
+    return [f"{len(rows)} readings were left out, for which the model has no solution: number {shown}"]

@@ -193,7 +193,7 @@ class Fit:
 
     def _expected(self, kind: int, rows: Mask | None) -> float:
         known = np.isfinite(self.residual[:, 3 * kind]) & (True if rows is None else rows)
-        return float(np.sqrt(self.expected_square[known, kind].mean())) if known.any() else nan
+        return rms(np.sqrt(self.expected_square[:, [kind]]), known)
 
     def apply(self, robot: Robot) -> Robot:
         """A copy of the robot with the fitted values."""
