@@ -202,7 +202,7 @@ class FramedRecording(ResidualModel):
                 continue
             effect = np.zeros((len(rows), 6, 6))
             effect[:, :3, :3] = effect[:, 3:, 3:] = -np.eye(3)
-            effect[:, :3, 3:] = _cross(arm[rows])
+            effect[:, :3, 3:] = np.cross(np.eye(3), arm[rows, None])  # matrices of the product with the arm
             known = np.isfinite(residual[rows]).ravel()
             numbers = (6 * rows[:, None] + np.arange(6)).ravel()[known]
             effect = effect.reshape(-1, 6)[known]
@@ -211,10 +211,3 @@ class FramedRecording(ResidualModel):
             taken[numbers] = effect @ solution
             moves[run] = -solution[:, 0]
         return taken, moves
-
-
-def _cross(vectors: Array) -> Array:
-    """Matrices (K, 3, 3) of the cross product with vectors (K, 3) from the left."""
-    x, y, z = vectors.T
-    zero = np.zeros_like(x)
-    return np.stack([np.stack(row, axis=-1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], axis=-2)

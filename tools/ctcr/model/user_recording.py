@@ -38,7 +38,7 @@ class UserRecording(ResidualModel):
     x holds the parameters `names`, of the robot, of the library's effects (effects.softening.gamma.2) and of
     `own_effects` (effects.<id>.<parameter>[.<tube>]); `fixed` gives others another value than the robot's. Derivatives
     by parameters of the library are exact, those by parameters of the user's come from central differences of the
-    user's functions; that the joints they change also change what friction remembers is left out of derivatives alone.
+    user's functions; they neglect that the joints which these change also change the history of friction.
     Raises InputError where a name does not exist, and where a function of the user's fails, returns other than it
     should, or acts at its neutral values.
     """
@@ -54,60 +54,57 @@ class UserRecording(ResidualModel):
         steps: int = settings.STEPS,
         threads: int = 0,
     ):
-        self._robot, self._table = robot, measurements
-        self._effects, self._names = list(own_effects), list(names)
-        self._hooks = Hooks(robot, Rows.of(measurements), own_effects)
-        known = catalogue.names_of(robot.n_tubes)
-        self._options = {"steps": max(steps, settings.PROFILE_STEPS) if self._hooks.has(*PROFILES) else steps}
-        self._options["threads"] = threads
-        self._options["fixed"] = {name: value for name, value in (fixed or {}).items() if name in known}
-        self._own_sigma = {
-            name: p.sigma
-            for effect in self._effects
-            for p in effect.described(robot.n_tubes).parameters
-            for name in p.full_names
-        }
-        library = recording.names_of(robot.n_tubes)
+        self._robot, self._table, self._names = robot, measurements, list(names)
+        self._hooks = hooks = Hooks(robot, Rows.of(measurements), own_effects)
+        own = {effect.id for effect in own_effects}
+        rest = {identity: given for identity, given in robot.effects.items() if identity not in own}
+        self._library_robot = robot.model_copy(update={"effects": rest})
+        self._library_robot._source = robot._source
+        library, known = recording.names_of(robot.n_tubes), catalogue.names_of(robot.n_tubes)
+        self._nominal = dict(zip(library, recording.values(self._library_robot).tolist(), strict=True))
+        self._own_sigma: dict[str, float] = {}
+        for effect in own_effects:
+            self._add_parameters(effect)
+        self._nominal |= fixed or {}
         for name in self._names:
-            if name not in self._own_sigma and name not in library:
+            if name not in self._nominal:
                 raise InputError(Problem(f"no parameter is named {name}"))
-        self._nominal = self._nominal_values(library) | dict(fixed or {})
-        n = robot.n_tubes
-        homes = [f"actuation.home_{kind}.{i + 1}" for kind in ("translation", "rotation") for i in range(n)]
-        forces = [f"effects.tip_load.force_{axis}" for axis in "xyz"]
-        # What the user's functions change acts through these.
-        self._joints = homes if self._hooks.has("joints") else []
-        self._forces = forces if self._hooks.has("force", "base") else []
+        self._options = {
+            "steps": max(steps, settings.PROFILE_STEPS) if hooks.has(*PROFILES) else steps,
+            "threads": threads,
+            "fixed": {name: value for name, value in (fixed or {}).items() if name in known},
+        }
+        # Joints and forces that the user's functions change act through these parameters of the compiled recording.
+        homes = [f"actuation.home_{kind}.{i + 1}" for kind in ("translation", "rotation") for i in range(robot.n_tubes)]
+        self._joints = homes if hooks.has("joints") else []
+        self._forces = [f"effects.tip_load.force_{axis}" for axis in "xyz"] if hooks.has("force", "base") else []
         given = [name for name in self._names if name in library]
         self._inner = list(dict.fromkeys([*given, *self._joints, *self._forces]))
-        self._active = np.ones(len(measurements), bool)
-        self._hooks.check_neutral(self._nominal)
-        self._reference = self._references()
+        hooks.check_neutral(self._nominal)
+        self._reference = self._reference_poses()
         self._recording, self._inputs = None, None
         self._measured_rotation = self._rotations(measurements.quaternion)
-        self._left_out = ~self._solvable()
+        self._active, self._solvable = np.ones((2, len(measurements)), bool)
+        self.residual(self.nominal())
+        self._solvable = self._solved
 
-    # ---- as a Recording
+    # ---- as a compiled Recording
 
     def nominal(self) -> Array:
-        """The file's values of the parameters."""
         return np.array([self._nominal[name] for name in self._names])
 
     def activate(self, rows: Sequence[bool]) -> None:
-        """Rows to solve from now on."""
         self._active = np.array(rows, bool)
 
     def wind_up(self, x: Array) -> float:
-        """As Recording.wind_up."""
         values = self._values(x)
-        return self._prepared(values).wind_up(np.array([values[name] for name in self._inner]))
+        return self._prepared(values).wind_up(self._inner_x(values))
 
     def unsolved(self) -> list[int]:
         """Active rows that could not be solved at the last call, and those that never can."""
         return np.flatnonzero(self._active & ~self._solved).tolist()
 
     def predicted(self) -> tuple[Array, Array]:
-        """What the tracker would read, as at the last call: position (M, 3) [m], quaternion (M, 4); NaN: not solved."""
         position, rotation = self._reading
         quaternion = np.full((len(position), 4), nan)
         good = np.isfinite(position).all(axis=1)
@@ -117,31 +114,34 @@ class UserRecording(ResidualModel):
         return position, quaternion
 
     def residual(self, x: Array, derivatives: bool = False) -> tuple[Array, Array, bool]:
-        """(residual (6 M,), its derivative (6 M, n) or empty, whether every row was solved that ever can be)."""
+        """As of a ResidualModel; usable where every row was solved that is solvable at the file's values."""
         values = self._values(x)
         inner = self._prepared(values)
-        wanted = self._active & ~self._left_out
+        wanted = self._active & self._solvable
         inner.activate(wanted.tolist())
-        start, slopes, _ = inner.residual(np.array([values[name] for name in self._inner]), derivatives)
+        start, jacobian, _ = inner.residual(self._inner_x(values), derivatives)
         position, quaternion = inner.predicted()
         rotation = self._rotations(quaternion)
         self._solved = wanted & np.isfinite(position).all(axis=1)
         self._reading = self._outer(position, rotation, values)
         error = self._residual(*self._reading)
-        solved = bool((self._solved | ~wanted).all())
+        usable = bool((self._solved | ~wanted).all())
         if not derivatives:
-            return error.ravel(), np.empty((0, 0)), solved
-        by_pose = np.linalg.solve(_by_prediction(start.reshape(-1, 6)), slopes.reshape(len(error), 6, -1))
-        total = self._totals(by_pose, position, rotation, values)
-        jacobian = _by_prediction(error) @ total
+            return error.ravel(), np.empty((0, 0)), usable
+        of_pose = np.linalg.solve(_by_prediction(start.reshape(-1, 6)), jacobian.reshape(len(error), 6, -1))
+        jacobian = _by_prediction(error) @ self._of_reading(of_pose, position, rotation, values)
         jacobian[~np.isfinite(error).any(axis=1)] = 0.0
-        return error.ravel(), np.nan_to_num(jacobian).reshape(error.size, -1), solved
+        return error.ravel(), np.nan_to_num(jacobian).reshape(error.size, -1), usable
 
-    # ---- before and behind the model
+    # ---- before and behind the compiled model
 
     def _values(self, x: Array) -> dict[str, float]:
-        """Of all parameters by name, these at x."""
+        """All parameters by name, those of x among them."""
         return self._nominal | dict(zip(self._names, map(float, x), strict=True))
+
+    def _inner_x(self, values: dict[str, float]) -> Array:
+        """Parameters of the compiled recording."""
+        return np.array([values[name] for name in self._inner])
 
     def _prepared(self, values: dict[str, float]):
         """The compiled recording of the rows as the user's effects change them."""
@@ -158,48 +158,44 @@ class UserRecording(ResidualModel):
         return recording.recording_of(self._library_robot, rows, self._inner, **options)
 
     def _outer(self, position: Array, rotation: Array, values: dict[str, float]) -> tuple[Array, Array]:
-        return self._hooks.outer(position, rotation, values, self._tracker_frame(values), self._solved)
-
-    def _tracker_frame(self, values: dict[str, float]) -> tuple[Array, Array]:
-        """Origin and axes of the base frame in the tracker frame."""
-        origin = np.array([values[f"tracker.position.{axis}"] for axis in "xyz"])
-        turn = np.array([values[f"tracker.rotation.{axis}"] for axis in "xyz"])
-        return origin, matrix_from_rotation_vector(turn) @ self._robot.tracker.rotation
+        """The reading of the sensor's pose, for a tracker frame as `values` have it."""
+        origin, turn = (np.array([values[f"tracker.{k}.{axis}"] for axis in "xyz"]) for k in ("position", "rotation"))
+        frame = origin, matrix_from_rotation_vector(turn) @ self._robot.tracker.rotation
+        return self._hooks.outer(position, rotation, values, frame, self._solved)
 
     # ---- derivatives
 
-    def _totals(self, by_pose: Array, position: Array, rotation: Array, values: dict[str, float]) -> Array:
-        """Derivatives (M, 6, n) of the reading, position and rotation vector, tracker axes."""
-        place = {name: k for k, name in enumerate(self._inner)}
+    def _of_reading(self, of_pose: Array, position: Array, rotation: Array, values: dict[str, float]) -> Array:
+        """Derivatives (M, 6, n) of the reading, position and rotation vector, tracker axes; `of_pose` (M, 6, k): of the
+        sensor's pose by the parameters of the compiled recording."""
+        column = {name: k for k, name in enumerate(self._inner)}
         total = np.zeros((len(position), 6, len(self._names)))
-        ratios = self._ratios(values)
+        kinds = ("translation", "rotation")
+        ratios = [values[name] / self._nominal[name] for name in (f"actuation.{kind}_ratio" for kind in kinds)]
         for k, name in enumerate(self._names):
-            if name in place:
-                total[:, :, k] = by_pose[:, :, place[name]]
+            if name in column:
+                total[:, :, k] = of_pose[:, :, column[name]]
                 continue
             plus, minus, width = self._two_sides(self._hooks.inputs, values, name)
             beta, alpha, force = ((a - b) / width for a, b in zip(plus, minus, strict=True))
             motions = (self._joints, np.hstack([ratios[0] * beta, ratios[1] * alpha])), (self._forces, force)
             for through, motion in motions:
                 if through:
-                    slopes = by_pose[:, :, [place[other] for other in through]]
-                    total[:, :, k] += np.einsum("mij,mj->mi", slopes, motion)
+                    chain = of_pose[:, :, [column[other] for other in through]]
+                    total[:, :, k] += np.einsum("mij,mj->mi", chain, motion)
         if self._hooks.has(*PROFILES):
             self._add_profiles(total, values)
         if not self._hooks.has("base", "reading"):
             return total
-        through = np.empty((len(position), 6, 6))
+        by_pose = np.empty((len(position), 6, 6))
         for i in range(6):
-            step = settings.POSITION_STEP if i < 3 else settings.ROTATION_STEP
-            shift = step * np.eye(3)[i % 3]
-            sides = [
-                self._outer(position + sign * shift, rotation, values)
-                if i < 3
-                else self._outer(position, matrix_from_rotation_vector(sign * shift) @ rotation, values)
-                for sign in (1, -1)
-            ]
-            through[:, :, i] = _difference(*sides, 2 * step)
-        total = through @ total
+            step, axis = settings.POSITION_STEP if i < 3 else settings.ROTATION_STEP, np.eye(3)[i % 3]
+            sides = []
+            for shift in (step * axis, -step * axis):
+                turned = rotation if i < 3 else matrix_from_rotation_vector(shift) @ rotation
+                sides.append(self._outer(position + shift if i < 3 else position, turned, values))
+            by_pose[:, :, i] = _difference(*sides, 2 * step)
+        total = by_pose @ total
         for k, name in enumerate(self._names):
             if name in self._own_sigma or (name.startswith("tracker.") and self._hooks.has("base")):
                 sides = self._two_sides(lambda v: self._outer(position, rotation, v), values, name)
@@ -207,8 +203,7 @@ class UserRecording(ResidualModel):
         return total
 
     def _add_profiles(self, total: Array, values: dict[str, float]) -> None:
-        """What the profiles do, by differences of whole predictions."""
-        x = np.array([values[name] for name in self._inner])
+        """Adds the derivatives by parameters of profiles, from differences of whole predictions."""
         for k, name in enumerate(self._names):
             step, sides = settings.PROFILE_STEP * self._own_sigma.get(name, 0.0), []
             for sign in (1, -1):
@@ -217,7 +212,7 @@ class UserRecording(ResidualModel):
                     break
                 other = self._recording_of((*self._inputs[:3], moved))
                 other.activate(self._solved.tolist())
-                other.residual(x)
+                other.residual(self._inner_x(values))
                 position, quaternion = other.predicted()
                 sides.append((position, self._rotations(quaternion)))
             else:
@@ -228,33 +223,21 @@ class UserRecording(ResidualModel):
         step = settings.DIFFERENCE_STEP * self._own_sigma.get(name, 1e-2)
         return (*(function(values | {name: values[name] + sign * step}) for sign in (1, -1)), 2 * step)
 
-    def _ratios(self, values: dict[str, float]) -> list[float]:
-        return [
-            values[name] / self._nominal[name] for name in ("actuation.translation_ratio", "actuation.rotation_ratio")
-        ]
-
     # ---- once
 
-    def _nominal_values(self, library: Sequence[str]) -> dict[str, float]:
-        robot = self._robot
-        own = {effect.id for effect in self._effects}
-        rest = {identity: given for identity, given in robot.effects.items() if identity not in own}
-        self._library_robot = robot.model_copy(update={"effects": rest})
-        self._library_robot._source = robot._source
-        values = dict(zip(library, recording.values(self._library_robot).tolist(), strict=True))
-        for effect in self._effects:
-            given = robot.effects.get(effect.id, {})
-            for p in effect.described(robot.n_tubes).parameters:
-                numbers = np.atleast_1d(given.get(p.name, p.neutral))
-                numbers = np.broadcast_to(numbers, len(p.full_names)) if len(numbers) == 1 else numbers
-                if len(numbers) != len(p.full_names):
-                    text = f"needs {len(p.full_names)} number(s)"
-                    raise InputError(Problem(text, field=f"effects.{effect.id}.{p.name}"))
-                values.update(zip(p.full_names, map(float, numbers), strict=True))
-        return values
+    def _add_parameters(self, effect: Effect) -> None:
+        """Takes the values of an effect of the user's from the robot file, and their prior sd."""
+        given = self._robot.effects.get(effect.id, {})
+        for p in effect.described(self._robot.n_tubes).parameters:
+            numbers, count = np.atleast_1d(given.get(p.name, p.neutral)).astype(float), len(p.full_names)
+            if len(numbers) not in (1, count):
+                raise InputError(Problem(f"needs {count} number(s)", field=f"effects.{effect.id}.{p.name}"))
+            self._nominal |= zip(p.full_names, np.broadcast_to(numbers, count).tolist(), strict=True)
+            self._own_sigma |= dict.fromkeys(p.full_names, p.sigma)
 
-    def _references(self) -> tuple[Array, Array]:
-        """Poses to count from: the measured positions (where missing their centre) and predicted orientations."""
+    def _reference_poses(self) -> tuple[Array, Array]:
+        """Poses from which residuals of the compiled recording count: the measured positions (where missing their
+        centre) and predicted orientations."""
         table = self._table
         plain = recording.recording_of(self._library_robot, table, (), **self._options)
         plain.residual(np.empty(0))
@@ -264,12 +247,6 @@ class UserRecording(ResidualModel):
         missing = ~np.isfinite(position).all(axis=1)
         position[missing] = 0.0 if missing.all() else position[~missing].mean(axis=0)
         return position, quaternion
-
-    def _solvable(self) -> Mask:
-        """Rows with a solution at the file's values."""
-        self._left_out = np.zeros(len(self._table), bool)
-        self.residual(self.nominal())
-        return self._solved
 
     # ---- poses
 
@@ -297,9 +274,7 @@ def _by_prediction(error: Array) -> Array:
     half = 0.5 * np.sqrt(np.maximum(square, 1e-3))
     far = (1 - half / np.tan(half)) / (4 * half**2)
     k = np.where(square < 1e-3, 1 / 12 + square / 720 + square**2 / 30240, far)
-    x, y, z = turn.T
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    cross = np.cross(np.eye(3), turn[:, None])  # matrices (M, 3, 3) of the product with `turn`
     made = np.tile(-np.eye(6), (len(error), 1, 1))
     made[:, 3:, 3:] -= 0.5 * cross + k[:, None, None] * (cross @ cross)
     return made
