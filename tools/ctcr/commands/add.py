@@ -2,11 +2,11 @@
 
 import click
 
-from ctcr.commands.options import effects_option, free_option, json_option, robot_argument, robot_file_options
+from ctcr.commands import options
 
 
 @click.command(name="add")
-@robot_argument
+@options.robot
 @click.argument("names", nargs=-1, metavar="[EFFECT..]")
 @click.option("--diagnosis", metavar="FILE.json", help="Add the effects that `ctcr diagnose --json FILE.json` found.")
 @click.option("--fit", "measurements", metavar="MEASUREMENTS", help="Fit the effects to this table.")
@@ -17,10 +17,10 @@ from ctcr.commands.options import effects_option, free_option, json_option, robo
     metavar="NAME=VALUE",
     help="Fix a parameter instead of fitting it, SI units: friction.coefficient.1=0.02. May be repeated.",
 )
-@free_option
-@effects_option
-@robot_file_options
-@json_option
+@options.free
+@options.effects
+@options.new_robot
+@options.json
 def command(robot, names, diagnosis, measurements, given, free, target, in_place, out) -> None:
     """Add physical effects to the file ROBOT, so that every command uses them. `ctcr effects` lists them.
 

@@ -5,7 +5,7 @@ import time
 
 import click
 
-from ctcr.commands.options import json_option
+from ctcr.commands import options
 
 ROWS = 20_000
 REPEATS = 5
@@ -13,7 +13,7 @@ REPEATS = 5
 
 @click.command(name="bench")
 @click.argument("robot", required=False)
-@json_option
+@options.json
 def command(robot: str | None, out) -> None:
     """Time the model on random joints of ROBOT (default: the robot of the paper's Table II).
 

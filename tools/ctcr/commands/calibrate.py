@@ -2,15 +2,7 @@
 
 import click
 
-from ctcr.commands.options import (
-    folder_option,
-    free_option,
-    load,
-    measurements_argument,
-    output_options,
-    robot_argument,
-    robot_file_options,
-)
+from ctcr.commands import options
 
 
 @click.group(name="calibrate")
@@ -26,15 +18,14 @@ def command() -> None:
 def _procedure(function):
     """The options that all procedures share: `robot`, `target`, `in_place` and `out`."""
     robot = click.option("--robot", metavar="ROBOT", help="The robot file: its values are used, and updated with -o.")
-    return robot(robot_file_options(output_options(function)))
+    return robot(options.new_robot(options.outputs(function)))
 
 
 def _live(function):
     """The options of procedures that the bench can carry out."""
-    frames = click.IntRange(2)
     for option in (
-        folder_option,
-        click.option("--readings", type=frames, default=20, show_default=True, help="With --live: readings per row."),
+        options.folder,
+        options.setting("--readings", click.IntRange(2), 20, "With --live: readings per row."),
         click.option("--bench", metavar="BENCH.yaml", help="With --live: the devices and their limits."),
         click.option("--live", is_flag=True, help="Measure now: write the table row by row, or resume the one there."),
     ):
@@ -56,12 +47,11 @@ def _desk(bench, folder, out):
 _tube = click.option("--tube", type=click.IntRange(1, 9), help="The tube measured, innermost 1 (with --robot).")
 
 
-def _length(name: str, default: float | None, text: str):
-    shown = default is not None
-    return click.option(name, type=click.FloatRange(min=0), default=default, show_default=shown, help=text)
+def _length(name: str, default: float | None, text: str, least: float = 0):
+    return options.setting(name, click.FloatRange(least), default, text)
 
 
-def _run(procedure: str, table: str, robot, target, in_place, out, **options) -> None:
+def _run(procedure: str, table: str, robot, target, in_place, out, **chosen) -> None:
     """Runs a function of ctcr.calibrate, "room.name", whose columns are its name in capitals, and gives the result."""
     from importlib import import_module
 
@@ -73,7 +63,7 @@ def _run(procedure: str, table: str, robot, target, in_place, out, **options) ->
     loaded = robot_file.load(robot) if robot else None
     target = outcome.check_target(loaded, target, in_place)
     data = tables.read(table, getattr(room, name.upper()))
-    found = getattr(room, name)(data, loaded, **options)
+    found = getattr(room, name)(data, loaded, **chosen)
     if target:
         outcome.write_robot(found, loaded, target, called, table, in_place)
     out.write_report("calibrate.outcome", found, table, command=called, robot=loaded)
@@ -87,12 +77,8 @@ def _run(procedure: str, table: str, robot, target, in_place, out, **options) ->
 @click.argument("table")
 @click.option("--ratio", type=float, help="Turns of a tube per turn of its motor; default: as in ROBOT.")
 @_live
-@click.option(
-    "--step-deg", type=click.FloatRange(1, 90), default=20.0, show_default=True, help="With --live: angle between rows."
-)
-@click.option(
-    "--deployed-mm", type=click.FloatRange(min=1), help="With --live: deployed length; default: the curved length."
-)
+@options.setting("--step-deg", click.FloatRange(1, 90), 20.0, "With --live: angle between rows.")
+@_length("--deployed-mm", None, "With --live: deployed length; default: the curved length.", least=1)
 @_procedure
 def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg, deployed_mm, out, **target) -> None:
     """Home rotations from circles: one tube alone stands out of the plate and turns, forward and backward.
@@ -124,7 +110,7 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
 @click.option("--cad", metavar="CAD.csv", help="With --live: names and coordinates of the points, columns as POINTS.")
-@click.option("--rounds", type=click.IntRange(1), default=1, show_default=True, help="With --live: over all points.")
+@options.setting("--rounds", click.IntRange(1), 1, "With --live: over all points.")
 @_procedure
 def registration(points, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, out, **target) -> None:
     """The tracker frame T_ref from named points on the robot, read with a probe.
@@ -155,7 +141,7 @@ def registration(points, robot, placement_sd_mm, live, bench, readings, folder, 
 @_length("--flush-sd-mm", 0.2, "Standard deviation of bringing a tip flush with the plate.")
 @_length("--length-sd-mm", 1.0, "Standard deviation of a length measured by hand.")
 @_procedure
-def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **options) -> None:
+def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **others) -> None:
     """Home translations and effective lengths of the tubes.
 
     TABLE: tube; distance_mm (plate to the grasped point at home, by hand); flush_angle_rev (motor angle with the tip
@@ -165,7 +151,7 @@ def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **options) -> No
     Example: ctcr calibrate home home.csv --robot robot.yaml -o new.yaml
     """
     sds = {"distance_sd": distance_sd_mm, "flush_sd": flush_sd_mm, "length_sd": length_sd_mm}
-    _run("procedures.home", table, sds_mm=sds, **options)
+    _run("procedures.home", table, sds_mm=sds, **others)
 
 
 @command.command(name="cantilever")
@@ -178,7 +164,7 @@ def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **options) -> No
 @_length("--diameter-sd-mm", 0.0, "Standard deviation of each diameter.")
 @click.option("--fit-zero", is_flag=True, help="Fit the reading without load too, where it is not known to be 0.")
 @_procedure
-def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, **options) -> None:
+def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, **others) -> None:
     """Young's modulus from a straight piece of tube, clamped at one end and loaded across.
 
     TABLE: load_N (or load_g, a hung mass), deflection_mm (at the free end), free_length_mm (clamp to end); optional:
@@ -187,7 +173,7 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
     Example: ctcr calibrate cantilever cantilever.csv --robot robot.yaml --tube 1 -o new.yaml
     """
     sds = {"deflection_sd": deflection_sd_mm, "free_length_sd": free_length_sd_mm, "diameter_sd": diameter_sd_mm}
-    _run("specimens.cantilever", table, sds_mm=sds, **options)
+    _run("specimens.cantilever", table, sds_mm=sds, **others)
 
 
 @command.command(name="curvature")
@@ -204,20 +190,20 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
 )
 @_length("--point-sd", 0.0, "Standard deviation of a point, in its unit; 0: from the residuals.")
 @_procedure
-def curvature(table: str, **options) -> None:
+def curvature(table: str, **others) -> None:
     """Curvature and curved length of a tube from points along its picture.
 
     TABLE: x_px, y_px (or x_mm, y_mm) along the tube, in any order, over the curved part and some of the straight one.
 
     Example: ctcr calibrate curvature picture.csv --robot robot.yaml --tube 2 --mm-per-px 0.0833 -o new.yaml
     """
-    _run("specimens.curvature", table, **options)
+    _run("specimens.curvature", table, **others)
 
 
 @command.command(name="fit")
-@robot_argument
-@measurements_argument
-@free_option
+@options.robot
+@options.measurements
+@options.free
 @click.option(
     "--sd",
     "widths",
@@ -232,15 +218,14 @@ def curvature(table: str, **options) -> None:
     metavar="N",
     help="Runs held out of a second fit to judge it, evenly spread; 0: none; default: a quarter.",
 )
-@click.option(
+@options.setting(
     "--noise",
-    type=click.Choice(["auto", "jitter", "field"]),
-    default="auto",
-    show_default=True,
-    help="jitter: the tracker's white noise; field: also its smooth error; auto: the one that the data support.",
+    click.Choice(["auto", "jitter", "field"]),
+    "auto",
+    "jitter: the tracker's white noise; field: also its smooth error; auto: the one that the data support.",
 )
-@robot_file_options
-@output_options
+@options.new_robot
+@options.outputs
 def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, target, in_place, out) -> None:
     """Fit named parameters of ROBOT to the poses in MEASUREMENTS, all together (maximum a posteriori).
 
@@ -252,11 +237,11 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, targe
     """
     from ctcr.calibrate import joint_fit, outcome, terminal
 
-    loaded, readings = load(robot, measurements)
+    loaded, readings = options.load(robot, measurements)
     target = outcome.check_target(loaded, target, in_place)
     names = [name.strip() for name in free.split(",") if name.strip()]
-    options = {"frame_per_run": frame_per_run, "hold_out": hold_out, "noise": noise, "sd": _widths(widths)}
-    calibration = joint_fit.calibrate(loaded, readings, names, halves=out.report is not None, **options)
+    chosen = {"frame_per_run": frame_per_run, "hold_out": hold_out, "noise": noise, "sd": _widths(widths)}
+    calibration = joint_fit.calibrate(loaded, readings, names, halves=out.report is not None, **chosen)
     if target:
         joint_fit.write_robot(calibration, target, measurements, in_place=in_place)
     out.write_report("calibrate.report", calibration, f"{measurements} fitted with {robot}")

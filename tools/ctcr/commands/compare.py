@@ -2,22 +2,15 @@
 
 import click
 
-from ctcr.commands.options import (
-    effects_option,
-    load,
-    measurements_argument,
-    output_options,
-    robot_argument,
-    steps_option,
-)
+from ctcr.commands import options
 
 
 @click.command(name="compare")
-@robot_argument
-@measurements_argument
-@output_options
-@steps_option
-@effects_option
+@options.robot
+@options.measurements
+@options.outputs
+@options.steps
+@options.effects
 def command(robot: str, measurements: str, steps: int, out) -> None:
     """Compare the poses that the model of ROBOT predicts with those measured in MEASUREMENTS.
 
@@ -30,7 +23,7 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     from ctcr.compare import compare, terminal
     from ctcr.robot import robot_file
 
-    loaded, readings = load(robot, measurements)
+    loaded, readings = options.load(robot, measurements)
     readings, excluded = spikes.left_out(loaded, readings)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import folder_option
+from ctcr.commands import options
 
 
 @click.group(name="demo")
@@ -21,7 +21,7 @@ def command() -> None:
     help="For all that is measured and found, and the report; what is there is removed.",
 )
 @click.option("--short", is_flag=True, help="Leave out what only shows more.")
-@folder_option
+@options.folder
 def bench(target, short, folder) -> int:
     """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.
 

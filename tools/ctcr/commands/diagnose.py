@@ -2,22 +2,15 @@
 
 import click
 
-from ctcr.commands.options import (
-    effects_option,
-    load,
-    measurements_argument,
-    output_options,
-    robot_argument,
-    threads_option,
-)
+from ctcr.commands import options
 
 
 @click.command(name="diagnose")
-@robot_argument
-@measurements_argument
-@output_options
-@effects_option
-@threads_option
+@options.robot
+@options.measurements
+@options.outputs
+@options.effects
+@options.threads
 def command(robot: str, measurements: str, threads: int, out) -> None:
     """Find out which physical effect the model of ROBOT lacks to explain the poses in MEASUREMENTS.
 
@@ -29,7 +22,7 @@ def command(robot: str, measurements: str, threads: int, out) -> None:
     """
     from ctcr.diagnose import diagnose, terminal
 
-    loaded, readings = load(robot, measurements)
+    loaded, readings = options.load(robot, measurements)
     with terminal.progress() as say:
         result = diagnose(loaded, readings, progress=say, threads=threads)
     out.write_report("diagnose.report", result, f"{measurements} diagnosed with the model of {robot}")

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import effects_option, json_option
+from ctcr.commands import options
 
 _NEEDS = {
     "order": "rows in the order measured",
@@ -15,11 +15,9 @@ _NEEDS = {
 
 @click.command(name="effects")
 @click.argument("name", required=False)
-@effects_option
-@click.option(
-    "--tubes", type=click.IntRange(1, 4), default=3, show_default=True, help="Tubes of the robot, for full names."
-)
-@json_option
+@options.effects
+@options.setting("--tubes", click.IntRange(1, 4), 3, "Tubes of the robot, for full names.")
+@options.json
 def command(name: str | None, tubes: int, out) -> None:
     """List the physical effects that a robot may have beyond the standard model, or describe the effect NAME.
 

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import Output
+from ctcr.commands import options
 
 
 @click.command(name="export")
@@ -19,4 +19,5 @@ def command(folder, target) -> None:
     from ctcr.track.mcap_file import write_mcap
 
     counts = write_mcap(folder, target)
-    Output().table(target, ["channel", "messages"], [[channel, str(count)] for channel, count in counts.items()])
+    rows = [[channel, str(count)] for channel, count in counts.items()]
+    options.Output().table(target, ["channel", "messages"], rows)

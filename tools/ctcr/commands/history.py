@@ -2,13 +2,13 @@
 
 import click
 
-from ctcr.commands.options import effects_option, output_options, robot_argument
+from ctcr.commands import options
 
 
 @click.command(name="history")
-@robot_argument
-@effects_option
-@output_options
+@options.robot
+@options.effects
+@options.outputs
 def command(robot: str, out) -> None:
     """Show the ledger of the file ROBOT: each calibration and added effect, with date, data and error.
 

@@ -4,12 +4,12 @@ from math import degrees
 
 import click
 
-from ctcr.commands.options import json_option, robot_argument
+from ctcr.commands import options
 
 
 @click.command(name="info")
-@robot_argument
-@json_option
+@options.robot
+@options.json
 def command(robot: str, out) -> None:
     """Show the values of the file ROBOT, the stiffnesses that follow from them, and what looks wrong.
 

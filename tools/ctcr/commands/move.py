@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import folder_option
+from ctcr.commands import options
 
 
 @click.command(name="move")
@@ -12,8 +12,8 @@ from ctcr.commands.options import folder_option
 @click.option("--alpha", metavar="DEG,DEG,...", help="Base angles, innermost tube first [deg].")
 @click.option("--home", is_flag=True, help="Find where the joints are, by retracting each tube until it is flush.")
 @click.option("--at-home", is_flag=True, help="Take where the joints stand now, set to their marks by hand, for home.")
-@click.option("--speed", type=click.FloatRange(0.01, 1.0), default=0.5, show_default=True, help="Share of the highest.")
-@folder_option
+@options.setting("--speed", click.FloatRange(0.01, 1.0), 0.5, "Fraction of the highest speed.")
+@options.folder
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
     """Move the joints of ROBOT in a straight line of joint space; those not given stay.
 

@@ -2,27 +2,18 @@
 
 import click
 
-from ctcr.commands.options import (
-    effects_option,
-    json_option,
-    load,
-    measurements_argument,
-    robot_argument,
-    threads_option,
-)
+from ctcr.commands import options
 
 
 @click.command(name="next")
-@robot_argument
-@measurements_argument
-@click.option("--runs", type=click.IntRange(1, 100), default=4, show_default=True, help="Runs to propose.")
-@click.option(
-    "--masses", default="0,10,20", show_default=True, metavar="GRAMS", help="Masses that can be hung at the tip [g]."
-)
+@options.robot
+@options.measurements
+@options.setting("--runs", click.IntRange(1, 100), 4, "Runs to propose.")
+@options.setting("--masses", str, "0,10,20", "Masses that can be hung at the tip [g].", metavar="GRAMS")
 @click.option("-o", "--output", "target", metavar="PLAN", help="Write the runs as a table that the robot can run.")
-@json_option
-@effects_option
-@threads_option
+@options.json
+@options.effects
+@options.threads
 def command(robot, measurements, runs, masses, target, threads, out) -> None:
     """Propose the runs that best discriminate between the effects that MEASUREMENTS leave open about ROBOT.
 
@@ -37,7 +28,7 @@ def command(robot, measurements, runs, masses, target, threads, out) -> None:
     from ctcr.model import simulation
 
     kilograms = _masses(masses)
-    loaded, readings = load(robot, measurements)
+    loaded, readings = options.load(robot, measurements)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
         say("looking for the runs that decide")

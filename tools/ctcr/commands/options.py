@@ -8,57 +8,46 @@ from importlib import import_module
 
 import click
 
-robot_argument = click.argument("robot")
-measurements_argument = click.argument("measurements")
-folder_option = click.option(
+
+def setting(name: str, kind, default, text: str, **more):
+    """An option with a default, which the help shows."""
+    return click.option(name, type=kind, default=default, show_default=True, help=text, **more)
+
+
+robot = click.argument("robot")
+measurements = click.argument("measurements")
+folder = click.option(
     "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
 )
-steps_option = click.option(
-    "--steps",
-    type=click.IntRange(1, 1000),
-    default=4,
-    show_default=True,
-    help="Integration steps per segment; more are more accurate and slower.",
-)
-threads_option = click.option(
-    "--threads", type=click.IntRange(0), default=0, show_default=True, help="Threads; 0: one per core."
-)
-seed_option = click.option(
-    "--seed",
-    type=click.IntRange(min=0),
-    default=1,
-    show_default=True,
-    help="Seed of the random numbers: the same seed gives the same result.",
-)
-noise_option = click.option(
+steps = setting("--steps", click.IntRange(1, 1000), 4, "Integration steps per segment; more are slower, more accurate.")
+threads = setting("--threads", click.IntRange(0), 0, "Threads; 0: one per core.")
+seed = setting("--seed", click.IntRange(min=0), 1, "Seed of the random numbers: the same seed gives the same result.")
+noise = setting(
     "--noise",
-    type=click.Choice(["none", "jitter", "realistic"]),
-    default="jitter",
-    show_default=True,
-    help="jitter: white noise as the robot file states; realistic: also the tracker's smooth field error and outliers.",
+    click.Choice(["none", "jitter", "realistic"]),
+    "jitter",
+    "jitter: white noise as the robot file states; realistic: also the tracker's smooth field error and outliers.",
 )
-hide_option = click.option(
+hide = click.option(
     "--hide",
     "hidden",
     multiple=True,
     metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
     help="Give the simulated robot an effect that ROBOT lacks; SI units (`ctcr effects EFFECT`). May be repeated.",
 )
-free_option = click.option(
+free = setting(
     "--free",
-    default="standard",
-    show_default=True,
+    str,
+    "standard",
+    "Parameters to fit, separated by commas, such as tubes.*.youngs_modulus,tracker.frame; standard: the paper's.",
     metavar="NAMES",
-    help="Parameters to fit, separated by commas, such as tubes.*.youngs_modulus,tracker.frame; standard: the paper's.",
 )
 
 
-def robot_file_options(function):
+def new_robot(function):
     """-o and --in-place, as `target` and `in_place`: the robot file to write."""
-    in_place = click.option("--in-place", is_flag=True, help="Change the robot file itself.")
-    return click.option("-o", "--output", "target", metavar="NEW", help="Write the changed robot file.")(
-        in_place(function)
-    )
+    target = click.option("-o", "--output", "target", metavar="NEW", help="Write the changed robot file.")
+    return target(click.option("--in-place", is_flag=True, help="Change the robot file itself.")(function))
 
 
 def _load_effects(context, parameter, files) -> None:
@@ -69,7 +58,7 @@ def _load_effects(context, parameter, files) -> None:
 
 
 # Eager: the robot file may name these effects.
-effects_option = click.option(
+effects = click.option(
     "--effects",
     multiple=True,
     metavar="FILE.py",
@@ -156,4 +145,4 @@ def _gives_output(*options):
 
 _json = click.option("--json", "json_target", metavar="FILE", help="Write the result as JSON; - for standard output.")
 _report = click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
-json_option, output_options = _gives_output(_json), _gives_output(_json, _report)
+json, outputs = _gives_output(_json), _gives_output(_json, _report)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ctcr.commands.options import effects_option, json_option, load, robot_argument, steps_option
+from ctcr.commands import options
 
 CHUNK_ROWS = 1 << 16
 LISTED_ROWS = 20
@@ -14,19 +14,15 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
 
 
 @click.command(name="predict")
-@robot_argument
+@options.robot
 @click.argument("table")
 @click.option("-o", "--output", "target", required=True, metavar="FILE", help="The table to write.")
-@click.option(
-    "--frame",
-    type=click.Choice(["tracker", "base"]),
-    default="tracker",
-    show_default=True,
-    help="Frame of the predicted poses; measured ones are in the tracker frame.",
+@options.setting(
+    "--frame", click.Choice(["tracker", "base"]), "tracker", "Frame of the predicted poses; tracker: as measured ones."
 )
-@steps_option
-@json_option
-@effects_option
+@options.steps
+@options.json
+@options.effects
 def command(robot: str, table: str, target: str, frame: str, steps: int, out) -> None:
     """Add the pose that the model of ROBOT predicts to each row of TABLE, a table of joints and forces.
 
@@ -38,7 +34,7 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
     from ctcr.robot import robot_file
     from ctcr.show.output import atomic_writer
 
-    loaded, readings = load(robot, table)
+    loaded, readings = options.load(robot, table)
     with atomic_writer(target, binary=True) as file:
         unsolved = _write(file, Path(table), readings, predictions(loaded, readings, steps), loaded.tracker, frame)
     solved = len(readings) - len(unsolved)

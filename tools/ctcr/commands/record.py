@@ -2,35 +2,32 @@
 
 import click
 
-from ctcr.commands.options import folder_option
+from ctcr.commands import options
 
 
 @click.command(name="record")
 @click.argument("robot")
 @click.argument("plan")
 @click.option(
-    "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; goes on with one there."
+    "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
 )
 @click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits.")
-@click.option("--dwell", type=click.FloatRange(0), default=0.5, show_default=True, help="Rest before reading [s].")
-@click.option("--readings", type=click.IntRange(1), default=1, show_default=True, help="Of each row of the plan.")
-@click.option("--speed", type=click.FloatRange(0.01, 1), default=1.0, show_default=True, help="Share of the highest.")
-@click.option(
+@options.setting("--dwell", click.FloatRange(0), 0.5, "Rest before reading [s].")
+@options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")
+@options.setting("--speed", click.FloatRange(0.01, 1), 1.0, "Fraction of the highest speed.")
+@options.setting(
     "--approach",
-    type=click.Choice(["planned", "forward", "backward"]),
-    default="planned",
-    show_default=True,
-    help="Come to each row as planned, or always with all joints moving up (forward) or down (backward).",
+    click.Choice(["planned", "forward", "backward"]),
+    "planned",
+    "Approach each row as planned, or always with all joints moving up (forward) or down (backward).",
 )
-@click.option("--approach-mm", type=click.FloatRange(0), default=2.0, show_default=True, help="Its length.")
-@click.option("--approach-deg", type=click.FloatRange(0), default=5.0, show_default=True, help="Its length.")
-@click.option(
-    "--patience", type=click.FloatRange(0.1), default=30.0, show_default=True, help="With an unseen sensor [s]."
-)
-@click.option("--effects", "own", multiple=True, metavar="FILE.py", help="File of your own effects that ROBOT has.")
+@options.setting("--approach-mm", click.FloatRange(0), 2.0, "Length of the approach [mm].")
+@options.setting("--approach-deg", click.FloatRange(0), 5.0, "Length of the approach [deg].")
+@options.setting("--patience", click.FloatRange(0.1), 30.0, "How long the tracker may lose the sensor [s].")
+@options.effects
 @click.option("--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew.")
-@folder_option
-@click.option("--json", "json_target", metavar="FILE", help="Write a summary as JSON; - for standard output.")
+@options.folder
+@options.json
 def command(
     robot,
     plan,
@@ -43,10 +40,9 @@ def command(
     approach_mm,
     approach_deg,
     patience,
-    own,
     page,
     folder,
-    json_target,
+    out,
 ) -> None:
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
@@ -69,26 +65,23 @@ def command(
     from ctcr.bench.record.plan import Approach, steps_of
     from ctcr.bench.record.session import Options, Session
     from ctcr.bench.shared.folder import private_folder
-    from ctcr.effects import user_effects
     from ctcr.robot import robot_file
-    from ctcr.show import output
     from ctcr.table import measurements
 
-    user_effects.load_all(own)
     loaded, place, bench = robot_file.load(robot), private_folder(folder), bench_file.load(bench_path)
     way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
     table = measurements.load(plan, loaded.n_tubes)
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
     options, sources = Options(dwell, readings, speed), {"robot": robot, "plan": plan, "bench": bench_path}
     settings, group = asdict(options) | {"approach": asdict(way)}, readings + way.has_way_point
-    console, person = output.console(json_target), person_of(bench, place)
+    person = person_of(bench, place)
     recording = Folder(target, sources, settings, loaded.n_tubes, group)
     with Tracker(bench, place, patience) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
         before = recording.rows.groups
         if before:
-            console.print(f"resuming after {before} of {len(steps)} rows", markup=False)
+            out.say(f"resuming after {before} of {len(steps)} rows")
         with Display() as display, LivePage(page, f"Recording {loaded.name}") if page else nullcontext() as live:
 
             def show(progress):
@@ -105,6 +98,5 @@ def command(
                 done = session.run(steps)
     path = recording.path / TABLE
     rms = f"RMS error against the model {done.rms_mm:.3f} mm"
-    console.print(f"{done.done - before} rows measured, {rms}: {path}", markup=False)
-    if json_target:
-        output.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)}, json_target)
+    out.say(f"{done.done - before} rows measured, {rms}: {path}")
+    out.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)})

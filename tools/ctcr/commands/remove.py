@@ -2,14 +2,14 @@
 
 import click
 
-from ctcr.commands.options import Output, effects_option, robot_argument, robot_file_options
+from ctcr.commands import options
 
 
 @click.command(name="remove")
-@robot_argument
+@options.robot
 @click.argument("names", nargs=-1, required=True, metavar="EFFECT..")
-@effects_option
-@robot_file_options
+@options.effects
+@options.new_robot
 def command(robot, names, target, in_place) -> None:
     """Take physical effects out of the file ROBOT.
 
@@ -21,7 +21,7 @@ def command(robot, names, target, in_place) -> None:
     from ctcr.diagnose import add
     from ctcr.robot import robot_file
 
-    loaded, out = robot_file.load(robot), Output()
+    loaded, out = robot_file.load(robot), options.Output()
     target = outcome.check_target(loaded, target, in_place, needed=True)
     _, notices = add.remove(loaded, list(dict.fromkeys(names)), target, in_place)
     out.say(*(f"  • {notice}" for notice in notices), f"{', '.join(names)} removed: {target}")

@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import json_option
+from ctcr.commands import options
 
 
 @click.command(name="reproduce")
@@ -10,7 +10,7 @@ from ctcr.commands.options import json_option
 @click.option(
     "--report", "target", metavar="FILE.html", default="reproduction.html", show_default=True, help="The page."
 )
-@json_option
+@options.json
 def command(quick: bool, target: str, out) -> None:
     """Compute Tables I and II, Figures 2 to 6 and the claims of Boyer et al. 2024, and write them as one page.
 

@@ -2,27 +2,22 @@
 
 import click
 
-from ctcr.commands.options import output_options, robot_argument, seed_option
-
-
-def _number(name: str, metavar: str, default: float, text: str, **bounds):
-    kind = click.FloatRange(min=0, **bounds)
-    return click.option(name, type=kind, default=default, show_default=True, metavar=metavar, help=text)
+from ctcr.commands import options
 
 
 @click.command(name="sensitivity")
-@robot_argument
+@options.robot
 @click.option("--open-loop", type=click.IntRange(min=1), metavar="N", help="Predict tips at N random configurations.")
 @click.option("--closed-loop", metavar="SCENARIO", help="Track the path of this scenario file.")
-@_number("--accuracy", "MM", 1.0, "Wanted accuracy [mm]: which parameters need calibration for it?", min_open=True)
-@_number("--force", "N", 0.3, "Open loop: largest tip force [N].")
-@click.option(
-    "--points", type=click.IntRange(2, 101), default=5, show_default=True, help="Closed loop: values over each range."
+@options.setting(
+    "--accuracy", click.FloatRange(0, min_open=True), 1.0, "Wanted accuracy [mm]: which parameters need calibration?"
 )
-@seed_option
+@options.setting("--force", click.FloatRange(0), 0.3, "Open loop: largest tip force [N].")
+@options.setting("--points", click.IntRange(2, 101), 5, "Closed loop: values over each range.")
+@options.seed
 @click.option("--resume", metavar="FILE", help="Keep the progress in FILE, and resume from it after an interruption.")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a dask.distributed cluster that does the work.")
-@output_options
+@options.outputs
 def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume, dask, out) -> None:
     """Vary each parameter of ROBOT over the paper's range, one at a time and together.
 
@@ -47,14 +42,14 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
     both, varied, found = open_loop and wanted, all_varied(loaded), {}
     if open_loop:
         keep = f"{resume}.open" if resume and both else resume
-        options = {"most_force": force, "seed": seed, "dask": dask, "keep": keep}
+        chosen = {"most_force": force, "seed": seed, "dask": dask, "keep": keep}
         with Progress("open loop", open_loop) as progress:
-            found["open_loop"] = opened.study(loaded, varied, open_loop, advance=progress.advance, **options)
+            found["open_loop"] = opened.study(loaded, varied, open_loop, advance=progress.advance, **chosen)
     if wanted:
         keep = f"{resume}.closed" if resume and both else resume
-        options = {"points": points, "dask": dask, "keep": keep}
+        chosen = {"points": points, "dask": dask, "keep": keep}
         with Progress("closed loop", 1 + len(varied) * points) as progress:
-            found["closed_loop"] = closed.study(loaded, varied, wanted, advance=progress.advance, **options)
+            found["closed_loop"] = closed.study(loaded, varied, wanted, advance=progress.advance, **chosen)
     source = robot + (f" in {closed_loop}" if closed_loop else "")
     out.write_report("sensitivity.report", found, source, accuracy=accuracy)
     out.write_json(terminal.as_data(loaded.name, found, accuracy))

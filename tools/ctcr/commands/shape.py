@@ -2,7 +2,7 @@
 
 import click
 
-from ctcr.commands.options import json_option, robot_argument, steps_option
+from ctcr.commands import options
 
 SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometres
 
@@ -20,15 +20,15 @@ class Numbers(click.ParamType):
 
 
 @click.command(name="shape")
-@robot_argument
+@options.robot
 @click.option("--beta", type=Numbers(), help="Grasped points [m], <= 0, innermost tube first.")
 @click.option("--beta-mm", type=Numbers(), help="The same in mm.")
 @click.option("--alpha", type=Numbers(), help="Base angles [rad], innermost tube first.")
 @click.option("--alpha-deg", type=Numbers(), help="The same in degrees.")
 @click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("-o", "--output", "picture", metavar="FILE.png", help="Draw the robot.")
-@steps_option
-@json_option
+@options.steps
+@options.json
 def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) -> None:
     """Solve ROBOT at one set of joints, one value a tube: shape, pose of the tip, and how near it is to snapping.
 

@@ -2,29 +2,16 @@
 
 import click
 
-from ctcr.commands.options import folder_option
-
-NOISES = ["none", "jitter", "realistic"]
+from ctcr.commands import options
 
 scenario_option = click.option(
     "--scenario", metavar="FILE.yaml", help="Faults at set times: a list of `at_s` with the faults that change."
-)
-hide_option = click.option(
-    "--hide",
-    "hidden",
-    multiple=True,
-    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
-    help="Give the simulated robot an effect that ROBOT does not have; SI units (see ctcr effects EFFECT).",
 )
 oracle_option = click.option(
     "--oracle",
     metavar="COMMAND",
     help="A program that knows where the tip is, instead of the model; gets ROBOT as its last argument.",
 )
-noise_option = click.option(
-    "--noise", type=click.Choice(NOISES), default="jitter", show_default=True, help="As in ctcr simulate."
-)
-seed_option = click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True)
 
 
 @click.group(name="sim")
@@ -37,11 +24,11 @@ def command() -> None:
 
 @command.command(name="aurora")
 @click.argument("robot")
-@folder_option
-@hide_option
+@options.folder
+@options.hide
 @oracle_option
-@noise_option
-@seed_option
+@options.noise
+@options.seed
 @scenario_option
 def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
     """Simulate an NDI Aurora tracker on a pseudo-terminal, looking at the tip of ROBOT.
@@ -58,16 +45,10 @@ def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
 
 @command.command(name="ethercat")
 @click.option("--interface", metavar="NAME", help="Answer on this one, instead of making a virtual pair.")
-@click.option("--motors", type=click.IntRange(1, 8), default=6, show_default=True)
-@click.option(
-    "--variant",
-    type=click.Choice(["EL7041", "EL7031"]),
-    default="EL7041",
-    show_default=True,
-    help="Type of the terminals.",
-)
-@folder_option
-@seed_option
+@options.setting("--motors", click.IntRange(1, 8), 6, "How many stepper terminals.")
+@options.setting("--variant", click.Choice(["EL7041", "EL7031"]), "EL7041", "Type of the terminals.")
+@options.folder
+@options.seed
 @scenario_option
 def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     """Simulate a coupler EK1100 and stepper terminals, which answer EtherCAT frames on a network interface.
@@ -90,11 +71,11 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})
 @click.argument("robot")
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
-@folder_option
-@hide_option
+@options.folder
+@options.hide
 @oracle_option
-@noise_option
-@seed_option
+@options.noise
+@options.seed
 @click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
 @click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
 def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario, bus_scenario) -> int:
@@ -113,7 +94,7 @@ def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario,
 @click.argument("settings", nargs=-1, metavar="[FAULT=VALUE]...")
 @click.option("--force", nargs=3, type=float, metavar="FX FY FZ", help="Hang a weight: force at the tip [N].")
 @click.option("--break", "line_break", is_flag=True, help="A break on the serial line: resets the tracker.")
-@folder_option
+@options.folder
 def set_(device, settings, force, line_break, folder) -> None:
     """Switch faults of a running simulator on and off; without any, show them."""
     from ctcr.bench.shared.control import request
@@ -150,17 +131,14 @@ def _robot(robot, hidden, oracle, noise, seed):
 
     from ctcr.bench.simulators.oracle import Oracle
     from ctcr.bench.simulators.robot import SimulatedRobot
-    from ctcr.diagnose import add
-    from ctcr.effects.settings import settings
     from ctcr.robot import robot_file
 
     if oracle and hidden:
         raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
     loaded = robot_file.load(robot)
-    values = settings(hidden, loaded)
-    names = list(dict.fromkeys(name.split(".")[1] for name in values))
+    hiding = options.with_effects(loaded, hidden)
     known = Oracle([*shlex.split(oracle), robot], loaded) if oracle else None
-    return SimulatedRobot(add.with_values(loaded, names, values), noise, seed, known)
+    return SimulatedRobot(hiding, noise, seed, known)
 
 
 def _folder(folder):

@@ -2,25 +2,16 @@
 
 import click
 
-from ctcr.commands.options import (
-    Output,
-    effects_option,
-    hide_option,
-    load,
-    noise_option,
-    robot_argument,
-    seed_option,
-    with_effects,
-)
+from ctcr.commands import options
 
 
 @click.command(name="simulate")
-@robot_argument
+@options.robot
 @click.argument("plan")
-@hide_option
-@noise_option
-@seed_option
-@effects_option
+@options.hide
+@options.noise
+@options.seed
+@options.effects
 @click.option("-o", "--output", "target", required=True, metavar="MEASUREMENTS", help="The table to write.")
 def command(robot, plan, hidden, noise, seed, target) -> None:
     """Write the poses that the tracker would read if ROBOT moved through the joints of PLAN, in their order.
@@ -35,10 +26,10 @@ def command(robot, plan, hidden, noise, seed, target) -> None:
 
     from ctcr.model import simulation
 
-    loaded, table = load(robot, plan)
-    made = simulation.simulate(with_effects(loaded, hidden), table, noise, seed)
+    loaded, table = options.load(robot, plan)
+    made = simulation.simulate(options.with_effects(loaded, hidden), table, noise, seed)
     simulation.write(made, target, loaded.n_tubes)
-    out, unsolved = Output(), int(np.isnan(made.position).any(axis=1).sum())
+    out, unsolved = options.Output(), int(np.isnan(made.position).any(axis=1).sum())
     out.say(f"{len(made) - unsolved} readings, noise: {noise}, seed {seed}: {target}")
     if unsolved:
         out.say(f"{unsolved} rows have no pose: the model has no solution there")

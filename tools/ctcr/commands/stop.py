@@ -2,12 +2,12 @@
 
 import click
 
-from ctcr.commands.options import folder_option
+from ctcr.commands import options
 
 
 @click.command(name="stop")
 @click.option("--release", is_flag=True, help="Release the stop, after its cause has been mended.")
-@folder_option
+@options.folder
 def command(release: bool, folder: str | None) -> None:
     """Stop all motors of the bench at once; they stay stopped until `ctcr stop --release`.
 

@@ -2,32 +2,20 @@
 
 import click
 
-from ctcr.commands.options import folder_option, output_options, robot_argument
+from ctcr.commands import options
 
 
 @click.command(name="track")
-@robot_argument
+@options.robot
 @click.argument("scenario")
 @click.option("--plant", metavar="ROBOT2", help="The robot that is controlled, where it differs from ROBOT.")
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
 @click.option("--bench", "bench_path", metavar="BENCH.yaml", help="The devices and their limits.")
 @click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; one that is there is resumed.")
-@click.option(
-    "--patience",
-    type=click.FloatRange(0.1),
-    default=2.0,
-    show_default=True,
-    help="How long the tracker may lose the sensor [s].",
-)
-@click.option(
-    "--most-error-mm",
-    type=click.FloatRange(1),
-    default=20.0,
-    show_default=True,
-    help="Stop where the tip is farther than this from its reference [mm].",
-)
-@folder_option
-@output_options
+@options.setting("--patience", click.FloatRange(0.1), 2.0, "How long the tracker may lose the sensor [s].")
+@options.setting("--most-error-mm", click.FloatRange(1), 20.0, "Stop where the tip is farther from its reference [mm].")
+@options.folder
+@options.outputs
 def command(robot, scenario, plant, live, bench_path, target, patience, most_error_mm, folder, out) -> None:
     """Let a controller that knows ROBOT follow the path of SCENARIO, on a simulated robot or on the bench.
 
