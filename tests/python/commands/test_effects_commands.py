@@ -61,10 +61,10 @@ def test_one_effect(run, name):
     """`ctcr effects ID` shows title, reference and parameters."""
     effect = catalogue.get(name, 3)
     code, out, _ = run("effects", name)
-    told = " ".join(out.split())
+    shown = " ".join(out.split())
     assert code == 0
     for part in (effect.title, effect.reference, *(p.name for p in effect.parameters)):
-        assert " ".join(part.split()) in told
+        assert " ".join(part.split()) in shown
     data = json.loads(run("effects", name, "--json", "-")[1])
     assert [p["name"] for p in data["parameters"]] == [p.name for p in effect.parameters]
     assert data["look_alikes"] == list(effect.look_alikes)
@@ -201,7 +201,7 @@ def test_add_diagnosis(run, tmp_path, robot):
 
 
 def test_fit_of_a_diagnosis(run, tmp_path, robot, plan, hidden):
-    """Only parameters of the answer are fitted: two laws of friction would share what one of them explains."""
+    """Only parameters of the answer are fitted: two constitutive laws of friction would share the error of one."""
     data, answer, target = tmp_path / "m.csv", tmp_path / "diagnosis.json", tmp_path / "new.yaml"
     simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data, 3)
     parameters = {"law": 1.0, **{f"coefficient.{i}": 0.01 for i in (1, 2, 3)}}

@@ -53,7 +53,7 @@ def without_links(svg_or_css):
 
 @pytest.fixture(autouse=True)
 def short_plotly(monkeypatch):
-    """The page holds plotly.js, 5 MB, as it is; what it contains is not ours to test."""
+    """The page holds plotly.js, 5 MB, as it is; its content is not tested here."""
     monkeypatch.setattr("ctcr.show.html_page.get_plotlyjs", lambda: "/* plotly.js */")
 
 

@@ -12,7 +12,7 @@ from ctcr.frames import matrix_from_rotation_vector
 
 
 def plain_held_out(design, target, label, ridge):
-    """Leave each block out, fit the others, sum what is left: written directly."""
+    """Leave each block out, fit the others, sum the squared residuals: written directly."""
     total = 0.0
     scale = np.diag(design.T @ design)
     for block in np.unique(label):
@@ -75,10 +75,10 @@ def test_regions_are_blocks():
     rows, label, kind = split(sample)
     assert kind == "places"
     assert np.bincount(label).min() > 0.8 * len(rows) / PLACES
-    place = np.empty(len(rows), int)
-    place[rows] = label
+    region = np.empty(len(rows), int)
+    region[rows] = label
     half = len(rows) // 2  # the second half of the path is the first one backwards, between its readings
-    mirrored = place[half + np.arange(1, half - 1)] == place[half - np.arange(1, half - 1)]
+    mirrored = region[half + np.arange(1, half - 1)] == region[half - np.arange(1, half - 1)]
     assert mirrored.mean() > 0.95
 
 

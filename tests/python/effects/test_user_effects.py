@@ -330,7 +330,7 @@ def test_profiles(robot, readings):
     softer = mine.residual(np.append(np.zeros(3), stiff))[0]
     np.testing.assert_allclose(softer, library.residual(x)[0], atol=1e-8)
     assert np.abs(softer - library.residual(file)[0]).max() > 1e-4
-    # The step at the start of the curved part lies between two places of the table.
+    # The step at the start of the curved part lies between two samples of the profile.
     bent, file[:3] = mine.residual(np.append(bend, np.zeros(3)))[0], file[:3] + bend
     change = np.abs(bent - mine.residual(np.zeros(6))[0]).max()
     np.testing.assert_allclose(bent, library.residual(file)[0], atol=0.02 * change)

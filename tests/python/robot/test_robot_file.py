@@ -1,4 +1,4 @@
-"""The robot file: what it means in SI units, every fault at once with its line, and round trips."""
+"""The robot file: SI units, every fault at once with its line, and round trips."""
 
 import re
 from math import pi

@@ -1,5 +1,4 @@
-"""A stand-in robot with planted errors, for the tests of `ctcr compare`: its tip follows a simple formula, so that
-what the error depends on is known exactly."""
+"""A surrogate robot for the tests of `ctcr compare`: a simple formula gives its tip, and its errors are planted."""
 
 from types import SimpleNamespace
 
@@ -13,7 +12,7 @@ LENGTHS = (0.30, 0.20)
 def robot(jitter_mm=JITTER_MM, roll="known", turn=(0.3, -0.2, 0.9)):
     """Two tubes, and a tracker frame that is turned by the rotation vector `turn` and shifted."""
     return SimpleNamespace(
-        name="stand-in",
+        name="surrogate",
         tubes=[SimpleNamespace(length=length) for length in LENGTHS],
         actuation=SimpleNamespace(translation_mm_per_rev=None),
         tracker=SimpleNamespace(

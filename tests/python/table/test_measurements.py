@@ -1,4 +1,4 @@
-"""The table of measurements: exact values back, every planted fault told with its row, and no size too big."""
+"""The table of measurements: exact values back, every planted fault with its row, and tables of any size."""
 
 import io
 
@@ -138,8 +138,8 @@ def test_all_faults(load):
         load("\n".join(lines))
     problems, omitted = caught.value.problems, caught.value.omitted
     assert len(problems) + omitted == 152
-    told = [(4, None), *((row, "alpha1_rad") for row in unreadable[:3]), (450, "alpha2_rad")]
-    assert [(problem.line, problem.field) for problem in problems] == told
+    expected = [(4, None), *((row, "alpha1_rad") for row in unreadable[:3]), (450, "alpha2_rad")]
+    assert [(problem.line, problem.field) for problem in problems] == expected
 
 
 @pytest.mark.parametrize(

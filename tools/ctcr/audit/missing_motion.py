@@ -25,7 +25,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
 
     A reading at the end of a long step, whose joints were visited from both sides before in its run, agrees with one
     of these two visits, wherever they differ. If the readings agree with the visits from the other side than that of
-    the recorded motion, the robot came the way of these visits: straight from where it last turned. This compares
+    the recorded motion, the robot followed the path of these visits from its last turn on. This compares
     readings, not a model.
     """
     jitter, returns = robot.tracker.jitter_mm, _returns(measurements)

@@ -1,4 +1,4 @@
-"""Parts of a table that may be treated as independent: what cross-validation leaves out, and standard errors."""
+"""Parts of a table that may be treated as independent: blocks of cross-validation, and standard errors by blocks."""
 
 import numpy as np
 from numpy.typing import NDArray

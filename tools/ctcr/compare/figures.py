@@ -24,7 +24,7 @@ BINS = 18
 
 
 def histogram(figure: Figure, c: Comparison) -> None:
-    """Error sizes against what noise alone would give."""
+    """Error sizes against those of noise alone."""
     axes = figure.subplots()
     size = np.linalg.norm(c.headline.error, axis=1) * 1e3
     noise = c.noise.axis_mm if c.noise.axis_mm > 0 else np.nan
@@ -166,7 +166,7 @@ def strongest(figure: Figure, c: Comparison) -> bool | None:
 
 
 def drawable(items: Iterable[Dependence], sample: Sample, rows: Array) -> list[tuple[Dependence, Abscissa]]:
-    """Dependences on one number each, with what to draw them against; of several on the same the first."""
+    """Dependences on one number each, with their abscissas; of several with the same one the first."""
     found: dict[str, tuple[Dependence, Abscissa]] = {}
     for item in items:
         against = _abscissa(item, sample, rows)

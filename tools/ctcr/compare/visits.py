@@ -4,7 +4,7 @@ Works for stops repeated exactly and for streams, where a pass never hits the sa
 
 A reading is matched with the nearest point of an earlier pass over the (piecewise straight) joint path, and the
 earlier error is interpolated along that path. Comparing errors instead of tip positions removes, to first order
-in the model, what the small joint difference itself does to the tip.
+in the model, the motion of the tip by the small joint difference itself.
 """
 
 from dataclasses import dataclass, fields

@@ -81,8 +81,8 @@ def _one(text: str, n_tubes: int, ids: list[str]) -> dict[str, float]:
     if len(parts) > 2:
         name = ".".join(["effects", *parts])
         if name not in names:
-            what = f"a tube from 1 to {n_tubes}" if parameter.per_tube else "no tube: it has one value"
-            raise _fault(text, f"{parts[1]} needs {what}")
+            tube = f"a tube from 1 to {n_tubes}" if parameter.per_tube else "no tube: it has one value"
+            raise _fault(text, f"{parts[1]} needs {tube}")
         names = [name]
     numbers = [_number(item, text, parameter) for item in value.split(",")]
     if len(numbers) not in (1, len(names)):

@@ -52,15 +52,8 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-ACTS_ON = {  # where each hook acts
-    "joints": "joints",
-    "force": "tip",
-    "base": "rod",
-    "reading": "reading",
-    "curvature": "rod",
-    "stiffness": "rod",
-}
-HOOKS = tuple(ACTS_ON)
+HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
+ACTS_ON = dict(zip(HOOKS, ("joints", "tip", "rod", "reading", "rod", "rod"), strict=True))  # where each hook acts
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -116,32 +109,27 @@ class Effect:
 
     def described(self, n_tubes: int) -> catalogue.Effect:
         """The description as that of the library's effects in the catalogue."""
-        parameters = [
+        kept = ("name", "unit", "meaning", "per_tube")
+        parameters = tuple(
             catalogue.EffectParameter(
-                name=p.name,
-                unit=p.unit,
-                meaning=p.meaning,
+                **{name: getattr(p, name) for name in kept},
                 neutral=float(p.neutral),
                 sigma=float(p.sigma),
                 soft=p.usual or (p.neutral - 5 * p.sigma, p.neutral + 5 * p.sigma),
                 hard=p.bounds,
-                per_tube=p.per_tube,
                 kind="shape" if p.shape else "amplitude",
                 full_names=catalogue.full_names(self.id, p.name, p.per_tube, n_tubes),
             )
             for p in self.parameters
-        ]
+        )
+        kept = ("id", "physics", "signature", "measure", "reference")
         return catalogue.Effect(
-            id=self.id,
+            **{name: getattr(self, name) for name in kept},
             title=self.title or self.id,
-            physics=self.physics,
-            signature=self.signature,
-            measure=self.measure,
             look_alikes=tuple(self.look_alikes),
-            reference=self.reference,
             needs=frozenset(self.needs),
             acts_on=frozenset(ACTS_ON[hook] for hook in self.hooks),
-            parameters=tuple(parameters),
+            parameters=parameters,
         )
 
     def values(self, n_tubes: int, given: dict[str, float]) -> SimpleNamespace:

@@ -134,6 +134,6 @@ def _array(effect: Effect, hook: str, answer: Any, shape: tuple, free: Mask | No
     bad = bad if free is None else bad & ~free
     if bad.any():
         which = int(np.flatnonzero(bad)[0])
-        place = f"sample {which + 1} along the tube" if hook in PROFILES else f"row {which + 2}"
-        raise InputError(Problem(f"returned a number that is not finite, first in {place}", field=where))
+        first = f"sample {which + 1} along the tube" if hook in PROFILES else f"row {which + 2}"
+        raise InputError(Problem(f"returned a number that is not finite, first in {first}", field=where))
     return array

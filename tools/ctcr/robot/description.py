@@ -218,7 +218,7 @@ class Robot(Section):
     effects: dict[str, dict[str, float | list[float]]] = Field(
         default_factory=dict, description="the name of each effect with its parameters, indented below it"
     )
-    history: list[dict[str, Any]] = Field(default_factory=list, description="a list of what was changed, oldest first")
+    history: list[dict[str, Any]] = Field(default_factory=list, description="a list of changes, oldest first")
 
     _source: YamlDocument | None = PrivateAttr(None)  # that robot_file loaded it from
 

@@ -57,7 +57,7 @@ def write(
     effects: Mapping[str, Mapping[str, Any]] | None = None,
     in_place: bool = False,
 ) -> Robot:
-    """Writes `robot`, as it was loaded, with the changes and one more entry of the ledger; returns what was written.
+    """Writes `robot`, as it was loaded, with the changes and one more entry of the ledger; returns the new robot.
 
     `effects` replaces that section; None leaves it. New homes leave the old ones as the recorded ones, so that tables
     keep their meaning. Raises InputError where the target is the file the robot came from and not `in_place`, where the

@@ -1,1 +1,1 @@
-"""What people see and programs read: terminal output, JSON, figures, HTML pages."""
+"""Output for people and programs: terminal, JSON, figures, HTML pages."""

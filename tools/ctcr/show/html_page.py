@@ -23,9 +23,9 @@ def page(
 
     title     plain text
     sections  HTML; empty ones are left out
-    footer    plain text: what the page is made from; `command` is the one that made it
+    footer    plain text: the sources of the page; `command` made it
     drawing   JSON of a 3-D view, which one of the sections has the element `view` for
-    reload_s  the browser loads the page anew so often; 0: never
+    reload_s  interval at which the browser reloads the page; 0: never
     """
     title = html.escape(title)
     reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
@@ -52,7 +52,7 @@ def _drawn(drawing: str) -> str:
 
 
 def cards(numbers: Iterable[tuple[str, str, str]]) -> str:
-    """Large numbers side by side: (kind, value, what it is)."""
+    """Large numbers side by side: (kind, value, meaning)."""
     return (
         '<div class="numbers">'
         + "".join(

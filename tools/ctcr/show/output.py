@@ -1,4 +1,4 @@
-"""What a command gives back: files that are whole or absent, JSON, tables, progress."""
+"""Output of commands: files that are whole or absent, JSON, tables on a terminal, progress bars."""
 
 import json
 import os
@@ -52,7 +52,7 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
 
 
 def write_json(data: Any, target: str) -> None:
-    """Writes `data` as JSON to a file, or to standard output for "-"; see `plain` for what may be in it."""
+    """Writes `data` as JSON to a file, or to standard output for "-"; see `plain` for the types it may hold."""
     text = json.dumps(plain(data), indent=2, allow_nan=False) + "\n"
     if target == "-":
         sys.stdout.write(text)
@@ -82,14 +82,14 @@ def console(json_target: str | None = None):
 
 
 def listed(items: Sequence[Any], most: int) -> str:
-    """The first of them, and dots where there are more."""
+    """At most `most` items as text, and dots where there are more."""
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
 
 
 def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()):
     """A rich table: the first columns, or those of `text`, are text, the others numbers.
 
-    On a narrow terminal text goes on in the next line between words, so that numbers and names are not cut.
+    On a narrow terminal text wraps between words, so that numbers and names are not cut.
     """
     made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
@@ -133,7 +133,7 @@ class Progress:
 
 
 def _usual_permissions() -> int:
-    """What a new file gets: temporary files are private, results are not."""
+    """Permissions of a new file by the umask; those of temporary files are private."""
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask

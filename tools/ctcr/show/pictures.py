@@ -83,26 +83,21 @@ def _stage(axes, centre: Array, margin: float) -> Array:
 
 
 def _draw_tubes(axes, robot, arc_length: Array, frames: Array, ends: Array, lamp: Array) -> None:
-    """Each tube from where the next one ends to its own tip: what can be seen of it."""
+    """The visible part of each tube: from the end of the next outer tube to its own tip."""
     faces, colours = [], []
-    for i in range(robot.n_tubes):
-        start = ends[i + 1] if i + 1 < robot.n_tubes else 0.0
-        s = np.unique(np.concatenate([[start], arc_length[(arc_length > start) & (arc_length < ends[i])], [ends[i]]]))
+    for tube, colour, start, end in zip(robot.tubes, TUBE_COLOURS, [*ends[1:], 0.0], ends, strict=False):
+        s = np.unique([start, *arc_length[(arc_length > start) & (arc_length < end)], end])
         if s[-1] - s[0] < 1e-6:
             continue
-        quads, normals = _surface(_at(arc_length, frames, s), _radius_mm(robot, i))
+        # where the file gives no diameters, the radius tells the tubes apart
+        radius = 500 * tube.outer_diameter or 0.6 + 0.3 * TUBE_COLOURS.index(colour)
+        quads, normals = _surface(_at(arc_length, frames, s), radius)
         faces.append(quads)
-        colours.append(_lit(TUBE_COLOURS[i], normals @ lamp))
+        colours.append(_lit(colour, normals @ lamp))
     if faces:
         colour = np.concatenate(colours)  # edges of the same colour close the seams between the facets
-        axes.add_collection3d(
-            Poly3DCollection(np.concatenate(faces), facecolors=colour, edgecolors=colour, linewidths=0.3, zorder=4)
-        )
-
-
-def _radius_mm(robot, i: int) -> float:
-    """Outer radius; where the file gives no diameters, one that tells the tubes apart."""
-    return 500 * robot.tubes[i].outer_diameter or 0.6 + 0.3 * i
+        style = {"facecolors": colour, "edgecolors": colour, "linewidths": 0.3, "zorder": 4}
+        axes.add_collection3d(Poly3DCollection(np.concatenate(faces), **style))
 
 
 def _at(arc_length: Array, frames: Array, s: Array) -> Array:
@@ -137,7 +132,7 @@ def _lit(colour: str, facing: Array) -> Array:
 
 
 def _draw_shadow(axes, centre: Array) -> None:
-    """The robot seen from above, on the plane of the plate, and the line that a straight robot would follow."""
+    """The projection on the plane of the plate, and the line of a straight robot."""
     axes.plot(centre[:, 0], centre[:, 1], np.zeros(len(centre)), color="#9aa5b5", linewidth=3, alpha=0.55)
     top = max(centre[-1, 2], 0.0)
     axes.plot([0, 0], [0, 0], [0, top], color="#8792a2", linewidth=0.9, linestyle=(0, (5, 4)))

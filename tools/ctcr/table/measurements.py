@@ -90,7 +90,7 @@ def column_names(n_tubes: int) -> list[str]:
 
 
 def group_columns(n_tubes: int) -> dict[str, tuple[str, ...]]:
-    """Columns of the format, by what they hold."""
+    """Columns of the format, by the field of Measurements that they fill."""
     numbers = range(1, n_tubes + 1)
     return {
         "t": ("t_s",),
