@@ -3,9 +3,10 @@
 import os
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from ctcr.bench.devices.fault import DeviceFault, needed
 from ctcr.bench.shared import ndi
@@ -59,11 +60,12 @@ class Aurora:
             try:
                 self.close()
                 self._open()
-                self._reset()
-                self._set_baud()
-                self.version = self._ask("VER", "4")
-                self._find_tools()
-                self._ask("TSTART", "80")  # frame numbers start at 0
+                with self._port_errors():
+                    self._reset()
+                    self._set_baud()
+                    self.version = self._ask("VER", "4")
+                    self._find_tools()
+                    self._ask("TSTART", "80")  # frame numbers start at 0
                 return
             except DeviceFault:  # a command sent again is refused where only the first reply was damaged
                 if not left or self.damaged_answers == damaged:
@@ -75,7 +77,7 @@ class Aurora:
             self._line.close()
         self._line = None
 
-    def __enter__(self) -> "Aurora":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_) -> None:
@@ -91,7 +93,10 @@ class Aurora:
             content = body()
             return Frame(time.monotonic(), *parse(content))
 
-        return self._retried(once)
+        if not self._line:
+            raise self._fault("not connected", "connect first")
+        with self._port_errors():
+            return self._retried(once)
 
     # ---- steps of the connection
 
@@ -110,7 +115,7 @@ class Aurora:
         A pseudo-terminal carries no break, so there the device is asked at each baud rate.
         """
         if not os.path.realpath(self.port).startswith("/dev/pts/"):
-            self._guarded(lambda: self._line.send_break(0.3))
+            self._line.send_break(0.3)
             self._line.timeout = RESET_S
             message = self._until_return()
             self._line.timeout = self._answer_s
@@ -191,7 +196,7 @@ class Aurora:
         raise self._fault(f"{self._tries} answers in a row came damaged", remedy)
 
     def _send(self, name: str, arguments: str) -> None:
-        self._guarded(lambda: self._line.write(ndi.framed(f"{name}:{arguments}".encode())))
+        self._line.write(ndi.framed(f"{name}:{arguments}".encode()))
 
     def _text_reply(self) -> bytes:
         line = self._until_return()
@@ -225,7 +230,7 @@ class Aurora:
         return text
 
     def _exactly(self, count: int) -> bytes:
-        data = self._guarded(lambda: self._line.read(count))
+        data = self._line.read(count)
         if not data:
             raise self._silence()
         if len(data) < count:
@@ -234,7 +239,7 @@ class Aurora:
 
     def _until_return(self) -> bytes:
         """A line without its end; empty after a timeout."""
-        data = self._guarded(lambda: self._line.read_until(b"\r"))
+        data = self._line.read_until(b"\r")
         if data and not data.endswith(b"\r"):
             raise Garbled("cut short")
         return data[:-1]
@@ -242,16 +247,15 @@ class Aurora:
     def _drain(self) -> None:
         """Waits until the line is silent, so that the next reply begins at its first byte."""
         end = time.monotonic() + self._answer_s
-        while time.monotonic() < end and self._guarded(lambda: self._line.in_waiting):
-            self._guarded(self._line.reset_input_buffer)
+        while time.monotonic() < end and self._line.in_waiting:
+            self._line.reset_input_buffer()
             time.sleep(0.02)
 
-    def _guarded(self, action: Callable[[], T]) -> T:
-        """The result of an action on the port. Raises DeviceFault where the port is gone."""
-        if not self._line:
-            raise self._fault("not connected", "connect first")
+    @contextmanager
+    def _port_errors(self) -> Iterator[None]:
+        """Raises DeviceFault where the port is gone."""
         try:
-            return action()
+            yield
         except (OSError, TypeError) as error:  # SerialException is an OSError; TypeError: the port was closed meanwhile
             self.close()
             reason = str(error).split(":")[0]

@@ -204,8 +204,9 @@ class _Owner:
                     self._pipe.send(("ok", None))
                 except DeviceFault as fault:
                     self._pipe.send(("fault", fault))
-        except (EOFError, OSError):  # the client has gone
-            self._on_close()
+        except (EOFError, OSError):  # the client has closed the pipe, or died
+            self._open = False
+            self._control.halt()
 
     def _on_motion(self, kind: str, *arguments) -> None:
         """move, jog or velocity of AxisControl."""
@@ -225,10 +226,6 @@ class _Owner:
         enable = self._enabled_at is not None
         for drive, count in zip(self._bus.drives, self._new_counters, strict=True):
             drive.command(enable, 0.0, counter=count)
-
-    def _on_close(self) -> None:
-        self._open = False
-        self._control.halt()
 
     def publish(self, now: float) -> None:
         """Writes the state."""

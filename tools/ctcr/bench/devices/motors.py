@@ -1,9 +1,7 @@
 """The robot's joints as a program uses them: a client of the process that owns the bus."""
 
-import multiprocessing
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ctcr.bench.devices import bus_process, emergency_stop
 from ctcr.bench.devices.bench_file import Bench
-from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.process_client import ProcessClient
 from ctcr.bench.shared.transmission import home_joints, transmission, turns_of_joints
 from ctcr.robot.description import Robot
 
@@ -23,11 +21,12 @@ ANSWER_S = 2.0
 POLL_S = 0.005
 
 
-class Motors:
+class Motors(ProcessClient):
     """Starts the bus process; ends it when closed. Methods raise DeviceFault; none is real-time safe."""
 
     def __init__(self, bench: Bench, robot: Robot, folder: Path, one_by_one: bool = False):
         """`one_by_one`: as in JointLimits."""
+        super().__init__("motors")
         self._robot, self._folder, self._number = robot, folder, 0
         axes = bench.axis_settings(robot)
         self.settings = bus_process.BusSettings(
@@ -40,33 +39,12 @@ class Motors:
             period=1e-3 * bench.motors.period_ms,
         )
         self.names: list[str] = []
-        self._pipe = self._process = None
 
     def connect(self) -> None:
         """Brings the bus up, motors off."""
-        context = multiprocessing.get_context("spawn")  # a fork would keep the pipe open after this process has died
-        self._pipe, other = context.Pipe()
-        arguments = (self.settings, self._folder, other)
-        self._process = context.Process(target=bus_process.run, args=arguments, name="bus owner")
-        self._process.start()
-        other.close()
+        self.start(bus_process.run, self.settings, self._folder)
         self.names = self._answer(CONNECT_S)
         self._state = bus_process.state_record(self._folder)
-
-    def close(self) -> None:
-        """Stops the motors and lets go of the bus."""
-        if self._process:
-            with suppress(OSError):
-                self._pipe.send((0, "close", ()))
-            self._process.join(CONNECT_S)
-            self._pipe.close()
-        self._process = None
-
-    def __enter__(self) -> "Motors":
-        return self
-
-    def __exit__(self, *_) -> None:
-        self.close()
 
     @property
     def state(self) -> np.void:
@@ -110,34 +88,28 @@ class Motors:
             self.check()
             if self.state["done"] == self._number:
                 return
-            self._require_alive()
+            if not (self._process and self._process.is_alive()):
+                raise self.gone()
             meanwhile()
 
     def _ask(self, name: str, *arguments) -> None:
-        self._require_alive()
+        if not (self._process and self._process.is_alive()):
+            raise self.gone()
         if emergency_stop.is_stopped(self._folder):
             raise emergency_stop.stop_fault(self._folder)
         self._number += 1
-        try:
-            self._pipe.send((self._number, name, arguments))
-        except OSError:
-            raise self._gone() from None
-        self._answer(ANSWER_S)
+        self._answer(ANSWER_S, (self._number, name, arguments))
 
-    def _answer(self, seconds: float):
+    def _answer(self, seconds: float, request: tuple | None = None):
+        """What the process answers to a request, or sends by itself."""
         try:
+            if request:
+                self._pipe.send(request)
             if not self._pipe.poll(seconds):
-                raise self._gone()
+                raise self.gone()
             kind, content = self._pipe.recv()
         except (EOFError, OSError):
-            raise self._gone() from None
+            raise self.gone() from None
         if kind == "fault":
             raise content
         return content
-
-    def _require_alive(self) -> None:
-        if not self._process or not self._process.is_alive():
-            raise self._gone()
-
-    def _gone(self) -> DeviceFault:
-        return DeviceFault("motors", "the process that owns the bus is not there", "connect again")

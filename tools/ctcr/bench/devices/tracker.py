@@ -1,6 +1,5 @@
 """The tracked sensor as a program uses it: a client of the process that reads the tracker, frame by frame."""
 
-import multiprocessing
 import pickle
 import time
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 from ctcr.bench.devices import tracker_process
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.process_client import ProcessClient
 from ctcr.bench.devices.tracker_process import RATE_HZ, TrackedFrame
 from ctcr.bench.shared.real_time import Lateness
 
@@ -16,27 +16,22 @@ RETRY_S = 3.0  # with faults during the connection, while the reader tries again
 STALE_S = 0.25  # without a new frame: the last pose is no longer the present one
 
 
-class Tracker:
+class Tracker(ProcessClient):
     """Starts the reader; ends it when closed. Not real-time safe."""
 
     def __init__(self, bench: Bench, folder: Path, patience_s: float):
         """`patience_s`: with a sensor that is not seen, before `seen` raises DeviceFault."""
+        super().__init__("tracker")
         self.port, self.patience_s, self._section = bench.port(folder), patience_s, bench.tracker
         self.version = ""
         self.frames = self.missed = self.unseen = self.connections = 0
         self.asked_late, self.frames_late = Lateness(), Lateness()  # of the reader; of frames, from the reply to here
         self.faults: list[tuple[float, DeviceFault]] = []  # when, what
         self.last: TrackedFrame | None = None
-        self._pipe = self._process = None
 
     def connect(self) -> None:
         """Waits until the tracker tracks. Raises DeviceFault where it cannot be reached."""
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        arguments = (self.port, self._section, other)
-        self._process = context.Process(target=tracker_process.run, args=arguments, name="tracker reader")
-        self._process.start()
-        other.close()
+        self.start(tracker_process.run, self.port, self._section)
         start = time.monotonic()
         while not self.version and (waited := time.monotonic() - start) < CONNECT_S:
             self._receive(0.1)
@@ -45,18 +40,6 @@ class Tracker:
         if not self.version:
             text = f"does not track after {CONNECT_S:g} s"
             raise DeviceFault(f"tracker {self.port}", text, "switch it off and on")
-
-    def close(self) -> None:
-        if self._process:
-            self._pipe.close()
-            self._process.join(CONNECT_S)
-        self._process = None
-
-    def __enter__(self) -> "Tracker":
-        return self
-
-    def __exit__(self, *_) -> None:
-        self.close()
 
     def next(self) -> TrackedFrame | None:
         """The next frame, seen or not; None where none comes within one and a half periods."""
@@ -103,7 +86,7 @@ class Tracker:
                 return None
             data = self._pipe.recv_bytes()
         except (EOFError, OSError):
-            raise DeviceFault("tracker", "the process that reads it is not there", "connect again") from None
+            raise self.gone() from None
         if data.startswith(TrackedFrame.MARK):
             self.last = frame = TrackedFrame.unpacked(data)
             self.frames += 1
