@@ -1,4 +1,4 @@
-"""`ctcr demo`: what the tools do together."""
+"""`ctcr demo`: the tools together."""
 
 import click
 
@@ -18,9 +18,9 @@ def command() -> None:
     default="build/bench_demo",
     show_default=True,
     metavar="FOLDER",
-    help="For all that is measured and found, and the report; what is there is removed.",
+    help="Folder of the recordings, results and the report; that of an earlier demonstration is removed.",
 )
-@click.option("--short", is_flag=True, help="Leave out what only shows more.")
+@click.option("--short", is_flag=True, help="Leave out the steps that only illustrate.")
 @options.folder
 def bench(target, short, folder) -> int:
     """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.
@@ -42,11 +42,9 @@ def bench(target, short, folder) -> int:
 def _tell(target, hidden, short) -> int:
     from ctcr.demo import bench_report, bench_story
     from ctcr.demo.story import Story, new_folder
-    from ctcr.show import output
 
-    console, report = output.console(), f"{target}/report.html"
-    story = Story(new_folder(target), console)
+    out, report = options.Output(), f"{target}/report.html"
+    story = Story(new_folder(target), out.console)
     bench_story.tell(story, short)
-    console.print(bench_report.write(story, hidden, report), markup=False)
-    console.print(f"Report: {report}", markup=False)
+    out.say(bench_report.write(story, hidden, report), f"Report: {report}")
     return 0

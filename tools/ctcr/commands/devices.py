@@ -1,4 +1,4 @@
-"""`ctcr devices`: what is connected, and how it is."""
+"""`ctcr devices`: the devices of a bench and their state."""
 
 import click
 
@@ -10,7 +10,7 @@ from ctcr.commands import options
 @options.folder
 @options.json
 def command(bench_path: str, folder: str | None, out) -> int:
-    """Show which devices of a bench answer, their versions, and what is wrong with them. Nothing moves."""
+    """Show which devices of a bench answer, their versions and their faults. Nothing moves."""
     from ctcr.bench.devices import bench_file, emergency_stop
     from ctcr.bench.devices.health import health_of
     from ctcr.bench.shared.folder import private_folder
@@ -20,7 +20,7 @@ def command(bench_path: str, folder: str | None, out) -> int:
     reason = emergency_stop.reason(place)
     out.write_json({"devices": [vars(device) for device in found], "stopped": reason})
     rows = [[d.name, d.place, "ok" if d.is_well else "FAULT", d.about] for d in found]
-    out.table("Devices", ["", "where", "", "what it says"], rows, 4)
+    out.table("Devices", ["", "where", "", "report"], rows, text_columns=4)
     if reason:
         out.say(f"The emergency stop is on: {reason}")
     return 0 if all(device.is_well for device in found) and not reason else 1

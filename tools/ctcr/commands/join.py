@@ -2,24 +2,25 @@
 
 import click
 
+from ctcr.commands import options
+
 
 @click.command(name="join")
-@click.argument("robot")
+@options.robot
 @click.argument("tables", nargs=-1, required=True, metavar="MEASUREMENTS...")
 @click.option("-o", "--output", "target", required=True, metavar="TABLE", help="The table to write.")
 def command(robot, tables, target) -> None:
-    """Put MEASUREMENTS of ROBOT, in the order in which they were recorded, into one table.
+    """Join MEASUREMENTS of ROBOT, in the order in which they were recorded, to one table.
 
-    For recordings between which the joints stayed where they were, such as a first one and the one that ctcr next
-    proposed. Runs are numbered on; times go on by what the recordings' session.json say.
+    For recordings between which the joints stayed where they were, such as a first one and the one that `ctcr next`
+    proposed. Runs are numbered on; times follow from the recordings' session.json.
     """
     from ctcr.bench.record.joined import joined, start_of
     from ctcr.model import simulation
     from ctcr.robot import robot_file
-    from ctcr.show import output
     from ctcr.table import measurements
 
     n = robot_file.load(robot).n_tubes
     whole = joined([measurements.load(table, n) for table in tables], [start_of(table) for table in tables])
     simulation.write(whole, target, n)
-    output.console().print(f"{len(whole)} rows of {len(tables)} tables: {target}", markup=False)
+    options.Output().say(f"{len(whole)} rows of {len(tables)} tables: {target}")

@@ -6,12 +6,12 @@ from ctcr.commands import options
 
 
 @click.command(name="move")
-@click.argument("robot")
+@options.robot
 @click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits.")
 @click.option("--beta", metavar="MM,MM,...", help="Grasped points, innermost tube first [mm].")
 @click.option("--alpha", metavar="DEG,DEG,...", help="Base angles, innermost tube first [deg].")
-@click.option("--home", is_flag=True, help="Find where the joints are, by retracting each tube until it is flush.")
-@click.option("--at-home", is_flag=True, help="Take where the joints stand now, set to their marks by hand, for home.")
+@click.option("--home", is_flag=True, help="Home the joints: retract each tube until its tip is flush with the plate.")
+@click.option("--at-home", is_flag=True, help="Take the present joints, set to their marks by hand, for home.")
 @options.setting("--speed", click.FloatRange(0.01, 1.0), 0.5, "Fraction of the highest speed.")
 @options.folder
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
@@ -21,32 +21,30 @@ def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> Non
     """
     import numpy as np
 
-    from ctcr.bench.devices import bench_file, homing, person
+    from ctcr.bench.devices import bench_file, homing
     from ctcr.bench.devices.motors import Motors
+    from ctcr.bench.devices.person import person_of
     from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import robot_file
-    from ctcr.show import output
 
     loaded, place = robot_file.load(robot), private_folder(folder)
-    bench, console, n = bench_file.load(bench_path), output.console(), loaded.n_tubes
+    bench, out, n = bench_file.load(bench_path), options.Output(), loaded.n_tubes
     wanted = [_numbers("--beta", beta, n, 1e-3), _numbers("--alpha", alpha, n, np.pi / 180)]
     with Motors(bench, loaded, place) as motors:
         motors.connect()
         if home:
-            homing.home(motors, loaded, person.person_of(bench, place), lambda text: console.print(text))
+            homing.home(motors, loaded, person_of(bench, place), out.say)
         if at_home:
             motors.set_joints(motors.settings.home)
         if beta or alpha:
-            target = np.array(motors.joints)
-            for part, values in zip((slice(0, n), slice(n, None)), wanted, strict=True):
-                if values is not None:
-                    target[part] = values
-            motors.move(target, speed)
+            now = motors.joints.reshape(2, n)
+            target = [row if given is None else given for given, row in zip(wanted, now, strict=True)]
+            motors.move(np.concatenate(target), speed)
             motors.wait()
-        state, joints = motors.state, motors.joints
-        rows = [[f"tube {i + 1}", f"{1e3 * joints[i]:.3f}", f"{np.rad2deg(joints[n + i]):.3f}"] for i in range(n)]
-        title = "Joints" if state["homed"] else "Joints since power on: home first (ctcr move --home)"
-        console.print(output.table(title, ["", "beta [mm]", "alpha [deg]"], rows))
+        degrees, homed = np.rad2deg(motors.joints[n:]), motors.state["homed"]
+        rows = [[f"tube {i + 1}", f"{1e3 * motors.joints[i]:.3f}", f"{degrees[i]:.3f}"] for i in range(n)]
+        title = "Joints" if homed else "Joints since power on: home first (ctcr move --home)"
+        out.table(title, ["", "beta [mm]", "alpha [deg]"], rows)
 
 
 def _numbers(option, text, n, scale):

@@ -6,13 +6,13 @@ from ctcr.commands import options
 
 
 @click.command(name="record")
-@click.argument("robot")
+@options.robot
 @click.argument("plan")
 @click.option(
     "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
 )
 @click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="The devices and their limits.")
-@options.setting("--dwell", click.FloatRange(0), 0.5, "Rest before reading [s].")
+@options.setting("--dwell", click.FloatRange(0), 0.5, "Rest before the first reading [s].")
 @options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")
 @options.setting("--speed", click.FloatRange(0.01, 1), 1.0, "Fraction of the highest speed.")
 @options.setting(
@@ -25,30 +25,14 @@ from ctcr.commands import options
 @options.setting("--approach-deg", click.FloatRange(0), 5.0, "Length of the approach [deg].")
 @options.setting("--patience", click.FloatRange(0.1), 30.0, "How long the tracker may lose the sensor [s].")
 @options.effects
-@click.option("--page", metavar="FILE.html", help="Show the error live on a page that the browser loads anew.")
+@click.option("--page", metavar="FILE.html", help="Show progress and error on a page that the browser reloads.")
 @options.folder
 @options.json
-def command(
-    robot,
-    plan,
-    target,
-    bench_path,
-    dwell,
-    readings,
-    speed,
-    approach,
-    approach_mm,
-    approach_deg,
-    patience,
-    page,
-    folder,
-    out,
-) -> None:
+def command(robot, plan, target, bench_path, dwell, readings, speed, patience, page, folder, out, **approach) -> None:
     """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
 
-    Every row is on the disk as soon as it is measured; the same command goes on where a recording was interrupted.
-    Where the force of a row is another than that before, you are asked to hang the weight. Joints must be known: home
-    first with `ctcr move --home`.
+    Every row is on the disk as soon as it is measured; the same command resumes an interrupted recording. Where the
+    force changes from one row to the next, you are asked to hang the weight. Home the joints first: `ctcr move --home`.
     """
     from contextlib import nullcontext
     from dataclasses import asdict
@@ -65,17 +49,14 @@ def command(
     from ctcr.bench.record.plan import Approach, steps_of
     from ctcr.bench.record.session import Options, Session
     from ctcr.bench.shared.folder import private_folder
-    from ctcr.robot import robot_file
-    from ctcr.table import measurements
 
-    loaded, place, bench = robot_file.load(robot), private_folder(folder), bench_file.load(bench_path)
-    way = Approach(approach, 1e-3 * approach_mm, float(np.deg2rad(approach_deg)))
-    table = measurements.load(plan, loaded.n_tubes)
+    loaded, table = options.load(robot, plan)
+    place, bench = private_folder(folder), bench_file.load(bench_path)
+    way = Approach(approach["approach"], 1e-3 * approach["approach_mm"], float(np.deg2rad(approach["approach_deg"])))
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
-    options, sources = Options(dwell, readings, speed), {"robot": robot, "plan": plan, "bench": bench_path}
-    settings, group = asdict(options) | {"approach": asdict(way)}, readings + way.has_way_point
-    person = person_of(bench, place)
-    recording = Folder(target, sources, settings, loaded.n_tubes, group)
+    how, sources = Options(dwell, readings, speed), {"robot": robot, "plan": plan, "bench": bench_path}
+    settings, group = asdict(how) | {"approach": asdict(way)}, readings + way.has_way_point
+    recording, person = Folder(target, sources, settings, loaded.n_tubes, group), person_of(bench, place)
     with Tracker(bench, place, patience) as tracker, Motors(bench, loaded, place) as motors:
         motors.connect()
         tracker.connect()
@@ -93,10 +74,9 @@ def command(
                 with display.paused():
                     person.hang(force)
 
-            session = Session(loaded, motors, tracker, recording.rows, options, recording.clock, hang, show)
+            session = Session(loaded, motors, tracker, recording.rows, how, recording.clock, hang, show)
             with recording.sitting(motors, tracker):
                 done = session.run(steps)
     path = recording.path / TABLE
-    rms = f"RMS error against the model {done.rms_mm:.3f} mm"
-    out.say(f"{done.done - before} rows measured, {rms}: {path}")
+    out.say(f"{done.done - before} rows measured, RMS error against the model {done.rms_mm:.3f} mm: {path}")
     out.write_json({"rows": done.done, "rms_mm": done.rms_mm, "table": str(path)})

@@ -7,11 +7,13 @@ from ctcr.commands import options
 scenario_option = click.option(
     "--scenario", metavar="FILE.yaml", help="Faults at set times: a list of `at_s` with the faults that change."
 )
-oracle_option = click.option(
-    "--oracle",
-    metavar="COMMAND",
-    help="A program that knows where the tip is, instead of the model; gets ROBOT as its last argument.",
-)
+
+
+def robot_options(function):
+    """The options of the simulated robot: those of `_robot`."""
+    text = "A program that computes the tip instead of the model; last argument: ROBOT."
+    oracle = click.option("--oracle", metavar="COMMAND", help=text)
+    return options.hide(oracle(options.noise(options.seed(function))))
 
 
 @click.group(name="sim")
@@ -23,29 +25,27 @@ def command() -> None:
 
 
 @command.command(name="aurora")
-@click.argument("robot")
+@options.robot
 @options.folder
-@options.hide
-@oracle_option
-@options.noise
-@options.seed
+@robot_options
 @scenario_option
-def aurora(robot, folder, hidden, oracle, noise, seed, scenario) -> None:
+def aurora(robot, folder, scenario, seed, **physics) -> None:
     """Simulate an NDI Aurora tracker on a pseudo-terminal, looking at the tip of ROBOT.
 
     The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
     """
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators.aurora import AuroraSimulator
     from ctcr.bench.simulators.bench import serve
 
-    simulator = AuroraSimulator(_robot(robot, hidden, oracle, noise, seed), _folder(folder), scenario, seed)
+    simulator = AuroraSimulator(_robot(robot, seed, **physics), private_folder(folder), scenario, seed)
     click.echo(f"tracker: {simulator.line.link}")
     serve(simulator)
 
 
 @command.command(name="ethercat")
-@click.option("--interface", metavar="NAME", help="Answer on this one, instead of making a virtual pair.")
-@options.setting("--motors", click.IntRange(1, 8), 6, "How many stepper terminals.")
+@click.option("--interface", metavar="NAME", help="Network interface to answer on, instead of a new virtual pair.")
+@options.setting("--motors", click.IntRange(1, 8), 6, "Number of motor terminals.")
 @options.setting("--variant", click.Choice(["EL7041", "EL7031"]), "EL7041", "Type of the terminals.")
 @options.folder
 @options.seed
@@ -55,12 +55,12 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
     Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
     """
-    from ctcr.bench.shared.folder import BUS, MASTER
+    from ctcr.bench.shared.folder import BUS, MASTER, private_folder
     from ctcr.bench.simulators import network
     from ctcr.bench.simulators.bench import serve
     from ctcr.bench.simulators.ethercat import EthercatSimulator
 
-    place = _folder(folder)
+    place = private_folder(folder)
     if not interface:
         network.make_cable()
     simulator = EthercatSimulator(interface or BUS, place, motors, variant, scenario, seed)
@@ -69,24 +69,23 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
 
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})
-@click.argument("robot")
+@options.robot
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @options.folder
-@options.hide
-@oracle_option
-@options.noise
-@options.seed
+@robot_options
 @click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
 @click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
-def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario, bus_scenario) -> int:
-    """Simulate a whole bench around ROBOT while COMMAND runs (a shell without one); its motors move the tracked tip.
+def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physics) -> int:
+    """Simulate a whole bench around ROBOT while COMMAND runs (default: a shell); its motors move the tracked tip.
 
     Needs no rights: bus and COMMAND get a network of their own.
     """
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated
 
-    robots = _robot(robot, hidden, oracle, noise, seed)
-    return simulated.run(lambda: _run(program), robots, _folder(folder), (tracker_scenario, bus_scenario), seed)
+    scenarios = tracker_scenario, bus_scenario
+    made = _robot(robot, seed, **physics)
+    return simulated.run(lambda: _run(program), made, private_folder(folder), scenarios, seed)
 
 
 @command.command(name="set")
@@ -98,19 +97,17 @@ def bench(robot, program, folder, hidden, oracle, noise, seed, tracker_scenario,
 def set_(device, settings, force, line_break, folder) -> None:
     """Switch faults of a running simulator on and off; without any, show them."""
     from ctcr.bench.shared.control import request
+    from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import yaml_document
-    from ctcr.show import output
 
     pairs = [text.partition("=")[::2] for text in settings]
     message = {"faults": {name: yaml_document.parse(value, name).data for name, value in pairs}}
-    if force:
-        message["force"] = list(force)
-    if line_break:
-        message["break"] = True
-    state = request(_folder(folder), device, message)
+    message |= {"force": list(force)} if force else {}
+    message |= {"break": True} if line_break else {}
+    state = request(private_folder(folder), device, message)
     rows = [[name, str(value).lower()] for name, value in state.pop("faults").items()]
     rows += [[name, str(value)] for name, value in state.items()]
-    output.console().print(output.table(f"Simulator: {device}", ["", "value"], rows))
+    options.Output().table(f"Simulator: {device}", ["", "value"], rows)
 
 
 def _run(program) -> int:
@@ -126,7 +123,7 @@ def _run(program) -> int:
         raise InputError(Problem(f"{program[0]}: no such command")) from None
 
 
-def _robot(robot, hidden, oracle, noise, seed):
+def _robot(robot, seed, hidden, oracle, noise):
     import shlex
 
     from ctcr.bench.simulators.oracle import Oracle
@@ -136,12 +133,5 @@ def _robot(robot, hidden, oracle, noise, seed):
     if oracle and hidden:
         raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
     loaded = robot_file.load(robot)
-    hiding = options.with_effects(loaded, hidden)
     known = Oracle([*shlex.split(oracle), robot], loaded) if oracle else None
-    return SimulatedRobot(hiding, noise, seed, known)
-
-
-def _folder(folder):
-    from ctcr.bench.shared.folder import private_folder
-
-    return private_folder(folder)
+    return SimulatedRobot(options.with_effects(loaded, hidden), noise, seed, known)

@@ -23,4 +23,4 @@ def command(release: bool, folder: str | None) -> None:
         return
     reason = emergency_stop.reason(place)
     emergency_stop.release(place)
-    click.echo(f"released; it was stopped because: {reason}" if reason else "nothing was stopped")
+    click.echo(f"released; the reason of the stop was: {reason}" if reason else "nothing was stopped")

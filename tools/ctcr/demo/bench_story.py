@@ -58,15 +58,14 @@ def _find_the_effect(story: Story, short: bool) -> None:
     story.do(why, _record(KNOWN, "first", dwell), _recorded, "first")
     if not short:
         story.do("How wrong is the model?", f"compare {KNOWN} {first}", _compared, "compared")
-    story.do("Which effect is missing?", f"diagnose {KNOWN} {first}", _diagnosed, "first_diagnosis")
+        story.do("Which effect is missing?", f"diagnose {KNOWN} {first}", _diagnosed, "first_diagnosis")
     propose = f"next {KNOWN} {first} --runs 2 -o second.csv"
     story.do("Ask for the runs that decide", propose, _proposed, "proposal")
-    if not story.answers["proposal"]["runs"]:  # the first recording has decided
+    if story.answers["proposal"]["runs"]:
+        story.do("Measure them", _record(KNOWN, "second", dwell), _recorded, "second")
+        story.do("Put both recordings together", f"join {KNOWN} {first} {second} -o both.csv", "both.csv")
+    else:  # the first recording has decided
         shutil.copy(story.folder / first, story.folder / "both.csv")
-        shutil.copy(story.folder / "first_diagnosis.json", story.folder / "diagnosis.json")
-        return
-    story.do("Measure them", _record(KNOWN, "second", dwell), _recorded, "second")
-    story.do("Put both recordings together", f"join {KNOWN} {first} {second} -o both.csv", "both.csv")
     story.do("Which effect is missing?", f"diagnose {KNOWN} both.csv", _diagnosed, "diagnosis")
 
 
