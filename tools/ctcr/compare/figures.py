@@ -12,6 +12,7 @@ from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
+from ctcr.show.scene import evenly
 from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
 
 Array = NDArray[np.float64]
@@ -103,7 +104,6 @@ def hysteresis(figure: Figure, c: Comparison) -> bool | None:
     left.legend(fontsize=8, loc="best")
     left.margins(y=0.3)
     _both_ways(right, c, opposite)
-    return None
 
 
 def _both_ways(axes, c: Comparison, pairs) -> None:
@@ -146,7 +146,6 @@ def ranking(figure: Figure, c: Comparison) -> bool | None:
     axes.set(ylim=(-0.6, len(items) + 0.1), xlim=(0, max([*shares, level]) * 1.25 + 1))
     axes.set_xlabel("share of the squared error predicted on held-out data, %")
     axes.grid(axis="y", visible=False)
-    return None
 
 
 def strongest(figure: Figure, c: Comparison) -> bool | None:
@@ -162,7 +161,6 @@ def strongest(figure: Figure, c: Comparison) -> bool | None:
         axes.set_visible(False)
     for axes, (item, against) in zip(grid[: len(items)], items, strict=True):
         _against(axes, item, against, c, item.name in chosen)
-    return None
 
 
 def drawable(items: Iterable[Dependence], sample: Sample, rows: Array) -> list[tuple[Dependence, Abscissa]]:
@@ -194,7 +192,7 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
     local = np.einsum("kji,kj->ki", c.ranking.frames[frame], c.ranking.error) * 1e3
     known = np.isfinite(x)
     x, local = x[known], local[known]
-    shown = np.linspace(0, len(x) - 1, min(len(x), 1500)).astype(int)
+    shown = evenly(len(x), 1500)
     levels, cell = np.unique(x, return_inverse=True)
     if len(levels) > 6:
         edges = np.unique(np.quantile(x, np.linspace(0, 1, BINS + 1)))

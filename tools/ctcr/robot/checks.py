@@ -45,10 +45,8 @@ def doubts(robot: Robot) -> Iterator[Fault]:
     for i, tube in enumerate(robot.tubes):
         yield from _unusual(tube, ("tubes", i))
         if (strain := tube.straightened_strain) > _MAX_STRAIN:
-            yield (
-                ("tubes", i, "curvature_per_m"),
-                f"straightening this tube strains it by {100 * strain:.1f} %: it yields",
-            )
+            text = f"straightening this tube strains it by {100 * strain:.1f} %: it yields"
+            yield ("tubes", i, "curvature_per_m"), text
         if (tube.curved_length == 0) != (tube.curvature == 0):
             text = "only one of curvature and curved length is zero: this tube counts as straight"
             yield ("tubes", i, "curved_length_mm"), text
@@ -81,10 +79,30 @@ def path_text(path: FieldPath) -> str:
 
 
 def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
-    """Faults between fields; fields that are faulty by themselves are skipped."""
+    """Faults between fields. Comparisons with NaN are false, so that fields that are faulty themselves are skipped."""
+    keys = ("inner_diameter_mm", "outer_diameter_mm", "length_mm", "curved_length_mm")
+    inner, outer, length, curved = ([_number(tube, key) for tube in tubes] for key in keys)
+    reverse = len(tubes) > 1 and bool(np.all(np.diff(outer) < 0))
+    if reverse:
+        yield ("tubes",), "go from the outermost inwards: list the innermost first"
     for i, tube in enumerate(tubes):
-        yield from _relations_in_tube(("tubes", i), tube)
-    yield from _nesting(tubes)
+        if tube.get("bending_stiffness_Nm2") is not None and tube.get("youngs_modulus_GPa") is not None:
+            text = "the stiffness is given twice: keep this or bending_stiffness_Nm2"
+            yield ("tubes", i, "youngs_modulus_GPa"), text
+        if inner[i] >= outer[i]:
+            text = f"{outer[i]:g} mm is not above the inner diameter, {inner[i]:g} mm"
+            yield ("tubes", i, "outer_diameter_mm"), text
+        if curved[i] > length[i]:
+            text = f"{curved[i]:g} mm is more than the length of the tube, {length[i]:g} mm"
+            yield ("tubes", i, "curved_length_mm"), text
+    for i in range(1, 1 if reverse else len(tubes)):
+        # Published diameters are often fitted: a tube that reaches into the wall around it is a doubt, one that reaches
+        # past the middle of that wall a fault.
+        if outer[i - 1] > (inner[i] + outer[i]) / 2:
+            yield _too_narrow(inner[i], i - 1, outer[i - 1])
+        if length[i] > length[i - 1]:
+            text = f"{length[i]:g} mm is longer than tube {i} inside it, {length[i - 1]:g} mm: no joints fit both"
+            yield ("tubes", i, "length_mm"), text
     actuation, tracker = _mapping(data.get("actuation")), _mapping(data.get("tracker"))
     for key in _PER_TUBE:
         home = actuation.get(key)
@@ -93,34 +111,6 @@ def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
     sensor = tracker.get("sensor_on_tube")
     if tubes and isinstance(sensor, int) and sensor > len(tubes):
         yield ("tracker", "sensor_on_tube"), f"{sensor} is not a tube: the robot has {len(tubes)}"
-
-
-def _relations_in_tube(path: FieldPath, tube: dict) -> Iterator[Fault]:
-    if tube.get("bending_stiffness_Nm2") is not None and tube.get("youngs_modulus_GPa") is not None:
-        yield (*path, "youngs_modulus_GPa"), "the stiffness is given twice: keep this or bending_stiffness_Nm2"
-    inner, outer = _number(tube, "inner_diameter_mm"), _number(tube, "outer_diameter_mm")
-    if inner is not None and outer is not None and inner >= outer:
-        yield (*path, "outer_diameter_mm"), f"{outer:g} mm is not above the inner diameter, {inner:g} mm"
-    length, curved = _number(tube, "length_mm"), _number(tube, "curved_length_mm")
-    if length is not None and curved is not None and curved > length:
-        yield (*path, "curved_length_mm"), f"{curved:g} mm is more than the length of the tube, {length:g} mm"
-
-
-def _nesting(tubes: list[dict]) -> Iterator[Fault]:
-    outer = [_number(tube, "outer_diameter_mm") for tube in tubes]
-    if len(tubes) > 1 and None not in outer and all(np.diff(outer) < 0):
-        yield ("tubes",), "go from the outermost inwards: list the innermost first"
-        return
-    for i, (tube, around) in enumerate(pairwise(tubes)):
-        inner = _number(around, "inner_diameter_mm")
-        # Published diameters are often fitted: a tube that reaches into the wall around it is a doubt, one that reaches
-        # past the middle of that wall a fault.
-        if None not in (outer[i], inner, outer[i + 1]) and outer[i] > (inner + outer[i + 1]) / 2:
-            yield _too_narrow(inner, i, outer[i])
-        length, length_around = _number(tube, "length_mm"), _number(around, "length_mm")
-        if length is not None and length_around is not None and length_around > length:
-            text = f"{length_around:g} mm is longer than tube {i + 1} inside it, {length:g} mm: no joints fit both"
-            yield ("tubes", i + 1, "length_mm"), text
 
 
 def _too_narrow(inner_mm: float, inside: int, outer_mm: float) -> Fault:
@@ -194,7 +184,8 @@ def _has_weight(gravity: Any) -> bool:
     return isinstance(gravity, list) and any(isinstance(g, int | float) and g != 0 for g in gravity)
 
 
-def _number(section: dict, key: str) -> float | None:
+def _number(section: dict, key: str) -> float:
+    """A field as a number; NaN where it is none."""
     value = section.get(key)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number and abs(value) <= LARGEST else None
+    return float(value) if is_number and abs(value) <= LARGEST else np.nan
