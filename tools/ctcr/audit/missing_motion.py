@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from ctcr import settings
 from ctcr.robot.description import Robot
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ctcr import settings
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show import wording
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 
 Array = NDArray[np.float64]
 

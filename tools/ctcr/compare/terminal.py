@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import findings, headline, held_out, limits, quiet
-from ctcr.show.output import listed, table
+from ctcr.show.output import table
+from ctcr.show.wording import listed
 
 SHOWN_RUNS = 15
 SHOWN_FORMS = 10

@@ -6,8 +6,8 @@ import numpy as np
 
 from ctcr.compare.figures import drawable
 from ctcr.diagnose.round import imitated
-from ctcr.show.html_page import short
 from ctcr.show.style import ERROR, FAINT, INK, NOISE
+from ctcr.show.wording import short
 
 if TYPE_CHECKING:
     from ctcr.diagnose.pipeline import Diagnosis

@@ -11,8 +11,9 @@ from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
-from ctcr.show.html_page import cards, figure, short, table
+from ctcr.show.html_page import cards, figure, table
 from ctcr.show.output import atomic_writer
+from ctcr.show.wording import short
 
 if TYPE_CHECKING:
     from ctcr.diagnose.pipeline import Diagnosis

@@ -10,7 +10,7 @@ from ctcr.diagnose.engine import OUTLIER, Engine
 from ctcr.diagnose.outliers import clustered
 from ctcr.fit import joint
 from ctcr.model import effect_model
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 
 LEVEL = 0.01  # probability that a dependence is named where there is none
 SHOWN = 6

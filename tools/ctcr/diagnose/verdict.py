@@ -9,7 +9,7 @@ from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import SURE
 from ctcr.diagnose.selection import Accepted
 from ctcr.fit import joint
-from ctcr.show.output import listed
+from ctcr.show.wording import listed
 
 # Fraction of the unexplained chi-square of held-out runs that effects must explain not to be spurious, and
 EXPLAINED = 0.75

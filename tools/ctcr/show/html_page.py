@@ -11,11 +11,6 @@ from plotly.offline import get_plotlyjs
 from ctcr.show.style import draw
 
 
-def short(value: float) -> str:
-    """An error as people say it: 1.36, 0.93, 0.10, 0.061."""
-    return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
-
-
 def page(
     title: str, sections: Iterable[str], footer: str, command: str, drawing: str | None = None, reload_s: int = 0
 ) -> str:

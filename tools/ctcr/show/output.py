@@ -5,7 +5,7 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
@@ -79,11 +79,6 @@ def plain(data: Any) -> Any:
 def console(json_target: str | None = None):
     """A rich console for human readers; it leaves standard output alone when that carries JSON."""
     return Console(stderr=json_target == "-", highlight=False, soft_wrap=True)
-
-
-def listed(items: Sequence[Any], most: int) -> str:
-    """At most `most` items as text, and dots where there are more."""
-    return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
 
 
 def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()):

@@ -1,4 +1,12 @@
-"""Numbers and lists as the findings print them."""
+"""Numbers and lists as messages and pages show them."""
+
+from collections.abc import Sequence
+from typing import Any
+
+
+def short(value: float) -> str:
+    """An error in two or three digits: 1.36, 0.93, 0.10, 0.061."""
+    return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
 
 
 def mm(value: float) -> str:
@@ -18,5 +26,11 @@ def probability(value: float) -> str:
     return f"{value:.2g}" if value >= 1e-3 else "below 0.001"
 
 
-def join(names: list[str] | tuple[str, ...]) -> str:
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+def join(names: Sequence[str]) -> str:
+    """All names as a part of a sentence; "" without any."""
+    return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def listed(items: Sequence[Any], most: int) -> str:
+    """At most `most` items, and dots where there are more."""
+    return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
