@@ -1,4 +1,4 @@
-"""The procedures that measure one thing at a time: the shipped tables give the truth, bad tables give words."""
+"""The procedures that measure one quantity each: the shipped tables give the truth, bad tables clear errors."""
 
 import json
 import re
@@ -47,21 +47,22 @@ def assert_within(found: tuple, true: float, most_sd: float) -> None:
     assert abs(value - true) < 3 * sd and sd < most_sd, (found, true)
 
 
-def test_circles_give_the_rotation_offsets(values):
+def test_rotation_offset(values):
     found = values("rotation-offset", DATA / "circles.csv", "--robot", ROBOT)
     for i, true in enumerate(truth("home rotation")):
         assert_within(found[f"tube {i + 1}: rotation offset"], true, 1.0)
         assert abs(found[f"tube {i + 1}: rotation offset"][0] - true) < 0.6  # a few tenths of a degree
 
 
-def test_the_two_directions_are_apart_by_the_drag(run):
+def test_directions(run):
+    """Forward and backward differ by the friction of the simulated tubes."""
     code, out, _ = run("rotation-offset", DATA / "circles.csv", "--robot", ROBOT, "--json", "-")
     tubes = json.loads(out)["tubes"]
     differences = [abs(tube["direction_difference_deg"]) for tube in tubes.values()]
     np.testing.assert_allclose(differences, 0.6, atol=0.15)  # forward and backward lag by 0.3 deg each
 
 
-def test_points_give_the_tracker_frame(values):
+def test_registration(values):
     found = values("registration", DATA / "points.csv", "--robot", ROBOT, "--placement-sd-mm", 0.1)
     for axis, true in zip("xyz", (-60.082, 19.556, -179.905), strict=True):
         assert abs(found[f"origin of the base frame, {axis}"][0] - true) < 0.5
@@ -70,7 +71,7 @@ def test_points_give_the_tracker_frame(values):
     assert 0 < found["expected error at tool, RMS"][0] < 2
 
 
-def test_ruler_and_encoder_give_homes_and_lengths(values):
+def test_home(values):
     found = values("home", DATA / "home.csv", "--robot", ROBOT)
     for i, (beta, length) in enumerate(zip(truth("home translation"), truth("length"), strict=True)):
         assert_within(found[f"tube {i + 1}: home translation"], beta, 1.5)
@@ -79,7 +80,8 @@ def test_ruler_and_encoder_give_homes_and_lengths(values):
         assert deployed is None or abs(deployed[0] - beta - length) < 1
 
 
-def test_hung_masses_give_the_stiffness(values):
+def test_cantilever(values):
+    """The true modulus, and a larger standard deviation with uncertain diameters."""
     found = values("cantilever", DATA / "cantilever.csv", "--robot", ROBOT, "--tube", 1)
     assert_within(found["Young's modulus"], truth("Young's modulus")[0], 1.0)
     assert found["Young's modulus"][2] == 58.0
@@ -89,7 +91,7 @@ def test_hung_masses_give_the_stiffness(values):
     assert blunt["Young's modulus"][1] > 3 * found["Young's modulus"][1]  # diameters count with the fourth power
 
 
-def test_a_photograph_gives_the_curvature(values):
+def test_curvature(values):
     scale = ["--mm-per-px", 1 / 12, "--scale-sd-percent", 0.5]
     found = values("curvature", DATA / "picture.csv", "--robot", ROBOT, "--tube", 2, *scale)
     assert_within(found["curvature"], truth("curvature")[1], 0.2)
@@ -108,7 +110,8 @@ STEPS = [
 ]
 
 
-def test_one_after_another_they_make_a_calibrated_file(run, tmp_path):
+def test_chain(run, tmp_path):
+    """One after another they make a calibrated file with its ledger."""
     robot = ROBOT
     for number, (name, table, options, field) in enumerate(STEPS):
         target = tmp_path / f"{number}.yaml"
@@ -125,7 +128,8 @@ def test_one_after_another_they_make_a_calibrated_file(run, tmp_path):
     np.testing.assert_allclose(final.actuation.home_translation_mm, truth("home translation"), atol=2.5)
 
 
-def test_the_robot_file_is_changed_only_when_told(run, tmp_path):
+def test_in_place(run, tmp_path):
+    """The input is changed with --in-place alone."""
     robot = tmp_path / "robot.yaml"
     robot.write_bytes(ROBOT.read_bytes())
     code, _, err = run("home", DATA / "home.csv", "--robot", robot, "-o", robot)
@@ -167,7 +171,8 @@ def doubled_first_point() -> list[str]:
         ("curvature", rows("picture.csv")[:4], ["--mm-per-px", 0.1], ""),
     ],
 )
-def test_bad_input_gives_words_and_writes_nothing(run, tmp_path, name, lines, options, message):
+def test_faults(run, tmp_path, name, lines, options, message):
+    """One clear error; nothing is written."""
     table = tmp_path / "circles.csv"
     table.write_text("\n".join(lines) + "\n")
     if "--robot" in options and "-o" not in options:
@@ -188,7 +193,8 @@ def test_bad_input_gives_words_and_writes_nothing(run, tmp_path, name, lines, op
         ("curvature", "picture.csv", ["--tube", 2, "--mm-per-px", 0.083333], "Shape of the tube: new robot"),
     ],
 )
-def test_each_procedure_writes_a_page_that_needs_nothing_else(run, tmp_path, command, table, options, title):
+def test_report(run, tmp_path, command, table, options, title):
+    """A page with a picture that needs no network."""
     page = tmp_path / "page.html"
     code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "--report", page)
     assert code == 0 and f"Report: {page}" in out, err
@@ -199,7 +205,8 @@ def test_each_procedure_writes_a_page_that_needs_nothing_else(run, tmp_path, com
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_the_picture_of_a_circle_shows_how_far_each_way_is_off(sign):
+def test_circle(sign):
+    """The picture shows the lag of each direction, for either sense of rotation."""
     from ctcr.calibrate.procedure_figures import Circle
 
     angle = np.tile(np.linspace(-3, 3, 40), 2)

@@ -23,7 +23,7 @@ def table(tmp_path):
 @pytest.mark.parametrize(
     "heading, value, si", [("x_mm", "12.5", 0.0125), ("x_m", "0.0125", 0.0125), ("x_um", "12500", 0.0125)]
 )
-def test_lengths_in_any_unit(table, heading, value, si):
+def test_lengths(table, heading, value, si):
     data = tables.read(table(f"motor_angle_deg,{heading},y_mm,z_mm\n90,{value},1,2\n"), ROTATION_OFFSETS)
     assert data["x"] == pytest.approx([si], rel=1e-12) and data.unit["x"] == heading[2:]
     assert data["motor_angle"] == pytest.approx([np.pi / 2])
@@ -31,12 +31,13 @@ def test_lengths_in_any_unit(table, heading, value, si):
 
 
 @pytest.mark.parametrize("heading, factor", [("load_N", 1), ("load_mN", 1e-3), ("load_g", 9.80665e-3)])
-def test_loads_in_any_unit(table, heading, factor):
+def test_loads(table, heading, factor):
     data = tables.read(table(f"{heading},deflection_mm,free_length_mm\n2,1,80\n"), CANTILEVER)
     assert data["load"] == pytest.approx([2 * factor]) and "load_distance" not in data
 
 
-def test_empty_fields_blank_lines_and_names(table):
+def test_empty_fields(table):
+    """Optional fields may be empty, blank lines are passed over, names are text."""
     data = tables.read(table("tube,distance_mm,length_mm\n1,,463\n\n2,220.5,\n"), HOME)
     assert data["tube"].tolist() == [1, 2] and data.row.tolist() == [2, 4]
     assert np.isnan(data["distance"]).tolist() == [True, False]
@@ -68,14 +69,15 @@ def test_empty_fields_blank_lines_and_names(table):
         ("", ["is empty"]),
     ],
 )
-def test_every_fault_is_told_with_its_place(table, text, faults):
+def test_faults(table, text, faults):
+    """Every fault names its row and column."""
     with pytest.raises(InputError) as caught:
         tables.read(table(text), ROTATION_OFFSETS)
     for fault in faults:
         assert re.search(fault.replace("?", r"\?"), str(caught.value)), caught.value
 
 
-def test_what_is_no_table(tmp_path):
+def test_no_table(tmp_path):
     for content, message in ((b"PK\x03\x04", "is a spreadsheet"), (b"\xff\xfea", "not text"), (b"a\0b", "not text")):
         (tmp_path / "a").write_bytes(content)
         with pytest.raises(InputError, match=message):

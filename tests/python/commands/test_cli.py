@@ -1,4 +1,4 @@
-"""The commands: what they print and write, one clear error, nothing half written. The model here is a stand-in."""
+"""The commands on a model that is always straight: output and files, one clear error, nothing half written."""
 
 import inspect
 import json
@@ -11,6 +11,7 @@ import click
 import numpy as np
 import pytest
 from ctcr import cli, frames
+from ctcr.model import model
 from ctcr.robot import robot_file
 from ctcr.robot.table_ii import table_ii
 from ctcr.table import measurements
@@ -19,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
 
 
-class StandIn:
+class Straight:
     """A robot that stays straight: its tip is at (0, 0, deployed length), turned by alpha_1 about z."""
 
     def __init__(self, robot, steps=1, integrator="default"):
@@ -43,11 +44,9 @@ class StandIn:
 
 
 @pytest.fixture(autouse=True)
-def stand_in(monkeypatch):
-    model = types.ModuleType("ctcr.model.model")
-    model.Model = StandIn
-    model.status_text = lambda code: {3: "not converged"}[code]
-    monkeypatch.setitem(sys.modules, "ctcr.model.model", model)
+def straight(monkeypatch):
+    monkeypatch.setattr(model, "Model", Straight)
+    monkeypatch.setattr(model, "status_text", lambda code: {3: "not converged"}[code])
 
 
 @pytest.fixture
@@ -62,7 +61,7 @@ def run(capsys):
 
 @pytest.fixture
 def table(tmp_path):
-    """A table of 50 rows whose rows 11 and 40 the stand-in cannot solve."""
+    """A table of 50 rows whose rows 11 and 40 have no solution."""
     rng = np.random.default_rng(6)
     lines = ["t_s,run,beta1_m,beta2_m,beta3_m,alpha1_rad,alpha2_rad,alpha3_rad,fx_N,fy_N,fz_N"]
     for row in range(2, 52):
@@ -74,7 +73,8 @@ def table(tmp_path):
     return path
 
 
-def test_info_shows_the_file_the_stiffnesses_and_what_looks_wrong(run, tmp_path):
+def test_info(run, tmp_path):
+    """It shows the stiffnesses that follow from the file, and values in a wrong unit, with their field."""
     code, out, _ = run("info", ROBOT)
     assert code == 0 and "bending stiffness EI" in out and "Nothing looks wrong" in out
     doubtful = tmp_path / "robot.yaml"
@@ -90,7 +90,8 @@ def test_info_shows_the_file_the_stiffnesses_and_what_looks_wrong(run, tmp_path)
 
 @pytest.mark.parametrize("frame", ["base", "tracker"])
 @pytest.mark.parametrize("chunk", [7, 1 << 16])
-def test_predict_adds_the_pose_to_each_row(run, tmp_path, table, monkeypatch, frame, chunk):
+def test_predict(run, tmp_path, table, monkeypatch, frame, chunk):
+    """Each row is kept and gets the pose of the model in the asked frame, in chunks of any size."""
     from ctcr.commands import predict
 
     monkeypatch.setattr(predict, "CHUNK_ROWS", chunk)
@@ -100,7 +101,7 @@ def test_predict_adds_the_pose_to_each_row(run, tmp_path, table, monkeypatch, fr
     before, after = table.read_text().splitlines(), (tmp_path / "out.csv").read_text().splitlines()
     assert after[0] == before[0] + ",pred_x_m,pred_y_m,pred_z_m,pred_qw,pred_qx,pred_qy,pred_qz"
     robot, readings = robot_file.load(ROBOT), measurements.load(table, 3)
-    answer = StandIn(robot).predict(readings.beta, readings.alpha, readings.force)
+    answer = Straight(robot).predict(readings.beta, readings.alpha, readings.force)
     position, quaternion = answer.position, answer.quaternion
     if frame == "tracker":
         position, quaternion = frames.base_to_tracker(robot.tracker, position, quaternion)
@@ -113,7 +114,8 @@ def test_predict_adds_the_pose_to_each_row(run, tmp_path, table, monkeypatch, fr
             np.testing.assert_allclose([float(x) for x in added], [*position[i], *quaternion[i]], atol=1e-9)
 
 
-def test_predict_may_write_over_its_own_table_and_lists_rows_as_json(run, table):
+def test_predict_over_its_table(run, table):
+    """The table may be its own output; rows without a solution are listed as JSON."""
     code, out, err = run("predict", ROBOT, table, "-o", table, "--json", "-")
     summary = json.loads(out)
     assert code == 0 and summary["solved"] == 48 and "48 of 50" in err
@@ -125,7 +127,8 @@ JOINTS_SI = ["--beta", "-0.33,-0.24,-0.165", "--alpha", "1.5707963267948966,0,-0
 JOINTS = ["--beta-mm", "-330,-240,-165", "--alpha-deg", "90,0,-30"]
 
 
-def test_shape_tells_where_each_tube_ends_in_either_unit(run, tmp_path):
+def test_shape(run, tmp_path):
+    """The ends of the tubes and a picture, from joints in SI units or in mm and degrees."""
     answers = []
     for joints in (JOINTS_SI, JOINTS):
         code, out, err = run("shape", ROBOT, *joints, "--force", "0,0.1,0", "--json", "-", "-o", tmp_path / "robot.png")
@@ -139,7 +142,7 @@ def test_shape_tells_where_each_tube_ends_in_either_unit(run, tmp_path):
     assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
 
 
-def test_bench_counts_what_it_solved(run, monkeypatch):
+def test_bench(run, monkeypatch):
     from ctcr.commands import bench
 
     monkeypatch.setattr(bench, "ROWS", 200)
@@ -151,7 +154,8 @@ def test_bench_counts_what_it_solved(run, monkeypatch):
     assert all(90 < result["solved_percent"] < 100 and result["per_second"] > 0 for result in results)
 
 
-def test_bench_joints_are_within_reach():
+def test_bench_joints():
+    """They keep the order of the tubes."""
     from ctcr.commands import bench
 
     lengths = np.array([tube.length for tube in table_ii().tubes])
@@ -161,11 +165,13 @@ def test_bench_joints_are_within_reach():
     assert (np.diff(tips, axis=1) <= 0).all() and (tips >= 0).all()
 
 
-def test_the_built_in_robot_is_the_example():
+def test_built_in_robot():
+    """It is the one of the examples."""
     assert table_ii().tubes == robot_file.load(ROBOT).tubes
 
 
-def test_faulty_input_writes_nothing_and_tells_row_field_and_unit(run, tmp_path, table):
+def test_faulty_table(run, tmp_path, table):
+    """The error names row, column and probable unit; nothing is written."""
     lines = table.read_text().splitlines()
     fields = lines[4].split(",")
     lines[4] = ",".join([*fields[:2], "-120", *fields[3:]])
@@ -176,7 +182,8 @@ def test_faulty_input_writes_nothing_and_tells_row_field_and_unit(run, tmp_path,
     assert not (tmp_path / "out.csv").exists()
 
 
-def test_all_faults_of_a_robot_file_are_listed(run, tmp_path):
+def test_faulty_robot(run, tmp_path):
+    """All faults of the file are listed."""
     path = tmp_path / "robot.yaml"
     path.write_text(ROBOT.read_text().replace("poisson_ratio: 0.3", "poisson_ratio: x"))
     code, _, err = run("info", path)
@@ -198,12 +205,14 @@ def test_all_faults_of_a_robot_file_are_listed(run, tmp_path):
         (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "3.1,0,0"], "no shape at these joints: not converged"),
     ],
 )
-def test_an_error_is_one_clear_sentence_and_exit_code_1(run, arguments, message):
+def test_errors(run, arguments, message):
+    """One sentence and exit code 1."""
     code, out, err = run(*arguments)
     assert code == 1 and message in err and "Traceback" not in err and out == ""
 
 
-def test_an_unexpected_error_is_a_sentence_too(run, monkeypatch):
+def test_unexpected_error(run, monkeypatch):
+    """A sentence too, or with CTCR_DEBUG the traceback."""
     monkeypatch.setattr(robot_file, "load", lambda path: 1 / 0)
     code, _, err = run("info", ROBOT)
     assert code == 1 and "division by zero (ZeroDivisionError" in err and "Traceback" not in err
@@ -212,7 +221,9 @@ def test_an_unexpected_error_is_a_sentence_too(run, monkeypatch):
         cli.run(["info", str(ROBOT)])
 
 
-def test_a_missing_extension_is_told(run, monkeypatch, table, tmp_path):
+def test_missing_core(run, monkeypatch, table, tmp_path):
+    """The error says what to install."""
+
     class Absent:
         def find_spec(self, name, *_):
             if name == "ctcr.model.model":
@@ -224,7 +235,8 @@ def test_a_missing_extension_is_told(run, monkeypatch, table, tmp_path):
     assert code == 1 and "the compiled part of ctcr is missing" in err
 
 
-def test_help_names_every_command_and_loads_nothing_heavy():
+def test_help():
+    """It names every command and loads no heavy package."""
     code = "import sys; from ctcr.cli import run; run(['--help'])\n"
     code += "print([name for name in ('numpy', 'pydantic', 'rich', 'matplotlib', 'ctcr._core') if name in sys.modules])"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -11,13 +11,14 @@ from ctcr.track.runs import run_once, system_values
 from ctcr.track.scenario import shipped
 
 
-def test_a_claim_has_a_ratio_where_the_paper_is_not_zero():
+def test_claim():
     assert Claim("I", "x", 2.0, 3.0, "mm").ratio == 1.5
     assert Claim("I", "x", 0.0, 3.0, "mm").ratio is None
     assert Claim("I", "x", 2.0, 3.0, "mm", "because").row() == ["I", "x", "because", "2 mm", "3 mm", "1.5"]
 
 
-def test_random_rows_are_in_order():
+def test_random_rows():
+    """They keep the order of the tubes and the largest force."""
     random = np.random.default_rng(5)
     robot = random_design(random)
     beta, _, force = random_rows(robot, 200, random, 0.3)
@@ -26,7 +27,8 @@ def test_random_rows_are_in_order():
     assert Model(robot).predict(beta[:20], np.zeros((20, 3))).solved.all()
 
 
-def test_schemes_rank_as_in_figure_2():
+def test_schemes():
+    """RK8, RK4 and RK3 rank as in Figure 2."""
     done = []
     errors, others, seconds = model.integration_errors(3, 40, done.append)
     mean = {name: error.mean() for name, error in errors.items()}
@@ -36,7 +38,8 @@ def test_schemes_rank_as_in_figure_2():
     assert of["RK4, mean error"].ours == pytest.approx(100 * mean["RK4"])
 
 
-def test_the_reference_has_converged():
+def test_reference():
+    """The reference of Figure 2 has converged."""
     random = np.random.default_rng(6)
     robot = random_design(random)
     beta, alpha, force = random_rows(robot, 20, random, 0.3)
@@ -47,7 +50,8 @@ def test_the_reference_has_converged():
     assert np.abs(at[0] - at[1]).max() < 1e-12
 
 
-def test_what_an_unknown_weight_adds_is_inverse_to_the_feedback():
+def test_unknown_weight():
+    """Without noise its error is inverse to the feedback; with noise it is below the paper's 10 um."""
     values = system_values(paper_robot())
 
     def added(feedback: float, noise_mm: float, seeds: range) -> float:
@@ -60,11 +64,11 @@ def test_what_an_unknown_weight_adds_is_inverse_to_the_feedback():
 
     assert added(60, 0, range(1)) == pytest.approx(added(30, 0, range(1)) / 2, rel=0.01)
     own = shipped("S3").tasks.feedback_per_s
-    for first in (1, 6, 11):
-        assert added(own, 0.035, range(first, first + 5)) < 0.01
+    assert added(own, 0.035, range(1, 6)) < 0.01
 
 
-def test_scenarios_hold_what_the_text_says():
+def test_scenarios():
+    """The claims of the text hold for S1 to S4, and S5 carries 27 g."""
     runs = control.scenarios(1, lambda amount: None)
     of = {claim.what: claim for claim in control.tracking_claims(runs)}
     assert of["S1: runs that fail"].ours == 100 and of["S2: runs that fail"].ours == 0
@@ -76,7 +80,8 @@ def test_scenarios_hold_what_the_text_says():
     assert of["S5 at 30 g: runs that fail"].ours == 100 and runs.reach[25.0] == 0 and runs.reach[30.0] > 1e-3
 
 
-def test_what_is_measured_spans_its_uncertainty():
+def test_measured():
+    """Parameters that are simple to measure vary by their uncertainty."""
     varied = all_varied(paper_robot())
     known = [influence._as_measured(one) for one in varied if influence._measured(one)]
     assert len(known) == 12 and {one.high for one in known} == {1.0, 0.5, 0.3}

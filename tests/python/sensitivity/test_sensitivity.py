@@ -1,4 +1,4 @@
-"""The sensitivity study: against the model itself, on other workers, after interruptions, and what it advises."""
+"""The sensitivity study: against the model itself, on other workers, after interruptions, and its advice."""
 
 import json
 import threading
@@ -41,7 +41,8 @@ def whole(robot, varied):
     return open_loop.study(robot, varied, COUNT)
 
 
-def test_the_papers_ranges(robot, varied):
+def test_ranges(robot, varied):
+    """The paper's ranges; a parameter varies alone."""
     assert len(varied) == 3 * 8 + 6
     names, nominal = parameters.names_of(3), parameters.values(robot)
     for one in varied:
@@ -56,13 +57,14 @@ def test_the_papers_ranges(robot, varied):
     assert robot.tubes[0].outer_diameter - wall.at(1.0)[inner] == pytest.approx(1.15 * 0.22e-3)
 
 
-def test_a_shift_of_the_tracker_moves_every_tip_as_much(whole):
+def test_tracker_shift(whole):
+    """A shift of the tracker moves every tip as much."""
     for one in whole.influences:
         if one.name.startswith("tracker position"):
             assert one.mean == pytest.approx(3) and one.maximum == pytest.approx(3)
 
 
-def test_influences_agree_with_the_model(robot, varied, whole):
+def test_influence(robot, varied, whole):
     """Other random configurations, solved by the model one by one: means agree within their spread."""
     random = np.random.default_rng(3)
     beta, alpha = uniform_joints(robot, 3000, random)
@@ -97,7 +99,7 @@ def single_end(robot, varied, name):
     return open_loop.study(robot, [only], 3000).influences[0]
 
 
-def test_together_is_drawn_within_the_ranges(robot, varied):
+def test_together(robot, varied):
     low, high = together(robot, varied)
     names = parameters.names_of(3)
     spread = {name for name, a, b in zip(names, low, high, strict=True) if a < b}
@@ -105,12 +107,14 @@ def test_together_is_drawn_within_the_ranges(robot, varied):
     assert high[names.index("tracker.rotation.x")] == pytest.approx(np.radians(3))
 
 
-def test_results_do_not_depend_on_who_works(robot, varied, whole, monkeypatch):
+def test_workers(robot, varied, whole, monkeypatch):
+    """Results do not depend on the division into jobs."""
     monkeypatch.setattr(open_loop, "CHUNK", 1)
     assert open_loop.study(robot, varied, COUNT) == whole
 
 
-def test_an_interrupted_study_goes_on(robot, varied, whole, tmp_path, monkeypatch):
+def test_resume(robot, varied, whole, tmp_path, monkeypatch):
+    """An interrupted study resumes with the same result; another study is refused."""
     monkeypatch.setattr(open_loop, "CHUNK", 1)
     kept, seen = tmp_path / "kept.json", []
 
@@ -132,7 +136,8 @@ def test_an_interrupted_study_goes_on(robot, varied, whole, tmp_path, monkeypatc
         open_loop.study(robot, varied, COUNT, keep=str(kept))
 
 
-def test_what_has_not_begun_is_left_when_interrupted():
+def test_interruption():
+    """Jobs that have not begun are dropped."""
     begun, first = [], threading.Event()
 
     def work(job: int) -> int:
@@ -148,7 +153,8 @@ def test_what_has_not_begun_is_left_when_interrupted():
     assert len(begun) <= 3
 
 
-def test_memory_does_not_grow():
+def test_memory():
+    """The state is a sum: it does not grow with the configurations."""
     totals = open_loop.Totals.empty(61)
     assert sum(np.asarray(value).nbytes for value in vars(totals).values()) < 200_000
 
@@ -161,7 +167,8 @@ def scenario():
     return s
 
 
-def test_closed_loop_is_a_hundred_times_less_sensitive(robot, varied, whole, scenario):
+def test_closed_loop(robot, varied, whole, scenario):
+    """Feedback leaves less than a twentieth of the open-loop error."""
     study = closed_loop.study(robot, varied, scenario, points=3)
     for curve in study.curves:
         assert curve.maximum[1] == 0 and curve.mean[1] == 0  # the nominal robot itself
@@ -171,7 +178,8 @@ def test_closed_loop_is_a_hundred_times_less_sensitive(robot, varied, whole, sce
     assert study.cumulated_maximum == pytest.approx(sum(curve.worst_maximum for curve in study.curves))
 
 
-def test_dask_gives_the_same(robot, varied, whole, scenario):
+def test_dask(robot, varied, whole, scenario):
+    """A cluster gives the same numbers."""
     distributed = pytest.importorskip("distributed")
     few = varied[:3]
     with distributed.LocalCluster(
@@ -184,7 +192,7 @@ def test_dask_gives_the_same(robot, varied, whole, scenario):
     assert [c.maximum.tolist() for c in there.curves] == [c.maximum.tolist() for c in here.curves]
 
 
-def test_no_cluster_is_named(robot, varied):
+def test_no_cluster(robot, varied):
     pytest.importorskip("distributed")
     with pytest.raises(InputError, match="no dask scheduler answers at"):
         open_loop.study(robot, varied, 10, dask="not an address")

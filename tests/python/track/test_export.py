@@ -48,7 +48,8 @@ def messages(path):
         return found
 
 
-def test_every_row_is_there(recording, tmp_path):
+def test_rows(recording, tmp_path):
+    """Every row stands at its time in its channel."""
     target = tmp_path / "out.mcap"
     counts = write_mcap(recording.path, target)
     found = messages(target)
@@ -67,7 +68,8 @@ def test_every_row_is_there(recording, tmp_path):
         np.testing.assert_allclose(times, [values[0] for _, values in rows], atol=1e-6)
 
 
-def test_what_it_was_made_with_is_attached(recording, tmp_path):
+def test_attachments(recording, tmp_path):
+    """The files that the recording was made with are attached."""
     target = tmp_path / "out.mcap"
     done = CliRunner().invoke(cli, ["export", str(recording.path), "-o", str(target)])
     assert done.exit_code == 0 and "/reference" in done.output

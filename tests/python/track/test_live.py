@@ -1,4 +1,4 @@
-"""Control and calibration with the devices: what needs a running bench is in on_bench_live.py."""
+"""Control and calibration with devices; tests that need a running bench are in on_bench_live.py."""
 
 import io
 from contextlib import closing
@@ -74,7 +74,8 @@ class Ideal:
         self.joints += self._ratios * velocity * period
 
 
-def test_a_device_in_python_is_controlled_as_the_simulated_robot_is(robot, scenario):
+def test_python_device(robot, scenario):
+    """A device in Python is controlled as the simulated robot is."""
     scenario.noise_mm, values = 0.0, system_values(robot)
     start = [*(1e-3 * np.array(scenario.start.beta_mm)), *np.deg2rad(scenario.start.alpha_deg)]
     device = Ideal(robot, start)
@@ -85,7 +86,8 @@ def test_a_device_in_python_is_controlled_as_the_simulated_robot_is(robot, scena
 
 
 @pytest.mark.parametrize("where", ["measure", "record", "move"])
-def test_what_a_device_raises_ends_the_run(robot, scenario, where):
+def test_device_raises(robot, scenario, where):
+    """The exception of a device ends the run and reaches the caller."""
     start = [*(1e-3 * np.array(scenario.start.beta_mm)), *np.deg2rad(scenario.start.alpha_deg)]
     device = Ideal(robot, start)
 
@@ -98,8 +100,8 @@ def test_what_a_device_raises_ends_the_run(robot, scenario, where):
     assert len(device.rows) == 0
 
 
-def test_late_readings_are_held_against_where_the_tip_was(robot, scenario, tmp_path):
-    """Two runs at constant speed, exactly on their paths, read late: nothing is left but for the last of each run."""
+def test_reading_age(robot, scenario, tmp_path):
+    """Runs at constant speed, exactly on their paths but read late, have no error once the age is known."""
     age, period, speed, count = 0.036, 0.025, 0.02, 20
     t = period * np.arange(count)
     along = np.array([0.6, 0.0, 0.8])
@@ -125,7 +127,8 @@ def test_late_readings_are_held_against_where_the_tip_was(robot, scenario, tmp_p
         np.testing.assert_allclose(run.error, speed * age, rtol=1e-3)
 
 
-def test_the_limits_are_those_of_bench_and_scenario(robot, bench, scenario):
+def test_within(robot, bench, scenario):
+    """The tighter limit of bench and scenario holds, less the braking distance."""
     scenario.limits.beta_high_mm = [-250.0, -210.0, 0.0]
     scenario.limits.base_gap_mm = 56.5
     scenario.tasks.feedback_per_s = 30.0
@@ -144,8 +147,8 @@ def test_the_limits_are_those_of_bench_and_scenario(robot, bench, scenario):
 # ---- calibration
 
 
-def test_a_tube_alone_is_that_of_a_robot_whose_other_tubes_end_at_the_plate(robot):
-    """The others are straight behind the plate, and no effect between tubes acts."""
+def test_one_tube(robot):
+    """A tube alone is that of a robot whose other tubes end at the plate; effects between tubes do not act."""
     from ctcr import Model
 
     for tube in range(3):
@@ -164,7 +167,8 @@ def test_a_tube_alone_is_that_of_a_robot_whose_other_tubes_end_at_the_plate(robo
     assert one_tube(hidden, 1).effects == {"backlash_rotation": {"play": [0.2]}, "delay": {"delay": 0.02}}
 
 
-def test_tubes_stand_out_one_by_one(robot, bench):
+def test_one_by_one(robot, bench):
+    """Only one tube may stand out of the plate, on all of its way."""
     limits = bench.axis_settings(robot).limits
     one_by_one = replace(limits, one_by_one=True)
     flush = np.concatenate([-limits.length, np.zeros(3)])
@@ -176,7 +180,8 @@ def test_tubes_stand_out_one_by_one(robot, bench):
     assert "tube 1 would end 50.00 mm inside tube 2" in one_by_one.problem(two)
 
 
-def test_a_tube_that_cannot_be_retracted_is_told_before_anything_moves(robot, bench, tmp_path):
+def test_tube_not_retractable(robot, bench, tmp_path):
+    """The error comes before any motion and names the tubes."""
     bench.limits.translation_mm[0] = [-450.0, -245.0]
     desk = Desk(bench, tmp_path, None, print)
     with pytest.raises(InputError) as caught:
@@ -185,7 +190,7 @@ def test_a_tube_that_cannot_be_retracted_is_told_before_anything_moves(robot, be
     assert "tube 2 cannot stand out alone: beta1 = -463.00 mm: may be -450.00 to" in str(caught.value)
 
 
-def test_a_person_is_told_what_to_fasten_and_to_touch(monkeypatch, capfd):
+def test_person(monkeypatch, capfd):
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
     person = Person()
     person.fasten(1)
@@ -196,14 +201,15 @@ def test_a_person_is_told_what_to_fasten_and_to_touch(monkeypatch, capfd):
     assert "Touch point B (CAD 60, -40, -20 mm) with the tip of the probe" in said
 
 
-def test_a_table_of_other_angles_is_not_gone_on_with(robot, bench, tmp_path):
+def test_other_angles(robot, bench, tmp_path):
+    """A table with rows at other angles is not resumed."""
     table = tmp_path / "circles.csv"
     table.write_text(",".join(ROTATION_COLUMNS) + "\n1,180,1,0,0,0,0.03,8\n1,90,1,0,0,0,0.03,8\n")
     with pytest.raises(InputError, match="row 3: holds rows at other angles"):
         rotation_table(table, robot, Desk(bench, tmp_path, None, print), Circles(np.deg2rad(60), 8))
 
 
-def test_names_of_points_may_hold_commas(tmp_path):
+def test_names_with_commas(tmp_path):
     path = tmp_path / "points.csv"
     with closing(RowFile(path, ["point", "x_mm"])) as file:
         file.append([["hole 3, left", 1.5]])
@@ -230,7 +236,8 @@ class Seen:
         return SimpleNamespace(reading=SimpleNamespace(position=tuple(self._place(self.count))))
 
 
-def test_a_reading_waits_for_rest():
+def test_still_reading():
+    """A reading is the mean of frames at rest; a sensor that keeps moving is a fault."""
     rng = np.random.default_rng(4)
     sight = Seen(lambda k: [1e-3 * max(0, 30 - k), 0.2, -0.1] + 3e-5 * rng.standard_normal(3))
     reading = still_reading(sight, 20, 0.5e-3)
@@ -242,7 +249,8 @@ def test_a_reading_waits_for_rest():
         still_reading(Seen(lambda k: [2e-3 * (k % 2), 0, 0]), 4, 0.5e-3)
 
 
-def test_scatter_of_means_is_their_noise(robot, tmp_path):
+def test_scatter(robot, tmp_path):
+    """The jitter of means follows from their scatter."""
     table = tmp_path / "circles.csv"
     table.write_text("motor_angle_deg,x_mm,y_mm,z_mm,scatter_mm,readings\n0,0,0,0,0.03,9\n5,0,0,0,0.05,25\n")
     noise = tracker_noise(robot, tables.read(table, ROTATION_OFFSETS))

@@ -1,4 +1,4 @@
-"""Scenarios in closed loop: what the paper says of S1 to S5, and what is told of files that cannot be run."""
+"""Scenarios in closed loop: the claims of the paper about S1 to S4, S5 beyond them, and faults of scenario files."""
 
 import json
 from pathlib import Path
@@ -37,13 +37,15 @@ def outcome(robot, name: str, mass: float, **changes) -> dict:
     return figures(run_all(load(name, load={"mass_g": [mass]}, **changes), robot, robot))
 
 
-def test_without_limit_avoidance_the_limits_stop_it(robot):
+def test_limit_avoidance(robot):
+    """Without it (S1) the limits stop the robot; with all tasks (S2) no limit is met."""
     alone, all_tasks = outcome(robot, "S1", 0.0), outcome(robot, "S2", 0.0)
     assert alone["failed"] == alone["runs"] and "base of tube 1 against that of tube 2" in alone["verdict"]
     assert all_tasks["failed"] == 0 and all_tasks["held_periods"] == 0 and all_tasks["verdict"] == "done"
 
 
-def test_errors_are_at_most_the_papers(robot):
+def test_paper_errors(robot):
+    """With 20 g the errors are at most those of the paper."""
     free = outcome(robot, "S2", 0.0)
     for name in ("S3", "S4"):
         loaded = outcome(robot, name, 20.0)
@@ -55,7 +57,8 @@ def test_errors_are_at_most_the_papers(robot):
 
 
 @pytest.mark.parametrize("name", ["S3", "S4"])
-def test_above_20_g_the_failure_is_named(robot, name):
+def test_above_20_g(robot, name):
+    """The paper's scheme fails at a limit, which the verdict names."""
     found = outcome(robot, name, 25.0)
     assert found["failed"] == found["runs"]
     assert "base of tube 1 against that of tube 2" in found["verdict"] and "off by up to" in found["verdict"]
@@ -63,12 +66,14 @@ def test_above_20_g_the_failure_is_named(robot, name):
 
 
 @pytest.mark.parametrize("mass", [25.0, 27.0])
-def test_estimated_force_redundancy_and_posture_go_on(robot, mass):
+def test_s5(robot, mass):
+    """With estimated force, redundancy and posture 27 g are carried."""
     found = outcome(robot, "S5", mass)
     assert found["failed"] == 0 and found["max_mm"] < 0.8 and found["held_periods"] > 0
 
 
-def test_above_27_g_no_posture_reaches_the_cube(robot):
+def test_above_27_g(robot):
+    """No posture within the limits reaches the whole cube, so that no controller can."""
     found = outcome(robot, "S5", 30.0)
     assert found["failed"] == found["runs"]
     least = 1e3 * least_distance(robot, load("S5"), 30.0, starts=6)
@@ -78,7 +83,8 @@ def test_above_27_g_no_posture_reaches_the_cube(robot):
     assert 1e3 * least_distance(robot, wide, 30.0, starts=6) < least
 
 
-def test_postures_are_drawn_within_the_limits(robot):
+def test_room(robot):
+    """Random postures keep all limits."""
     limits = load(
         "S5", limits={"beta_low_mm": [-320.0, -230.0, -150.0], "beta_high_mm": [-100.0, -180.0, -60.0]}
     ).limits
@@ -90,13 +96,14 @@ def test_postures_are_drawn_within_the_limits(robot):
     assert not room.holds(np.array([-0.3, -0.25, -0.145, 0, 0, 0]))
 
 
-def test_the_force_is_estimated(robot):
+def test_force_estimate(robot):
     run = run_once(load("S5"), system_values(robot), system_values(robot), 15.0)
     across = run.force[-1000:].mean(axis=0)[:2]  # along the robot it is stiff: that component is not observed
     assert np.linalg.norm(across - [0, -15 * 9.80665e-3]) < 0.012
 
 
-def test_limits_hold_and_repetitions_differ_only_in_noise(robot):
+def test_limits_hold(robot):
+    """Limits are hard, and repetitions differ by their noise alone."""
     s = load("S3", load={"mass_g": [30.0]})
     first, again, other = (run_once(s, system_values(robot), system_values(robot), 30.0, seed) for seed in (1, 1, 2))
     assert np.array_equal(first.tip, again.tip) and not np.array_equal(first.tip, other.tip)
@@ -106,7 +113,8 @@ def test_limits_hold_and_repetitions_differ_only_in_noise(robot):
     assert (-np.diff(np.hstack([tips, np.zeros((len(beta), 1))]), axis=1) >= 2 - 1e-6).all()
 
 
-def test_the_cube_visits_all_edges():
+def test_cube():
+    """The tour visits all twelve edges."""
     tour = scenario_file.CUBE_TOUR
     edges = {frozenset(pair) for pair in zip(tour, tour[1:], strict=False)}
     assert len(edges) == 12 and all(bin(a ^ b).count("1") == 1 for a, b in map(tuple, edges))
@@ -114,7 +122,8 @@ def test_the_cube_visits_all_edges():
     assert np.allclose(np.linalg.norm(np.diff(path, axis=0), axis=1), 0.03)
 
 
-def test_another_plant_is_followed_too(robot):
+def test_other_plant(robot):
+    """The path is followed with 10 % more curvature than the controller knows."""
     plant = robot.model_copy(deep=True)
     plant.tubes[0].curvature_per_m *= 1.1
     s = load("S2")
@@ -146,7 +155,8 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("old", "new", "told"), FAULTS)
-def test_faults_are_named(old, new, told):
+def test_faults(old, new, told):
+    """A fault names its field and the remedy."""
     text = BASE.replace(old, new)
     assert text != BASE
     with pytest.raises(InputError) as caught:
@@ -156,7 +166,8 @@ def test_faults_are_named(old, new, told):
     assert "file.yaml" in str(caught.value)
 
 
-def test_all_faults_at_once_with_their_lines():
+def test_all_faults():
+    """All faults at once, with their lines."""
     text = BASE.replace("speed_mm_s: 5\n", "speed_mm_s: 0\n").replace("radius_mm: 5", "radius_mm: no")
     with pytest.raises(InputError) as caught:
         scenario_file.parse(text, "s.yaml", 3)
@@ -165,13 +176,14 @@ def test_all_faults_at_once_with_their_lines():
     ]
 
 
-def test_limits_that_exclude_the_start_are_named(robot):
+def test_start_outside_limits(robot):
     told = r"S2.yaml, line \d+, start.beta_mm: .*base of tube 2 against that of tube 3: 75.5 mm, but .* 76 mm"
     with pytest.raises(InputError, match=told):
         run_all(load("S2", limits={"base_gap_mm": 76.0}), robot, robot)
 
 
-def test_a_start_out_of_reach_is_named(robot):
+def test_start_out_of_reach(robot):
+    """The error says why the start is not reached: distance, obstacle or noise."""
     with pytest.raises(
         InputError,
         match=r"S2.yaml, line \d+, trajectory: the start of the path is not reached, the tip stays .* mm away",
@@ -185,13 +197,14 @@ def test_a_start_out_of_reach_is_named(robot):
         run_all(noisy, robot, robot)
 
 
-def test_a_path_out_of_reach_fails_in_words(robot):
+def test_path_out_of_reach(robot):
     far = {"kind": "polyline", "points_mm": [[-18.0, 9.0, 170.0], [-18.0, 150.0, 170.0]], "speed_mm_s": 20.0}
     found = figures(run_all(load("S2", trajectory=far), robot, robot))
     assert found["failed"] == found["runs"] and "off by up to" in found["verdict"]
 
 
-def test_a_robot_of_other_size_and_a_sensor_elsewhere_are_named(robot):
+def test_other_robot(robot):
+    """Robots of another size and sensors on another tube are refused."""
     two = robot.model_copy(deep=True)
     two.tubes = two.tubes[:2]
     with pytest.raises(InputError, match="the plant has 2 tubes"):
@@ -205,6 +218,7 @@ def test_a_robot_of_other_size_and_a_sensor_elsewhere_are_named(robot):
 def test_command(tmp_path):
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
     text = BASE.replace("repetitions: 10", "repetitions: 1").replace("mass_g: [0]", "mass_g: [0, 10]")
+    text = text.replace("side_mm: 30", "side_mm: 3")
     (tmp_path / "s.yaml").write_text(text)
     asked = ["track", str(ROBOT), str(tmp_path / "s.yaml"), "--report", str(page), "--json", str(numbers)]
     done = CliRunner().invoke(cli, asked)

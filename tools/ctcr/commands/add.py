@@ -22,11 +22,12 @@ from ctcr.commands import options
 @options.new_robot
 @options.json
 def command(robot, names, diagnosis, measurements, given, free, target, in_place, out) -> None:
-    """Add physical effects to the file ROBOT, so that every command uses them. `ctcr effects` lists them.
+    """Add physical effects to a robot file.
 
-    With --fit the effects are fitted together with the parameters of --free. Every fourth run is held out and judges
-    the error; the values written come from a fit to all runs. Without --fit the effects take the values of --set, and
-    otherwise their neutral ones, which change nothing. The history of the file keeps the old values.
+    Every command then uses them; `ctcr effects` lists them. With --fit the effects are fitted together with the
+    parameters of --free. Every fourth run is held out and judges the error; the values written come from a fit to
+    all runs. Without --fit the effects take the values of --set, and otherwise their neutral ones, which change
+    nothing. The history of the file keeps the old values.
 
     Example: ctcr add robot.yaml friction --fit measurements.csv -o new.yaml
     """

@@ -15,10 +15,11 @@ REPEATS = 5
 @click.argument("robot", required=False)
 @options.json
 def command(robot: str | None, out) -> None:
-    """Time the model on random joints of ROBOT (default: the robot of the paper's Table II).
+    """Time the model on random joints.
 
-    The times hold for this machine at this moment: absolute times mean nothing across machines. The benchmark of the
-    library itself, with instruction counts and the rival, is `tools/dev bench`.
+    ROBOT is by default the robot of the paper's Table II. The times hold for this machine at this moment: absolute
+    times mean nothing across machines. The benchmark of the library itself, with instruction counts and the rival,
+    is `tools/dev bench`.
 
     Example: ctcr bench robot.yaml
     """

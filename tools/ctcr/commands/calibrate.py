@@ -7,11 +7,12 @@ from ctcr.commands import options
 
 @click.group(name="calibrate")
 def command() -> None:
-    """Calibrate a robot: measure its parts one by one, or fit named parameters to measured poses.
+    """Measure parts of a robot, or fit parameters to poses.
 
-    Every value comes with its standard deviation. With -o (or --in-place) the values go into a robot file, which keeps
-    the old ones, their source and the date under `history`. Columns of the tables carry their unit in the name and may
-    come in another one of the same kind: x_mm or x_m, motor_angle_deg, _rad or _rev, load_N, _mN or _g.
+    Every value comes with its standard deviation. With -o (or --in-place) the values go into a robot file, which
+    keeps the old ones, their source and the date under `history`. Columns of the tables carry their unit in the
+    name and may come in another one of the same kind: x_mm or x_m, motor_angle_deg, _rad or _rev, load_N, _mN or
+    _g.
     """
 
 

@@ -12,10 +12,11 @@ from ctcr.commands import options
 @options.steps
 @options.effects
 def command(robot: str, measurements: str, steps: int, out) -> None:
-    """Compare the poses that the model of ROBOT predicts with those measured in MEASUREMENTS.
+    """Compare predicted poses with measured ones.
 
-    Shows the size of the error beside the noise, the hysteresis (difference between visits of the same joints from
-    opposite directions), and which of joints, load and time the error depends on.
+    The model of ROBOT predicts the poses of MEASUREMENTS. Shows the size of the error beside the noise, the
+    hysteresis (difference between visits of the same joints from opposite directions), and which of joints, load
+    and time the error depends on.
 
     Example: ctcr compare robot.yaml measurements.csv --report error.html
     """

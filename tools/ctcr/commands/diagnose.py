@@ -12,11 +12,12 @@ from ctcr.commands import options
 @options.effects
 @options.threads
 def command(robot: str, measurements: str, threads: int, out) -> None:
-    """Find out which physical effect the model of ROBOT lacks to explain the poses in MEASUREMENTS.
+    """Find the physical effect that a model lacks.
 
-    Calibrates first. Then fits every effect of the catalogue (`ctcr effects`) together with the calibration, accepts
-    one at a time, and checks the result on held-out runs. The verdict also says when nothing is missing, when the data
-    cannot tell effects apart, and when no effect of the catalogue explains the error.
+    Calibrates ROBOT to the poses in MEASUREMENTS first. Then fits every effect of the catalogue (`ctcr effects`)
+    together with the calibration, accepts one at a time, and checks the result on held-out runs. The verdict also
+    says when nothing is missing, when the data cannot tell effects apart, and when no effect of the catalogue
+    explains the error.
 
     Example: ctcr diagnose robot.yaml measurements.csv --json diagnosis.json --report diagnosis.html
     """

@@ -19,10 +19,11 @@ _NEEDS = {
 @options.setting("--tubes", click.IntRange(1, 4), 3, "Tubes of the robot, for full names.")
 @options.json
 def command(name: str | None, tubes: int, out) -> None:
-    """List the physical effects that a robot may have beyond the standard model, or describe the effect NAME.
+    """List the physical effects, or describe one.
 
-    The description says how the effect shows in measurements, what to measure to see it, and its parameters with their
-    units, standard deviations and bounds.
+    These are effects that a robot may have beyond the standard model. The description of the effect NAME says how
+    the effect shows in measurements, what to measure to see it, and its parameters with their units, standard
+    deviations and bounds.
 
     Example: ctcr effects friction
     """

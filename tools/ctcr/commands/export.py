@@ -9,10 +9,11 @@ from ctcr.commands import options
 @click.argument("folder")
 @click.option("-o", "--output", "target", required=True, metavar="FILE.mcap", help="The file to write.")
 def command(folder, target) -> None:
-    """Write the recording in FOLDER, which ctcr record or ctcr track --live made, as MCAP.
+    """Write a recording as MCAP.
 
-    The channels /joints, /measurements and, for a controlled robot, /reference hold one JSON message a row, with the
-    columns of the recording; the names of the columns carry their units. Needs the package mcap.
+    FOLDER holds a recording of ctcr record or ctcr track --live. The channels /joints, /measurements and, for a
+    controlled robot, /reference hold one JSON message a row, with the columns of the recording; the names of the
+    columns carry their units. Needs the package mcap.
 
     Example: ctcr export recording -o recording.mcap
     """

@@ -10,9 +10,10 @@ from ctcr.commands import options
 @options.effects
 @options.outputs
 def command(robot: str, out) -> None:
-    """Show the ledger of the file ROBOT: each calibration and added effect, with date, data and error.
+    """Show the ledger of a robot file.
 
-    Errors are those on held-out runs where there were any, in mm RMS.
+    It holds each calibration and added effect, with date, data and error. Errors are those on held-out runs where
+    there were any, in mm RMS.
 
     Example: ctcr history robot.yaml --report history.html
     """

@@ -11,7 +11,9 @@ from ctcr.commands import options
 @options.robot
 @options.json
 def command(robot: str, out) -> None:
-    """Show the values of the file ROBOT, the stiffnesses that follow from them, and what looks wrong.
+    """Show the values of a robot file.
+
+    With the stiffnesses that follow from them, and values that look wrong.
 
     Example: ctcr info robot.yaml
     """

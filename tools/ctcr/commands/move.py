@@ -15,9 +15,10 @@ from ctcr.commands import options
 @options.setting("--speed", click.FloatRange(0.01, 1.0), 0.5, "Fraction of the highest speed.")
 @options.folder
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
-    """Move the joints of ROBOT in a straight line of joint space; those not given stay.
+    """Move the joints of a robot.
 
-    Limits and the order of the tubes are checked before and during every move. Ctrl+C stops it.
+    They move in a straight line of joint space; those not given stay. Limits and the order of the tubes are checked
+    before and during every move. Ctrl+C stops it.
     """
     import numpy as np
 

@@ -15,11 +15,12 @@ from ctcr.commands import options
 @options.effects
 @options.threads
 def command(robot, measurements, runs, masses, target, threads, out) -> None:
-    """Propose the runs that best discriminate between the effects that MEASUREMENTS leave open about ROBOT.
+    """Propose the runs to measure next.
 
-    Diagnoses first. Each run goes out and back through the same stops under one load, within the range of the joints
-    measured so far; the runs with the largest expected log evidence come first. Says so when nothing is open, and when
-    no run can decide.
+    They discriminate best between the effects that MEASUREMENTS leave open about ROBOT. Diagnoses first. Each run
+    goes out and back through the same stops under one load, within the range of the joints measured so far; the
+    runs with the largest expected log evidence come first. Says so when nothing is open, and when no run can
+    decide.
 
     Example: ctcr next robot.yaml measurements.csv --runs 4 --masses 0,20 -o plan.csv
     """

@@ -24,10 +24,11 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
 @options.json
 @options.effects
 def command(robot: str, table: str, target: str, frame: str, steps: int, out) -> None:
-    """Add the pose that the model of ROBOT predicts to each row of TABLE, a table of joints and forces.
+    """Add predicted poses to a table.
 
-    The new columns are pred_x_m, pred_y_m, pred_z_m and the unit quaternion pred_qw, pred_qx, pred_qy, pred_qz of the
-    tube that carries the sensor, with the effects that ROBOT has. Rows without a solution stay empty and are listed.
+    Each row of TABLE, with joints and forces, gets the pose that the model of ROBOT predicts. The new columns are
+    pred_x_m, pred_y_m, pred_z_m and the unit quaternion pred_qw, pred_qx, pred_qy, pred_qz of the tube that carries
+    the sensor, with the effects that ROBOT has. Rows without a solution stay empty and are listed.
 
     Example: ctcr predict robot.yaml measurements.csv -o predicted.csv
     """

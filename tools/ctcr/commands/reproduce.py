@@ -12,9 +12,10 @@ from ctcr.commands import options
 )
 @options.json
 def command(quick: bool, target: str, out) -> None:
-    """Compute Tables I and II, Figures 2 to 6 and the claims of Boyer et al. 2024, and write them as one page.
+    """Compute the paper's results beside ours.
 
-    Each value stands beside the paper's, with their ratio and, where they differ, the reason.
+    Tables I and II, Figures 2 to 6 and the claims of Boyer et al., RA-L 2024, as one page. Each value stands beside
+    the paper's, with their ratio and, where they differ, the reason.
 
     Example: ctcr reproduce --quick --report page.html
     """

@@ -19,10 +19,11 @@ from ctcr.commands import options
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a dask.distributed cluster that does the work.")
 @options.outputs
 def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume, dask, out) -> None:
-    """Vary each parameter of ROBOT over the paper's range, one at a time and together.
+    """Find out which parameters matter.
 
-    Open loop: how far predicted tips move. Closed loop: how much the tracking error grows when the controller's
-    parameters are wrong. Ends with the fewest parameters that need calibration for the wanted accuracy.
+    Each parameter of ROBOT is varied over the paper's range, one at a time and together. Open loop: how far
+    predicted tips move. Closed loop: how much the tracking error grows when the controller's parameters are wrong.
+    Ends with the fewest parameters that need calibration for the wanted accuracy.
 
     Example: ctcr sensitivity robot.yaml --open-loop 10000 --accuracy 0.5
     """

@@ -30,10 +30,11 @@ class Numbers(click.ParamType):
 @options.steps
 @options.json
 def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) -> None:
-    """Solve ROBOT at one set of joints, one value a tube: shape, pose of the tip, and how near it is to snapping.
+    """Solve the shape of a robot at given joints.
 
-    The JSON holds samples of the backbone [m] in the base frame. Effects that depend on how the joints were reached
-    are left out.
+    The joints are one value a tube. Shows the pose of the tip, the ends of the tubes and the stability. The JSON
+    holds samples of the backbone [m] in the base frame. Effects that depend on how the joints were reached are left
+    out.
 
     Example: ctcr shape robot.yaml --beta-mm -330,-240,-165 --alpha-deg 50,-40,-60 -o robot.png
     """

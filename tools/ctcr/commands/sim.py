@@ -18,9 +18,10 @@ def robot_options(function):
 
 @click.group(name="sim")
 def command() -> None:
-    """Simulated devices: a tracker on a serial line, stepper motors on EtherCAT, and the robot between them.
+    """Simulate the devices of a bench.
 
-    They speak the devices' own protocols, so that programs take them for the real ones.
+    A tracker on a serial line, stepper motors on EtherCAT, and the robot between them. They speak the devices' own
+    protocols, so that programs take them for the real ones.
     """
 
 

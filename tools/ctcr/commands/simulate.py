@@ -14,10 +14,11 @@ from ctcr.commands import options
 @options.effects
 @click.option("-o", "--output", "target", required=True, metavar="MEASUREMENTS", help="The table to write.")
 def command(robot, plan, hidden, noise, seed, target) -> None:
-    """Write the poses that the tracker would read if ROBOT moved through the joints of PLAN, in their order.
+    """Simulate the measurements of a plan.
 
-    PLAN is a table with the columns of a table of measurements (beta1_m, alpha1_rad, fx_N, ...); it needs no poses.
-    The readings come from the same model that later explains them. They serve to plan measurements and to learn the
+    Writes the poses that the tracker would read if ROBOT moved through the joints of PLAN, in their order. PLAN is
+    a table with the columns of a table of measurements (beta1_m, alpha1_rad, fx_N, ...); it needs no poses. The
+    readings come from the same model that later explains them. They serve to plan measurements and to learn the
     tools, and cannot show that the model is right.
 
     Example: ctcr simulate robot.yaml plan.csv --hide friction.coefficient=0.02 -o measurements.csv

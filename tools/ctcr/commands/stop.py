@@ -9,9 +9,10 @@ from ctcr.commands import options
 @click.option("--release", is_flag=True, help="Release the stop, after its cause has been mended.")
 @options.folder
 def command(release: bool, folder: str | None) -> None:
-    """Stop all motors of the bench at once; they stay stopped until `ctcr stop --release`.
+    """Stop all motors of the bench at once.
 
-    This stops by software. The switch that cuts the motors' power is the emergency stop of the bench.
+    They stay stopped until `ctcr stop --release`. This stops by software. The switch that cuts the motors' power is
+    the emergency stop of the bench.
     """
     from ctcr.bench.devices import emergency_stop
     from ctcr.bench.shared.folder import private_folder

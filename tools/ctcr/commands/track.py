@@ -17,14 +17,15 @@ from ctcr.commands import options
 @options.folder
 @options.outputs
 def command(robot, scenario, plant, live, bench_path, target, patience, most_error_mm, folder, out) -> None:
-    """Let a controller that knows ROBOT follow the path of SCENARIO, on a simulated robot or on the bench.
+    """Follow a path in closed loop.
 
-    SCENARIO is a YAML file with the path, the tasks, the limits, an obstacle and the weights at the tip. The paper's
-    are examples/data/scenarios/S1.yaml to S4.yaml; S5.yaml goes beyond them. The result is the tracking error in mm for
+    A controller that knows ROBOT follows the path of SCENARIO, on a simulated robot or on the bench. SCENARIO is a
+    YAML file with the path, the tasks, the limits, an obstacle and the weights at the tip. The paper's are
+    examples/data/scenarios/S1.yaml to S4.yaml; S5.yaml goes beyond them. The result is the tracking error in mm for
     each weight, and which limit or task caused a failure.
 
-    With --live the tracker sets the pace. You are asked to hang each weight, and every reading is on the disk at once;
-    the same command resumes an interrupted recording after its last whole run.
+    With --live the tracker sets the pace. You are asked to hang each weight, and every reading is on the disk at
+    once; the same command resumes an interrupted recording after its last whole run.
 
     Example: ctcr track robot.yaml examples/data/scenarios/S3.yaml --report tracking.html
     """
