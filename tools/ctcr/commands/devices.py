@@ -10,7 +10,12 @@ from ctcr.commands import options
 @options.folder
 @options.json
 def command(bench_path: str, folder: str | None, out) -> int:
-    """Show which devices of a bench answer, their versions and their faults. Nothing moves."""
+    """Show the devices of a bench.
+
+    Which of them answer, their versions and their faults. Nothing moves.
+
+    Example: ctcr devices --bench bench.yaml
+    """
     from ctcr.bench.devices import bench_file, emergency_stop
     from ctcr.bench.devices.health import health_of
     from ctcr.bench.shared.folder import private_folder

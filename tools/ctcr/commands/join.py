@@ -10,10 +10,11 @@ from ctcr.commands import options
 @click.argument("tables", nargs=-1, required=True, metavar="MEASUREMENTS...")
 @click.option("-o", "--output", "target", required=True, metavar="TABLE", help="The table to write.")
 def command(robot, tables, target) -> None:
-    """Join MEASUREMENTS of ROBOT, in the order in which they were recorded, to one table.
+    """Join the tables of one session.
 
-    For recordings between which the joints stayed where they were, such as a first one and the one that `ctcr next`
-    proposed. Runs are numbered on; times follow from the recordings' session.json.
+    MEASUREMENTS of ROBOT, in the order in which they were recorded, become one table. For recordings between which
+    the joints stayed where they were, such as a first one and the one that `ctcr next` proposed. Runs are numbered
+    on; times follow from the recordings' session.json.
     """
     from ctcr.bench.record.joined import joined, start_of
     from ctcr.model import simulation

@@ -29,10 +29,11 @@ from ctcr.commands import options
 @options.folder
 @options.json
 def command(robot, plan, target, bench_path, dwell, readings, speed, patience, page, folder, out, **approach) -> None:
-    """Measure the rows of PLAN with ROBOT on the bench, in their order, into FOLDER/measurements.csv.
+    """Measure the rows of a plan on the bench.
 
-    Every row is on the disk as soon as it is measured; the same command resumes an interrupted recording. Where the
-    force changes from one row to the next, you are asked to hang the weight. Home the joints first: `ctcr move --home`.
+    ROBOT moves through PLAN in its order, and FOLDER/measurements.csv holds the readings. Every row is on the disk
+    as soon as it is measured; the same command resumes an interrupted recording. Where the force changes from one
+    row to the next, you are asked to hang the weight. Home the joints first: `ctcr move --home`.
     """
     from contextlib import nullcontext
     from dataclasses import asdict
