@@ -10,7 +10,7 @@ namespace ctcr {
 namespace detail {
 
 /// The derivatives of one reading. In the lanes stand first the unknowns of the equations, then the parameters that move
-/// the tip, a force at the robot tip, and the parameters that change the reading alone, which need no integration.
+/// the tip, force and moment at the robot tip, and the parameters that change the reading alone, which need no integration.
 template <int N, class Fx>
 class RecordedSlopes {
   using P = SystemParameters<N, Fx>;
@@ -19,8 +19,8 @@ class RecordedSlopes {
   using Pass = EffectPass<N, Fx, Window::groups>;
   using S = Window::S;
   using On = typename Fx::template On<N>;
-  static constexpr int unknowns = Pass::unknowns;
-  static constexpr int groups = Window::groups_for(unknowns + P::count + 3);
+  static constexpr int unknowns = Pass::unknowns, loads = 6;
+  static constexpr int groups = Window::groups_for(unknowns + P::count + loads);
 
 public:
   RecordedSlopes(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
@@ -34,24 +34,29 @@ public:
       equations_ = equations_ || reach == Reach::equations;
       if (reach != Reach::reading) variables_.put(force_++, int(j), v);
     }
-    lanes_ = force_ + 3;
+    lanes_ = force_ + loads;
     for (std::size_t j = 0; j < variables.size(); ++j)
       if (variables_.lane(variables[j]) < 0) variables_.put(lanes_++, int(j), variables[j]);
     for (auto& r : rows_)
       for (auto& x : r.x) x = Lanes{};
   }
 
-  /// @param out  6 x variables, zero
-  Status write(Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) noexcept {
+  /// @param out         6 x variables, zero
+  /// @param compliance  of the tube's tip, base frame; or null
+  Status write(Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out, Mat6* compliance) noexcept {
     const bool pushed = find_push();
     if (pushed || equations_)
-      integrate(pushed);
-    else if (const Status status = take_standard(); !has_equilibrium(status))
+      integrate(compliance ? loads : pushed ? 3 : 0);
+    else if (const Status status = take_standard(compliance); !has_equilibrium(status))
       return status;
-    if (pushed) add_push();
+    if (pushed) add_push(compliance ? force_ + loads : force_);
+    if (compliance && (pushed || equations_))
+      for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < loads; ++j) (*compliance)(i, j) = rows_[unknowns + i][force_ + j];
     read(out);
-    if (out.allFinite()) return prediction_.solution.status;
+    if (out.allFinite() && (!compliance || compliance->allFinite())) return prediction_.solution.status;
     out.setZero();
+    if (compliance) compliance->setZero();
     return Status::not_finite;
   }
 
@@ -88,14 +93,17 @@ private:
     return pushed;
   }
 
-  /// The tip by everything, from the equations with their effects.
-  void integrate(bool pushed) noexcept {
+  /// The tip by everything, and by the first components of force and moment, from the equations with their effects.
+  void integrate(int components) noexcept {
     const Events<N> events = sort_events(with_all_curves(model().robot()), prediction_.q.beta);
-    const int count = force_ + (pushed ? 3 : 0);
+    const int count = force_ + components;
     for (Window window; window.first < count; window.first += window.size) {
       auto in = rod_inputs<S>(system_, row_, prediction_.load, variables_.seeding(window), actuating(window));
       in.effects = effects<typename Fx::OnRod>(window);
-      for (int i = 0; pushed && i < 3; ++i) window.add(in.force[std::size_t(i)], force_ + i, 1);
+      for (int i = 0; i < components; ++i) {
+        const auto k = std::size_t(i % 3);
+        window.add(i < 3 ? in.force[k] : in.moment[k], force_ + i, 1);
+      }
       Pass(in, events, ws_.guess, system_.sensor.tube, system_.settings.steps, window)
           .write(rows_, window.first / lane_count);
     }
@@ -104,9 +112,12 @@ private:
   }
 
   /// The tip by the joints that the tubes have and by the tubes, as the faster way of the standard model gives them.
-  Status take_standard() noexcept {
+  Status take_standard(Mat6* compliance) noexcept {
     TipDerivatives<N> tip;
-    const Status status = differentiate_tip(Model<N>(model().robot()), ws_, system_.sensor.tube, tip, system_.settings);
+    const Model<N> standard(model().robot());
+    const Status status =
+        compliance ? differentiate_tip(standard, ws_, system_.sensor.tube, tip, *compliance, system_.settings)
+                   : differentiate_tip(standard, ws_, system_.sensor.tube, tip, system_.settings);
     for (const int v : asked_)
       if (v < V::robot_count)
         for (int k = 0; k < 6; ++k) rows_[unknowns + k].add(variables_.lane(v), tip.by_parameters(k, v));
@@ -124,7 +135,7 @@ private:
   }
 
   /// What the tip's own motion changes of the push: df = push dv + slope dp and dp = A dv + C df, p the robot tip.
-  void add_push() noexcept {
+  void add_push(int end) noexcept {
     if constexpr (On::has_environment) {
       using Slope = Dual<1>;
       const Vec3& p = prediction_.solution.position;
@@ -139,10 +150,11 @@ private:
         for (int i = 0; i < 3; ++i) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
       }
       const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - slope * C);
-      for (int j = unknowns; j < force_; ++j) {
-        Vec3 A, direct;
+      for (int j = unknowns; j < end; ++j) {
+        Vec3 A, direct = Vec3::Zero();
         for (int i = 0; i < 3; ++i) {
           A[i] = rows_[Pass::rows + i][j];
+          if (j >= force_) continue;
           const int l = j % Window::size;
           direct[i] = push_[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
         }
@@ -201,7 +213,7 @@ private:
   PastSlopesOfRow past_;
   std::span<const int> asked_;
   Variables<N, Fx> variables_;
-  int force_ = unknowns, lanes_ = 0;  ///< lane of the force; end of all
+  int force_ = unknowns, lanes_ = 0;  ///< lane of force and moment; end of all
   bool equations_ = false;            ///< whether effects change the equations
   LaneRow<groups> rows_[Pass::rows + (On::has_environment ? 3 : 0)];
   std::array<std::array<S, 3>, groups / Window::groups> push_;
@@ -214,17 +226,19 @@ private:
 /// @param variables  places in SystemParameters<N, Fx>, each once
 /// @param out        6 x variables.size()
 /// @param past       slopes of what the row's memory holds, by the variables; none: it is held
-/// @return as predict(); where that failed `out` is zero. Real time: yes, one integration for sixteen variables.
+/// @param compliance derivatives of the tube's tip by force [N] and moment [N m] at the robot tip, base frame; or null
+/// @return as predict(); where that failed the derivatives are zero. Real time: yes, one integration for sixteen variables.
 template <int N, class Fx>
   requires(!Fx::none)
 CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                                    const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
                                    Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out,
-                                   const PastSlopesOfRow& past = {}) noexcept {
+                                   const PastSlopesOfRow& past = {}, Mat6* compliance = nullptr) noexcept {
   out.setZero();
+  if (compliance) compliance->setZero();
   const Status status = prediction.solution.status;
   if (!has_equilibrium(status)) return status;
-  return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables, past).write(out);
+  return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables, past).write(out, compliance);
 }
 
 /// As above without effects, by the faster way of predict.hpp.

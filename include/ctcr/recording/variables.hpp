@@ -71,7 +71,7 @@ public:
   }
 
 private:
-  static constexpr int lanes = count + N + 5 + Contacts<N>::count;  // unknowns, a force and contacts may have some, too
+  static constexpr int lanes = count + N + 8 + Contacts<N>::count;  // unknowns, a load and contacts may have some, too
   std::array<int, std::size_t(count)> lane_;
   std::array<int, std::size_t(lanes)> variable_;
   int size_ = 0;

@@ -3,6 +3,7 @@
 // (derivatives, calibration, the Python module) takes its name, unit and place in a vector from here.
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 
 #include "ctcr/robot/tube.hpp"
@@ -36,20 +37,22 @@ struct ParameterKind {
   std::string_view unit;           ///< SI; empty: a pure number
   double low, high;                ///< plausible magnitude, in that unit
   double Tube::* field = nullptr;  ///< where a Tube keeps it
+  double lowest = -std::numeric_limits<double>::infinity(),
+         highest = std::numeric_limits<double>::infinity();  ///< possible
 };
 
 /// The tracker frame is T_ref, from base to tracker coordinates. Its rotation is a turn about the tracker's axes that
 /// leaves the base frame's origin where it is: T_ref becomes {exp(turn) R, p}.
 inline constexpr std::array<ParameterKind, 17> parameter_kinds{{
-    {"tubes.#.youngs_modulus", "Pa", 1e9, 250e9, &Tube::youngs_modulus},
-    {"tubes.#.poisson_ratio", "", 0.2, 0.5, &Tube::poisson_ratio},
-    {"tubes.#.density", "kg/m^3", 800, 20000, &Tube::density},
+    {"tubes.#.youngs_modulus", "Pa", 1e9, 250e9, &Tube::youngs_modulus, 0},
+    {"tubes.#.poisson_ratio", "", 0.2, 0.5, &Tube::poisson_ratio, -0.9, 0.5},
+    {"tubes.#.density", "kg/m^3", 800, 20000, &Tube::density, 0},
     {"tubes.#.inner_diameter", "m", 0.05e-3, 20e-3, &Tube::inner_diameter},
-    {"tubes.#.outer_diameter", "m", 0.1e-3, 20e-3, &Tube::outer_diameter},
-    {"tubes.#.length", "m", 5e-3, 2, &Tube::length},
-    {"tubes.#.curved_length", "m", 1e-3, 1, &Tube::curved_length},
+    {"tubes.#.outer_diameter", "m", 0.1e-3, 20e-3, &Tube::outer_diameter, 0},
+    {"tubes.#.length", "m", 5e-3, 2, &Tube::length, 0},
+    {"tubes.#.curved_length", "m", 1e-3, 1, &Tube::curved_length, 0},
     {"tubes.#.curvature", "1/m", 0.1, 200, &Tube::curvature},
-    {"tubes.#.bending_stiffness", "N m^2", 1e-5, 10, &Tube::bending_stiffness},
+    {"tubes.#.bending_stiffness", "N m^2", 1e-5, 10, &Tube::bending_stiffness, 0},
     {"gravity.*", "m/s^2", 0, 9.9},
     {"actuation.translation_ratio", "m/rad", 1e-6, 2e-2},
     {"actuation.rotation_ratio", "", 1e-4, 10},

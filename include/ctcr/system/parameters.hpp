@@ -31,24 +31,12 @@ struct SystemParameters {
 
   /// The values of a system; tracker.rotation is the turn since `frame`, which counts as 0.
   [[nodiscard]] static Eigen::VectorXd values(const System<N, Fx>& system) {
-    Eigen::VectorXd x(count);
-    const auto put = [&](Parameter kind, const auto& v) { x.segment(Robot::index(kind), Robot::size(kind)) = v; };
-    const auto& robot = system.model.robot();
-    for (int k = 0; k <= int(Parameter::bending_stiffness); ++k)
-      for (int i = 0; i < N; ++i)
-        x[Robot::index(Parameter(k), i)] = robot.tubes[std::size_t(i)].*Robot::info(Parameter(k)).field;
-    put(Parameter::gravity, robot.gravity);
-    x[Robot::index(Parameter::translation_ratio)] = system.transmission.translation_ratio;
-    x[Robot::index(Parameter::rotation_ratio)] = system.transmission.rotation_ratio;
-    put(Parameter::home_translation, system.transmission.home_translation);
-    put(Parameter::home_rotation, system.transmission.home_rotation);
-    put(Parameter::tracker_position, system.sensor.T_tracker_base.position);
-    put(Parameter::tracker_rotation, Vec3::Zero());
-    x[Robot::index(Parameter::sensor_roll)] = system.sensor.roll;
-    system.model.effects().for_each([&](const auto& effect, int first) {
-      for (std::size_t k = 0; k < effect.values.size(); ++k)
-        x[Robot::count + first + Eigen::Index(k)] = effect.values[k];
-    });
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(count);
+    ctcr::Robot<N> robot = system.model.robot();
+    Transmission<N> transmission = system.transmission;
+    PoseSensor sensor = system.sensor;
+    Effects effects = system.model.effects();
+    for_each(robot, transmission, sensor, effects, [&](int index, double& value) { x[index] = value; });
     return x;
   }
 
@@ -59,30 +47,34 @@ struct SystemParameters {
     ctcr::Robot<N> robot = nominal.model.robot();
     Transmission<N> transmission = nominal.transmission;
     PoseSensor sensor = nominal.sensor;
+    Effects effects = nominal.model.effects();
+    for_each(robot, transmission, sensor, effects, [&](int index, double& value) { value = x[index]; });
+    const int turn = Robot::index(Parameter::tracker_rotation);
+    sensor.T_tracker_base.rotation =
+        rotation_matrix({x[turn], x[turn + 1], x[turn + 2]}) * nominal.sensor.T_tracker_base.rotation;
+    return {transmission, Model<N, Fx>(robot, effects), sensor, nominal.settings};
+  }
+
+private:
+  /// Calls f(index, value) for every parameter but tracker.rotation, with the number that holds it.
+  static void for_each(ctcr::Robot<N>& robot, Transmission<N>& transmission, PoseSensor& sensor, Effects& effects,
+                       const auto& f) noexcept {
+    const auto each = [&](Parameter kind, auto& numbers) {
+      for (int i = 0; i < Robot::size(kind); ++i) f(Robot::index(kind, i), numbers[i]);
+    };
     for (int k = 0; k <= int(Parameter::bending_stiffness); ++k)
       for (int i = 0; i < N; ++i)
-        robot.tubes[std::size_t(i)].*Robot::info(Parameter(k)).field = x[Robot::index(Parameter(k), i)];
-    const auto three = [&](Parameter kind) {
-      const int i = Robot::index(kind);
-      return Vec3(x[i], x[i + 1], x[i + 2]);
-    };
-    robot.gravity = three(Parameter::gravity);
-    transmission.translation_ratio = x[Robot::index(Parameter::translation_ratio)];
-    transmission.rotation_ratio = x[Robot::index(Parameter::rotation_ratio)];
-    for (int i = 0; i < N; ++i) {
-      transmission.home_translation[i] = x[Robot::index(Parameter::home_translation, i)];
-      transmission.home_rotation[i] = x[Robot::index(Parameter::home_rotation, i)];
-    }
-    sensor.T_tracker_base.position = three(Parameter::tracker_position);
-    sensor.T_tracker_base.rotation =
-        rotation_matrix(three(Parameter::tracker_rotation)) * nominal.sensor.T_tracker_base.rotation;
-    sensor.roll = x[Robot::index(Parameter::sensor_roll)];
-    Effects effects = nominal.model.effects();
+        f(Robot::index(Parameter(k), i), robot.tubes[std::size_t(i)].*Robot::info(Parameter(k)).field);
+    each(Parameter::gravity, robot.gravity);
+    f(Robot::index(Parameter::translation_ratio), transmission.translation_ratio);
+    f(Robot::index(Parameter::rotation_ratio), transmission.rotation_ratio);
+    each(Parameter::home_translation, transmission.home_translation);
+    each(Parameter::home_rotation, transmission.home_rotation);
+    each(Parameter::tracker_position, sensor.T_tracker_base.position);
+    f(Robot::index(Parameter::sensor_roll), sensor.roll);
     effects.for_each([&](auto& effect, int first) {
-      for (std::size_t k = 0; k < effect.values.size(); ++k)
-        effect.values[k] = x[Robot::count + first + Eigen::Index(k)];
+      for (std::size_t k = 0; k < effect.values.size(); ++k) f(Robot::count + first + int(k), effect.values[k]);
     });
-    return {transmission, Model<N, Fx>(robot, effects), sensor, nominal.settings};
   }
 };
 
