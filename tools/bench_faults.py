@@ -1,8 +1,8 @@
-"""Writes docs/bench_faults.md: faults that strike a recording on the simulated bench, and what becomes of it.
+"""Writes docs/bench_faults.md: the effects of faults on a recording on the simulated bench.
 
-The recorder is the real one; faults come from the simulators, or are done to its processes. After each, the fault is
-mended and the same command is run again, until the plan is done. Fails where something is lost, or said wrongly.
-Needs no rights beyond those of `ctcr sim bench`. Four minutes; the kills another ten.
+The recorder is the real one; faults come from the simulators, or strike its processes. After each, the fault is mended
+and the same command is run again, until the plan is done. Fails where a row is lost or a message is wrong. Needs no
+rights beyond those of `ctcr sim bench`. Four minutes; the kills another ten.
 """
 
 import argparse
@@ -42,7 +42,7 @@ limits:
   clearance_mm: 5
 person: simulated
 """
-ROWS, STRUCK_AFTER = 10, 3  # rows of a plan, of which so many are measured before the fault
+ROWS, STRUCK_AFTER = 10, 3  # rows of a plan, and rows measured before the fault
 DISK = "64k"
 OPTIONS = ("--dwell", "0.05", "--patience", "1.5")
 LONGEST_S = 60.0
@@ -79,14 +79,8 @@ class Wires:
         return self.command("record", "robot.yaml", "plan.csv", *where, *OPTIONS, "--readings", readings)
 
     def start(self, command: list[str]) -> subprocess.Popen:
-        return subprocess.Popen(
-            command,
-            cwd=self.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        return subprocess.Popen(command, cwd=self.folder, text=True, **quiet)
 
     def run(self, *arguments: object) -> None:
         subprocess.run(self.command(*arguments), cwd=self.folder, check=True, capture_output=True, timeout=120)
@@ -95,7 +89,7 @@ class Wires:
         return request(self.wires, device, {"faults": faults})
 
     def mend(self, off_and_on: bool = False) -> None:
-        """No fault any more, nothing stopped; where the terminals were switched off and on, joints known again."""
+        """Ends every fault and releases the stop; after a power cycle of the terminals, homes the joints."""
         if off_and_on:
             self.set("ethercat", power_loss=True)
         self.set("aurora", **aurora.FAULTS)
@@ -143,7 +137,7 @@ class Fault:
     name: str
     strike: Callable[[Wires, subprocess.Popen], object]
     goes_on: bool  # whether the recording finishes by itself
-    says: str  # what the message must hold: of the recorder, or where it goes on of its session.json
+    says: str  # pattern of the message: of the recorder, or of its session.json where it finishes by itself
     lasts: float | None = None
     readings: int = 1  # of each row of the plan
     off_and_on: bool = False  # the terminals, and homing, before it can go on
@@ -185,7 +179,7 @@ class Outcome:
     before: int  # rows on the disk when it struck
     after: int  # when the recording had ended
     lost: int  # of those before, and of the plan in the end
-    wrong: str = ""  # what is not as it should be
+    wrong: str = ""  # deviations from what is expected
 
 
 def strike(wires: Wires, fault: Fault) -> Outcome:
@@ -235,7 +229,7 @@ def strike(wires: Wires, fault: Fault) -> Outcome:
 
 
 def wait_for_rows(process: subprocess.Popen, table: Path, rows: int = STRUCK_AFTER) -> bytes:
-    """What is on the disk once so many rows are."""
+    """The table on the disk once it holds so many rows."""
     end = time.monotonic() + LONGEST_S
     while process.poll() is None and time.monotonic() < end:
         if table.exists() and rows_of(content := table.read_bytes()) >= rows:
@@ -249,7 +243,7 @@ def rows_of(table: bytes) -> int:
 
 
 def notes(recording: Path) -> str:
-    """What a recording that went on noted of its tracker and its bus."""
+    """Remarks of a recording that finished by itself on its tracker and its bus."""
     sitting = json.loads((recording / "session.json").read_text(encoding="utf-8"))["sittings"][0]
     tracker, bus = sitting["tracker"], sitting["bus"]
     said = list(dict.fromkeys(fault["text"] for fault in tracker["faults"]))[:1]
@@ -353,30 +347,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         near_the_plate(folder / "robot.yaml", folder / "bench.yaml")
-        command = [
-            sys.executable,
-            "-m",
-            "ctcr",
-            "sim",
-            "bench",
-            folder / "robot.yaml",
-            "--noise",
-            "none",
-            "--folder",
-            folder / "wires",
-            "--",
-            sys.executable,
-            __file__,
-            "--beside",
-            folder,
-            "-o",
-            given.output.resolve(),
-            "--only",
-            given.only,
-            "--kills",
-            str(given.kills),
-        ]
-        return subprocess.run(command).returncode
+        simulators = ["sim", "bench", folder / "robot.yaml", "--noise", "none", "--folder", folder / "wires", "--"]
+        program = [sys.executable, __file__, "--beside", folder, "-o", given.output.resolve()]
+        program += ["--only", given.only, "--kills", str(given.kills)]
+        return subprocess.run([sys.executable, "-m", "ctcr", *simulators, *program]).returncode
 
 
 if __name__ == "__main__":

@@ -51,7 +51,8 @@ SMALL = [-2e-3, -1e-3, -1e-3, 0.2, -0.1, 0.1]
 # ---- driver
 
 
-def test_settings_come_before_enabling(bench, folder):
+def test_settings(bench, folder):
+    """Motor current, feedback and encoder are written before a motor is enabled."""
     bus = Bus(MASTER, [1, 2], bench.drive_settings)
     bus.connect()
     try:
@@ -84,7 +85,8 @@ def test_interrupted_move(robot, bench, folder):
     assert request(folder, "ethercat", {})["states"][1] < OP
 
 
-def test_one_program_at_a_time(robot, bench, folder, monkeypatch):
+def test_bus_lock(robot, bench, folder, monkeypatch):
+    """A second program is refused; the first one goes on."""
     monkeypatch.setattr(bus_process, "LOCK_S", 0.2)
     with Motors(bench, robot, folder) as motors:
         motors.connect()
@@ -94,6 +96,7 @@ def test_one_program_at_a_time(robot, bench, folder, monkeypatch):
 
 
 def test_wrong_terminal(bench, folder):
+    """Wrong positions and interfaces are named."""
     for positions, text in (([0, 1], "no stepper terminal"), ([1, 9], "none at position 9")):
         bus = Bus(MASTER, positions, bench.drive_settings)
         with pytest.raises(DeviceFault, match=text):
@@ -106,7 +109,8 @@ def test_wrong_terminal(bench, folder):
 class TestMotors:
     """One connection for all: two masters cannot share the bus."""
 
-    def test_moves(self, motors, robot, folder):
+    def test_move(self, motors, robot, folder):
+        """Joints, shafts and tips arrive together, within the resolution of the encoders."""
         n = robot.n_tubes
         target = motors.settings.home + SMALL
         motors.move(target)
@@ -120,6 +124,7 @@ class TestMotors:
         np.testing.assert_allclose(deployed, target[:n] + [t.length for t in robot.tubes], atol=1.2e-5)
 
     def test_forbidden_moves(self, motors):
+        """Nothing moves where a limit forbids the target."""
         start = motors.joints.copy()
         for way, text in (
             ([0, 0, -40e-3, 0, 0, 0], "may be"),
@@ -132,7 +137,8 @@ class TestMotors:
         assert not motors.state["moving"]
         np.testing.assert_allclose(motors.joints, start, atol=1e-4)
 
-    def test_velocity_stops_by_itself_and_before_limits(self, motors, bench):
+    def test_velocity(self, motors, bench):
+        """It ends when its time is over, and before a limit."""
         start = motors.joints.copy()
         motors.velocity([2e-3, 2e-3, 2e-3, 0.1, 0, 0], 0.3)
         motors.wait()
@@ -144,29 +150,30 @@ class TestMotors:
         gap = motors.joints[0] + lengths[0] - motors.joints[1] - lengths[1]
         assert motors.state["limited"] and -1e-4 < gap < 5e-4
 
-    def test_lost_and_late_frames_are_survived(self, motors, folder):
+    def test_lost_frames(self, motors, folder):
+        """5 % lost and 5 % late frames stop nothing."""
         request(folder, "ethercat", {"faults": {"lost_frames": 0.05, "late_frames": 0.05}})
         go(motors, SMALL)
         motors.wait()
         assert motors.state["bad_cycles"] > 0 and not motors.state["stopped"]
 
-    def test_missed_steps_are_made_up_for(self, motors, folder):
-        """The loop around the position runs on the encoder."""
+    def test_missed_steps(self, motors, folder):
+        """The position loop, closed on the encoders, corrects them."""
         request(folder, "ethercat", {"faults": {"missed_steps": 1}})
         go(motors, SMALL)
         motors.wait()
         time.sleep(0.1)
         assert abs(motors.joints[0] - motors.settings.home[0] - SMALL[0]) < 1.1e-5
 
-    def test_stop_is_not_released_by_itself(self, motors, folder):
-        """Another program's stop holds for this one; released, it may go on where it did not stop itself."""
+    def test_stop_latches(self, motors, folder):
+        """A stop by another program holds for this one."""
         emergency_stop.stop(folder, "a test")
         with pytest.raises(DeviceFault, match="a test: .*ctcr stop --release"):
             motors.move(motors.settings.home)
 
 
 def test_homing(robot, bench, folder):
-    """After a power cycle the counters say nothing; flush retraction finds the joints again."""
+    """After a power cycle flush retraction finds the joints again; a new connection keeps them."""
     request(folder, "ethercat", {"faults": {"power_loss": True}})
     request(folder, "ethercat", {"faults": {"power_loss": False}})
     with Motors(bench, robot, folder) as motors:
@@ -228,19 +235,22 @@ def check_fault(robot, bench, folder, fault, value, says):
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_fault(robot, bench, folder, fault):
+    """The motors stop, the message names the cause, and nothing moves before the release."""
     check_fault(robot, bench, folder, fault, *FAULTS[fault])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", MORE_FAULTS)
 def test_more_faults(robot, bench, folder, fault):
+    """As test_fault."""
     check_fault(robot, bench, folder, fault, *MORE_FAULTS[fault])
     request(folder, "ethercat", {"faults": {"power_loss": True}})  # counters and settings of this fault are gone
     request(folder, "ethercat", {"faults": {"power_loss": False}})
 
 
 @pytest.mark.slow
-def test_forty_bring_ups(bench, folder):
+def test_bring_ups(bench, folder):
+    """Forty in a row, under load."""
     for _ in range(40):
         bus = Bus(MASTER, [1, 2, 3, 4, 5, 6], bench.drive_settings)
         bus.connect()
@@ -248,6 +258,7 @@ def test_forty_bring_ups(bench, folder):
 
 
 def test_health(bench, folder):
+    """Every device is listed; an unplugged one is named."""
     found = health_of(bench, folder)
     assert [device.name for device in found] == ["tracker", "tool 0A", "tool 0B", "tool 0C", "EK1100", *["EL7041"] * 6]
     assert all(device.is_well for device in found)

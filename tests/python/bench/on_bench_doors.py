@@ -1,4 +1,4 @@
-"""Who may talk to the devices of a bench: test_ethercat.py runs this in `ctcr sim bench` (see on_bench.py)."""
+"""Nobody else can reach the devices of a bench: test_ethercat.py runs this in `ctcr sim bench` (see on_bench.py)."""
 
 import os
 import socket
@@ -22,7 +22,7 @@ def doors(folder) -> list[str]:
     return found + [name for name in names if Path(name).parent.resolve() != folder.resolve()]
 
 
-def test_nobody_else_can_talk_to_the_devices():
+def test_privacy():
     """Control sockets lie in a folder for this user alone; nothing listens on the network, not even on loopback."""
     folder = mended_bench()
     robot, bench = robot_file.load(os.environ["ROBOT_FILE"]), bench_file.load(os.environ["BENCH_FILE"])

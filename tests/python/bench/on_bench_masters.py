@@ -1,4 +1,4 @@
-"""EtherCAT masters written by others drive the simulated terminals, inside of `ctcr sim bench` (see on_bench.py)."""
+"""Independent EtherCAT masters drive the simulated terminals, inside of `ctcr sim bench` (see on_bench.py)."""
 
 import struct
 import subprocess
@@ -46,7 +46,8 @@ def to_op(master):
     raise AssertionError([hex(slave.al_status) for slave in master.slaves])
 
 
-def test_pysoem_reads_and_writes_objects(master):
+def test_pysoem_objects(master):
+    """SDO transfers and their abort codes."""
     import pysoem
 
     assert master.config_init() == 7
@@ -73,6 +74,7 @@ def test_pysoem_reads_and_writes_objects(master):
 
 
 def test_pysoem_watchdog(master):
+    """Without process data the terminals leave OP with 0x001B, and return to it once acknowledged."""
     assert to_op(master) == master.expected_wkc == 18
     for _ in range(20):
         master.send_processdata()
@@ -97,6 +99,7 @@ def test_pysoem_watchdog(master):
 
 
 def test_kickcat(folder):
+    """Another master: mailbox, mapping, OP, fifty cycles with the right working counter."""
     pytest.importorskip("kickcat", reason="kickcat is not installed")
     script = f"""
 import time

@@ -32,7 +32,7 @@ def at_known_joints(robot, bench, folder):
 
 
 def plan(path, rows, force=0.0):
-    """`rows` places around home; the second half under a weight."""
+    """`rows` positions around home; the second half under a weight."""
     robot = robot_file.load(ROBOT)
     home = np.array([*robot.actuation.home_translation_mm, 0, 0, 0]) * 1e-3
     rng = np.random.default_rng(3)
@@ -57,7 +57,7 @@ def record(plan, target, *options):
 @pytest.mark.slow
 @pytest.mark.usefixtures("at_known_joints")
 def test_record(tmp_path, folder, robot):
-    """Poses are those of the model at the joints of the encoders, under the weight that was hung."""
+    """The poses equal the model at the joints of the encoders, under the weight that was hung."""
     path, target = plan(tmp_path / "plan.csv", 4, force=0.1), tmp_path / "out"
     done = record(path, target, "--readings", 2, "--approach", "forward", "--json", "-")
     assert done.returncode == 0, done.stderr
@@ -90,7 +90,7 @@ def wait_for_rows(process, table, rows):
 @pytest.mark.slow
 @pytest.mark.usefixtures("at_known_joints")
 def test_killed_recorder(tmp_path, folder):
-    """Killed at a random moment the recorder loses nothing, the motors stop, and the same command goes on."""
+    """A recorder killed at a random moment loses nothing, the motors stop, and the same command resumes."""
     path, target = plan(tmp_path / "plan.csv", 8), tmp_path / "out"
     table, rng, kept = target / "measurements.csv", np.random.default_rng(1), b""
     for _ in range(1):  # tools/bench_faults.py kills a hundred times
@@ -116,7 +116,7 @@ def test_killed_recorder(tmp_path, folder):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("at_known_joints")
-def test_recording_survives_the_tracker(tmp_path, folder):
+def test_tracker_lost(tmp_path, folder):
     """Unplugged and back, a third of the frames missing, garbage: rows wait, and all are measured."""
     path, target = plan(tmp_path / "plan.csv", 6), tmp_path / "out"
     request(folder, "aurora", {"faults": {"missing": 0.3, "garbage": 0.02}})
@@ -133,7 +133,8 @@ def test_recording_survives_the_tracker(tmp_path, folder):
 
 
 @pytest.mark.slow
-def test_blind_tracker_stops_the_recording(tmp_path, robot, bench, folder):
+def test_blind_tracker(tmp_path, robot, bench, folder):
+    """The recording ends after its patience."""
     with Motors(bench, robot, folder) as motors:
         motors.connect()
         motors.set_joints(motors.settings.home)

@@ -28,7 +28,7 @@ def needs_compiler():
         pytest.skip(f"the oracle is compiled when it is first used, and {compiler} is not installed")
 
 
-def test_the_oracle_and_the_model_are_one_robot(robot, needs_compiler):
+def test_oracle_and_model(robot, needs_compiler):
     """Turned by the same motors, under the same weights, two independent programs are within a micrometre."""
     theirs, ours = (
         SimulatedRobot(robot, "none", oracle=Oracle([*SERVE, str(ROBOT)], robot)),
@@ -44,7 +44,7 @@ def test_the_oracle_and_the_model_are_one_robot(robot, needs_compiler):
         assert np.linalg.norm(place - expected) < 1e-6 and 1 - abs(turn @ expected_turn) < 1e-10
 
 
-def test_the_oracle_remembers_friction(robot, needs_compiler):
+def test_oracle_friction(robot, needs_compiler):
     """The same joints, reached from both sides."""
     simulated = SimulatedRobot(robot, "none", oracle=Oracle([*SERVE, "--friction", "0.02", str(ROBOT)], robot))
     places = []
@@ -54,7 +54,8 @@ def test_the_oracle_remembers_friction(robot, needs_compiler):
     assert np.linalg.norm(places[2] - places[4]) > 1e-4
 
 
-def test_the_tracker_sees_the_oracle(robot, needs_compiler, tmp_path):
+def test_tracker_sees_oracle(robot, needs_compiler, tmp_path):
+    """Through the serial line of the simulated tracker."""
     pytest.importorskip("serial", reason="pyserial is not installed")
     from ctcr.bench.devices.aurora import Aurora
 
@@ -67,7 +68,8 @@ def test_the_tracker_sees_the_oracle(robot, needs_compiler, tmp_path):
         np.testing.assert_allclose(place, SimulatedRobot(robot, "none").reading()[0], atol=1e-6)
 
 
-def test_programs_that_do_not_work(robot, capfd):
+def test_broken_oracles(robot, capfd):
+    """Programs that do not start or answer are named."""
     with pytest.raises(InputError, match="nowhere: does not start"):
         Oracle(["nowhere"], robot)
     for silent in ("true", "echo nonsense"):

@@ -1,4 +1,4 @@
-"""What moves the joints, without hardware: limits, motions, stops, the bench file, records shared between processes."""
+"""The drivers without hardware: limits, motions, stops, the bench file, records shared between processes."""
 
 import multiprocessing
 import os
@@ -46,7 +46,8 @@ HOME = np.array([-0.298, -0.2205, -0.145, 0, 0, 0])
 # ---- limits
 
 
-def test_every_limit_is_said(settings):
+def test_limits(settings):
+    """Each violated limit is named with its value."""
     limits: JointLimits = settings.limits
     assert limits.problem(HOME) is None
     for way, text in (
@@ -62,8 +63,8 @@ def test_every_limit_is_said(settings):
     assert "the tip of tube 3 would be 1.00 mm behind" in wide.problem([-0.4, -0.3, -0.2, 0, 0, 0])
 
 
-def test_between_two_allowed_places_all_is_allowed(settings):
-    """Limits are convex: what a straight move passes need not be searched."""
+def test_limits_are_convex(settings):
+    """A straight move between two allowed positions is allowed all the way."""
     rng, limits = np.random.default_rng(5), settings.limits
     scale = np.array([0.1, 0.08, 0.05, 3, 3, 3])
     places = [place for place in HOME + scale * rng.uniform(-1, 1, (4000, 6)) if not limits.problem(place)]
@@ -77,7 +78,7 @@ def test_between_two_allowed_places_all_is_allowed(settings):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_straight_move(seed):
-    """In one line, from rest to rest, no joint faster than allowed, and its speed is the derivative of its place."""
+    """In one line, from rest to rest, no joint faster than allowed; its velocity is the derivative of its position."""
     rng = np.random.default_rng(seed)
     start, end = rng.standard_normal((2, 6)) * 10 ** rng.uniform(-3, 0)
     speeds, ramp = rng.uniform(0.1, 2, 6), rng.uniform(0.05, 0.5)
@@ -96,19 +97,21 @@ def test_straight_move(seed):
     assert (np.abs(np.diff(rates, axis=0)) <= 1.01 * speeds / ramp * 1e-3 + 1e-9).all()
 
 
-def test_no_way_is_no_move():
+def test_move_of_no_length():
+    """It stays where it is."""
     move = StraightMove(HOME, HOME, np.ones(6), 0.2)
     place, rate = move.advance(DT)
     assert np.array_equal(place, HOME) and not rate.any()
 
 
-def test_velocity_move_rests_where_it_says():
+def test_braking_distance():
+    """`rest` predicts where a velocity move ends."""
     move = VelocityMove(np.zeros(2), np.zeros(2), [0.5, -1.0], np.array([2.0, 1.0]), valid_s=1.0)
     while move._left > 0:
-        move.advance(1e-4)
+        move.advance(5e-4)
     rest = move.rest()
     while not move.is_finished:
-        place, _ = move.advance(1e-4)
+        place, _ = move.advance(5e-4)
     np.testing.assert_allclose(place, rest, atol=1e-3)
 
 
@@ -130,7 +133,8 @@ class Motors:
                 break
 
 
-def test_move_and_order(settings):
+def test_axis_move(settings):
+    """It arrives within the resolution of the encoders; a second one must wait."""
     control = AxisControl(settings, HOME, homed=True)
     motors, target = Motors(control), HOME + [-0.01, -0.01, -0.01, 1, 0, -1]
     control.move(target)
@@ -145,8 +149,9 @@ def test_move_and_order(settings):
         control.move(HOME - 1)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_velocities_never_leave_the_limits(settings, seed):
+@pytest.mark.parametrize("seed", range(2))
+def test_velocities_keep_limits(settings, seed):
+    """Random velocities never leave the limits."""
     rng = np.random.default_rng(seed)
     control = AxisControl(settings, HOME, homed=True)
     motors = Motors(control)
@@ -157,7 +162,8 @@ def test_velocities_never_leave_the_limits(settings, seed):
     assert control.limited or np.ptp(motors.joints) > 0
 
 
-def test_a_stuck_axis_stops_all(settings):
+def test_stuck_axis(settings):
+    """The following error stops all joints for good."""
     control = AxisControl(settings, HOME, homed=True)
     motors = Motors(control, stuck=[4])
     control.move(HOME + [-0.01, -0.01, -0.01, 1, 1, 1])
@@ -175,14 +181,16 @@ def test_a_stuck_axis_stops_all(settings):
             request()
 
 
-def test_an_encoder_that_jumps(settings):
+def test_encoder_jump(settings):
+    """It is a fault of its own."""
     control = AxisControl(settings, HOME, homed=True)
     control.cycle(DT, HOME)
     control.cycle(DT, HOME + [0.8e-3, 0, 0, 0, 0, 0])
     assert "translation of tube 1: its encoder jumped" in str(control.fault)
 
 
-def test_outside_of_the_limits_nothing_starts(settings):
+def test_start_outside_limits(settings):
+    """Nothing moves from there."""
     control = AxisControl(settings, HOME - [0.06, 0, 0, 0, 0, 0], homed=True)
     with pytest.raises(DeviceFault, match="5.00 mm inside tube 2"):
         control.move(HOME)
@@ -191,7 +199,8 @@ def test_outside_of_the_limits_nothing_starts(settings):
 # ---- bench file
 
 
-def test_bench_file_faults_come_together(tmp_path):
+def test_bench_file_faults(tmp_path):
+    """All faults come in one error, with their lines."""
     path = tmp_path / "bench.yaml"
     text = BENCH.read_text().replace("port:", "prot:").replace("current_mA: 1000", "current_mA: none")
     path.write_text(text.replace("clearance_mm: 5", "clearance_mm: -5"))
@@ -202,7 +211,8 @@ def test_bench_file_faults_come_together(tmp_path):
     assert "line 3" in said
 
 
-def test_bench_file_for_another_robot(robot):
+def test_bench_of_other_robot(robot):
+    """The number of tubes must agree."""
     two = robot.model_copy(update={"tubes": robot.tubes[:2]})
     with pytest.raises(InputError, match="has 3 entries, the robot has 2 tubes"):
         bench_file.load(BENCH).axis_settings(two)
@@ -211,7 +221,8 @@ def test_bench_file_for_another_robot(robot):
 # ---- stop
 
 
-def test_stop_stays_until_it_is_released(tmp_path, capfd):
+def test_stop_and_release(tmp_path, capfd):
+    """The first reason stays until the release."""
     folder = tmp_path / "bench"
     assert cli.run(["stop", "--folder", str(folder)]) == 0
     emergency_stop.stop(folder, "a later reason")
@@ -222,7 +233,8 @@ def test_stop_stays_until_it_is_released(tmp_path, capfd):
     assert "nothing was stopped" in capfd.readouterr().out
 
 
-def test_codes_in_words():
+def test_codes():
+    """Every code has a meaning and a remedy."""
     assert ethercat.state_name(0x14) == "SAFEOP with an error" and ethercat.state_name(0) == "state 0x0"
     assert all(map(all, (*ethercat.STATUS_CODES.values(), *ethercat.DIAGNOSES.values())))
 
@@ -238,7 +250,8 @@ def _write_for_a_while(path, seconds):
         record.write(number=number, copies=number)
 
 
-def test_a_reader_never_sees_half_of_a_write(tmp_path):
+def test_shared_record(tmp_path):
+    """A reader never sees a write half done."""
     context = multiprocessing.get_context("fork")
     path = tmp_path / "record"
     fields = np.dtype([("number", "i8"), ("copies", "i8", 200)])
@@ -255,6 +268,7 @@ def test_a_reader_never_sees_half_of_a_write(tmp_path):
 
 
 def test_lateness():
+    """Quantiles of known delays."""
     late = Lateness()
     for value in np.linspace(0, 1e-3, 1001):
         late.add(value)
@@ -268,7 +282,8 @@ def scheduling():
     return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, os.sched_getaffinity(0)
 
 
-def test_real_time_is_given_back():
+def test_real_time():
+    """Priority and core hold inside the block alone."""
     before = scheduling()
     for duty, core in ((BUS, min(before[2])), (TRACKER, max(before[2]))):
         with real_time(duty) as granted:
@@ -279,7 +294,9 @@ def test_real_time_is_given_back():
     assert scheduling() == before
 
 
-def test_without_the_permission_nothing_changes(monkeypatch):
+def test_without_permission(monkeypatch):
+    """Scheduling stays as it was."""
+
     def refused(*_):
         raise PermissionError
 
@@ -300,8 +317,8 @@ def test_without_the_permission_nothing_changes(monkeypatch):
         ("backlash_rotation", "play", (0.25, 0.5, 0.75), 1e-6),
     ],
 )
-def test_moving_model_is_that_of_a_whole_table(robot, effect, strength, shares, off):
-    """Reading after reading it says what the simulation of the whole path says, with effects that remember the path."""
+def test_moving_model(robot, effect, strength, shares, off):
+    """Reading by reading it equals the simulation of the whole path, with effects that have a history."""
     effects = {f"effects.{effect}.{strength}.{i}": 0.02 for i in (1, 2, 3)}
     true = add.with_values(robot, [effect], effects)
     plan = measurements.load(DATA / "plan.csv", 3)

@@ -76,7 +76,8 @@ def dictionary():
 
 
 @pytest.mark.parametrize("mailbox", [24, 32, 128])
-def test_objects_in_segments(dictionary, mailbox):
+def test_segmented_transfer(dictionary, mailbox):
+    """Objects longer than a mail come and go whole."""
     client = Client(dictionary, mailbox)
     assert client.read(0x1000, 0) == struct.pack("<I", 0x1389)
     assert client.read(0x1008, 0).decode() == dictionary.value(0x1008, 0)
@@ -107,6 +108,7 @@ def test_objects_in_segments(dictionary, mailbox):
     ],
 )
 def test_aborts(dictionary, body, code):
+    """The abort code of each wrong request."""
     with pytest.raises(RuntimeError, match=code):
         Client(dictionary, 128).ask(body)
 
@@ -115,6 +117,7 @@ def test_aborts(dictionary, body, code):
 
 
 def test_process_image():
+    """Values at their bits, with padding and two's complement."""
     image = ProcessImage([0x70000101, 0x70000201, 0x0000000E, 0x70001120, 0x70102110])
     assert image.length == 8 and image.fields[0x7000, 0x11].offset == 16
     values = {(0x7000, 1): 1, (0x7000, 2): 0, (0x7000, 0x11): 0xDEADBEEF, (0x7010, 0x21): -2}
@@ -135,6 +138,7 @@ def working_counter(made) -> int:
 
 
 def test_addressing():
+    """Auto-increment, fixed, broadcast and read-multiple-write addressing, by their working counters."""
     segment = Segment([SlaveController(coupler()), SlaveController(StepperTerminal(0)), SlaveController(coupler())])
     made = frame(7, 0, 0x0130, bytes(2))  # BRD of the AL status
     assert segment.pass_through(made, 0.0) and working_counter(made) == 3
@@ -159,7 +163,8 @@ def test_addressing():
 
 
 @pytest.mark.parametrize(("variant", "status"), [("EL7041", 0x1A06), ("EL7031", 0x1A05)])
-def test_layouts_differ_between_variants(variant, status):
+def test_variants(variant, status):
+    """The first POS status of the one is no first POS status of the other."""
     terminal = StepperTerminal(0, variant)
     other = 0x1A06 + 0x1A06 - 1 - status  # the first of the one is no first of the other
     assert terminal.objects[status].name == "POS Status compact"
@@ -198,7 +203,7 @@ def test_positioning_interface():
     assert 0 < halted < 25600 and run(0, 0, 0.1)[0] == halted
 
 
-def test_too_much_current_burns_the_motor():
+def test_overcurrent():
     """The terminal's default current is five times that of the motor: it reports an error until it is reset."""
     terminal = StepperTerminal(0)
     terminal.entered(8)
@@ -220,18 +225,20 @@ def on_bench(tmp_path, *options):
 
 
 @pytest.mark.alone
-def test_on_the_simulated_bench(tmp_path):
+def test_on_bench(tmp_path):
+    """The tests of ON_BENCH beside running simulators."""
     on_bench(tmp_path)
 
 
 @pytest.mark.slow
-def test_more_on_the_simulated_bench(tmp_path):
+def test_more_on_bench(tmp_path):
+    """Those that take long."""
     on_bench(tmp_path, "-m", "slow")
 
 
 @pytest.mark.slow
-def test_the_guide_shows_what_works(tmp_path):
-    """The first session of docs/hardware.md, as it is written there."""
+def test_guide(tmp_path):
+    """The first session of docs/hardware.md runs as it is written there."""
     skip_without_bench()
     for name, target in (("examples", ROOT / "examples"), (".venv", Path(sys.prefix))):
         (tmp_path / name).symlink_to(target)
@@ -245,7 +252,7 @@ def test_the_guide_shows_what_works(tmp_path):
 
 
 @pytest.mark.slow
-def test_faults_lose_no_row(tmp_path):
+def test_faults(tmp_path):
     """Every fault of docs/bench_faults.md, and some kills: survived, or stopped with the right message."""
     skip_without_bench()
     table = tmp_path / "faults.md"

@@ -1,4 +1,4 @@
-"""Recordings without hardware: what is written stays through kills and power cuts, plans are checked before moves."""
+"""Recordings without hardware: rows survive kills and power cuts, plans are checked before moves."""
 
 import io
 import multiprocessing
@@ -40,11 +40,11 @@ def _append_for_ever(path, group, pipe):
         pipe.send(file.groups)
 
 
-def test_a_hundred_kills_lose_no_row(tmp_path):
-    """SIGKILL at random moments: every row whose writing was reported is in the file, whole, once, in order."""
+def test_kills(tmp_path):
+    """SIGKILL at random moments: every row that was reported as written is in the file, whole, once, in order."""
     context, rng, group = multiprocessing.get_context("fork"), random.Random(1), 3
     path, reported = tmp_path / "measurements.csv", 0
-    for _ in range(100):
+    for _ in range(40):
         ours, theirs = context.Pipe()
         process = context.Process(target=_append_for_ever, args=(path, group, theirs))
         process.start()
@@ -61,11 +61,12 @@ def test_a_hundred_kills_lose_no_row(tmp_path):
         lines = path.read_text().splitlines()[1:]
         assert len(lines) >= reported * group
         assert [int(float(line.split(",")[0])) for line in lines] == list(range(len(lines)))
-    assert reported > 100
+    assert reported > 40
 
 
 @pytest.mark.parametrize("cut", [1, 20, 70, 150])
-def test_a_power_cut_costs_the_group_it_hit(tmp_path, cut):
+def test_power_cut(tmp_path, cut):
+    """It costs the group that was being written, no other."""
     path = tmp_path / "measurements.csv"
     file = RowFile(path, column_names(2), 2)
     for number in range(5):
@@ -81,7 +82,8 @@ def test_a_power_cut_costs_the_group_it_hit(tmp_path, cut):
     assert path.read_bytes() == whole
 
 
-def test_another_table_is_left_alone(tmp_path):
+def test_foreign_table(tmp_path):
+    """A file with other columns is refused and left alone."""
     path = tmp_path / "measurements.csv"
     path.write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="other columns"):
@@ -109,7 +111,8 @@ def test_full_disk(tmp_path, monkeypatch):
     assert path.read_bytes().startswith(before) and file.groups == 2
 
 
-def test_recorded_tables_can_be_read(tmp_path):
+def test_table_of_rows(tmp_path):
+    """A recorded table loads as measurements."""
     path = tmp_path / "measurements.csv"
     file = RowFile(path, column_names(3))
     joints = [-0.3, -0.2, -0.1, 0.1, 0.2, 0.3]
@@ -127,6 +130,7 @@ def limits():
 
 
 def test_approach(limits):
+    """The way point lies below or above the target."""
     plan = measurements.load(DATA / "plan.csv", 3)
     for direction, sign in (("forward", -1), ("backward", 1)):
         step = steps_of(plan, Approach(direction, 1e-3, 0.1), limits, "plan")[3]
@@ -135,29 +139,20 @@ def test_approach(limits):
     assert all(step.way_point is None for step in steps_of(plan, Approach(), limits, "plan"))
 
 
-def test_forbidden_rows_are_said_before_anything_moves(tmp_path, capfd):
+def test_forbidden_rows(tmp_path, capfd):
+    """They are named before anything moves or is written."""
     lines = (DATA / "plan.csv").read_text().splitlines()[:5]
     lines[2] = lines[2].replace("-0.158925341", "-0.05")
     plan = tmp_path / "plan.csv"
     plan.write_text("\n".join(lines) + "\n")
-    code = cli.run(
-        [
-            "record",
-            str(DATA / "demo" / "robot.yaml"),
-            str(plan),
-            "--bench",
-            str(DATA / "bench" / "bench.yaml"),
-            "-o",
-            str(tmp_path / "out"),
-            "--folder",
-            str(tmp_path / "bench"),
-        ]
-    )
+    command = ["record", DATA / "demo" / "robot.yaml", plan, "--bench", DATA / "bench" / "bench.yaml"]
+    code = cli.run([*map(str, command), "-o", str(tmp_path / "out"), "--folder", str(tmp_path / "bench")])
     assert code == 1 and "row 3: beta3 = -50.00 mm: may be" in capfd.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
-def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
+def test_person(monkeypatch, capfd):
+    """The prompts for weights and tubes."""
     answers = io.StringIO("\n\n12.5\n")
     monkeypatch.setattr("sys.stdin", answers)
     person = Person()
@@ -170,7 +165,7 @@ def test_a_person_is_told_what_to_hang(monkeypatch, capfd):
 
 
 def test_live_page(tmp_path, monkeypatch):
-    """It shows the newest state, loads itself anew while the recording goes on, and rests in the end."""
+    """It shows the newest state, reloads itself during the recording, and no more at its end."""
     target, now = tmp_path / "page.html", [0.0]
     monkeypatch.setattr("ctcr.bench.record.live_page.time.monotonic", lambda: now[0])
     progress = Progress(10, done=2, doing="row 4: moving", errors_mm=[3.0, 4.0])
@@ -189,7 +184,8 @@ def test_live_page(tmp_path, monkeypatch):
     assert "refresh" not in target.read_text() and target.read_text().count("<circle") == 3
 
 
-def test_live_picture():
+def test_picture():
+    """Errors as blocks, a gap for NaN."""
     assert picture([0.0, 0.5, 1.0, float("nan")]) == "▁▅█ "
     progress = Progress(10, errors_mm=[3.0, 4.0, float("nan")])
     assert progress.rms_mm == pytest.approx(12.5**0.5)

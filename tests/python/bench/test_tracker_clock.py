@@ -15,7 +15,8 @@ UNSEEN = replace(SEEN, reading=ToolReading(10, None, None, None, 0x100, 7))
 
 
 @pytest.mark.parametrize("frame", [SEEN, UNSEEN])
-def test_a_frame_is_the_same_behind_the_pipe(frame):
+def test_packed_frame(frame):
+    """A frame is the same behind the pipe."""
     assert TrackedFrame.unpacked(frame.packed()) == frame
 
 
@@ -34,8 +35,9 @@ class Time:
 
 @pytest.mark.parametrize("answer_s", [0.001, 0.011, 0.014])
 @pytest.mark.parametrize("drift", [-1e-4, 1e-4])
-def test_questions_settle_just_behind_the_frames(monkeypatch, answer_s, drift):
-    """From any phase, and whichever clock is the faster one, as long as an answer is shorter than a period."""
+def test_frame_clock(monkeypatch, answer_s, drift):
+    """Requests settle just behind the frames, from any phase and with any drift, as long as a reply is shorter than a
+    period."""
     random = np.random.default_rng(3)
     for phase in random.uniform(0, PERIOD_S, 20):
         clock_of_computer = Time(random)

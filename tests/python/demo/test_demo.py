@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import subprocess
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,7 @@ from ctcr.demo.story import LOG, Story, new_folder
 from ctcr.errors import InputError
 from ctcr.table import measurements
 from rich.console import Console
-from simulated_bench import ROOT, before_others, ctcr, skip_without_bench, was_starved
+from simulated_bench import ROOT, ctcr, run_before_others, skip_without_bench, was_starved
 
 TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
 
@@ -22,7 +21,7 @@ TABLE = ROOT / "examples" / "data" / "calibration" / "measurements.csv"
 # ---- recordings put together
 
 
-def test_joined_recordings():
+def test_joined():
     """Rows keep their order, runs their borders, times their distance by one clock."""
     table = measurements.load(TABLE, 3)
     for starts, shift in (([1e9, 1e9 + 500], 500), ([None, 3.0], table.t.max() + PAUSE_S)):
@@ -38,7 +37,8 @@ def test_joined_recordings():
     assert joined([table, without], [None, None]).quaternion is None
 
 
-def test_start_of_a_recording(tmp_path):
+def test_start(tmp_path):
+    """From the session.json beside the table."""
     assert start_of(tmp_path / "measurements.csv") is None
     (tmp_path / "session.json").write_text(json.dumps({"started_unix_s": 12.5}))
     assert start_of(tmp_path / "measurements.csv") == 12.5
@@ -47,7 +47,8 @@ def test_start_of_a_recording(tmp_path):
 # ---- stories
 
 
-def test_a_story_keeps_what_commands_say(tmp_path):
+def test_story(tmp_path):
+    """It keeps the results of commands, and their errors."""
     story = Story(new_folder(tmp_path / "story"), Console(quiet=True))
     robot = ROOT / "examples" / "data" / "demo" / "robot.yaml"
     story.do("describe it", f"info {robot}", lambda told: told["robot"]["name"], "described")
@@ -57,7 +58,8 @@ def test_a_story_keeps_what_commands_say(tmp_path):
         story.do("fail", "info nothing.yaml", lambda told: "")
 
 
-def test_foreign_folders_are_left_alone(tmp_path):
+def test_foreign_folder(tmp_path):
+    """Only the folder of an earlier story is removed."""
     (tmp_path / "mine.txt").write_text("keep me")
     with pytest.raises(InputError, match="holds no demonstration"):
         new_folder(tmp_path)
@@ -74,14 +76,7 @@ def run_demo(tmp_path, *options):
         target = tmp_path / attempt / "demo"
         target.parent.mkdir()
         command = ctcr("demo", "bench", "-o", target, "--folder", tmp_path / attempt / "wires", *options)
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            env=os.environ | {"COLUMNS": "150"},
-            timeout=600,
-            preexec_fn=before_others,
-        )
+        done = run_before_others(command, env=os.environ | {"COLUMNS": "150"}, timeout=600)
         if done.returncode == 0 or not was_starved(done.stdout + done.stderr):
             break
     assert done.returncode == 0, done.stdout + done.stderr
@@ -106,13 +101,14 @@ def check_story(said, folder):
 
 
 @pytest.mark.alone
-def test_demo_on_the_simulated_bench(tmp_path):
+def test_short_demo(tmp_path):
     """Shortened, but through the same serial line and the same bus."""
     check_story(*run_demo(tmp_path, "--short"))
 
 
 @pytest.mark.slow
 def test_whole_demo(tmp_path):
+    """The second recording decides; friction in the model reduces every error."""
     said, folder = run_demo(tmp_path)
     check_story(said, folder)
     first = json.loads((folder / "first_diagnosis.json").read_text())

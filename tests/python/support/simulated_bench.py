@@ -7,6 +7,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from ctcr.bench.devices import emergency_stop
+from ctcr.bench.shared.control import request
+from ctcr.bench.shared.folder import private_folder
+from ctcr.bench.simulators import aurora, ethercat, network
 
 ROOT = Path(__file__).parents[3]
 HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
@@ -21,8 +25,6 @@ def ctcr(*arguments) -> list[str]:
 
 def skip_without_bench() -> None:
     """Skips the test that asks, where no bench can be simulated."""
-    from ctcr.bench.simulators import network
-
     if not network.is_permitted():
         pytest.skip("this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing")
     for package in ("pysoem", "serial"):
@@ -35,10 +37,14 @@ def was_starved(said: str) -> bool:
     return any(sign in said for sign in BUS_STARVED)
 
 
-def before_others() -> None:
-    """Lets this process and its children run before other tests, where that is permitted: a `preexec_fn`."""
-    with suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, 0, -15)
+def run_before_others(command: list[str], **options) -> subprocess.CompletedProcess:
+    """Runs a command, with its children, before other tests, where that is permitted."""
+
+    def raise_priority() -> None:
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, -15)
+
+    return subprocess.run(command, capture_output=True, text=True, preexec_fn=raise_priority, **options)
 
 
 def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) -> None:
@@ -47,35 +53,10 @@ def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) ->
     skip_without_bench()
     known = {"PYTHONPATH": Path(__file__).parent, **environment}
     for attempt in (1, 2):
-        command = ctcr(
-            "sim",
-            "bench",
-            *bench,
-            "--folder",
-            folder / str(attempt),
-            "--",
-            sys.executable,
-            "-m",
-            "pytest",
-            "-q",
-            "--durations=9",
-            "-p",
-            "no:cacheprovider",
-            "-p",
-            "no:xdist",
-            "-p",
-            "bench_fixtures",
-            *tests,
-        )
-        done = subprocess.run(
-            command,
-            capture_output=True,
-            text=True,
-            cwd=ROOT,
-            timeout=900,
-            preexec_fn=before_others,
-            env=os.environ | {name: str(value) for name, value in known.items()},
-        )
+        pytest_command = "-m pytest -q --durations=9 -p no:cacheprovider -p no:xdist -p bench_fixtures".split()
+        program = ["--folder", folder / str(attempt), "--", sys.executable, *pytest_command, *tests]
+        environ = os.environ | {name: str(value) for name, value in known.items()}
+        done = run_before_others(ctcr("sim", "bench", *bench, *program), cwd=ROOT, timeout=900, env=environ)
         print(done.stdout)
         if done.returncode == 0 or not was_starved(done.stdout):
             break
@@ -102,11 +83,6 @@ def running(*command):
 
 def mended_bench() -> Path:
     """The folder of the bench on which this program runs, with every fault of the simulators mended."""
-    from ctcr.bench.devices import emergency_stop
-    from ctcr.bench.shared.control import request
-    from ctcr.bench.shared.folder import private_folder
-    from ctcr.bench.simulators import aurora, ethercat
-
     folder = private_folder()
     request(folder, "ethercat", {"faults": dict(ethercat.FAULTS)})
     request(folder, "aurora", {"faults": dict(aurora.FAULTS), "force": [0, 0, 0]})
