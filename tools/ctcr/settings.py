@@ -80,8 +80,93 @@ RUN_OFFSET_SIGNIFICANCE = 0.0125  # p-value below which runs have offsets of the
 FRAMES_BEYOND = 4.0  # RMS error over the expected one, from which frames for each run may be the reason,
 FRAMES_LEAVE = 0.5  # ... if they leave less than this part of it
 
-# ---- Diagnosis
+# ---- Diagnosis: evidence for an effect
+
+DECISIVE = 5.0  # log evidence that decides between two models: odds of 150 to 1
+TIE = 3.0  # log evidence below which candidates cannot be told apart: odds of 20 to 1
+SAME_FORM = 0.5  # log evidence below which the form of an effect with the fewest settings is taken: it means nothing
+SAME_SIGNAL = 0.95  # fraction of each other's signal that candidates imitate, from which data cannot tell them apart
+UNASKED = 10.0  # log evidence beyond DECISIVE that a further effect needs where noise explains the residual,
+FIRST_UNASKED = 5.0  # ... and the first effect: what nothing asks for is mostly a chance
+EXPLAINED = 0.25  # fraction of the unexplained chi-square that a further effect must explain: less is mostly spurious
+FIRST_EXPLAINED = 0.1  # the same for the first effect, beside which others may act
+SUSPECT_EXPLAINED = 0.5  # the same for a look-alike of an effect whose law is open: it imitates part of another law
+BEYOND_CROSS_VALIDATION = 200.0  # log evidence of a further effect that a linearised cross-validation cannot outweigh
+IMPROVEMENT = 0.1  # fraction of the error of left-out runs beyond jitter that a further effect must remove
+SURELY_NEEDED = 100.0  # log evidence of an earlier effect from which later ones surely did not make it superfluous
+MAX_EFFECTS = 4  # more causes than that no session can tell apart
+
+# ---- Diagnosis: course of the forward selection
 
 LINEARISATION_ROWS = 1500  # rows by whose derivatives candidates are screened where there are twice as many or more
+REFITS = 6  # effects that are refitted, the best ones by linearisation: the true one was always among them
+NEAR = 0.2  # linearised gain over the best one, below which a candidate is not refitted
+FIRST_ITERATIONS = 5  # of a refit: enough to see whether a candidate contends
+CONTENDS = 0.5  # gain over the best one, above which a refit goes on until it has converged
+IN_REACH = 0.8  # gain over the best one on a part of many rows, below which a candidate is not refitted to all
 INFLATION_EXPLAINED = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
-FIRST_ROW_EVIDENCE = 5.0  # log evidence that decides how the robot came to its first row
+INFLATION_SOUND = 1.05  # inflation up to which it explains them as it is
+INFLATION_WRONG = 3.0  # inflation from which the form of an effect is hardly right: other laws and amplitudes are tried
+HARDLY_EXPLAINED = 0.4  # fraction of the unexplained chi-square below which no effect is stacked on the first one
+LOST_TO_OUTLIERS = 10.0  # log evidence by which a fit with new weights may be worse before it has lost the effect
+HOPELESS = 1.0  # log evidence lost per number read, as by three times the mean square error: such a law is not followed
+NOISE_BETTER = 0.95  # RMS error of left-out runs over the usual one, at which another noise is used for prediction,
+NOISE_MUCH_BETTER = 0.9  # ... and where the model explains the readings as it is
+
+# ---- Diagnosis: searches for a start
+
+MOMENTS_AT_A_TIME = 40  # moments that are tried at a time; then those between the neighbours of the best
+SURFACE_OUTSIDE = (0.6, 0.75, 0.9, 0.97)  # fractions of the tips that a surface leaves outside
+FEWEST_CONTACTS = 5  # tips that must touch a surface
+SOURCE_DISTANCES = (1.1, 1.5, 2.2, 3.5)  # of a source from the centre of the readings, over that of far readings
+SOURCE_DIRECTIONS = 48  # in which a source is tried: 30 deg apart
+SOURCE_STARTS, SOURCE_EVALUATIONS = 3, 150  # simplex searches for a source, and evaluations of each
+SOURCE_EVIDENCE = 3.0  # log evidence of the best position of the grid, below which no better one is searched for
+ADDED_STARTS = 2  # starts of an effect that `ctcr add` tries, with and without outliers
+
+# ---- Diagnosis: nuisance errors that no robot file can hold
+
+SEGMENTS = 2  # of each run, at least: out and back
+SEGMENT_ROWS = 12  # in each of more segments, at least
+MOST_SEGMENTS = 96  # of more runs several share one, as each is a column of all readings
+SEGMENTS_AT_ONCE = 16  # columns that are made at a time: memory
+LAG_SPREAD = 0.2  # prior standard deviation of the lag of a segment, over the delay
+LAG_CORRELATION = (0.0, 1 / 16, 1 / 4)  # correlation times of lags over the session that are tried
+LAGS_LEAVE = 0.5  # fraction of the unexplained chi-square that lags may leave, if they are to be its cause
+ONE_FRAME = 0.3  # by how much lags may differ from one frame of the tracker, over it, and still be called so
+SMOOTH_LENGTHS = (0.025, 0.04, 0.07)  # [m] correlation lengths of a smooth field error that are tried
+SMOOTH_SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # [m] standard deviations an axis that are tried
+
+# ---- Diagnosis: outliers
+
+SURPRISE = 3.0  # error over its expected size, from which a reading is an outlier
+MOST_OUTLIERS = 0.01  # fraction of outliers beyond which the model may be wrong and not the readings
+MANY_OUTLIERS = 0.1  # ... and beyond which it hardly can be right
+MOST_ISOLATED = 0.03  # fraction of readings that may be isolated outliers: of more, the model is to blame
+CLUSTER_COSINE, CLUSTER_CHANCE = 0.5, 0.25  # between errors of neighbours that agree; how often it is that by chance
+CLUSTER_SIGNIFICANCE = 1e-3  # p-value below which outliers that agree with their neighbours are no chance
+CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least
+
+# ---- Diagnosis: verdict and varying-coefficient model, in fractions of unexplained chi-square of held-out runs
+
+TURNS = 2  # quarters that are held out in turn where nothing was found and the held-out one has new errors
+MOST_UNCERTAIN = 1.5  # expected square error of a held-out run over that of fitted ones, above which it judges nothing
+NOT_SPURIOUS = 0.75  # explained by effects in the median run, below which they are spurious,
+MOSTLY = 0.8  # ... and from which they are identified though the residual is more than noise
+MISLED = 2.0  # mean square error beyond noise over that without effects, from which effects predict worse than none
+DEPENDENCE_SIGNIFICANCE = 0.01  # p-value below which the residual depends on a quantity
+VARYING_ROWS = 400  # rows of the model where there are twice as many or more
+VARYING_MOST = 4  # variations, one found after the other
+VARYING_EXPLAINED = 0.3  # that all variations must explain together
+VARYING_NEGLIGIBLE = 0.05  # for which no further variation is named
+VARYING_RIVAL = 0.15  # left by effects, below which no varying-coefficient model can outdo them
+VARYING_OUTDOES = 0.25  # left by a varying-coefficient model over what effects leave, below which it outdoes them
+VARYING_AT_ONCE = 2_000_000  # numbers that are made at a time: memory
+MOST_TEETH = 24  # of a wheel whose errors are tried
+
+# ---- Plan of further runs
+
+PLAN_POOL = 120  # random runs to choose from
+PLAN_TRIES = 100  # random runs that are drawn for each one that the joints allow
+PLAN_STOP_S = 2.0  # [s] from stop to stop
+PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that each is reached from both sides

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import add, diagnose
 from ctcr.diagnose import round as rounds
 from ctcr.diagnose.linearised import Linear
@@ -97,7 +98,7 @@ def test_contact_of_few_readings(robot):
     hidden = {f"effects.contact.{name}": value for name, value in wall.items()}
     result = diagnose(robot, measured(robot, np.random.default_rng(4), hidden))
     assert result.accepted[0].ids == ["contact"]
-    assert rounds.outlier_fraction(result.final) <= rounds.MOST_OUTLIERS
+    assert rounds.outlier_fraction(result.final) <= settings.MOST_OUTLIERS
     floor, seen = result.rms_mm["noise_floor"], ~result.held_out
     assert result.final.rms_mm(seen) < 1.1 * floor < 2 * floor < result.calibrated.rms_mm(seen)
 

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr.diagnose.outliers import FEWEST, clustered, isolated, messages, outliers
+from ctcr import settings
+from ctcr.diagnose.outliers import clustered, isolated, messages, outliers
 from ctcr.table.measurements import Measurements
 
 JITTER = 3e-5  # [m] per axis
@@ -50,7 +51,7 @@ def test_pair_with_one_error(table):
     for seed in range(50):
         random = np.random.default_rng(seed)
         (error,) = directions(random, 1, 2e-3)
-        assert 2 < FEWEST
+        assert 2 < settings.CLUSTER_ROWS
         assert np.flatnonzero(clustered(table, fit(random, {10: error, 11: error}))).tolist() == [10, 11]
 
 

@@ -43,24 +43,24 @@ def test_unconverged_fit(weighted):
     """The gain of converging the fit before is no gain of a further effect."""
     ended = weighted.fit([MASS])
     early = weighted.fit_like(ended, [MASS], max_iterations=1)
-    assert ended.log_evidence - early.log_evidence > 2 * rounds.UNASKED
+    assert ended.log_evidence - early.log_evidence > 2 * settings.UNASKED
     accepted = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=early)
     others = [c for c in candidates(weighted.robot, weighted.measurements)[0] if c.id not in ("tip_load", "contact")]
     round_ = rounds.run_round(weighted, early, others, [accepted], lambda _: None)
     assert round_.accepted is None
     assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
-    assert max(one.score for one in round_.tried) < rounds.EVIDENCE
+    assert max(one.score for one in round_.tried) < settings.DECISIVE
 
 
 def test_contenders_converge(weighted, monkeypatch):
     """A candidate that is slow to fit does not lose to one that is quick."""
-    monkeypatch.setattr(rounds, "ITERATIONS", 1)
+    monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)
     before = weighted.fit()
     screened = rounds.screen(weighted, before, pool(weighted, "tip_load", "softening"), {})
     tried = rounds.refit_all(weighted, before, screened, {}, lambda _: None)
     best = max(tried, key=lambda one: one.score)
     assert best.id == "tip_load" and best.fit.converged
-    assert all(one.fit.iterations <= 1 for one in tried if one.score < rounds.CONTENDS * best.score)
+    assert all(one.fit.iterations <= 1 for one in tried if one.score < settings.CONTENDS * best.score)
 
 
 def test_best_of_few_rows(robot, plan, monkeypatch):
@@ -80,9 +80,11 @@ def test_cross_validation_vetoes(robot, plan, monkeypatch, offset, accepted):
     before = engine.fit([MASS])
     first = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=before)
     monkeypatch.setattr(rounds, "predicts_better", lambda *_: False)
-    monkeypatch.setattr(rounds, "CERTAIN", 90.0)  # these are few rows
+    monkeypatch.setattr(settings, "BEYOND_CROSS_VALIDATION", 90.0)  # these are few rows
     round_ = rounds.run_round(engine, before, pool(engine, "sensor_offset"), [first], lambda _: None)
-    assert (round_.tried[0].score > rounds.CERTAIN) == accepted and round_.tried[0].score > round_.needed
+    assert (round_.tried[0].score > settings.BEYOND_CROSS_VALIDATION) == accepted and round_.tried[
+        0
+    ].score > round_.needed
     assert round_.ids == (["sensor_offset"] if accepted else [])
     assert ("cross-validation" in round_.reason) != accepted
 
@@ -154,7 +156,7 @@ def test_hopeless():
 
 def test_simplest_form():
     """Of forms that are equally likely the one with the fewest settings is taken, else the likeliest."""
-    for better, shape in ((0.4 * rounds.ALIKE, ()), (2 * rounds.ALIKE, ((SPREAD, 0.5),))):
+    for better, shape in ((0.4 * settings.SAME_FORM, ()), (2 * settings.SAME_FORM, ((SPREAD, 0.5),))):
         plain, spread = candidate_fit("delay", 100.0), candidate_fit("delay", 100.0 + better, shape=((SPREAD, 0.5),))
         round_ = decided(plain, spread, candidate_fit("tip_load", 20.0))
         assert round_.accepted.candidate.shape == shape and round_.ids == ["delay"]
@@ -166,7 +168,7 @@ def test_indistinguishable():
     random = np.random.default_rng(0)
     signal, other = random.normal(size=(2, 40, 1))
     best = candidate_fit("delay", 100.0, columns=signal)
-    near = candidate_fit("clearance", 100.0 - 0.5 * rounds.TIE, columns=other)
+    near = candidate_fit("clearance", 100.0 - 0.5 * settings.TIE, columns=other)
     same, apart = (candidate_fit(name, 50.0, columns=c) for name, c in (("contact", 2 * signal), ("tip_load", other)))
     round_ = decided(best, near, same, apart)
     assert round_.ids == ["delay", "clearance", "contact"] and round_.margin == pytest.approx(50.0)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import add, diagnose, figures, segment_delays
 from ctcr.diagnose import round as rounds
 from ctcr.diagnose.candidates import candidates
@@ -76,8 +77,8 @@ def test_no_hysteresis(by_chance):
     """With lags of the segments no effect that depends on the history explains anything more."""
     engine, fit = by_chance
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id in ("friction", "backlash_rotation")]
-    assert max(one.linear for one in rounds.screen(engine, fit, pool, {})) < rounds.EVIDENCE
-    assert segment_delays.log_evidence(engine, fit) > fit.log_evidence + segment_delays.SURE
+    assert max(one.linear for one in rounds.screen(engine, fit, pool, {})) < settings.DECISIVE
+    assert segment_delays.log_evidence(engine, fit) > fit.log_evidence + settings.DECISIVE
 
 
 def test_message(by_chance):

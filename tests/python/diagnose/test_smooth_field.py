@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr.diagnose import add, diagnose, smooth_field
-from ctcr.diagnose.candidates import METAL
 from ctcr.diagnose.engine import Engine
+from ctcr.effects.catalogue import get
 from ctcr.fit import joint
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
 
-NAMES = [smooth_field.EFFECT + name for name in METAL]
+NAMES = get("field_distortion").names_with("source")  # volume, position, coils
 LENGTH, SIZE = 0.04, 1.5e-4  # of the smooth error [m]
 
 
@@ -86,7 +86,7 @@ def test_metal_alone(robot, by_metal, piece):
     assert [a.ids for a in found.accepted] == [["field_distortion"]]
     values = found.parameters(found.accepted[0])
     volume, *at = (piece[name] for name in NAMES[:4])
-    assert np.linalg.norm([values[name] for name in METAL[1:4]] - np.array(at)) < 0.01
-    assert values[METAL[0]] == pytest.approx(volume, rel=0.3)
+    assert np.linalg.norm([values[f"metal_{axis}"] for axis in "xyz"] - np.array(at)) < 0.01
+    assert values["metal_volume"] == pytest.approx(volume, rel=0.3)
     assert not any("more than the small piece" in line for line in found.residual.messages)
     assert found.rms_mm["with_effects"] < 1.15 * found.rms_mm["noise_floor"]

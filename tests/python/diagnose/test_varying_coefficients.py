@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.compare.sample import take_sample
 from ctcr.diagnose import diagnose, held_out, report, terminal, varying_coefficients
 from ctcr.diagnose.engine import Engine
@@ -108,7 +109,7 @@ def test_unexplained_chi_square(noise):
 def test_part_of_the_rows(robot, recorded, monkeypatch):
     """A part of many rows gives the same answer."""
     readings = readings_of(robot, recorded, twisted(recorded))
-    monkeypatch.setattr(varying_coefficients, "ROWS", 60)
+    monkeypatch.setattr(settings, "VARYING_ROWS", 60)
     engine, fit, found = looked_at(robot, readings)
     assert engine.thinned(fit, 60)[0].rows.sum() < engine.rows.sum() / 2
     first = found.variations[0]

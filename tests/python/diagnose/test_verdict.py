@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import verdict
 
 ROOT = Path(__file__).parents[3]
@@ -31,8 +32,8 @@ def test_words_in_tutorial():
     rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
     words = ["nothing_missing", "identified", "probable", "ambiguous", "stand_in", "not_in_catalogue"]
     assert [word for word in rows if word in words] == words
-    assert f"less than {100 * verdict.MOSTLY:.0f} %" in rows["probable"]
-    assert f"less than {100 * verdict.EXPLAINED:.0f} %" in rows["stand_in"]
+    assert f"less than {100 * settings.MOSTLY:.0f} %" in rows["probable"]
+    assert f"less than {100 * settings.NOT_SPURIOUS:.0f} %" in rows["stand_in"]
 
 
 def test_nothing_accepted(tip_load):

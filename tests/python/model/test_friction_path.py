@@ -8,10 +8,10 @@ import pytest
 from ctcr import settings
 from ctcr.diagnose import add
 from ctcr.diagnose.candidates import Candidate, forms
-from ctcr.diagnose.engine import FITS, Engine
+from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain
 from ctcr.diagnose.round import CandidateFit
-from ctcr.diagnose.selection import WRONG, Accepted, Selection
+from ctcr.diagnose.selection import Accepted, Selection
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import simulation, user_recording
@@ -125,8 +125,8 @@ def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot
         selection = Selection(engine, lambda _: None, accepted=[one], fit=fit)
         selection.refine_form(one)
         after = selection.fit
-        assert (np.max(fit.inflation) > WRONG) == (given == "torque_per_length")
+        assert (np.max(fit.inflation) > settings.INFLATION_WRONG) == (given == "torque_per_length")
         assert set(names["coefficient"]) <= set(one.best.candidate.names)
         assert not set(names["torque_per_length"]) & set(one.best.candidate.names)
-        assert np.max(after.inflation) < FITS
+        assert np.max(after.inflation) < settings.INFLATION_EXPLAINED
         assert after.rms_mm() < 1.2 * joint.tracker_error(after, noise)[0]

@@ -33,8 +33,6 @@ from ctcr.table.measurements import Measurements
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-PLACES = 2  # of an effect that are tried, the best by their slopes, with outliers and without
-
 
 @dataclass(frozen=True)
 class Stage:
@@ -280,7 +278,7 @@ class _Fitter:
         for weights in (None, np.ones((len(engine.measurements), 2))):
             there = engine.linear_fit(before, weights=weights)
             entries = [e for e in screen(*engine.thinned(there), plain, {}) if e.candidate.shape]
-            found += [(entry, linearised_end(engine, there, entry)) for entry in entries[:PLACES]]
+            found += [(entry, linearised_end(engine, there, entry)) for entry in entries[: settings.ADDED_STARTS]]
         if found:
             fitted = catalogue.get(identity, self.robot.n_tubes).shapes
             chosen = {name: x for name, x in found[0][0].candidate.shape if name not in fitted}

@@ -18,13 +18,6 @@ from ctcr.table.measurements import Measurements
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-SCREENING_ROWS = 1500  # rows at whose derivatives candidates are screened where there are twice as many or more
-OUTLIER = 0.3  # weight below which a reading is taken for one
-SIGNIFICANCE = 0.01
-FITS = 1.2  # inflation of the noise beyond which the model certainly does not explain the readings
-SAID = 5.0  # log evidence by which readings say how the robot came to its first row
-CLOSE = 1.0  # chi-square of integration errors: log evidences are meant to a half
-
 
 @dataclass
 class Engine:
@@ -45,7 +38,9 @@ class Engine:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
         self.measured = folds.measured_rows(self.measurements)
-        self.steps = recording.steps_for(self.robot, self.measurements, self.noise, CLOSE)
+        self.steps = recording.steps_for(
+            self.robot, self.measurements, self.noise, settings.INTEGRATION_CHI_SQUARE_COARSE
+        )
 
     @property
     def fitted(self) -> Mask:
@@ -136,7 +131,7 @@ class Engine:
         at rest there. If so, all later fits assume that."""
         other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
         there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=settings.COARSE)
-        if there.log_evidence - fit.log_evidence < SAID:
+        if there.log_evidence - fit.log_evidence < settings.DECISIVE:
             return False
         self.measurements = other.measurements
         return True
@@ -149,7 +144,7 @@ class Engine:
         """The noise of a fit with that part of its field error which makes the readings likeliest."""
         return joint.likeliest_field(fit)
 
-    def thinned(self, fit: joint.Fit, least: int = SCREENING_ROWS) -> tuple["Engine", joint.Fit]:
+    def thinned(self, fit: joint.Fit, least: int = settings.LINEARISATION_ROWS) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""
         few = folds.few_of(self.fitted, least)
         if few is None:
@@ -164,7 +159,9 @@ class Engine:
 
     def rejects(self, fit: joint.Fit) -> bool:
         """Whether the noise as stated does not explain the residual."""
-        return bool(np.max(fit.inflation) > FITS or self.as_stated(fit).p_value < SIGNIFICANCE)
+        return bool(
+            np.max(fit.inflation) > settings.INFLATION_EXPLAINED or self.as_stated(fit).p_value < settings.SIGNIFICANCE
+        )
 
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()

@@ -8,25 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import settings
-from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
+from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.fit import folds, joint
 from ctcr.model.noise import with_field
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-IMPROVEMENT = 0.1  # of the error of left-out runs that a further effect must remove
 # Another noise must predict left-out runs so much better to be preferred to that of the most evidence.
-BETTER = 0.95
-MUCH_BETTER = 0.9  # where the model explains the readings as it is
-SOUND = 1.05  # inflation of the noise up to which it does
 
 
 def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
     """Mean square position errors [mm^2] of fitted runs, each left out with a few others, of the model linearised at a
     fit."""
     group = folds.groups(engine.measurements)
-    plain, squares = fit.weights[:, 0] > OUTLIER, []
+    plain, squares = fit.weights[:, 0] > settings.OUTLIER_WEIGHT, []
     for fold in range(settings.FOLDS):
         out = engine.rows & (group % settings.FOLDS == fold)
         if not out.any():
@@ -47,7 +43,7 @@ def predicts_better(engine: Engine, before: joint.Fit, after: joint.Fit) -> bool
     """Whether a further effect removes a sufficient part of the error of left-out runs beyond jitter."""
     jitter = 3e6 * engine.noise.position_jitter**2
     old, new = typical(cross_validated(engine, before)), typical(cross_validated(engine, after))
-    return old - new >= IMPROVEMENT * max(old - jitter, 0.0)
+    return old - new >= settings.IMPROVEMENT * max(old - jitter, 0.0)
 
 
 def fit_to_predict(
@@ -72,7 +68,7 @@ def _noise_that_predicts(engine: Engine, fit: joint.Fit) -> Any:
     errors = {part: typical(cross_validated(engine, fit, noise)) for part, noise in tried.items()}
     part = min(errors, key=lambda part: errors[part])
     usual = min(tried, key=lambda p: abs(tried[p].position_field - fit.noise.position_field))
-    needed = MUCH_BETTER if np.max(fit.inflation) < SOUND else BETTER
+    needed = settings.NOISE_MUCH_BETTER if np.max(fit.inflation) < settings.INFLATION_SOUND else settings.NOISE_BETTER
     return fit.noise if errors[part] > needed**2 * errors[usual] else tried[part]
 
 

@@ -7,24 +7,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import binom
 
-from ctcr.diagnose.engine import OUTLIER
+from ctcr import settings
 from ctcr.table.measurements import Measurements
 
 Mask = NDArray[np.bool_]
-
-SURPRISE = 3.0  # error over its expected size, from which a reading is an outlier
-ALIKE = 0.5  # cosine between the errors of neighbours from which they agree,
-BY_CHANCE = 0.25  # ... and how often it is that by chance
-DOUBT = 1e-3  # significance of saying that it is no chance
-FEWEST = 4  # readings that say so
-GLITCHES = 0.03  # fraction of readings that may be isolated outliers: of more, the model is to blame
 
 
 def outliers(fit: Any, admitted: float = 1.0) -> Mask:
     """Rows (M,) whose position error is much larger than uncertain parameters and the noise, `admitted` times as large
     as stated, let expect."""
     square = np.sum(fit.residual[:, :3] ** 2, axis=1)
-    return np.isfinite(square) & (square > (SURPRISE * admitted) ** 2 * fit.expected_square[:, 0])
+    return np.isfinite(square) & (square > (settings.SURPRISE * admitted) ** 2 * fit.expected_square[:, 0])
 
 
 def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
@@ -40,7 +33,7 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     beside[1:] |= same & far[:-1]
     beside[:-1] |= same & far[1:]
     found[read] = rows[read] & far & ~beside & ~far[_nearest(measurements, read)]
-    return found if np.sum(found) <= GLITCHES * np.sum(rows[read]) else np.zeros_like(found)
+    return found if np.sum(found) <= settings.MOST_ISOLATED * np.sum(rows[read]) else np.zeros_like(found)
 
 
 def messages(measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:
@@ -59,7 +52,7 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     Outliers are those that the fit down-weights, not readings with the error that its model has everywhere.
     """
     fitted = fit.weights[:, 0] > 0
-    down_weighted = fitted & (fit.weights[:, 0] < OUTLIER)
+    down_weighted = fitted & (fit.weights[:, 0] < settings.OUTLIER_WEIGHT)
     far, error = down_weighted & outliers(fit, fit.inflation[0]), fit.residual[:, :3]
     read = np.flatnonzero(fitted & np.isfinite(error).all(axis=1))
     found = np.zeros(len(measurements), bool)
@@ -68,14 +61,14 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     neighbour = read[_nearest(measurements, read)]
     both, fraction = far[read] & far[neighbour], np.mean(far[read])
     size, size_there = (np.linalg.norm(error[rows], axis=1) for rows in (read, neighbour))
-    alike = both & (np.sum(error[read] * error[neighbour], axis=1) > ALIKE * size * size_there)
-    if np.sum(alike) >= FEWEST and _p_value(np.sum(alike), far, BY_CHANCE * fraction) < DOUBT:
+    alike = both & (np.sum(error[read] * error[neighbour], axis=1) > settings.CLUSTER_COSINE * size * size_there)
+    if np.sum(alike) >= settings.CLUSTER_ROWS and _beyond_chance(alike.sum(), far, settings.CLUSTER_CHANCE * fraction):
         found[read] |= alike
     expected = fit.expected_square[:, 0]
-    noise = SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])
+    noise = settings.SURPRISE * fit.inflation[0] * np.sqrt(expected[read] + expected[neighbour])
     equal = both & (np.linalg.norm(error[read] - error[neighbour], axis=1) < noise)
     by_chance = np.mean((noise[far[read]] / size[far[read]]) ** 3)  # ratio of the volumes of two balls
-    if equal.any() and _p_value((np.sum(equal) + 1) // 2, far, by_chance * fraction) < DOUBT:  # two may be one pair
+    if equal.any() and _beyond_chance((equal.sum() + 1) // 2, far, by_chance * fraction):  # two may be one pair
         found[read] |= equal
     return found
 
@@ -87,6 +80,6 @@ def _nearest(measurements: Measurements, read: NDArray[np.int64]) -> NDArray[np.
     return np.where(near[:, 0] == np.arange(len(read)), near[:, 1], near[:, 0])
 
 
-def _p_value(seen: int, far: Mask, chance: float) -> float:
-    """Probability that at least so many of the outliers would agree by chance."""
-    return float(binom.sf(seen - 1, np.sum(far), min(chance, 1.0)))
+def _beyond_chance(seen: int, far: Mask, chance: float) -> bool:
+    """Whether so many of the outliers that agree, each with this probability, are no chance."""
+    return bool(binom.sf(seen - 1, np.sum(far), min(chance, 1.0)) < settings.CLUSTER_SIGNIFICANCE)

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.audit.preparation import prepared
-from ctcr.diagnose import jump, outliers, segment_delays, smooth_field
+from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
-from ctcr.diagnose.engine import FITS, Engine, values_of
+from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
-from ctcr.diagnose.round import MOST_OUTLIERS, Progress, Round, outlier_fraction, parameters_of
-from ctcr.diagnose.selection import HARDLY, WRONG, Accepted, select_effects
+from ctcr.diagnose.round import Progress, Round, outlier_fraction, parameters_of
+from ctcr.diagnose.selection import Accepted, select_effects
+from ctcr.diagnose.starts import rows_around
 from ctcr.diagnose.varying_coefficients import VaryingModel, may_outdo, varying_model
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.effects import catalogue
@@ -25,10 +27,6 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Mask = NDArray[np.bool_]
-
-TURNS = 2  # quarters of the runs that are held out in turn, where that is needed
-MANY = 0.1  # fraction of outliers of the calibration beyond which it is hardly right
-MOST_OPEN = 1.5  # expected mean square error of a held-out run over that of the fitted ones
 
 
 @dataclass
@@ -55,10 +53,10 @@ class Diagnosis:
         """Whether more readings are outliers than a tracker makes, and effects do not explain why."""
         before, after = outlier_fraction(self.rounds[0].before), outlier_fraction(self.final)
         explained = self.accepted[0].explained if self.accepted else 0.0
-        others_fit = np.max(self.rounds[0].before.inflation) < FITS
-        is_wrong = before > MANY and np.max(self.final.inflation) > WRONG
-        many = before > MOST_OUTLIERS and after > max(MOST_OUTLIERS, 0.5 * before)
-        return many and bool(explained < HARDLY or others_fit or is_wrong)
+        others_fit = np.max(self.rounds[0].before.inflation) < settings.INFLATION_EXPLAINED
+        is_wrong = before > settings.MANY_OUTLIERS and np.max(self.final.inflation) > settings.INFLATION_WRONG
+        many = before > settings.MOST_OUTLIERS and after > max(settings.MOST_OUTLIERS, 0.5 * before)
+        return many and bool(explained < settings.HARDLY_EXPLAINED or others_fit or is_wrong)
 
     @property
     def judged(self) -> Mask:
@@ -129,7 +127,7 @@ def diagnose(
     """
     began = perf_counter()
     measurements, notices = prepared(robot, measurements)
-    for turn in range(TURNS):
+    for turn in range(settings.TURNS):
         held_out = folds.held_out_rows(robot, measurements, turn)
         result = _diagnose_robustly(robot, measurements, held_out, progress, threads)
         undetermined = _undetermined_groups(result)
@@ -170,20 +168,21 @@ def _undetermined_groups(result: Diagnosis) -> set[int]:
     expected = fit.expected_square[:, 0]
     usual = np.nanmean(expected[~result.held_out])
     held_out = np.unique(group[result.held_out])
-    found = {k for k in held_out if np.nanmean(expected[group == k]) > MOST_OPEN * usual}
+    found = {k for k in held_out if np.nanmean(expected[group == k]) > settings.MOST_UNCERTAIN * usual}
     for a in result.accepted:
-        if "order" in catalogue.get(a.id, result.robot.n_tubes).needs and 0 in held_out:
+        effect = catalogue.get(a.id, result.robot.n_tubes)
+        if "order" in effect.needs and 0 in held_out:
             found.add(0)  # how the robot came to its first row is not recorded
-        if a.id == "frame_jump":  # before or after it?
-            when = dict(a.best.candidate.shape)[jump.WHEN]
-            found |= set(group[jump.uncertain_rows(result.measurements, ~result.held_out, when)])
+        for moment in effect.names_with("moment"):
+            when = dict(a.best.candidate.shape)[moment]
+            found |= set(group[rows_around(result.measurements, ~result.held_out, when)])
     return found
 
 
 def _has_new_errors(result: Diagnosis) -> bool:
     """Whether the held-out runs have errors that the fitted ones do not have."""
     seen = np.isfinite(result.calibrated.residual[:, 0])
-    return bool(np.mean(outliers.outliers(result.calibrated)[seen & result.held_out]) > MOST_OUTLIERS)
+    return bool(np.mean(outliers.outliers(result.calibrated)[seen & result.held_out]) > settings.MOST_OUTLIERS)
 
 
 def _diagnose(

@@ -4,15 +4,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ctcr import settings
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
-from ctcr.diagnose.engine import OUTLIER, Engine
+from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.outliers import clustered
 from ctcr.fit import joint
 from ctcr.model import effect_model
 from ctcr.show.wording import listed
 
-LEVEL = 0.01  # probability that a dependence is named where there is none
 SHOWN = 6
 
 
@@ -65,9 +65,9 @@ def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
     rows = np.searchsorted(engine.measurements.row, sample.row)
     left = (fit.residual - fit.field)[rows, :3]
     weight = fit.weights[rows, 0]
-    left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < OUTLIER))] = 0.0
+    left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < settings.OUTLIER_WEIGHT))] = 0.0
     error = left @ sample.rotation
-    return rank(sample, error - error.mean(axis=0), screw_pitch(engine), LEVEL)
+    return rank(sample, error - error.mean(axis=0), screw_pitch(engine), settings.DEPENDENCE_SIGNIFICANCE)
 
 
 def screw_pitch(engine: Engine) -> float | None:

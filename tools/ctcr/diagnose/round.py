@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import settings
-from ctcr.diagnose import contact, jump, metal, segment_delays
-from ctcr.diagnose.candidates import Candidate, is_of_metal
-from ctcr.diagnose.engine import OUTLIER, Engine, effects_in, values_of
+from ctcr.diagnose import segment_delays, starts
+from ctcr.diagnose.candidates import Candidate
+from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.diagnose.held_out import predicts_better
 from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
@@ -18,26 +18,6 @@ from ctcr.fit import folds, joint
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-
-SURE = 5.0  # log evidence beyond which candidates can surely be told apart
-CERTAIN = 200.0  # log evidence of a further effect that a linearised cross-validation does not outweigh
-REFITS = 6  # effects that are refitted, the best ones by linearisation
-ITERATIONS = 5  # of a first refit: kinks of an effect that is far behind need not be followed to the end
-CONTENDS = 0.5  # fraction of the best gain above which a candidate is refitted to convergence
-END = 50  # iterations by which a refit has converged, or never will
-IN_REACH = 0.8  # of the best evidence on a few of many rows: candidates below it are not refitted to all
-NEAR = 0.2  # of the best linearised gain: candidates below it are not refitted
-MOST_OUTLIERS = 0.01  # fraction of readings: where more are outliers, the model may be wrong and not they
-
-EVIDENCE = 5.0  # of the best candidate over none, beyond the penalty for having looked at many: log(number of effects)
-UNASKED = 10.0  # evidence needed of a further effect besides where noise alone explains the residual, and
-FIRST_UNASKED = 5.0  # of the first one
-EXPLAINED = 0.25  # fraction of the unexplained chi-square that a further effect must explain, and
-FIRST_EXPLAINED = 0.1  # the first one, and
-SUSPECT_EXPLAINED = 0.5  # a look-alike of one whose constitutive law is not known: it imitates part of another law
-TIE = 3.0  # candidates whose log evidence is nearer than this cannot be told apart
-ALIKE = 0.5  # ... and of forms of one effect the one with the fewest settings is taken
-SAME = 0.95  # fraction of a signal that another candidate can imitate, both ways: the same to these data
 
 
 @dataclass(frozen=True)
@@ -140,7 +120,7 @@ def _chi_square(fit: joint.Fit) -> float:
 def outlier_fraction(fit: joint.Fit) -> float:
     """Of the fitted positions."""
     used = fit.weights[:, 0] > 0
-    return float(np.mean(fit.weights[used, 0] < OUTLIER)) if used.any() else 0.0
+    return float(np.mean(fit.weights[used, 0] < settings.OUTLIER_WEIGHT)) if used.any() else 0.0
 
 
 def parameters_of(fits: Collection[CandidateFit]) -> tuple[list[str], dict[str, float]]:
@@ -174,7 +154,7 @@ def run_round(
     round_ = Round(before, tried)
     n_effects = len({c.id for c in candidates})
     decide(round_, n_effects, bool(accepted), engine.rejects(before), _suspects(engine, accepted))
-    unsure = round_.accepted and accepted and round_.accepted.score < CERTAIN
+    unsure = round_.accepted and accepted and round_.accepted.score < settings.BEYOND_CROSS_VALIDATION
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
         round_.accepted, round_.ids = None, []
@@ -186,47 +166,40 @@ def screen(
     engine: Engine, before: joint.Fit, candidates: list[Candidate], fixed: dict[str, float]
 ) -> list[CandidateFit]:
     """All candidates with their linearised gain, best first."""
-    linear = segment_delays.linearised(engine, before)
+    n_tubes, linear = engine.robot.n_tubes, segment_delays.linearised(engine, before)
     candidates = [c for c in candidates if not set(c.names) & set(before.names)]
-    names = list(dict.fromkeys([name for c in candidates for name in c.names] + contact.FORCE))
-    columns = dict(
-        zip(names, np.moveaxis(engine.derivatives(before, names, fixed | {jump.WHEN: -1.0}), 2, 0), strict=True)
-    )
-    found = []
+    forces, everywhere = starts.tip_forces_of(n_tubes), dict.fromkeys(starts.moments_of(n_tubes), starts.EVERYWHERE)
+    names = list(dict.fromkeys([*(name for c in candidates for name in c.names), *forces]))
+    derivatives = engine.derivatives(before, names, fixed | everywhere)
+
+    def by(own: Collection[str]) -> Array:
+        return derivatives[:, :, [names.index(name) for name in own]]
 
     def worth(columns: Array) -> float:
         return linear.gain(before.whiten(columns)).log_evidence
 
+    by_force = by(forces) / engine.priors(forces)[1]
+    found = []
     for candidate in candidates:
-        if candidate.shape:
-            own = engine.derivatives(before, candidate.names, fixed | dict(candidate.shape))
-        else:
-            own = np.stack([columns[name] for name in candidate.names], axis=2)
-        kinds = [[(candidate, own)]]  # of each the best enters
-        if candidate.id == "frame_jump":
-            kinds = [jump.moment(engine, candidate, own, worth)]
-        elif candidate.id == "contact":
-            tip = np.stack([columns[name] for name in contact.FORCE], axis=2) / engine.priors(contact.FORCE)[1]
-            kinds = [contact.planes(engine, candidate, tip, part) for part in contact.DEPTHS]
-        elif is_of_metal(candidate.names[0]):
-            kinds = [metal.piece(engine, candidate, worth)]
-        for options in kinds:
-            gains = [(linear.gain(before.whiten(columns)), variant) for variant, columns in options]
+        at = fixed | dict(candidate.shape)
+        own = engine.derivatives(before, candidate.names, at) if candidate.shape else by(candidate.names)
+        for options in starts.options(engine, candidate, own, by_force, worth):
+            gains = [(linear.gain(before.whiten(columns)), start) for start, columns in options]
             if gains:
-                gain, variant = max(gains, key=lambda pair: pair[0].log_evidence)
-                found.append(CandidateFit(variant, gain))
+                gain, start = max(gains, key=lambda pair: pair[0].log_evidence)
+                found.append(CandidateFit(start, gain))
     return sorted(found, key=lambda one: -one.linear)
 
 
 def _worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
-    """The best REFITS effects, two of each at most. Forms of the same parameters come last: once an effect is accepted,
+    """The best effects, two of each at most. Forms of the same parameters come last: once an effect is accepted,
     all its forms are tried."""
-    worth = [one for one in screened if one.linear > max(1.0, NEAR * screened[0].linear)]
+    worth = [one for one in screened if one.linear > max(1.0, settings.NEAR * screened[0].linear)]
     first = {one.candidate.names: one for one in reversed(worth)}
     chosen: list[CandidateFit] = []
     for one in sorted(worth, key=lambda one: first[one.candidate.names] is not one):
         same = [other for other in chosen if other.id == one.id]
-        if len(same) < 2 and (same or len({other.id for other in chosen}) < REFITS):
+        if len(same) < 2 and (same or len({other.id for other in chosen}) < settings.REFITS):
             chosen.append(one)
     return chosen
 
@@ -242,7 +215,7 @@ def _in_reach(
     base = small.fit_like(before, effects_in(before), start=values_of(before), fixed=fixed, near=True)
     tried = refit_all(small, base, chosen, fixed, progress)
     best = max(one.score for one in tried)
-    reach = min(best, IN_REACH * best)  # the best itself always is
+    reach = min(best, settings.IN_REACH * best)  # the best itself always is
     return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
 
 
@@ -252,10 +225,10 @@ def refit_all(
     """Each after a joint fit with calibration and accepted effects, at the same weights and noise. Those that contend
     are refitted to convergence: a candidate that is slow to fit must not lose to one that is quick."""
     evidence = segment_delays.log_evidence(engine, before)
-    tried = [_refit(engine, before, evidence, one, fixed, progress, ITERATIONS) for one in chosen]
-    near = CONTENDS * max((one.score for one in tried), default=0.0)
+    tried = [_refit(engine, before, evidence, one, fixed, progress, settings.FIRST_ITERATIONS) for one in chosen]
+    near = settings.CONTENDS * max((one.score for one in tried), default=0.0)
     return [
-        _refit(engine, before, evidence, one, fixed, progress, END)
+        _refit(engine, before, evidence, one, fixed, progress, settings.ITERATIONS)
         if one.fit and not one.fit.converged and one.score > near
         else one
         for one in tried
@@ -357,8 +330,8 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
     n_effects that were looked at; is_further: whether others are in the model already; is_rejected: whether the noise
     as stated does not explain the residual; suspects: ids that may imitate the unknown law of an accepted effect.
     """
-    round_.needed = EVIDENCE + np.log(n_effects)
-    unasked = UNASKED if is_further else FIRST_UNASKED
+    round_.needed = settings.DECISIVE + np.log(n_effects)
+    unasked = settings.UNASKED if is_further else settings.FIRST_UNASKED
     threshold = round_.needed + (0.0 if is_rejected else unasked)
     refitted = [one for one in round_.tried if one.fit is not None]
     fitted = [one for one in refitted if not (is_further and one.implausible)]
@@ -369,14 +342,16 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
             round_.reason = f"the best candidate, {refitted[0].id}, would need an implausible value, {values}"
         return
     best = fitted[0]
-    alike = [one for one in fitted if one.id == best.id and best.score - one.score < ALIKE]
+    alike = [one for one in fitted if one.id == best.id and best.score - one.score < settings.SAME_FORM]
     best = min(alike, key=lambda one: len(one.candidate.shape))
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
         )
         return
-    needed = SUSPECT_EXPLAINED if best.id in suspects else EXPLAINED if is_further else FIRST_EXPLAINED
+    needed = settings.EXPLAINED if is_further else settings.FIRST_EXPLAINED
+    if best.id in suspects:
+        needed = settings.SUSPECT_EXPLAINED
     if best.explained < needed:
         round_.is_spurious = best.explained + 2 * best.explained_sd < needed
         round_.reason = (
@@ -388,7 +363,9 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
     for rival in rivals:
         overlap = min(imitated(best, rival), imitated(rival, best))
         round_.overlap[rival.id] = max(overlap, round_.overlap.get(rival.id, 0.0))
-    same = [one for one in rivals if best.score - one.score < TIE or round_.overlap[one.id] >= SAME]
+    same = [
+        one for one in rivals if best.score - one.score < settings.TIE or round_.overlap[one.id] >= settings.SAME_SIGNAL
+    ]
     round_.accepted = best
     round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
     others = [one.score for one in rivals if one.id not in round_.ids]

@@ -10,24 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain, Linear, laplace
+from ctcr.effects import catalogue
 from ctcr.fit import folds
 from ctcr.fit.joint import Fit
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-DELAY = "effects.delay.delay"
-SEGMENTS = 2  # of each run, at least: out and back
-FEWEST = 12  # readings in each of more segments than these
-MOST = 96  # segments: of more runs several share one, as each is a column of all readings
-AT_ONCE = 16  # of these columns are made at a time
-SPREAD = 0.2  # prior standard deviation of a segment's lag, over the delay
-CORRELATION_TIMES = (0.0, 1 / 16, 1 / 4)  # of lags, over the time of all readings: the likeliest of these
-SURE = 5.0  # log evidence from which lags are allowed for
-LEFT = 0.5  # fraction of the unexplained chi-square that they may leave
-ONE_FRAME = 0.3  # by how much lags may differ by more or less than a frame of the tracker, over it
 
 CORRECTED = (
     "Errors with the effects found are corrected for that: readings of held-out runs count as late as the readings "
@@ -39,6 +31,7 @@ CORRECTED = (
 class SegmentLags:
     """How much later than the fitted delay each segment is, linearised at a fit."""
 
+    delay: int  # index of the fitted delay
     plain: Linear  # with one delay
     columns: Array  # (K, segments) whitened derivatives by independent lags, from which those of the segments follow
     gain: Gain  # of these
@@ -88,13 +81,12 @@ def corrected(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
     not sure, or leave most of the unexplained chi-square: then the rest may be what causes them.
     """
     lags = segment_lags(engine, fit)
-    if lags is None or lags.log_evidence < SURE:
+    if lags is None or lags.log_evidence < settings.DECISIVE:
         return fit, []
-    derivative = np.nan_to_num(fit.jacobian_all[:, fit.names.index(DELAY)].reshape(-1, 6))
-    more = lags.lag[:, None] * derivative
+    more = lags.lag[:, None] * np.nan_to_num(fit.jacobian_all[:, lags.delay].reshape(-1, 6))
     noise = engine.likeliest_noise(engine.linear_fit(fit, more=more, noise=engine.noise))
     there = engine.linear_fit(fit, more=more, noise=noise)
-    if _unexplained(engine, there) > LEFT * _unexplained(engine, fit):
+    if _unexplained(engine, there) > settings.LAGS_LEAVE * _unexplained(engine, fit):
         return fit, []
     # Once more with its weights: then rows that were not fitted have a residual, too.
     seen = engine.linear_fit(fit, more=more, noise=noise, weights=there.weights, inflation=there.inflation)
@@ -112,8 +104,8 @@ def _message(engine: Engine, fit: Fit, lags: SegmentLags) -> str:
     each = np.array([lags.lag[lags.segment == k][0] for k in fitted])
     text = f"between time segments it varies by {1e3 * each.std():.2g} ms (standard deviation)"
     rate = engine.robot.tracker.rate_Hz
-    early, late = _delay(fit) + np.quantile(each, [0.1, 0.9])
-    if rate and abs((late - early) * rate - 1) < ONE_FRAME:
+    early, late = fit.values[lags.delay] + np.quantile(each, [0.1, 0.9])
+    if rate and abs((late - early) * rate - 1) < settings.ONE_FRAME:
         text += f", {1e3 * early:.2g} to {1e3 * late:.2g} ms, about one frame of the tracker ({1e3 / rate:.3g} ms)"
     return (
         f"The delay is not constant: {text}. Where the tracker and the computer have clocks of their own, no model "
@@ -124,29 +116,28 @@ def _message(engine: Engine, fit: Fit, lags: SegmentLags) -> str:
 def segment_lags(engine: Engine, fit: Fit) -> SegmentLags | None:
     """None for a fit without a delay."""
     time = engine.measurements.t
-    if DELAY not in fit.names or not _delay(fit) or not np.ptp(time) > 0:
+    known = catalogue.parameter_of(engine.robot.n_tubes)
+    delays = [i for i, name in enumerate(fit.names) if name in known and known[name].quantity == "lag"]
+    if not delays or not fit.values[delays[0]] or not np.ptp(time) > 0:
         return None
+    (delay,) = delays
     plain, segment = engine.linear(fit), segments(engine.measurements)
     each = np.arange(segment.max() + 1)
-    columns, derivative = np.empty((len(plain.residual), len(each))), fit.slope_where_used(DELAY)
-    for some in np.array_split(each, max(1, len(each) // AT_ONCE)):
+    columns, derivative = np.empty((len(plain.residual), len(each))), fit.slope_where_used(fit.names[delay])
+    for some in np.array_split(each, max(1, len(each) // settings.SEGMENTS_AT_ONCE)):
         columns[:, some] = fit.whiten(derivative[:, :, None] * (segment[:, None] == some)[:, None, :])
     middle = np.array([time[segment == k].mean() for k in each])
-    apart, spread = np.abs(middle[:, None] - middle), SPREAD * abs(_delay(fit))
+    apart, spread = np.abs(middle[:, None] - middle), settings.LAG_SPREAD * abs(fit.values[delay])
     crossed, gradient = plain.jacobian.T @ columns, columns.T @ plain.residual
     information = columns.T @ columns - crossed.T @ plain.imitation(columns)
     roots = []
-    for part in CORRELATION_TIMES:
+    for part in settings.LAG_CORRELATION:
         alike = np.exp(-apart / (part * np.ptp(time))) if part else np.eye(len(each))
         roots.append(spread * np.linalg.cholesky(alike + 1e-9 * np.eye(len(each))))
     root = max(roots, key=lambda root: laplace(root.T @ information @ root, root.T @ gradient)[0])
     columns = columns @ root
     gain = plain.gain(columns)
-    return SegmentLags(plain, columns, gain, (root @ gain.values)[segment], segment)
-
-
-def _delay(fit: Fit) -> float:
-    return float(fit.values[fit.names.index(DELAY)])
+    return SegmentLags(delay, plain, columns, gain, (root @ gain.values)[segment], segment)
 
 
 def segments(measurements: Measurements) -> NDArray[np.int64]:
@@ -155,8 +146,8 @@ def segments(measurements: Measurements) -> NDArray[np.int64]:
     segment, count = np.zeros(len(group), np.int64), 0
     for k in np.unique(group):
         rows = np.flatnonzero(group == k)
-        parts = min(MOST // (group.max() + 1), len(rows) // FEWEST)
-        parts = min(max(parts, SEGMENTS), len(rows))
+        parts = min(settings.MOST_SEGMENTS // (group.max() + 1), len(rows) // settings.SEGMENT_ROWS)
+        parts = min(max(parts, settings.SEGMENTS), len(rows))
         segment[rows] = count + np.arange(len(rows)) * parts // len(rows)
         count += parts
-    return segment if count <= MOST else segment * MOST // count
+    return segment if count <= settings.MOST_SEGMENTS else segment * settings.MOST_SEGMENTS // count

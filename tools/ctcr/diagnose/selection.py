@@ -8,31 +8,12 @@ from numpy.typing import NDArray
 from ctcr import settings
 from ctcr.diagnose import segment_delays
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
-from ctcr.diagnose.engine import FITS, Engine, values_of
-from ctcr.diagnose.round import (
-    END,
-    EVIDENCE,
-    ITERATIONS,
-    SURE,
-    TIE,
-    CandidateFit,
-    Progress,
-    Round,
-    fraction_explained,
-    parameters_of,
-    run_round,
-)
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.round import CandidateFit, Progress, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
 
 Array = NDArray[np.float64]
-
-MAX_EFFECTS = 4
-HARDLY = 0.4  # fraction of the unexplained chi-square below which the first effect hardly explains anything
-LOST = 10.0  # log evidence by which a fit with its own weights may be worse, before it has lost the effect to outliers
-SAFE = 100.0  # log evidence of an effect that others have surely not made superfluous
-WRONG = 3.0  # inflation of the noise at which a model is hardly right
-HOPELESS = 1.0  # log evidence lost per number read, as by three times the mean square error: such a law is not followed
 
 
 @dataclass
@@ -80,18 +61,18 @@ class Selection:
         more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
         left to them.
         """
-        while len(self.accepted) < MAX_EFFECTS:
+        while len(self.accepted) < settings.MAX_EFFECTS:
             taken = {identity for a in self.accepted for identity in a.ids}
             open_to = [c for c in pool if c.id not in taken]
             round_ = run_round(self.engine, self.fit, open_to, self.fits, self.progress)
-            sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= SURE)
+            sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= settings.DECISIVE)
             if more > 1 and not sure:
                 return
             self.rounds.append(round_)
             if round_.accepted is None:
                 break
             rejected = self._accept(round_)
-            if rejected and self.accepted[0].explained < HARDLY:
+            if rejected and self.accepted[0].explained < settings.HARDLY_EXPLAINED:
                 break  # no effect is stacked on one that hardly explains anything
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
@@ -106,7 +87,7 @@ class Selection:
         self.accepted.append(one)
         converged = self._refit_to_convergence(best.fit, before)
         self.fit = self.calibrate(self.fits, values_of(converged))
-        if self.fit.log_evidence < converged.log_evidence - LOST:
+        if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
             names, fixed = parameters_of(self.fits)
             self.fit = engine.fit_like(before, names, start=values_of(converged), fixed=fixed, near=True)
         rejected = engine.rejects(self.fit)
@@ -139,13 +120,13 @@ class Selection:
                 one, [form for form in forms(effect, variant, one.rejected_variants) if form != given]
             )
             gain = max((there.log_evidence for _, there in freed), default=-np.inf) - fit.log_evidence
-            if variant is given and gain < TIE:
+            if variant is given and gain < settings.TIE:
                 freed, ended = [], [(fit, one.best, fit)]
             for best, there in _best_of_each_law(freed, fit):
                 ended.append((self.calibrate(self._with(one, best), values_of(there)), best, there))
-                if np.max(ended[-1][0].inflation) < FITS:
+                if np.max(ended[-1][0].inflation) < settings.INFLATION_EXPLAINED:
                     break  # it explains the readings: no other law can do more
-            if min(np.max(calibrated.inflation) for calibrated, _, _ in ended) <= WRONG:
+            if min(np.max(calibrated.inflation) for calibrated, _, _ in ended) <= settings.INFLATION_WRONG:
                 break
         self.fit, best, freed = max(ended, key=lambda end: end[0].log_evidence)
         if self.fit is not fit:
@@ -175,16 +156,19 @@ class Selection:
             self.progress(f"without {a.id}")
             names, fixed = parameters_of(rest)
             start = values_of(self.fit)
-            for iterations in (ITERATIONS, END):  # a fit that is far behind need not converge
+            for iterations in (
+                settings.FIRST_ITERATIONS,
+                settings.ITERATIONS,
+            ):  # a fit that is far behind need not converge
                 without = self.engine.fit_like(
                     self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=settings.COARSE
                 )
                 evidence = segment_delays.log_evidence
                 a.log_evidence = evidence(self.engine, self.fit) - evidence(self.engine, without)
-                if a.log_evidence > SAFE:
+                if a.log_evidence > settings.SURELY_NEEDED:
                     break
                 start = values_of(without)
-            if a.log_evidence < EVIDENCE:
+            if a.log_evidence < settings.DECISIVE:
                 self.accepted.remove(a)
                 self.fit = self.calibrate(rest, values_of(without))
                 return
@@ -220,9 +204,9 @@ def _best_of_each_law(
     """The best form alone; or that of each constitutive law, the best first, where the noise of the fit before is so
     inflated that its law must be wrong: in such noise laws can hardly be told apart, but for hopeless ones."""
     tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)
-    if np.max(fit.inflation) <= WRONG:
+    if np.max(fit.inflation) <= settings.INFLATION_WRONG:
         return tried[:1]
-    least = fit.log_evidence - HOPELESS * fit.observations
+    least = fit.log_evidence - settings.HOPELESS * fit.observations
     laws: dict[tuple, tuple[CandidateFit, joint.Fit]] = {}
     for best, freed in tried:
         if freed.log_evidence > least:

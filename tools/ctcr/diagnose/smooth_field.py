@@ -8,15 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.diagnose.engine import Engine
+from ctcr.effects import catalogue
 from ctcr.fit.joint import Fit
 from ctcr.model.noise import with_field
-
-EFFECT = "effects.field_distortion."
-LENGTHS = (0.025, 0.04, 0.07)  # correlation lengths that are tried [m]
-SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # standard deviations an axis that are tried [m]
-SURE = 5.0  # log evidence from which the error is allowed for
 
 CORRECTED = "Errors with the effects found are corrected for it: those of held-out runs by readings nearby."
 
@@ -24,15 +20,17 @@ CORRECTED = "Errors with the effects found are corrected for it: those of held-o
 def likeliest_noise(engine: Engine, fit: Fit) -> Any:
     """The tracker's noise with the smooth error that a linearised fit with a distorted field leaves; None where that
     effect is not in the fit, or no smooth error is sure."""
-    if not any(name.startswith(EFFECT) for name in fit.names):
+    effects = catalogue.all_effects(engine.robot.n_tubes).values()
+    of_field = {name for effect in effects if effect.names_with("source") for name in effect.names()}
+    if of_field.isdisjoint(fit.names):
         return None
     engine, at = engine.thinned(fit)
     stated = engine.noise
     ratio = stated.rotation_field / stated.position_field if stated.position_field > 0 else 0.0
     best = engine.linear_fit(at, weights=at.weights)
-    least = best.log_evidence + SURE
-    for length in LENGTHS:
-        for size in SIZES:
+    least = best.log_evidence + settings.DECISIVE
+    for length in settings.SMOOTH_LENGTHS:
+        for size in settings.SMOOTH_SIZES:
             for turned in {0.0, ratio}:
                 noise = _core.Noise(
                     position_jitter=stated.position_jitter,

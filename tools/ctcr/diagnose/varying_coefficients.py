@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.compare.covariates import HARMONICS, Covariate, covariates
 from ctcr.compare.sample import Sample
 from ctcr.diagnose.engine import Engine
@@ -24,15 +25,6 @@ from ctcr.model import parameters
 
 Array = NDArray[np.float64]
 
-ROWS = 400  # that are used where there are twice as many or more
-MOST = 4  # variations, one found after the other
-EVIDENCE = 5.0  # of a variation, beyond the penalty for having looked at many
-EXPLAINED = 0.3  # fraction of the unexplained chi-square of held-out runs that they must explain together
-LITTLE = 0.05  # ... and for which no further one is named
-MUCH = 0.15  # of the unexplained chi-square there: effects that leave less are not outdone by anything
-FAR_LESS = 0.25  # of the chi-square that effects leave there, below which a varying-coefficient model outdoes them
-AT_ONCE = 2_000_000  # numbers that are made or gathered at a time
-MOST_TEETH = 24  # of a wheel whose errors are looked for
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
 MEASURE = {  # by how the id of a quantity begins: what shows it best
@@ -90,7 +82,7 @@ class VaryingModel:
     def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
         """Whether it leaves far less of the held-out runs than effects do."""
         unexplained = unexplained_of(engine, calibrated, ~engine.rows)
-        return unexplained(self.residual) < FAR_LESS * unexplained(with_effects.residual)
+        return unexplained(self.residual) < settings.VARYING_OUTDOES * unexplained(with_effects.residual)
 
     @property
     def depends_on(self) -> list[str]:
@@ -133,7 +125,7 @@ class _Trials:
         for size in np.unique(sizes):
             which = np.flatnonzero(sizes == size)
             index = np.array([trials[k].index for k in which])
-            parts = 1 + index.size * columns.shape[1] // AT_ONCE
+            parts = 1 + index.size * columns.shape[1] // settings.VARYING_AT_ONCE
             gathered = (columns[some] for some in np.array_split(index, parts))
             self._batches.append((which, index, np.concatenate([own @ own.transpose(0, 2, 1) for own in gathered])))
 
@@ -151,14 +143,14 @@ class _Trials:
 def may_outdo(engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
     """Whether effects leave enough of the held-out runs for a varying-coefficient model to explain far more."""
     unexplained = unexplained_of(engine, calibrated, ~engine.rows)
-    return unexplained(with_effects.residual) > MUCH * unexplained(calibrated.residual)
+    return unexplained(with_effects.residual) > settings.VARYING_RIVAL * unexplained(calibrated.residual)
 
 
 def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | None:
     """The model that explains most of the residual of a fit, by forward selection; None unless that holds on the
     held-out runs."""
     unexplained = unexplained_of(engine, fit, ~engine.rows)
-    thin, at = engine.thinned(fit, ROWS)
+    thin, at = engine.thinned(fit, settings.VARYING_ROWS)
     if at is not fit:  # that is the optimum for all readings, not for these
         at = thin.linear_fit(at, weights=at.weights, inflation=at.inflation)
     residual, jacobian = at.whitened()
@@ -169,10 +161,10 @@ def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | No
     moved = np.zeros(len(at.names))
     chosen: list[_Trial] = []
     reached = [(unexplained(at.residual), moved)]
-    while len(chosen) < MOST and is_open.any():
+    while len(chosen) < settings.VARYING_MOST and is_open.any():
         gains = np.where(is_open, trials.log_evidences(Linear(residual + whitened @ moved, whitened)), -np.inf)
         best = int(np.argmax(gains))
-        if gains[best] < EVIDENCE + np.log(np.sum(is_open)):
+        if gains[best] < settings.DECISIVE + np.log(np.sum(is_open)):
             break
         chosen.append(trials.trials[best])
         is_open &= [not trial.ids & chosen[-1].ids for trial in trials.trials]
@@ -184,9 +176,9 @@ def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | No
         moved = -np.linalg.solve(whitened.T @ whitened + np.eye(len(gradient)), gradient)
         reached.append((unexplained(at.residual + columns @ moved), moved))
     before, least = reached[0][0], min(left for left, _ in reached)
-    count = next(k for k, (left, _) in enumerate(reached) if left - least <= LITTLE * before)
+    count = next(k for k, (left, _) in enumerate(reached) if left - least <= settings.VARYING_NEGLIGIBLE * before)
     after, moved = reached[count]
-    if after >= (1 - EXPLAINED) * before:
+    if after >= (1 - settings.VARYING_EXPLAINED) * before:
         return None
     pairs = [pair for trial in chosen[:count] for pair in trial.pairs]
     variations = _variations(engine, at, sample, pairs, moved[len(at.names) :])
@@ -210,7 +202,7 @@ def _trials(engine: Engine, fit: Fit, sample: Sample, derivatives: Array) -> tup
             columns[rows] = np.nan_to_num(basis)
             varied = [p for p, name in enumerate(fit.names) if name in engine.base and kind in name]
             numbers = len(varied) * 6 * columns.size
-            for some in np.array_split(varied, 1 + numbers // AT_ONCE):
+            for some in np.array_split(varied, 1 + numbers // settings.VARYING_AT_ONCE):
                 each = derivatives[:, :, some, None] * columns[:, None, None, :]
                 whitened.append(fit.whiten(each.reshape(*each.shape[:2], -1)).T)
             for p in varied:
@@ -235,7 +227,7 @@ def _bases(quantity: Covariate) -> Iterator[tuple[Covariate, Array, str]]:
     for basis in quantity.bases():
         yield quantity, basis, ""
     if quantity.kind == "angle" and quantity.tube:
-        for teeth in range(HARMONICS + 1, MOST_TEETH + 1):
+        for teeth in range(HARMONICS + 1, settings.MOST_TEETH + 1):
             label = f"{quantity.label}, {teeth} times a turn"
             angle = teeth * quantity.value[:, None]
             yield replace(quantity, label=label), np.hstack([np.cos(angle), np.sin(angle)]), "home_rotation"

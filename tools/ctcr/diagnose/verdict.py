@@ -5,17 +5,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.diagnose.residual import Residual
-from ctcr.diagnose.round import SURE
 from ctcr.diagnose.selection import Accepted
 from ctcr.fit import joint
 from ctcr.show.wording import listed
 
 # Fraction of the unexplained chi-square of held-out runs that effects must explain not to be spurious, and
-EXPLAINED = 0.75
-MOSTLY = 0.8  # ... to be identified where the residual is more than noise, if each run is explained as much as above
 SHOWN = 6  # runs that are named
-MISLED = 2.0  # mean square error beyond noise over that without effects, at which effects predict worse than none
 
 
 @dataclass
@@ -53,22 +50,22 @@ def judge(
         return Verdict("not_in_catalogue", [missing, *residual.about_clusters])
     first = accepted[0]
     typical = float(np.median([*explained.values()])) if explained else first.explained
-    if residual.rejected and typical < EXPLAINED:
+    if residual.rejected and typical < settings.NOT_SPURIOUS:
         return Verdict("stand_in", [f"Adding {first.id} removes part of the error, but much of it stays."])
     if outdone:
         return Verdict("stand_in", [f"Calibration that is not constant explains far more than {first.id} does."])
-    if after > max(MISLED * before, jitter**2):
+    if after > max(settings.MISLED * before, jitter**2):
         return Verdict("stand_in", [f"With {first.id} the prediction of held-out runs is worse."])
     if any(a.best.implausible for a in accepted):
         return Verdict("stand_in", ["The data ask for implausible values.", *first.best.implausible])
     if any(len(a.ids) > 1 for a in accepted):
         return Verdict("ambiguous", ["These data cannot tell some effects apart."])
-    if any(a.margin < SURE for a in accepted):
+    if any(a.margin < settings.DECISIVE for a in accepted):
         return Verdict("probable", ["Another effect is nearly as likely."])
     names = " and ".join(a.id for a in accepted)
     verb = "explains" if len(accepted) == 1 else "explain"
-    odd = [run for run, fraction in explained.items() if fraction < EXPLAINED]
-    if residual.rejected and (typical < MOSTLY or odd):
+    odd = [run for run, fraction in explained.items() if fraction < settings.NOT_SPURIOUS]
+    if residual.rejected and (typical < settings.MOSTLY or odd):
         stays = [f"Much of the error in {listed(odd, SHOWN)} stays."] if odd else []
         most = (
             f"In the median held-out run {names} {verb} {typical:.0%} of the chi-square that noise leaves unexplained."

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.diagnose.pipeline import Diagnosis
-from ctcr.diagnose.round import SURE, CandidateFit
+from ctcr.diagnose.round import CandidateFit
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
@@ -21,8 +22,6 @@ from ctcr.plan.runs import Run, random_runs, table
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
-
-POOL = 120  # runs to choose from
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Proposal:
 
     @property
     def decides(self) -> bool:
-        return bool(self.gain) and self.gain[-1] >= SURE
+        return bool(self.gain) and self.gain[-1] >= settings.DECISIVE
 
 
 def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
@@ -53,7 +52,7 @@ def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
     for round_, accepted in zip(diagnosis.rounds, diagnosis.accepted, strict=False):
         entries: dict[str, CandidateFit] = {}
         for entry in round_.tried:
-            near = entry.refit is not None and round_.accepted.score - entry.score < SURE
+            near = entry.refit is not None and round_.accepted.score - entry.score < settings.DECISIVE
             if entry.fit is not None and (entry.id in round_.ids or near):
                 entries.setdefault(entry.id, entry)
         if len(entries) > 1:
@@ -72,7 +71,7 @@ def propose(
         return Proposal(rivals, np.inf, [], [], None)
     robot, measurements = diagnosis.robot, diagnosis.measurements
     offered = np.array(masses if robot.gravity is not None else (0.0,))
-    pool = random_runs(robot, measurements, POOL, offered, np.random.default_rng(seed))
+    pool = random_runs(robot, measurements, settings.PLAN_POOL, offered, np.random.default_rng(seed))
     if not pool:
         return Proposal(rivals, _margin(rivals), [], [], None)
     plan = table(robot, pool)

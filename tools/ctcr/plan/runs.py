@@ -8,19 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-STOP_S = 2.0  # from stop to stop
-WAY = 4  # stops on the way out; the way back has the same in reverse, so that each is approached from both sides
-
 
 @dataclass(frozen=True)
 class Run:
-    beta: Array  # (2 WAY, N) [m]
-    alpha: Array  # (2 WAY, N) [rad]
+    beta: Array  # (2 stops, N) [m]
+    alpha: Array  # (2 stops, N) [rad]
     mass: float  # hung at the tip [kg]
 
 
@@ -32,9 +30,9 @@ def random_runs(
     low, high = joints.min(axis=0), joints.max(axis=0)
     slack = _orders(measurements.beta, robot).min(axis=0)
     runs = []
-    for _ in range(100 * count):
+    for _ in range(settings.PLAN_TRIES * count):
         ends = random.uniform(low, high, size=(2, len(low)))
-        way = np.linspace(ends[0], ends[1], WAY)
+        way = np.linspace(ends[0], ends[1], settings.PLAN_STOPS)
         beta, alpha = np.hsplit(np.vstack([way, way[::-1]]), 2)
         if (_orders(beta, robot) >= slack).all():
             runs.append(Run(beta, alpha, float(random.choice(masses))))
@@ -55,7 +53,7 @@ def table(robot: Robot, runs: list[Run], first_run: int = 0) -> Measurements:
     down = np.array(robot.gravity if robot.gravity is not None else (0.0, 0.0, 0.0))
     mass = np.concatenate([np.full(len(run.beta), run.mass) for run in runs])
     return Measurements(
-        t=STOP_S * np.arange(rows),
+        t=settings.PLAN_STOP_S * np.arange(rows),
         run=np.repeat(np.arange(first_run, first_run + len(runs)), [len(run.beta) for run in runs]),
         beta=np.vstack([run.beta for run in runs]),
         alpha=np.vstack([run.alpha for run in runs]),
