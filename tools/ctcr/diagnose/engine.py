@@ -28,7 +28,7 @@ class Engine:
     robust: bool = True  # whether outliers count for little
     threads: int = 0
     free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in parameters.expand
-    tolerance: float = 0.02  # of log evidence, in fits for which no other is given
+    tolerance: float = settings.TOLERANCE  # of log evidence, in fits for which no other is given
     steps: int = field(init=False)  # of integration
     positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
     base: list[str] = field(init=False)  # names of the calibration parameters
@@ -38,9 +38,7 @@ class Engine:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
         self.measured = folds.measured_rows(self.measurements)
-        self.steps = recording.steps_for(
-            self.robot, self.measurements, self.noise, settings.INTEGRATION_CHI_SQUARE_COARSE
-        )
+        self.steps = recording.steps_for(self.robot, self.measurements, self.noise, settings.INTEGRATION_ERROR_COARSE)
 
     @property
     def fitted(self) -> Mask:
@@ -65,7 +63,7 @@ class Engine:
         weights: Array | None = None,
         inflation: Array | None = None,
         noise: Any = None,
-        max_iterations: int = 50,
+        max_iterations: int = settings.ITERATIONS,
         tolerance: float | None = None,
         near: bool = False,
     ) -> joint.Fit:
