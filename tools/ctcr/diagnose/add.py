@@ -22,7 +22,6 @@ from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
 from ctcr.model import fields
-from ctcr.model import parameters as free_parameters
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
@@ -36,7 +35,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Stage:
-    """The error of the judging rows at one stage, RMS; NaN: not measured."""
+    """RMS error of the judged rows at one stage; NaN: not measured."""
 
     name: str
     rms_mm: float
@@ -51,7 +50,7 @@ class Added:
     ids: list[str]
     fit: joint.Fit  # of all rows
     stages: list[Stage]  # nominal, calibrated, each effect, noise floor
-    held_out: str  # what judged: runs, or blocks of time; empty: the rows that were fitted
+    held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
 
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -86,53 +85,54 @@ def add(
 ) -> Added:
     """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
 
-    Of each effect the amplitudes are fitted first, then its shape parameters are freed too, also from where slopes say
-    that they may be. `fixed` parameters, by full name in SI, keep their value, those of `start` begin at one. Every
-    fourth run (where there are few: block of time) is kept out of the fits that give the errors; the values are those
-    of a fit to all rows. Raises InputError where no fit is possible.
+    The amplitudes of each effect are fitted first, then its shape too, also from the starts that a linearised search
+    finds. `fixed` parameters, by full name in SI, keep their value, those of `start` begin at it. One of four runs (or
+    blocks of time, where there are few runs) is held out of the fits that give the errors; the values are those of a
+    fit to all rows. Raises InputError where no fit is possible.
     """
     readings, said = prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     before = robot_before(robot, ids)
-    held, fitted = folds.held_out_rows(before, readings), [*before.effects]
+    held_out, everything = folds.held_out_rows(before, readings), np.ones(len(readings), bool)
+    fitted = [*before.effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, free, fixed)
         now, nominal = stage.values(), stage.nominal(fitted)
-        fit = stage(fitted, fitted, ~held, [now])
+        fit = stage(fitted, fitted, ~held_out, [now])
         progress.advance(1)
         errors = {"nominal": nominal, "calibrated": fit.residual}
         for identity in ids:
             fitted.append(identity)
             begun = set(catalogue.get(identity, robot.n_tubes).names()) & {*fixed, *(start or {})}
-            elsewhere = [] if begun else [now | values for values in stage.places(identity, fit, fitted)]
+            elsewhere = [] if begun else [now | values for values in stage.starts(identity, fit, fitted)]
             now |= values_of(fit)
-            fit = stage(fitted, fitted[:-1], ~held, [now])
+            fit = stage(fitted, fitted[:-1], ~held_out, [now])
             progress.advance(1)
             now |= values_of(fit)
             if stage.shapes(identity):
-                fit = stage(fitted, fitted, ~held, [*elsewhere, now])
+                fit = stage(fitted, fitted, ~held_out, [*elsewhere, now])
             progress.advance(1)
             errors[identity] = fit.residual
-        glitches = outliers.isolated(readings, fit, held)
-        judged = held & ~glitches if held.any() else np.ones(len(readings), bool)
+        isolated = outliers.isolated(readings, fit, held_out)
+        judged = held_out & ~isolated if held_out.any() else everything
         stages = [_stage(name, residual, judged) for name, residual in errors.items()]
-        off = [sentence(text) for text in outliers.messages(readings, fit, glitches)]
-        if held.any():
-            fit = stage(fitted, fitted, np.ones(len(readings), bool), [now | values_of(fit)])
+        about_outliers = [sentence(text) for text in outliers.messages(readings, fit, isolated)]
+        if held_out.any():
+            fit = stage(fitted, fitted, everything, [now | values_of(fit)])
         progress.advance(1)
-    varies = segment_delays.corrected(stage.engine, fit)[1]
+    _, nuisances = segment_delays.corrected(stage.engine, fit)
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
-        varies.append(smooth_field.message(smooth))
+        nuisances.append(smooth_field.message(smooth))
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     return Added(
-        _applied(stage.robot, fit),
+        fit.apply(stage.robot),
         list(ids),
         fit,
         stages,
-        _in_words(readings, held),
-        [*said, *off, *_notices(robot, fit, ids), *varies],
+        _name_of(readings, held_out),
+        [*said, *about_outliers, *_notices(robot, fit, ids), *nuisances],
     )
 
 
@@ -170,7 +170,7 @@ def write_values(before: Robot, after: Robot, ids: Sequence[str], target: str | 
 
 
 def remove(robot: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> tuple[Robot, list[str]]:
-    """Writes the robot without these effects; returns it and what there is to know.
+    """Writes the robot without these effects; returns it and notices.
 
     Values that were fitted together with them go back to what they were, where nothing has changed them since and no
     other effect that the robot keeps was added with them. Raises InputError for effects that it does not have.
@@ -201,7 +201,7 @@ def remove(robot: Robot, ids: Sequence[str], target: str | Path, in_place: bool 
 
 
 def _undone(robot: Robot, entry: Mapping[str, Any]) -> tuple[list[Change], int]:
-    """The changes that bring the values of an entry back, and how many cannot be."""
+    """The changes that restore the values before an entry, and how many cannot be restored."""
     changes, kept = [], 0
     for row in entry.get("changes") or []:
         path = _path(str(row.get("field", "")))
@@ -236,12 +236,12 @@ class _Fitter:
         return [name for name in catalogue.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]
 
     def values(self) -> dict[str, float]:
-        """Of all parameters, as the robot has them."""
+        """Nominal values of all parameters."""
         known = [*self.engine.base, *catalogue.value_of(self.robot)]
         return dict(zip(known, self.engine.recording(known).nominal().tolist(), strict=True))
 
     def nominal(self, ids: Sequence[str]) -> Array:
-        """Residuals (M, 6) of the robot as its file describes it, with these effects alone."""
+        """Residuals (M, 6) at nominal values, with these effects alone."""
         self.engine.robot = self._with(ids)
         recorded = self.engine.recording([])
         return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
@@ -250,67 +250,60 @@ class _Fitter:
         return _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
 
     def __call__(
-        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, begins: Sequence[Mapping[str, float]]
+        self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, starts: Sequence[Mapping[str, float]]
     ) -> joint.Fit:
+        """Fits the amplitudes of the effects `ids`, and the shapes of `shaped`, to rows (M,) from the best start."""
         engine = self.engine
         engine.robot, engine.rows = self._with(ids), rows
         known = [catalogue.get(identity, self.robot.n_tubes) for identity in ids]
         own = [name for effect in known for name in effect.amplitudes if name not in self.fixed]
         own += [name for identity in shaped for name in self.shapes(identity)]
-        likely = engine.fit_with_field(own, self._best(own, begins))
+        likely = engine.fit_with_field(own, self._best(own, starts))
         if any("order" in effect.needs for effect in known) and engine.revise_initial_history(likely, own):
             likely = engine.fit_with_field(own, values_of(likely))
-        # The robot is to predict; how sure its values are is another question.
+        # Values under the noise that predicts best, uncertainty under the likeliest noise.
         fit = fit_to_predict(engine, likely, {}, tolerance=engine.tolerance)
         return replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
 
-    def places(self, identity: str, before: joint.Fit, ids: Sequence[str]) -> list[dict[str, float]]:
-        """Where slopes at the fit before, of all rows, say that an effect may be: a plane, a piece of metal.
+    def starts(self, identity: str, before: joint.Fit, ids: Sequence[str]) -> list[dict[str, float]]:
+        """Starts of an effect by a search that is linearised at the fit before, over all rows.
 
-        A jump is put where they say: between which rows it was, no fit can find.
+        A choice, such as the moment of a jump, is taken over at once: no fit finds it.
         """
         engine = self.engine
         engine.robot, engine.rows = self._with(ids), np.ones(len(engine.measurements), bool)
         usual, _ = candidates(engine.robot, engine.measurements)
         plain = [one for one in usual if one.id == identity and not one.shape]
         found = []
-        # What a contact does to a few readings looks like outliers: with and without these.
+        # Readings of a contact look like outliers: with and without down-weighting.
         for weights in (None, np.ones((len(engine.measurements), 2))):
             there = engine.linear_fit(before, weights=weights)
-            entries = [e for e in screen(*engine.thinned(there), plain, {}) if e.candidate.shape]
-            found += [(entry, linearised_end(engine, there, entry)) for entry in entries[: settings.ADDED_STARTS]]
+            screened = [one for one in screen(*engine.thinned(there), plain, {}) if one.candidate.shape]
+            found += [(one, linearised_end(engine, there, one)) for one in screened[: settings.ADDED_STARTS]]
         if found:
-            fitted = catalogue.get(identity, self.robot.n_tubes).shapes
-            chosen = {name: x for name, x in found[0][0].candidate.shape if name not in fitted}
+            choices = catalogue.get(identity, self.robot.n_tubes).choices
+            chosen = {name: x for name, x in found[0][0].candidate.shape if name in choices}
             self.robot = with_values(self.robot, [identity], chosen)
         return [start for _, start in found]
 
-    def _best(self, own: Sequence[str], begins: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    def _best(self, own: Sequence[str], starts: Sequence[Mapping[str, float]]) -> dict[str, float]:
         """The best of all starts for these parameters of effects."""
-        first, *others = [dict(values) for values in begins]
+        first, *others = [dict(values) for values in starts]
         if not others:
             return first
-        fit = self.engine.fit(own, start=first, near=True, tolerance=settings.COARSE)
-        fits = [fit]
-        for other in others:
-            fits.append(self.engine.fit_like(fit, own, start=other, near=True, tolerance=settings.COARSE))
+        options = {"near": True, "tolerance": settings.COARSE}
+        fit = self.engine.fit(own, start=first, **options)
+        fits = [fit, *(self.engine.fit_like(fit, own, start=other, **options) for other in others)]
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
 
 
-def _in_words(readings: Measurements, held: Mask) -> str:
-    if not held.any():
+def _name_of(readings: Measurements, held_out: Mask) -> str:
+    if not held_out.any():
         return ""
-    runs = np.unique(readings.run[held])
-    if np.isin(readings.run[~held], runs).any():
+    runs = np.unique(readings.run[held_out])
+    if np.isin(readings.run[~held_out], runs).any():
         return "one of every four blocks of time"
     return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
-
-
-def _applied(robot: Robot, fit: joint.Fit) -> Robot:
-    own = [i for i, name in enumerate(fit.names) if name.startswith("effects.")]
-    rest = [i for i in range(len(fit.names)) if i not in own]
-    section = catalogue.as_section([fit.names[i] for i in own], fit.values[own], robot)
-    return _copy(free_parameters.applied(robot, [fit.names[i] for i in rest], fit.values[rest]), section)
 
 
 def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
@@ -324,22 +317,22 @@ def _stage(name: str, residual: Array, rows: Mask) -> Stage:
 
 
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str]) -> list[str]:
-    """What to doubt of the fitted effects."""
+    """Doubts about the fitted effects."""
     known = catalogue.parameter_of(robot.n_tubes)
     said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
-    place = {name: i for i, name in enumerate(fit.names)}
+    index = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)
-        mine = [name for name in effect.amplitudes if name in place]
-        if mine and all(fit.ratio[place[name]] > settings.SAYS_NOTHING for name in mine):
+        mine = [name for name in effect.amplitudes if name in index]
+        if mine and all(fit.ratio[index[name]] > settings.SAYS_NOTHING for name in mine):
             said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
-        elif mine and all(abs(fit.values[place[name]]) < 2 * fit.sd[place[name]] for name in mine):
+        elif mine and all(abs(fit.values[index[name]]) < 2 * fit.sd[index[name]] for name in mine):
             said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")
         for name in effect.names():
-            if name in place and not known[name].soft[0] <= fit.values[place[name]] <= known[name].soft[1]:
+            if name in index and not known[name].soft[0] <= fit.values[index[name]] <= known[name].soft[1]:
                 low, high = known[name].soft
                 said.append(
-                    f"{name} = {fit.values[place[name]]:.3g} is hardly physical ({low:g} to {high:g} is usual): the "
-                    "effect may stand in for another one."
+                    f"{name} = {fit.values[index[name]]:.3g} is hardly physical ({low:g} to {high:g} is usual): the "
+                    "effect may imitate another one."
                 )
     return said
