@@ -6,7 +6,7 @@ from pathlib import Path
 import ctcr
 import numpy as np
 import pytest
-from ctcr.diagnose import add, fitted_effects
+from ctcr.diagnose import add, terminal
 from ctcr.effects import catalogue
 from ctcr.fit.folds import held_out_rows
 from ctcr.model import effect_model, recording, simulation
@@ -93,7 +93,7 @@ def test_of_many_coefficients_the_clearest_are_shown(capsys):
     field = catalogue.get("field_distortion", 3)
     many = [(name, 1e-4 * (k % 7), 1e-4) for k, name in enumerate(field.names())]
     console = output.console(None)
-    fitted_effects.show(console, 3, [("tracker.position.x", 0.1, 0.1), ("effects.delay.delay", 0.0606, 0.0015), *many])
+    terminal.show_fitted(console, 3, [("tracker.position.x", 0.1, 0.1), ("effects.delay.delay", 0.0606, 0.0015), *many])
     out = capsys.readouterr().out
     assert "Fitted: delay (SI)" in out and "0.0606" in out and "tracker" not in out.split("Fitted: field")[0]
     told = [line.split()[0] for line in out.split("Fitted: field_distortion")[1].splitlines() if line.strip()]

@@ -78,10 +78,10 @@ def _as_data(added) -> dict:
 def _show(out, robot, added) -> None:
     from math import isfinite
 
-    from ctcr.diagnose import fitted_effects
+    from ctcr.diagnose import terminal
 
     fitted = ((name, found["value"], found["sd"]) for name, found in added.parameters().items())
-    fitted_effects.show(out.console, robot.n_tubes, fitted)
+    terminal.show_fitted(out.console, robot.n_tubes, fitted)
     units = ["mm", "deg"] if isfinite(added.stages[0].rms_deg) else ["mm"]
     rows = [
         [stage.name.replace("_", " "), *(f"{getattr(stage, f'rms_{unit}'):.3f}" for unit in units)]

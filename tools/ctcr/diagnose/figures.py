@@ -1,17 +1,14 @@
 """The pictures of the diagnosis: error waterfall, candidates, the error before and after against what it depends on."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ctcr.compare.figures import drawable
+from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import imitated
+from ctcr.fit.result import Fit
+from ctcr.show.html_page import short
 from ctcr.show.style import ERROR, FAINT, INK, NOISE
 from ctcr.show.wording import short
-
-if TYPE_CHECKING:
-    from ctcr.diagnose.pipeline import Diagnosis
-    from ctcr.fit.result import Fit
 
 GOOD = "#4b8b3b"
 CANDIDATES = 10
@@ -19,7 +16,7 @@ PANELS = 3
 PALE = 0.45  # opacity of bars of linearised gains
 
 
-def waterfall(figure, d: "Diagnosis") -> None:
+def waterfall(figure, d: Diagnosis) -> None:
     """RMS error on held-out runs, from the robot file to the noise floor."""
     axes = figure.subplots()
     rms = d.rms_mm
@@ -48,7 +45,7 @@ def waterfall(figure, d: "Diagnosis") -> None:
     axes.set_ylim(0.5 * min([rms["noise_floor"], *[v for _, v, _ in bars]]), 2 * max(v for _, v, _ in bars))
 
 
-def candidates(figure, d: "Diagnosis") -> bool | None:
+def candidates(figure, d: Diagnosis) -> bool | None:
     """Log evidence of every candidate in each round; what the data cannot tell apart is boxed."""
     rounds = [r for r in d.rounds if r.tried]
     if not rounds:
@@ -77,7 +74,7 @@ def candidates(figure, d: "Diagnosis") -> bool | None:
     return None
 
 
-def before_after(figure, d: "Diagnosis") -> bool | None:
+def before_after(figure, d: Diagnosis) -> bool | None:
     """The error after calibration against what predicts it best, and the part of it that the effects found explain.
 
     Both along the tip's motion where it is that, else along the direction in which the effects act most.
@@ -108,7 +105,7 @@ def before_after(figure, d: "Diagnosis") -> bool | None:
     return None
 
 
-def varying(figure, d: "Diagnosis") -> None:
+def varying(figure, d: Diagnosis) -> None:
     """How each parameter that is not constant would have to change with its quantity."""
     panels = figure.subplots(1, len(d.varying.variations), squeeze=False)[0]
     for axes, v in zip(panels, d.varying.variations, strict=True):
@@ -120,7 +117,7 @@ def varying(figure, d: "Diagnosis") -> None:
         axes.set_title(v.label)
 
 
-def overlap(figure, d: "Diagnosis") -> bool | None:
+def overlap(figure, d: Diagnosis) -> bool | None:
     """How much of the signal of each candidate of the first round another one can imitate together with calibration."""
     best = [one for one in d.rounds[0].best if one.fit is not None]
     if len(best) < 2:
@@ -139,13 +136,13 @@ def overlap(figure, d: "Diagnosis") -> bool | None:
     return None
 
 
-def fits_shown(d: "Diagnosis") -> list[tuple["Fit", str, str]]:
+def fits_shown(d: Diagnosis) -> list[tuple[Fit, str, str]]:
     """Fits whose errors are drawn one beside the other, each with its colour and name."""
     shown = [(d.calibrated, ERROR, "calibrated"), (d.with_effects, GOOD, "with the effects found")]
     return shown if d.accepted else shown[:1]
 
 
-def directions(figure, d: "Diagnosis") -> None:
+def course(figure, d: Diagnosis) -> None:
     """The course of the error over the session, before and after effects were found."""
     axes = figure.subplots()
     for fit, colour, label in fits_shown(d):

@@ -1,20 +1,28 @@
-"""A diagnosis on the terminal: the verdict first, then why."""
+"""A diagnosis, and fitted effects, on the terminal: the verdict first, then why."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from itertools import groupby
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from ctcr.diagnose import fitted_effects
+from ctcr.calibrate.outcome import deviation, number
+from ctcr.diagnose.pipeline import Diagnosis
+from ctcr.diagnose.round import Round
+from ctcr.effects import catalogue
 from ctcr.show import output
 
-if TYPE_CHECKING:
-    from ctcr.diagnose.pipeline import Diagnosis
-
-SHOWN = 8  # candidates of a round
+CANDIDATES = 8  # of a round
+ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest
+STAGES = {
+    "nominal": "as described",
+    "calibrated": "calibrated",
+    "with_effects": "with the effects found",
+    "noise_floor": "noise floor",
+}
 
 
 @contextmanager
@@ -29,57 +37,69 @@ def progress() -> Iterator[Callable[[str], None]]:
         yield lambda text: bar.update(task, description=text)
 
 
-def show(console: Any, result: "Diagnosis") -> None:
-    verdict = result.verdict
-    console.print(f"[bold]{verdict.word.upper().replace('_', ' ')}[/bold]")
-    for sentence in verdict.sentences:
-        console.print(sentence, markup=False)
-    console.print()
+def show(console: Any, result: Diagnosis) -> None:
+    def say(*lines: str) -> None:
+        for line in lines:
+            console.print(line, markup=False)
+
+    console.print(f"[bold]{result.verdict.word.upper().replace('_', ' ')}[/bold]")
+    say(*result.verdict.sentences, "")
     console.print(_errors(result))
-    for number, round_ in enumerate(result.rounds, start=1):
+    for number_, round_ in enumerate(result.rounds, start=1):
         if round_.tried:
-            console.print(_candidates(number, round_))
+            console.print(_candidates(number_, round_))
         if round_.why_not:
-            console.print(round_.why_not, markup=False)
-    console.print(
-        "  linear, fit: log evidence gained, linearised and in the joint fit; explained: of the unexplained chi-square"
-    )
+            say(round_.why_not)
+    say("  linear, fit: log evidence gained, linearised and in the joint fit; explained: of the unexplained chi-square")
     if result.accepted:
         fit = result.final
-        fitted_effects.show(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
-    for line in result.residual.messages:
-        console.print(line, markup=False)
+        show_fitted(console, result.robot.n_tubes, zip(fit.names, fit.values, fit.sd, strict=True))
+    say(*result.residual.messages)
     if result.varying:
-        console.print(f"{result.varying.lead}:", markup=False)
-        for variation in result.varying.variations:
-            console.print(f"  • {variation.message}", markup=False)
-        console.print(result.varying.advice, markup=False)
-        console.print(f"What to measure next: {result.varying.measure[0]}", markup=False)
-    for notice in result.notices:
-        console.print(f"{notice}.", markup=False)
-    for identity, reason in result.not_testable.items():
-        console.print(f"Not tested: {identity}: {reason}.", markup=False)
+        say(f"{result.varying.lead}:", *(f"  • {variation.message}" for variation in result.varying.variations))
+        say(result.varying.advice, f"What to measure next: {result.varying.measure[0]}")
+    say(*(f"{notice}." for notice in result.notices))
+    say(*(f"Not tested: {identity}: {reason}." for identity, reason in result.not_testable.items()))
 
 
-def _errors(result: "Diagnosis") -> Any:
-    names = {
-        "nominal": "as described",
-        "calibrated": "calibrated",
-        "with_effects": "with the effects found",
-        "noise_floor": "noise floor",
-    }
-    runs = len(set(result.measurements.run[result.judged].tolist()))
-    rows = [[names[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
+def _errors(result: Diagnosis) -> Any:
+    rows = [[STAGES[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
     rows.append(["expected from noise and uncertain parameters", f"{result.expected_mm:.3f}"])
+    runs = len(set(result.measurements.run[result.judged].tolist()))
     title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} held-out run(s)"
     return output.table(title, ["model", "mm"], rows)
 
 
-def _candidates(number: int, round_: Any) -> Any:
+def _candidates(number_: int, round_: Round) -> Any:
     rows = []
-    for one in round_.best[:SHOWN]:
+    for one in round_.best[:CANDIDATES]:
         refitted = [f"{one.refit:.1f}", f"{one.explained:.0%}"] if one.refit is not None else ["", ""]
         remark = "accepted" if one is round_.accepted else "as likely" if one.id in round_.ids else ""
         rows.append([one.id, one.candidate.summary, f"{one.linear:.1f}", *refitted, remark])
-    title = f"Round {number}: effects, each fitted together with the calibration"
+    title = f"Round {number_}: effects, each fitted together with the calibration"
     return output.table(title, ["effect", "parameters", "linear", "fit", "explained", ""], rows, text=(0, 1, 5))
+
+
+def show_fitted(console: Any, n_tubes: int, fitted: Iterable[tuple[str, float, float]]) -> None:
+    """Prints a table for each effect, from name, value and standard deviation (SI) of parameters by full name; those of
+    no effect are passed over."""
+    known = catalogue.parameter_of(n_tubes)
+
+    def clarity(row: tuple[str, float, float]) -> float:
+        name, value, sd = row
+        return abs(value - known[name].neutral) / sd if sd > 0 else 0.0
+
+    own = [row for row in fitted if row[0] in known]
+    for identity, of_effect in groupby(own, key=lambda row: row[0].split(".")[1]):
+        rows, hidden = [], 0
+        for meaning, of_meaning in groupby(of_effect, key=lambda row: known[row[0]].meaning):
+            alike = list(of_meaning)
+            clearest = set(sorted(alike, key=clarity, reverse=True)[:ALIKE])
+            hidden += len(alike) - len(clearest)
+            for k, (name, value, sd) in enumerate(row for row in alike if row in clearest):
+                short = name.removeprefix(f"effects.{identity}.")
+                rows.append([short, number(value, sd), deviation(sd), known[name].unit, "the same" if k else meaning])
+        columns = ["parameter", "value", "sd", "unit", "meaning"]
+        console.print(output.table(f"Fitted: {identity} (SI)", columns, rows, text=(0, 3, 4)))
+        if hidden:
+            console.print(f"  and {hidden} coefficients that are smaller beside their uncertainty")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.effects import before_rebuild  # noqa: F401  facts of a stale compiled module
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot

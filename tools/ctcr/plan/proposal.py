@@ -1,8 +1,8 @@
-"""The runs that best tell rival explanations of the measurements apart.
+"""The runs that best discriminate between rival explanations of the measurements.
 
-Each rival is a fit: a robot with an effect. Where two of them predict different readings that no calibration within
-what is known of it can make alike, a measurement decides. Runs are added one by one, each the one that raises the
-smallest expected evidence between any two rivals most (T-optimal design: Atkinson and Fedorov 1975).
+Each rival is a fit: a robot with an effect. A run discriminates where two rivals predict different readings that no
+calibration within its priors can make alike. Runs are added one by one, each the one that raises the smallest expected
+log evidence between any two rivals most (T-optimal design: Atkinson and Fedorov 1975).
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ctcr import settings
 from ctcr.diagnose.pipeline import Diagnosis
-from ctcr.diagnose.round import CandidateFit
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
@@ -36,7 +35,7 @@ class Rival:
 @dataclass(frozen=True)
 class Proposal:
     rivals: list[Rival]
-    now: float  # log evidence between the two that the measurements tell apart least
+    now: float  # log evidence between the two nearest rivals
     runs: list[Run]
     gain: list[float]  # expected log evidence between those two after each further run
     plan: Measurements | None  # the runs, without poses
@@ -47,18 +46,17 @@ class Proposal:
 
 
 def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
-    """Fits of the effects of the first round whose effect the measurements cannot tell from others."""
-    before: list[CandidateFit] = []
+    """Fits of the effects of the first round that the measurements left undecided."""
+    held: dict[str, float] = {}  # by the effects accepted before
     for round_, accepted in zip(diagnosis.rounds, diagnosis.accepted, strict=False):
-        entries: dict[str, CandidateFit] = {}
-        for entry in round_.tried:
-            near = entry.refit is not None and round_.accepted.score - entry.score < settings.DECISIVE
-            if entry.fit is not None and (entry.id in round_.ids or near):
-                entries.setdefault(entry.id, entry)
-        if len(entries) > 1:
-            shapes = dict(pair for entry in before for pair in entry.candidate.shape)
-            return [Rival(entry.id, entry.fit, shapes | dict(entry.candidate.shape)) for entry in entries.values()]
-        before.append(accepted.best)
+        rivals: dict[str, Rival] = {}
+        for one in round_.tried:
+            near = round_.accepted.score - one.score < settings.DECISIVE
+            if one.fit is not None and (one.id in round_.ids or near):
+                rivals.setdefault(one.id, Rival(one.id, one.fit, held | dict(one.candidate.shape)))
+        if len(rivals) > 1:
+            return [*rivals.values()]
+        held |= accepted.best.candidate.shape
     return []
 
 
@@ -96,12 +94,12 @@ def _margin(rivals: list[Rival]) -> float:
 
 
 def instead(proposal: Proposal, n_tubes: int) -> dict[str, str]:
-    """By effect: what else can be measured to see it."""
+    """By effect: other measurements that show it."""
     return {rival.id: catalogue.get(rival.id, n_tubes).measure for rival in proposal.rivals}
 
 
 class Contest:
-    """How far readings of one explanation would be from what another can explain, run by run, in normal equations.
+    """The evidence of readings that follow one explanation against another one, by run, in normal equations.
 
     residual (rows,) and jacobian (rows, n) by the other's parameters, in units of the noise; run (rows,) from 0;
     covariance (n, n) of the other's parameters before these runs.
@@ -131,7 +129,7 @@ def _contest(diagnosis: Diagnosis, truth: Rival, other: Rival, plan: Measurement
     seen = replace(plan, position=position, quaternion=quaternion)
     recorded = user_recording.recording_of(diagnosis.robot, seen, other.fit.names, fixed=other.fixed)
     residual, jacobian, _ = recorded.residual(other.fit.values, True)
-    # The field error is the same for both, so that jitter remains, as much as the fit had to admit.
+    # The field error is the same for both: jitter remains, inflated as in the fit.
     noise = other.fit.noise
     sd = np.repeat([noise.position_jitter, noise.rotation_jitter], 3) * np.repeat(other.fit.inflation, 3)
     if diagnosis.measurements.quaternion is None:

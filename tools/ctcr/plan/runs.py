@@ -1,6 +1,6 @@
-"""Runs that a robot can do: stops on the way between random places and back again, under one load.
+"""Runs that a robot can do: stops between two random configurations and back again, under one load.
 
-Joints stay within what has been measured, tube tips in the order that they had, loads among those that are offered.
+Joints stay within the measured range, tube tips in their measured order, loads among those that are offered.
 """
 
 from dataclasses import dataclass
