@@ -6,7 +6,6 @@ from ctcr.compare.figures import drawable
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import imitated
 from ctcr.fit.result import Fit
-from ctcr.show.html_page import short
 from ctcr.show.style import ERROR, FAINT, INK, NOISE
 from ctcr.show.wording import short
 
