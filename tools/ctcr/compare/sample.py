@@ -70,23 +70,19 @@ def take_sample(robot, measurements, prediction) -> Sample:
     if m.quaternion is not None:
         rotation_error = _rotation_error(m.quaternion[keep], orientation[keep], tracker.roll_known)
     velocity, step = _tip_motion(position, m.t, m.run, solved)
+    arrays = {name: np.asarray(getattr(m, name)) for name in ("row", "t", "run", "beta", "alpha", "force")}
+    arrays |= {"measured": measured, "predicted": predicted, "base_position": position}
+    arrays |= {
+        "tip_velocity": velocity,
+        "tip_step": step,
+        "deployed": (lengths + m.beta)[:, tracker.sensor_on_tube - 1],
+    }
     return Sample(
-        row=np.asarray(m.row)[keep],
-        t=np.asarray(m.t, float)[keep],
-        run=np.asarray(m.run)[keep],
-        beta=np.asarray(m.beta)[keep],
-        alpha=np.asarray(m.alpha)[keep],
-        force=np.asarray(m.force)[keep],
-        measured=measured[keep],
-        predicted=predicted[keep],
-        base_position=position[keep],
+        **{name: values[keep] for name, values in arrays.items()},
         tip_rotation=matrix_from_quaternion(prediction.quaternion[keep]),
-        tip_velocity=velocity[keep],
-        tip_step=step[keep],
         rotation=np.asarray(tracker.rotation),
         rotation_error=rotation_error,
         roll_known=tracker.roll_known,
-        deployed=(lengths + m.beta)[keep, tracker.sensor_on_tube - 1],
         tube_lengths=lengths,
         lever=lever,
         motion=follow(m.t, m.run, m.beta, m.alpha, lever).rows(keep),

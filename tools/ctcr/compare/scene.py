@@ -31,9 +31,12 @@ def scene(c: Comparison) -> str:
     unit = error / np.maximum(size, 1e-12)[:, None]
     head = predicted + factor * error
     colour = {"colorscale": show.SCALE, "cmin": 0, "cmax": float(max(np.percentile(size, 98), 1e-6))}
-    shaft = {"width": 4, "color": np.repeat(size, 3).round(3).tolist(), **colour}
-    cone = {"anchor": "tip", "sizemode": "absolute", "sizeref": HEAD_SHARE * float(np.max(np.ptp(measured, axis=0)))}
-    red = {"showscale": False, "colorscale": [[0, "#b3361e"], [1, "#b3361e"]]}
+    lines = {"mode": "lines", "hoverinfo": "skip", "connectgaps": False}
+    lines["line"] = {"width": 4, "color": np.repeat(size, 3).round(3).tolist(), **colour}
+    extent = float(np.max(np.ptp(measured, axis=0)))
+    cones = {"anchor": "tip", "sizemode": "absolute", "sizeref": HEAD_SHARE * extent, "hoverinfo": "skip"}
+    cones |= {"showscale": False, "colorscale": [[0, "#b3361e"], [1, "#b3361e"]]}
+    plate = {"mode": "markers", "hoverinfo": "name", "marker": {"size": 6, "symbol": "diamond", "color": INK}}
     bar = {"size": 0.01, "color": [0], **colour, "showscale": True, "colorbar": show.COLOUR_BAR}
     hover = [
         f"row {row}, run {run}: {value:.2f} mm"
@@ -48,22 +51,9 @@ def scene(c: Comparison) -> str:
         [
             points(predicted, "predicted", "#8794a0", 1.8),
             points(measured, "measured", OUT, 2.2),
-            show.trace(
-                show.shafts(predicted, head),
-                f"error × {factor:g}",
-                mode="lines",
-                hoverinfo="skip",
-                connectgaps=False,
-                line=shaft,
-            ),
-            show.trace(head, "arrow heads", "cone", hoverinfo="skip", **show.columns(unit, "uvw"), **cone, **red),
-            show.trace(
-                c.plate_mm[None, :],
-                "front plate (robot file)",
-                mode="markers",
-                hoverinfo="name",
-                marker={"size": 6, "symbol": "diamond", "color": INK},
-            ),
+            show.trace(show.shafts(predicted, head), f"error × {factor:g}", **lines),
+            show.trace(head, "arrow heads", "cone", **show.columns(unit, "uvw"), **cones),
+            show.trace(c.plate_mm[None, :], "front plate (robot file)", **plate),
             # an invisible point carries the colour bar
             show.trace(predicted[:1], mode="markers", showlegend=False, hoverinfo="skip", marker=bar),
         ]
