@@ -129,5 +129,8 @@ _PARAMETER = {
 
 def _as_data(effect) -> dict:
     parameters = [{key: getattr(p, member) for key, member in _PARAMETER.items()} for p in effect.parameters]
+    for p in parameters:
+        if p["kind"] == "amplitude":
+            p["kind"] = "strength"  # the word of the JSON format
     data = {key: getattr(effect, key) for key in _EFFECT}
     return data | {"needs": sorted(effect.needs), "parameters": parameters}
