@@ -18,7 +18,7 @@ struct Place {
   Solution<3> solution;
   Reference reference;
   explicit Place(const Joints<3>& at) : q(at) { (void)solve<Derivatives::jacobian>(model, q, TipLoad{}, ws, solution); }
-  [[nodiscard]] Situation<3> situation() const {
+  [[nodiscard]] ControlState<3> situation() const {
     return {model, settings, {}, q, solution.pose(), reference, ws, solution};
   }
 };

@@ -100,7 +100,7 @@ public:
       return report;
     }
     tip.position += moved_since_reading();
-    Situation<N, Fx> situation{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
+    ControlState<N, Fx> situation{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
     JointVelocity<N> v;
     Status found = minimum(situation, motors, v, report.limits);
     if constexpr (Fx::template On<N>::follows_twist) {
@@ -159,7 +159,7 @@ private:
     return past_[0] - (later + (periods - double(k)) * (earlier - later));
   }
 
-  Status minimum(const Situation<N, Fx>& situation, const Joints<N>& motors, JointVelocity<N>& v,
+  Status minimum(const ControlState<N, Fx>& situation, const Joints<N>& motors, JointVelocity<N>& v,
                  LimitReport& limits) const noexcept {
     LeastSquares<N> goals;
     tasks.add(situation, goals);

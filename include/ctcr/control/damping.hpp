@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -10,12 +10,12 @@ struct Damping {
   double translation = 20e-3, rotation = 2;  ///< speeds beyond which it gave way [m/s], [rad/s]
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>&, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>&, LeastSquares<N>& goals) const noexcept {
     goals.add_joint_goal(JointVelocity<N>::Zero(), weight);
   }
 
   template <int N, class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>&, const JointVelocity<N>& v) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>&, const JointVelocity<N>& v) const noexcept {
     return std::max(v.template head<N>().cwiseAbs().maxCoeff() / translation,
                     v.template tail<N>().cwiseAbs().maxCoeff() / rotation);
   }

@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -24,12 +24,12 @@ struct LimitAvoidance {
   }
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     goals.add_joint_goal(-rate * gradient(s.model.robot(), s.q.beta), weight);
   }
 
   template <int N, class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
     const Gaps<N> now = gaps(s.model.robot(), s.q.beta);
     const VecN<N> ahead = s.q.beta + v.template head<N>();
     const Gaps<N> later = gaps(s.model.robot(), ahead);

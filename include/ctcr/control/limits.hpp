@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 

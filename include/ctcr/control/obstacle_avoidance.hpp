@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -24,7 +24,7 @@ struct ObstacleAvoidance {
   }
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     if (!(obstacle.radius > 0)) return;
     constexpr double nearest = 1e-4;  // [m]: the velocity stays finite on the surface, and points out from inside
     const double d = std::max(distance(s.tip.position), nearest);
@@ -34,7 +34,7 @@ struct ObstacleAvoidance {
   }
 
   template <int N, class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
     if (!(obstacle.radius > 0)) return 0;
     const Vec3 move = (s.solution.jacobian * v).template head<3>();
     const bool nears = move.dot(s.tip.position - obstacle.centre) < 0;

@@ -4,7 +4,7 @@
 #include <unsupported/Eigen/Splines>
 #include <vector>
 
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 #include "ctcr/control/trapezoid.hpp"
 
 namespace ctcr {

@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -13,14 +13,14 @@ struct Posture {
   double tolerance = 0.05;  ///< distance from the preferred positions beyond which it gave way [m]
 
   template <class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     JointVelocity<N> v;
     v << preferred.beta - s.q.beta, preferred.alpha - s.q.alpha;
     goals.add_joint_goal(rate * v, weight);
   }
 
   template <class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>& s, const JointVelocity<N>&) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>&) const noexcept {
     return weight.translation > 0 ? (preferred.beta - s.q.beta).cwiseAbs().maxCoeff() / tolerance : 0;
   }
 };

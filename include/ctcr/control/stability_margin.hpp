@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -13,7 +13,7 @@ struct StabilityMargin {
 
   /// d(stability)/dq by one-sided differences.
   template <int N, class Fx>
-  [[nodiscard]] static JointVelocity<N> gradient(const Situation<N, Fx>& s) noexcept {
+  [[nodiscard]] static JointVelocity<N> gradient(const ControlState<N, Fx>& s) noexcept {
     constexpr double translation = 1e-5, rotation = 1e-4;
     JointVelocity<N> g = JointVelocity<N>::Zero();
     double here = 0;
@@ -37,7 +37,7 @@ struct StabilityMargin {
   }
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     if (!(weight.translation > 0 || weight.rotation > 0) || s.solution.stability >= wanted) return;
     const JointVelocity<N> g = gradient(s);
     const double steepness = g.squaredNorm();
@@ -45,7 +45,7 @@ struct StabilityMargin {
   }
 
   template <int N, class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>& s, const JointVelocity<N>&) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>&) const noexcept {
     return weight.translation > 0 || weight.rotation > 0 ? 2 - s.solution.stability / wanted : 0;
   }
 };

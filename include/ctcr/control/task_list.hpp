@@ -29,12 +29,12 @@ struct TaskList {
   }
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     std::apply([&](const Task&... task) { (task.add(s, goals), ...); }, tasks);
   }
 
   template <int N, class Fx>
-  [[nodiscard]] Shortfalls shortfalls(const Situation<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
+  [[nodiscard]] Shortfalls shortfalls(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
     return std::apply([&](const Task&... task) { return Shortfalls{task.shortfall(s, v)...}; }, tasks);
   }
 };

@@ -1,5 +1,5 @@
 #pragma once
-#include "ctcr/control/situation.hpp"
+#include "ctcr/control/control_state.hpp"
 
 namespace ctcr {
 
@@ -23,13 +23,13 @@ struct Tracking {
   }
 
   template <int N, class Fx>
-  void add(const Situation<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+  void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
     goals.add_tip_goal(s.solution.jacobian, velocity(s), weight);
   }
 
   /// How far the task gives way at q', in units of its tolerance.
   template <int N, class Fx>
-  [[nodiscard]] double shortfall(const Situation<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
+  [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
     const Vec6 missing = s.solution.jacobian * v - velocity(s);
     const double turn = weight.rotation > 0 ? missing.tail<3>().norm() * rotation_per_translation : 0;
     return std::max(missing.head<3>().norm(), turn) / tolerance;

@@ -65,11 +65,7 @@ public:
     using Rod = EffectRod<N, S, Fx>;
     for (int k = 0; k < 3; ++k) turn_[std::size_t(k)] = window(0, turn + k);
     typename Rod::State y = state_at_tip(in, guess, window);
-    tip_ = Frame<S>{};
-    for (int k = 0; k < 3; ++k)
-      for (int g = 0; g < Window::groups; ++g)
-        tip_.rotation_twist[k][g] = tip_.translation_twist[k][g] = frame_.rotation_twist[k][g] =
-            frame_.translation_twist[k][g] = Lanes{};
+    tip_ = frame_ = frame_of<S>(Pose{});
     const auto keep_tip = [&](int id, const Frame<S>& frame, const auto& state, const auto&) noexcept {
       met(id, state);
       if (id >= N) return;
@@ -82,14 +78,14 @@ public:
     for (int i = 0; i < N; ++i) {
       const auto t = std::size_t(i);
       torque[t] = y.torque(i);
-      twist[i] = y.torque(i).v / in.tubes[t].kz.v;
+      twist_rate[i] = y.torque(i).v / in.tubes[t].kz.v;
       angle_[t] = y.psi(i) + in.beta[t] * (y.torque(i) * inverse(in.tubes[t].kz));
     }
     in.effects.base_compliance(torque, angle_);
   }
 
-  TubeTips<N> tips;  ///< tips of tubes 2..N as seen from the robot tip
-  VecN<N> twist;     ///< of each tube behind the front plate [rad/m]
+  TubeTips<N> tips;    ///< tips of tubes 2..N as seen from the robot tip
+  VecN<N> twist_rate;  ///< of each tube behind the front plate [rad/m]
 
   [[nodiscard]] double angle(int i) const noexcept {
     return angle_[std::size_t(i)].v;
@@ -212,7 +208,7 @@ CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joi
     out.rotation = tip.rotation;
     out.position = tip.position;
     out.tips = pass.tips;
-    out.w = pass.twist;
+    out.w = pass.twist_rate;
     for (int i = 0; i < N; ++i) {
       out.angle[i] = pass.angle(i);
       out.angle_error[i] = (out.angle[i] - out.angle[0]) - (q.alpha[i] - q.alpha[0]);

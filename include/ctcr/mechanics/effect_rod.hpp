@@ -1,10 +1,12 @@
 #pragma once
-// The general path: the rod with effects, for any scalar S, from the robot tip to the front plate. Every tube may bend
-// anywhere and by any law of hooks.hpp; tubes may exchange torque along their length and where tubes end or start to
-// curve, and there the frame may kink. Without effects it computes what the fast path of shooting.hpp does, which a test holds.
-#include "ctcr/mechanics/bend.hpp"
+// The general path: the rod with effects, for any scalar S, integrated from the robot tip to the front plate. Every tube
+// may bend anywhere and by any constitutive law of Material. Tubes may exchange torque along their length and at
+// breakpoints, and there the frame may kink. Without effects it computes what the fast path of shooting.hpp computes; a
+// test holds both equal.
+#include "ctcr/math/frame_algebra.hpp"
 #include "ctcr/mechanics/effect_state.hpp"
 #include "ctcr/mechanics/events.hpp"
+#include "ctcr/mechanics/moment_sharing.hpp"
 #include "ctcr/mechanics/steppers.hpp"
 
 namespace ctcr {
@@ -14,8 +16,8 @@ class EffectRod {
 public:
   using State = EffectState<N, S>;
   using Inputs = RodInputs<N, S, Fx>;
-  using Place = TubesHere<N, S>;
-  using Bend = ctcr::Bend<N, S>;
+  using Section = CrossSection<N, S>;
+  using Sharing = MomentSharing<N, S>;
 
   explicit EffectRod(const Inputs& inputs) noexcept
     : in_(inputs),
@@ -26,18 +28,17 @@ public:
   /// @param frame  out: Bishop frame there as seen from the tip frame
   /// @param met    called as met(breakpoint, frame, state, moments) at each breakpoint of Contacts<N> but the robot tip;
   ///               moments() are those of the tubes on its far and on its near side, Bishop axes
-  /// @param node   called as node(s, place, state, frame, bend) at both ends of every step
+  /// @param node   called as node(s, section, state, frame, rod) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
   template <class Met, class Node>
   void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Met& met,
            const Node& node) const noexcept {
-    Place place;
-    frame = Frame<S>{};
-    clear_twist(frame);
-    S here = event_place(events.id[0]);
-    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || place.present < N); ++e) {
+    Section section;
+    frame = frame_of<S>(Pose{});
+    S here = event_position(events.id[0]);
+    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || section.present < N); ++e) {
       const int id = events.id[e];
-      Place near = place;
+      Section near = section;
       if (id < N) {
         near.present = id + 1;
         near.curved[std::size_t(id)] = has_curve(id);
@@ -46,42 +47,42 @@ public:
         near.curved[std::size_t(id - N)] = false;
       }
       locate(near);
-      if (place.present > 0) {
+      if (section.present > 0) {
         using Kind = typename Breakpoint<S, N>::Kind;
-        stop(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, place, near, y, frame);
+        apply_breakpoint(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, section, near, y, frame);
       }
-      if (id > 0) met(id, frame, y, [&] { return std::pair(moments(place, y), moments(near, y)); });
-      place = near;
-      place.bent = false;
+      if (id > 0) met(id, frame, y, [&] { return std::pair(moments(section, y), moments(near, y)); });
+      section = near;
+      section.knows_u = false;
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
-      const S next = last ? S(0.0) : event_place(events.id[e + 1]);
-      set_friction_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, place);
+      const S next = last ? S(0.0) : event_position(events.id[e + 1]);
+      set_friction_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, section);
       const S h = (1.0 / steps) * (next - here);
       for (int i = 0; i < steps; ++i) {
-        if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, place, y, frame, *this);
-        step(place, h, y, frame);
+        if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, section, y, frame, *this);
+        step(section, h, y, frame);
       }
-      if constexpr (!std::is_same_v<Node, NoNode>) node(next, place, y, frame, *this);
+      if constexpr (!std::is_same_v<Node, NoNode>) node(next, section, y, frame, *this);
       here = next;
     }
-    met(Contacts<N>::plate, frame, y, [&] { return std::pair(moments(place, y), moments_behind_plate(place, y)); });
-    stop(Breakpoint<S, N>::Kind::plate, -1, place, place, y, frame);
+    met(Contacts<N>::plate, frame, y, [&] { return std::pair(moments(section, y), moments_behind_plate(section, y)); });
+    apply_breakpoint(Breakpoint<S, N>::Kind::plate, -1, section, section, y, frame);
   }
 
   struct NoNode {};
 
-  /// How the tubes bend under the moment of a state.
-  [[nodiscard]] CTCR_NOINLINE Bend bend(const Place& place, const State& y) const noexcept {
-    return {place, y, varied_};
+  /// How the tubes share the bending moment of a state, and the curvatures that follow.
+  [[nodiscard]] CTCR_NOINLINE Sharing shared_moment(const Section& section, const State& y) const noexcept {
+    return {section, y, varied_};
   }
 
   /// Rate of the angle of a tube [rad/m].
-  [[nodiscard]] S twist(int i, const State& y) const noexcept {
+  [[nodiscard]] S twist_rate(int i, const State& y) const noexcept {
     return y.torque(i) * inverse(in_.tubes[std::size_t(i)].kz);
   }
 
   /// One integration step of length h inside a segment: the scheme of MagnusRk4.
-  void step(Place& place, const S& h, State& y, Frame<S>& frame) const noexcept {
+  void step(Section& section, const S& h, State& y, Frame<S>& frame) const noexcept {
     const S half = 0.5 * h;
     const auto moved = [](const State& y0, const S& k, const State& d) {
       State r;
@@ -90,18 +91,18 @@ public:
     };
     const auto advance = [&] {
       if (has_distributed_friction())
-        for (std::size_t i = 0; i < N; ++i) place.friction[i] = place.friction[i] + half * place.friction_rate[i];
+        for (std::size_t i = 0; i < N; ++i) section.friction[i] = section.friction[i] + half * section.friction_rate[i];
       if (!varied_) return;
-      for (std::size_t i = 0; i < std::size_t(place.present); ++i) place.along[i] = place.along[i] + half;
-      locate(place);
+      for (std::size_t i = 0; i < std::size_t(section.present); ++i) section.along[i] = section.along[i] + half;
+      locate(section);
     };
     std::array<S, 2> u1, u2, u3, u4;
-    const State k1 = rates(place, y, u1);
+    const State k1 = rates(section, y, u1);
     advance();
-    const State k2 = rates(place, moved(y, half, k1), u2);
-    const State k3 = rates(place, moved(y, half, k2), u3);
+    const State k2 = rates(section, moved(y, half, k1), u2);
+    const State k3 = rates(section, moved(y, half, k2), u3);
     advance();
-    const State k4 = rates(place, moved(y, h, k3), u4);
+    const State k4 = rates(section, moved(y, h, k3), u4);
     const S sixth = (1.0 / 6.0) * h;
     for (std::size_t i = 0; i < State::size; ++i)
       y.y[i] = y.y[i] + sixth * (k1.y[i] + 2.0 * (k2.y[i] + k3.y[i]) + k4.y[i]);
@@ -111,7 +112,7 @@ public:
 private:
   [[nodiscard]] bool has_curve(int i) const noexcept { return value(in_.tubes[std::size_t(i)].curved_length) > 0; }
 
-  [[nodiscard]] S event_place(int id) const noexcept {
+  [[nodiscard]] S event_position(int id) const noexcept {
     const auto i = std::size_t(id < N ? id : id - N);
     const S tip = in_.tubes[i].length + in_.beta[i];
     return id < N ? tip : tip - in_.tubes[i].curved_length;
@@ -122,51 +123,44 @@ private:
   }
 
   /// Sets the friction along the tubes from a breakpoint to the next one, a distance of h < 0 towards the base.
-  void set_friction_between(int far, int near, const S& h, Place& place) const noexcept {
+  void set_friction_between(int far, int near, const S& h, Section& section) const noexcept {
     if (!has_distributed_friction()) return;
     constexpr double shortest = 1e-9;  // [m]: no division by 0
     std::array<S, N> end;
-    for (std::size_t i = 0; i < N; ++i) place.friction[i] = end[i] = 0.0;
-    in_.effects.distributed_friction(far, place.friction);
+    for (std::size_t i = 0; i < N; ++i) section.friction[i] = end[i] = 0.0;
+    in_.effects.distributed_friction(far, section.friction);
     in_.effects.distributed_friction(near, end);
     const S per_length = value(h) < -shortest ? inverse(h) : S(0.0);
-    for (std::size_t i = 0; i < N; ++i) place.friction_rate[i] = (end[i] - place.friction[i]) * per_length;
+    for (std::size_t i = 0; i < N; ++i) section.friction_rate[i] = (end[i] - section.friction[i]) * per_length;
   }
 
-  static void clear_twist(Frame<S>& frame) noexcept {
-    if constexpr (is_dual<S>)
-      for (int i = 0; i < 3; ++i)
-        for (std::size_t g = 0; g < std::size_t(groups_of<S>); ++g)
-          frame.rotation_twist[i][g] = frame.translation_twist[i][g] = Lanes{};
+  void locate(Section& section) const noexcept {
+    for (int j = 0; j < section.present; ++j) section.material[std::size_t(j)] = material_of(section, j);
   }
-
-  void locate(Place& place) const noexcept {
-    for (int j = 0; j < place.present; ++j) place.material[std::size_t(j)] = material_of(place, j);
-  }
-  [[nodiscard]] Material<S> material_of(const Place& place, int j) const noexcept {
+  [[nodiscard]] Material<S> material_of(const Section& section, int j) const noexcept {
     const auto i = std::size_t(j);
     const TubeParameters<S>& t = in_.tubes[i];
-    Material<S> m{.bending_stiffness = t.k, .curvature = {place.curved[i] ? t.kappa : S(0.0), S(0.0)}};
+    Material<S> m{.bending_stiffness = t.k, .curvature = {section.curved[i] ? t.kappa : S(0.0), S(0.0)}};
     if (varied_) {
       const S straight = t.length - t.curved_length;
-      const S within = place.curved[i] ? S(place.along[i] - straight) : place.along[i];
-      const S part = within * inverse(place.curved[i] ? t.curved_length : straight);
-      in_.effects.material(TubePoint<S>{j, place.curved[i], place.along[i], within, part}, m);
+      const S within = section.curved[i] ? S(section.along[i] - straight) : section.along[i];
+      const S part = within * inverse(section.curved[i] ? t.curved_length : straight);
+      in_.effects.material(TubePoint<S>{j, section.curved[i], section.along[i], within, part}, m);
     }
     return m;
   }
 
-  State rates(Place& place, const State& y, std::array<S, 2>& u) const noexcept {
-    const Bend b = bend(place, y);
+  State rates(Section& section, const State& y, std::array<S, 2>& u) const noexcept {
+    const Sharing b = shared_moment(section, y);
     u = b.u;
-    place.u = {value(u[0]), value(u[1])};
-    place.bent = true;
+    section.u = {value(u[0]), value(u[1])};
+    section.knows_u = true;
     State d;
     S mz = 0.0, mass = 0.0;
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
-      if (j < place.present) {
-        d.psi(j) = twist(j, y);
+      if (j < section.present) {
+        d.psi(j) = twist_rate(j, y);
         d.torque(j) = b.curvature[i][1] * b.moment[i][0] - b.curvature[i][0] * b.moment[i][1];
         mz = mz + y.torque(j);
         mass = mass + in_.tubes[i].mass;
@@ -175,9 +169,9 @@ private:
       }
     }
     if (has_distributed_friction()) {
-      for (int j = 0; j + 1 < place.present; ++j) {
-        d.torque(j) = d.torque(j) - place.friction[std::size_t(j)];
-        d.torque(j + 1) = d.torque(j + 1) + place.friction[std::size_t(j)];
+      for (int j = 0; j + 1 < section.present; ++j) {
+        d.torque(j) = d.torque(j) - section.friction[std::size_t(j)];
+        d.torque(j + 1) = d.torque(j + 1) + section.friction[std::size_t(j)];
       }
     }
     const S &ux = u[0], &uy = u[1];
@@ -193,8 +187,8 @@ private:
   }
 
   /// Lets the effects act where tubes end or start to curve.
-  void stop(typename Breakpoint<S, N>::Kind kind, int tube, const Place& far, const Place& near, State& y,
-            Frame<S>& frame) const noexcept {
+  void apply_breakpoint(typename Breakpoint<S, N>::Kind kind, int tube, const Section& far, const Section& near,
+                        State& y, Frame<S>& frame) const noexcept {
     if constexpr (Fx::template On<N, S>::has_breakpoint) {
       if (!in_.effects.acts_at_breakpoints()) return;
       Breakpoint<S, N> s{
@@ -218,12 +212,12 @@ private:
     }
   }
 
-  std::array<std::array<S, 2>, N> moments(const Place& place, const State& y) const noexcept {
-    const Bend b = bend(place, y);
+  std::array<std::array<S, 2>, N> moments(const Section& section, const State& y) const noexcept {
+    const Sharing b = shared_moment(section, y);
     std::array<std::array<S, 2>, N> m;
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
-      if (j < place.present) {
+      if (j < section.present) {
         m[i] = {b.cosine[i] * b.moment[i][0] - b.sine[i] * b.moment[i][1],
                 b.sine[i] * b.moment[i][0] + b.cosine[i] * b.moment[i][1]};
       } else {
@@ -234,12 +228,12 @@ private:
   }
 
   /// The guide behind the plate keeps the tubes straight: each carries what straightens it, Bishop frame.
-  std::array<std::array<S, 2>, N> moments_behind_plate(const Place& place, const State& y) const noexcept {
+  std::array<std::array<S, 2>, N> moments_behind_plate(const Section& section, const State& y) const noexcept {
     std::array<std::array<S, 2>, N> m;
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
-      const Material<S> mat = material_of(place, j);
-      const std::array<S, 2> q = bending::response<S>(mat, mat.curvature[0], mat.curvature[1]).moment;
+      const Material<S> mat = material_of(section, j);
+      const std::array<S, 2> q = constitutive::response<S>(mat, mat.curvature[0], mat.curvature[1]).moment;
       S s, c;
       sincos(y.psi(j), s, c);
       m[i] = {s * q[1] - c * q[0], -(s * q[0] + c * q[1])};

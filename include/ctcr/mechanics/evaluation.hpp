@@ -139,7 +139,7 @@ inline constexpr EventDirections<Col, N> event_directions{};
 /// Arc length of an event with its derivatives by beta_2..N. The robot tip stays where it is: beta_1 is left to the
 /// common shift.
 template <class Col, int N, class H>
-CTCR_INLINE H event_place(int event, double s) noexcept {
+CTCR_INLINE H event_arc_length(int event, double s) noexcept {
   if constexpr (std::is_same_v<H, double>) {
     return s;
   } else {
@@ -185,8 +185,8 @@ template <class Stepper, class Col, int N, class S>
 CTCR_INLINE SegmentTubes<N> integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state,
                                  Frame<S>& frame, TubeTips<N>& tips) noexcept {
   using H = typename Pass<N, Stepper, Col>::Length;
-  const auto place = [](int event, double s) noexcept { return event_place<Col, N, H>(event, s); };
-  return Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), place, steps, state, frame, tips);
+  const auto arc_length = [](int event, double s) noexcept { return event_arc_length<Col, N, H>(event, s); };
+  return Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, steps, state, frame, tips);
 }
 
 /// What follows from state and frame at the front plate; out.axis and out.tips are there already.

@@ -9,7 +9,7 @@ namespace ctcr {
 /// An explicit scheme by its Butcher tableau: `order`, `stages`, a[i][j] for j < i, weights b[j].
 template <class Tableau>
 struct RungeKutta {
-  static constexpr bool replayed = false;
+  static constexpr bool has_tangent_pass = false;
   static constexpr bool general_equations = true;  ///< those with load and weight, whatever acts: compiled once
 
   template <bool Gravity, class S, class P, int NC, class F, class H>

@@ -110,8 +110,8 @@ private:
   };
   struct Pack {
     Coefficients<N, Four> c;
-    Events<N> events;               ///< of the first robot
-    std::array<Four, 2 * N> place;  ///< of each event, of all [m]
+    Events<N> events;                    ///< of the first robot
+    std::array<Four, 2 * N> arc_length;  ///< of each event, of all [m]
     std::array<Four, N> beta, alpha;
     Four3 gravity;
   };
@@ -141,7 +141,7 @@ private:
       p.gravity[k] = each([k](const auto& of) { return of.gravity[Eigen::Index(k)]; });
     p.events = robots[0].events;
     for (std::size_t e = 0; e < 2 * N; ++e)
-      p.place[std::size_t(p.events.id[e])] = four([&](int i) { return robots[std::size_t(i)].events.s[e]; });
+      p.arc_length[std::size_t(p.events.id[e])] = four([&](int i) { return robots[std::size_t(i)].events.s[e]; });
     return p;
   }
 
@@ -201,8 +201,8 @@ private:
     }
     Frame<Four> f;
     TipPositions tips;
-    const auto place = [&](int event, double) noexcept { return pack.place[std::size_t(event)]; };
-    (void)Rod::run(pack.c, pack.events, place, steps_, y, f, tips);
+    const auto arc_length = [&](int event, double) noexcept { return pack.arc_length[std::size_t(event)]; };
+    (void)Rod::run(pack.c, pack.events, arc_length, steps_, y, f, tips);
 
     Row out;
     std::array<Four, N> angle;

@@ -9,15 +9,15 @@
 
 namespace ctcr {
 
-/// One tube at one place. Vectors in the tube's own frame: z along it, x the axis of its precurvature.
+/// One tube at one arc length. Vectors in the tube's own frame: z along it, x the axis of its precurvature.
 struct TubeShape {
-  bool present = false;           ///< false: the tube ends before, or is grasped before, this place; all else is zero
-  double angle = 0;               ///< psi, from the Bishop frame about z [rad]
+  bool present = false;  ///< false: the tube ends before, or is grasped before, this arc length; all else is zero
+  double angle = 0;      ///< psi, from the Bishop frame about z [rad]
   Vec3 curvature = Vec3::Zero();  ///< u: bending x, y and twist rate z [1/m]
   Vec3 moment = Vec3::Zero();     ///< internal: EI (u - kappa e_x), GJ u_z [N m]
 };
 
-/// All tubes at one place. The Bishop frame follows the common centreline without twisting; at the front plate it is
+/// All tubes at one arc length. The Bishop frame follows the common centreline without twisting; at the front plate it is
 /// the base frame.
 template <int N>
 struct ShapePoint {
@@ -38,8 +38,8 @@ inline constexpr int shape_steps = 16;
 
 namespace detail {
 
-/// Places closer than this are the same [m]: arc lengths carry rounding.
-inline constexpr double same_place = 1e-12;
+/// Arc lengths that differ by less are the same [m]: they carry rounding.
+inline constexpr double same_arc_length = 1e-12;
 
 template <bool Loaded, int N>
 inline RobotState<double, N> tip_values(const Coefficients<N>& c, const TipLoad& load,
@@ -100,7 +100,7 @@ inline void fill_behind_plate(const Robot<N>& robot, const Joints<N>& q, const B
                               const std::array<double, std::size_t(N)>& w, ShapePoint<N>& out) noexcept {
   out.bishop.position << 0, 0, out.s;
   for (std::size_t i = 0; i < N; ++i) {
-    if (out.s < q.beta[Eigen::Index(i)] - same_place) continue;
+    if (out.s < q.beta[Eigen::Index(i)] - same_arc_length) continue;
     TubeShape& t = out.tube[i];
     t.present = true;
     t.angle = psi[i] + base.turn + out.s * w[i];
@@ -114,12 +114,12 @@ inline void fill_behind_plate(const Robot<N>& robot, const Joints<N>& q, const B
 template <int N>
 inline std::size_t fill_beyond_tip(double tip, const BaseView& base, std::span<ShapePoint<N>> points) noexcept {
   std::size_t left = points.size();
-  for (; left > 0 && points[left - 1].s > tip + same_place; --left)
+  for (; left > 0 && points[left - 1].s > tip + same_arc_length; --left)
     points[left - 1].bishop = {base.T_base_tip.rotation * rotation_z(-base.turn), base.T_base_tip.position};
   return left;
 }
 
-/// Shape of the equilibrium that `guess` describes, at the places already set in `points`.
+/// Shape of the equilibrium that `guess` describes, at the arc lengths already set in `points`.
 template <Loading L, int N>
 inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
                        int steps, std::span<ShapePoint<N>> points) noexcept {
@@ -134,14 +134,14 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
   };
   const Coefficients<N>& c = model.coefficients();
   const Events<N> events = sort_events(c, q.beta);
-  const auto place = [](int, double s) noexcept { return s; };
+  const auto arc_length = [](int, double s) noexcept { return s; };
   const State tip = tip_values<Col::loaded>(c, load, guess);
   TubeTips<N> tips;
 
   // Where the plate is, as seen from the tip, is known only after a first pass.
   State plate = tip;
   Frame<double> frame;
-  Pass::run(c, events, place, steps, plate, frame, tips);
+  Pass::run(c, events, arc_length, steps, plate, frame, tips);
   BaseView base;
   base.turn = q.alpha[0] - (plate.psi[0] + q.beta[0] * plate.w[0]);
   base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * Pose{frame.rotation(), frame.position()}.inverse();
@@ -149,7 +149,7 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
   std::size_t left = fill_beyond_tip(events.s[0], base, points);
   Node node{events.s[0], {}, tip, {}};
   const auto fill_down_to = [&](double end) noexcept {
-    for (; left > 0 && points[left - 1].s > end + same_place; --left) {
+    for (; left > 0 && points[left - 1].s > end + same_arc_length; --left) {
       ShapePoint<N>& point = points[left - 1];
       Node here = node;
       Pass::advance(c, here.tubes, point.s - here.s, here.s, 1, here.y, here.frame, NoRecord{});
@@ -162,8 +162,8 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
     node = {s, tubes, y, f};
   };
   State y = tip;
-  Pass::run(c, events, place, steps, y, frame, tips, record);
-  fill_down_to(-2 * same_place);
+  Pass::run(c, events, arc_length, steps, y, frame, tips, record);
+  fill_down_to(-2 * same_arc_length);
   for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, plate.psi, plate.w, points[left - 1]);
 }
 
@@ -174,10 +174,10 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
   using Equilibrium = RodInEquilibrium<N, Fx>;
   using Rod = typename Equilibrium::Rod;
   using State = typename Rod::State;
-  using Place = typename Rod::Place;
+  using Section = typename Rod::Section;
   struct Node {
     double s;
-    Place place;
+    Section section;
     State y;
     Frame<double> frame;
   };
@@ -206,36 +206,37 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
   std::size_t left = fill_beyond_tip(events.s[0], base, points);
   Node node{events.s[0], {}, tip, {}};
   const auto fill = [&](const Node& here, ShapePoint<N>& out) noexcept {
-    const auto bend = rod.bend(here.place, here.y);
+    const auto sharing = rod.shared_moment(here.section, here.y);
     const Pose T_base_here = base.T_base_tip * pose_of(here.frame);
     out.bishop = {T_base_here.rotation * rotation_z(-base.turn), T_base_here.position};
     out.force = T_base_here.rotation * Vec3(here.y.n(0), here.y.n(1), here.y.n(2));
     Vec3 moment(here.y.m(0), here.y.m(1), 0);
-    for (int i = 0; i < here.place.present; ++i) {
+    for (int i = 0; i < here.section.present; ++i) {
       const auto k = std::size_t(i);
       TubeShape& t = out.tube[k];
       t.present = true;
       t.angle = here.y.psi(i) + base.turn;
-      t.curvature << bend.curvature[k][0], bend.curvature[k][1], rod.twist(i, here.y);
-      t.moment << bend.moment[k][0], bend.moment[k][1], here.y.torque(i);
+      t.curvature << sharing.curvature[k][0], sharing.curvature[k][1], rod.twist_rate(i, here.y);
+      t.moment << sharing.moment[k][0], sharing.moment[k][1], here.y.torque(i);
       moment[2] += here.y.torque(i);
     }
     out.moment = T_base_here.rotation * moment;
   };
   const auto fill_down_to = [&](double end) noexcept {
-    for (; left > 0 && points[left - 1].s > end + same_place; --left) {
+    for (; left > 0 && points[left - 1].s > end + same_arc_length; --left) {
       Node here = node;
-      rod.step(here.place, points[left - 1].s - here.s, here.y, here.frame);
+      rod.step(here.section, points[left - 1].s - here.s, here.y, here.frame);
       fill(here, points[left - 1]);
     }
   };
-  const auto record = [&](double s, const Place& place, const State& y, const Frame<double>& f, const Rod&) noexcept {
+  const auto record = [&](double s, const Section& section, const State& y, const Frame<double>& f,
+                          const Rod&) noexcept {
     fill_down_to(s);
-    node = {s, place, y, f};
+    node = {s, section, y, f};
   };
   State y = tip;
   rod.run(events, steps, y, frame, no_breakpoint, record);
-  fill_down_to(-2 * same_place);
+  fill_down_to(-2 * same_arc_length);
   for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, psi, w, points[left - 1]);
 }
 
@@ -291,7 +292,7 @@ std::size_t shape_places(const Model<N, Fx>& model, const Joints<N>& q, std::siz
     if (at > 0) s[count++] = at;
   const auto end = s.begin() + std::ptrdiff_t(count);
   std::sort(s.begin(), end);
-  const auto same = [](double a, double b) { return b - a <= detail::same_place; };
+  const auto same = [](double a, double b) { return b - a <= detail::same_arc_length; };
   return std::size_t(std::unique(s.begin(), end, same) - s.begin());
 }
 

@@ -4,8 +4,8 @@
 // Shooting starts at the tip because every guess is then an exact equilibrium: of the same robot with other base angles
 // and a turned load. Newton's method walks through equilibria only, and derivatives by base angles cost nothing.
 #include "ctcr/mechanics/events.hpp"
-#include "ctcr/mechanics/replay.hpp"
 #include "ctcr/mechanics/steppers.hpp"
+#include "ctcr/mechanics/tangent_pass.hpp"
 
 namespace ctcr {
 
@@ -80,7 +80,7 @@ public:
   using Length = H;
 
   /// Integrates from the tip to s = 0.
-  /// @param place   H place(event, s): arc length of an event with its derivatives [m]
+  /// @param arc_length  H arc_length(event, s): arc length of an event with its derivatives [m]
   /// @param steps   integration steps per segment, >= 1
   /// @param y       in: state at the tip; out: at the front plate
   /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
@@ -88,12 +88,13 @@ public:
   /// @param record  record(s, tubes, state, frame, u) at both ends of every step
   /// @return tubes of the last segment
   /// Real time: yes (2N segments, `steps` steps each).
-  template <class Place, class Tips, class Record = NoRecord>
-  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const Place& place, int steps,
-                                   State& y, Frame<S>& frame, Tips& tips, const Record& record = {}) noexcept {
+  template <class ArcLength, class Tips, class Record = NoRecord>
+  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const ArcLength& arc_length,
+                                   int steps, State& y, Frame<S>& frame, Tips& tips,
+                                   const Record& record = {}) noexcept {
     SegmentTubes<N> tubes;
     set_identity(frame);
-    H here = place(events.id[0], events.s[0]);
+    H here = arc_length(events.id[0], events.s[0]);
     for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || tubes.present < N); ++e) {
       const int id = events.id[e];
       if (id < N) {
@@ -103,7 +104,7 @@ public:
         tubes.straighten(id - N);
       }
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
-      const H next = last ? H{} : place(events.id[e + 1], events.s[e + 1]);
+      const H next = last ? H{} : arc_length(events.id[e + 1], events.s[e + 1]);
       tubes.near = tubes.present + (!last && events.id[e + 1] < N);
       advance(c, tubes, next - here, events.s[e], steps, y, frame, record);
       here = next;
@@ -150,7 +151,7 @@ public:
 
 private:
   using Values = std::conditional_t<is_dual<S>, Frame<double>, Frame<S>>;
-  static constexpr bool replayed = is_dual<S> && !is_dual<P> && Stepper::replayed;
+  static constexpr bool has_tangent_pass = is_dual<S> && !is_dual<P> && Stepper::has_tangent_pass;
   static constexpr TangentOf of =
       Col::jacobian ? TangentOf::frame : (Loaded ? TangentOf::rotation : TangentOf::nothing);
 
@@ -164,10 +165,62 @@ private:
         }
   }
 
-  template <int NC>
-  static CTCR_INLINE RodSection<S, P, NC> section(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
-                                            const State& y) noexcept {
-    RodSection<S, P, NC> r;
+  // A step moves the rod between two layouts, by the functions gather, scatter and section. They copy one part of each
+  // number: all of it, its value, or its tangents along one group of four columns.
+  //
+  //                     gather, section                                   scatter
+  //   RobotState<S, N>  --- all --------> RodState<S, NC>       step      --------> RobotState<S, N>   direct_step
+  //   by tube, 1..N     --- value ------> RodState<double, NC>  step      --------> by tube, 1..N      tangent_step
+  //                     --- tangents g -> GroupState<NC>        tangents  -------->                    tangent_group
+  //
+  // Angles and twist rates of the curved tubes are packed in the order of SegmentTubes::curved; straight tubes keep their
+  // twist rate, and their angle follows from it.
+  struct All {
+    CTCR_INLINE const S& operator()(const S& x) const noexcept { return x; }
+    CTCR_INLINE S& operator()(S& x) const noexcept { return x; }
+  };
+  struct Value {
+    CTCR_INLINE double operator()(const S& x) const noexcept { return x.v; }
+    CTCR_INLINE double& operator()(S& x) const noexcept { return x.v; }
+  };
+  template <int g>
+  struct Tangents {
+    CTCR_INLINE Lanes operator()(const S& x) const noexcept { return x.d[g]; }
+    CTCR_INLINE Lanes& operator()(S& x) const noexcept { return x.d[g]; }
+  };
+
+  template <int NC, class Part, class Rod>
+  static CTCR_INLINE void gather(const SegmentTubes<N>& tubes, const State& y, Rod& z, const Part& part) noexcept {
+    for (std::size_t i = 0; i < NC; ++i) {
+      z.psi[i] = part(y.psi[std::size_t(tubes.curved[i])]);
+      z.w[i] = part(y.w[std::size_t(tubes.curved[i])]);
+    }
+    if constexpr (Loaded)
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (i < 2) z.m[i] = part(y.m[i]);
+        z.n[i] = part(y.n[i]);
+        if constexpr (Gravity) z.g[i] = part(y.g[i]);
+      }
+  }
+
+  template <int NC, class Part, class Rod>
+  static CTCR_INLINE void scatter(const SegmentTubes<N>& tubes, const Rod& z, State& y, const Part& part) noexcept {
+    for (std::size_t i = 0; i < NC; ++i) {
+      part(y.psi[std::size_t(tubes.curved[i])]) = z.psi[i];
+      part(y.w[std::size_t(tubes.curved[i])]) = z.w[i];
+    }
+    if constexpr (Loaded)
+      for (std::size_t i = 0; i < 3; ++i) {
+        if (i < 2) part(y.m[i]) = z.m[i];
+        part(y.n[i]) = z.n[i];
+        if constexpr (Gravity) part(y.g[i]) = z.g[i];
+      }
+  }
+
+  template <int NC, class T, class Part>
+  static CTCR_INLINE RodSection<T, P, NC> section(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const State& y,
+                                            const Part& part) noexcept {
+    RodSection<T, P, NC> r;
     const auto last = std::size_t(tubes.present - 1);
     r.compliance = c.compliance[last];
     if constexpr (Gravity) r.weight = c.weight[last];
@@ -181,30 +234,18 @@ private:
       r.straight_mz = 0.0;
       for (int i = 0; i < tubes.straight_count; ++i) {
         const auto t = std::size_t(tubes.straight[std::size_t(i)]);
-        r.straight_mz = r.straight_mz + c.kz[t] * y.w[t];
+        r.straight_mz = r.straight_mz + c.kz[t] * part(y.w[t]);
       }
     }
     return r;
-  }
-
-  template <int NC>
-  static CTCR_INLINE RodState<S, NC> gather(const SegmentTubes<N>& tubes, const State& y) noexcept {
-    RodState<S, NC> z;
-    for (std::size_t i = 0; i < NC; ++i) {
-      z.psi[i] = y.psi[std::size_t(tubes.curved[i])];
-      z.w[i] = y.w[std::size_t(tubes.curved[i])];
-    }
-    if constexpr (Loaded) z.m = y.m, z.n = y.n;
-    if constexpr (Gravity) z.g = y.g;
-    return z;
   }
 
   template <int NC, class Record>
   static void advance_curved(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s, int steps,
                              State& y, Frame<S>& frame, const Record& record) noexcept {
     const H k = steps == 1 ? h : (1.0 / steps) * h;
-    if constexpr (replayed && (Loaded || NC > 0)) {
-      for (int i = 0; i < steps; ++i) replay_step<NC>(c, tubes, k, y, frame);
+    if constexpr (has_tangent_pass && (Loaded || NC > 0)) {
+      for (int i = 0; i < steps; ++i) tangent_step<NC>(c, tubes, k, y, frame);
     } else {
       const auto observe = [&] {
         if constexpr (!std::is_same_v<Record, NoRecord>) record(s, tubes, y, frame, rates<NC>(c, tubes, y).u);
@@ -222,101 +263,74 @@ private:
   template <int NC>
   static CTCR_INLINE void direct_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& k, State& y,
                                 Frame<S>& frame) noexcept {
-    RodState<S, NC> z = gather<NC>(tubes, y);
+    RodState<S, NC> z;
+    gather<NC>(tubes, y, z, All{});
     if constexpr (Loaded)
-      Stepper::template loaded<Gravity>(section<NC>(c, tubes, y), z, frame, k);
+      Stepper::template loaded<Gravity>(section<NC, S>(c, tubes, y, All{}), z, frame, k);
     else if constexpr (NC > 0)
-      Stepper::unloaded(section<NC>(c, tubes, y), z, frame, k);
+      Stepper::unloaded(section<NC, S>(c, tubes, y, All{}), z, frame, k);
     else
       move_straight(frame, k);
     for (int j = 0; j < tubes.straight_count; ++j) {
       const auto t = std::size_t(tubes.straight[std::size_t(j)]);
       y.psi[t] = y.psi[t] + k * y.w[t];
     }
-    for (std::size_t j = 0; j < NC; ++j) {
-      y.psi[std::size_t(tubes.curved[j])] = z.psi[j];
-      y.w[std::size_t(tubes.curved[j])] = z.w[j];
-    }
-    if constexpr (Loaded) y.m = z.m, y.n = z.n;
-    if constexpr (Gravity) y.g = z.g;
+    scatter<NC>(tubes, z, y, All{});
   }
 
-  /// The taped form of a step: values first, then four columns at a time.
+  /// The same with the tangents in a pass of their own: values first, then four columns at a time.
   template <int NC>
-  static CTCR_INLINE void replay_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, State& y,
-                                Frame<S>& frame) noexcept {
-    RodSection<double, double, NC> r;
-    const auto last = std::size_t(tubes.present - 1);
-    r.compliance = c.compliance[last];
-    if constexpr (Gravity) r.weight = c.weight[last];
+  static CTCR_INLINE void tangent_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, State& y,
+                                 Frame<S>& frame) noexcept {
+    const RodSection<double, double, NC> r = section<NC, double>(c, tubes, y, Value{});
     RodState<double, NC> z;
-    for (std::size_t i = 0; i < NC; ++i) {
-      const auto t = std::size_t(tubes.curved[i]);
-      r.a[i] = c.a[t], r.rho[i] = c.rho[t], r.kz[i] = c.kz[t];
-      z.psi[i] = y.psi[t].v, z.w[i] = y.w[t].v;
-    }
+    gather<NC>(tubes, y, z, Value{});
     const double k = value(h);
-    r.straight_mz = 0.0;
-    for (int i = 0; i < tubes.straight_count; ++i) {
-      const auto t = std::size_t(tubes.straight[std::size_t(i)]);
-      r.straight_mz += c.kz[t] * y.w[t].v;
-    }
     Stage<Loaded, Gravity, NC> stages[Loaded ? 4 : 3];
     Exponential step;
-    TapedFrame<of> taped{frame, step};
-    const auto tape = [&](int i, const RodState<double, NC>& state, const RodRates<double, NC>& rates) {
+    RecordedFrame<of> recorded{frame, step};
+    const auto record = [&](int i, const RodState<double, NC>& state, const RodRates<double, NC>& rates) {
       stages[i].keep(state, rates);
     };
     std::array<double, 2> u_mid, u_end;
     if constexpr (Loaded) {
-      for (std::size_t i = 0; i < 2; ++i) z.m[i] = y.m[i].v;
-      for (std::size_t i = 0; i < 3; ++i) z.n[i] = y.n[i].v;
-      if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) z.g[i] = y.g[i].v;
-      Stepper::template loaded<Gravity>(r, z, taped, k, tape);
+      Stepper::template loaded<Gravity>(r, z, recorded, k, record);
       for (std::size_t i = 0; i < 2; ++i) u_mid[i] = 0.5 * (stages[1].u[i] + stages[2].u[i]);
       u_end = stages[3].u;
-      for (std::size_t i = 0; i < 2; ++i) y.m[i].v = z.m[i];
-      for (std::size_t i = 0; i < 3; ++i) y.n[i].v = z.n[i];
-      if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) y.g[i].v = z.g[i];
     } else {
-      Stepper::unloaded(r, z, taped, k, tape);
+      Stepper::unloaded(r, z, recorded, k, record);
       u_mid = stages[1].u;
       u_end = stages[2].u;
     }
-    replay_groups<0>(c, r, tubes, stages, step, u_mid, u_end, h, y, frame);
+    tangent_groups<0>(c, r, tubes, stages, step, u_mid, u_end, h, y, frame);
     for (int i = 0; i < tubes.straight_count; ++i) {
       const auto t = std::size_t(tubes.straight[std::size_t(i)]);
       y.psi[t].v += k * y.w[t].v;
     }
-    for (std::size_t i = 0; i < NC; ++i) {
-      y.psi[std::size_t(tubes.curved[i])].v = z.psi[i];
-      y.w[std::size_t(tubes.curved[i])].v = z.w[i];
-    }
+    scatter<NC>(tubes, z, y, Value{});
   }
 
   /// Groups g and later, those that have started.
   template <int g, class... A>
-  static CTCR_INLINE void replay_groups(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
-                                  A&... rest) noexcept {
+  static CTCR_INLINE void tangent_groups(const Coefficients<N, P>& c, const auto& r, const SegmentTubes<N>& tubes,
+                                   A&... rest) noexcept {
     if constexpr (g < groups_of<S>) {
       constexpr int first = Col::starts_with(g);
       if constexpr (first <= N)
-        if (first == 1 || tubes.near >= first) replay_group<g>(c, r, tubes, rest...);
-      replay_groups<g + 1>(c, r, tubes, rest...);
+        if (first == 1 || tubes.near >= first) tangent_group<g>(c, r, tubes, rest...);
+      tangent_groups<g + 1>(c, r, tubes, rest...);
     }
   }
 
   template <int g, int NC>
-  static CTCR_INLINE void replay_group(const Coefficients<N, P>& c, const RodSection<double, double, NC>& r,
-                                 const SegmentTubes<N>& tubes,
-                                 const Stage<Loaded, Gravity, NC> (&stages)[Loaded ? 4 : 3], const Exponential& step,
-                                 const std::array<double, 2>& u_mid, const std::array<double, 2>& u_end, const H& h,
-                                 State& y, Frame<S>& frame) noexcept {
+  static CTCR_INLINE void tangent_group(const Coefficients<N, P>& c, const RodSection<double, double, NC>& r,
+                                  const SegmentTubes<N>& tubes,
+                                  const Stage<Loaded, Gravity, NC> (&stages)[Loaded ? 4 : 3], const Exponential& step,
+                                  const std::array<double, 2>& u_mid, const std::array<double, 2>& u_end, const H& h,
+                                  State& y, Frame<S>& frame) noexcept {
     constexpr int G = groups_of<S>;
     constexpr bool Dk = has_length_tangent<H, g>;
-    using R = Replay<Loaded, Gravity, Dk, NC>;
+    using R = TangentPass<Loaded, Gravity, Dk, NC>;
     const double k = value(h);
     const Lanes dk = length_tangent<G>(h, g);
     GroupState<NC> z;
@@ -328,28 +342,13 @@ private:
       y.psi[t].d[g] += k * w;
       if constexpr (Dk) y.psi[t].d[g] += y.w[t].v * dk;
     }
-    for (std::size_t j = 0; j < NC; ++j) {
-      z.psi[j] = y.psi[std::size_t(tubes.curved[j])].d[g];
-      z.w[j] = y.w[std::size_t(tubes.curved[j])].d[g];
-    }
+    gather<NC>(tubes, y, z, Tangents<g>{});
     typename R::Curvature u[3];
-    if constexpr (Loaded) {
-      for (std::size_t i = 0; i < 2; ++i) z.m[i] = y.m[i].d[g];
-      for (std::size_t i = 0; i < 3; ++i) z.n[i] = y.n[i].d[g];
-      if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) z.g[i] = y.g[i].d[g];
+    if constexpr (Loaded)
       R::loaded(r, stages, k, dk, mz, z, u);
-      for (std::size_t i = 0; i < 2; ++i) y.m[i].d[g] = z.m[i];
-      for (std::size_t i = 0; i < 3; ++i) y.n[i].d[g] = z.n[i];
-      if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) y.g[i].d[g] = z.g[i];
-    } else {
+    else
       R::unloaded(r, stages, k, dk, z, u);
-    }
-    for (std::size_t j = 0; j < NC; ++j) {
-      y.psi[std::size_t(tubes.curved[j])].d[g] = z.psi[j];
-      y.w[std::size_t(tubes.curved[j])].d[g] = z.w[j];
-    }
+    scatter<NC>(tubes, z, y, Tangents<g>{});
     if constexpr (of != TangentOf::nothing)
       R::template frame<of>(step, stages[0].u, u_mid, u_end, k, dk, u, &frame.rotation_twist[0][g],
                             &frame.translation_twist[0][g], std::size_t(G));

@@ -54,13 +54,13 @@ public:
     y_ = tip_state<Col, S>(c_, load_, guess, axis);
     TubeTips<N> tips;
     Frame<S> frame{};
-    const auto place = [](int, double s) noexcept { return s; };
+    const auto arc_length = [](int, double s) noexcept { return s; };
     const auto record = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f,
                             const std::array<double, 2>&) noexcept {
       if constexpr (!std::is_same_v<Watch, NoRecord>)
         watch(s, jacobian(y, f, guess.rotation * f.rotation(), VecN<N>::Zero()).determinant());
     };
-    Pass::run(c_, sort_events(c_, q_.beta), place, steps_per_segment_, y_, frame, tips, record);
+    Pass::run(c_, sort_events(c_, q_.beta), arc_length, steps_per_segment_, y_, frame, tips, record);
     frame_ = frame;
     VecN<N> angle;
     for (int i = 0; i < N; ++i) angle[i] = y_.psi[std::size_t(i)].v + q_.beta[i] * y_.w[std::size_t(i)].v;

@@ -6,7 +6,7 @@
 namespace ctcr {
 
 /// Observer of stages that does nothing.
-struct NoTape {
+struct NoStageRecord {
   template <class... A>
   CTCR_INLINE void operator()(const A&...) const noexcept {}
 };
@@ -42,12 +42,13 @@ CTCR_INLINE void sincos_of_two(const std::array<S, std::size_t(NC)>& a, const st
 /// stage curvatures (fourth order, arc length and orthogonality exact). Ref: Hairer, Lubich & Wanner, Geometric
 /// Numerical Integration, IV.7-8.
 struct MagnusRk4 {
-  static constexpr bool replayed = true;  ///< tangents by replay.hpp where the parameters are plain numbers
+  static constexpr bool has_tangent_pass =
+      true;  ///< tangents by tangent_pass.hpp where the parameters are plain numbers
 
-  /// @param tape  called as tape(stage, state, rates) for each of the four stages
-  template <bool Gravity, class S, class P, int NC, class F, class H, class Tape = NoTape>
+  /// @param record  called as record(stage, state, rates) for each of the four stages
+  template <bool Gravity, class S, class P, int NC, class F, class H, class Record = NoStageRecord>
   static CTCR_INLINE void loaded(const RodSection<S, P, NC>& r, RodState<S, NC>& y, F& frame, const H& k,
-                           const Tape& tape = {}) noexcept {
+                           const Record& record = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
     const auto along = [](const auto& from, const auto& h, const auto& rate) {
@@ -66,22 +67,22 @@ struct MagnusRk4 {
     y2.psi = along(y.psi, half, y.w);
     sincos_of_two(y.psi, y2.psi, k1, k2);
     loaded_rates<Gravity>(r, y, k1);
-    tape(0, y, k1);
+    record(0, y, k1);
     y2.w = along(y.w, half, k1.F);
     wrench(half, k1, y2);
     loaded_rates<Gravity>(r, y2, k2);
-    tape(1, y2, k2);
+    record(1, y2, k2);
     y3.w = along(y.w, half, k2.F);
     y3.psi = along(y.psi, half, y2.w);
     y4.psi = along(y.psi, k, y3.w);
     sincos_of_two(y3.psi, y4.psi, k3, k4);
     wrench(half, k2, y3);
     loaded_rates<Gravity>(r, y3, k3);
-    tape(2, y3, k3);
+    record(2, y3, k3);
     y4.w = along(y.w, k, k3.F);
     wrench(k, k3, y4);
     loaded_rates<Gravity>(r, y4, k4);
-    tape(3, y4, k4);
+    record(3, y4, k4);
     const auto sixth = (1.0 / 6.0) * k;
     const auto mean = [&](const S& a, const S& b, const S& c, const S& d) {
       return S(sixth * (a + 2.0 * (b + c) + d));
@@ -100,9 +101,9 @@ struct MagnusRk4 {
 
   /// Unloaded: torsion is a second-order equation of its own (Nystrom RKN4, three evaluations), and w is constant
   /// where one tube alone is curved.
-  template <class S, class P, int NC, class F, class H, class Tape = NoTape>
+  template <class S, class P, int NC, class F, class H, class Record = NoStageRecord>
   static CTCR_INLINE void unloaded(const RodSection<S, P, NC>& r, RodState<S, NC>& y, F& frame, const H& k,
-                             const Tape& tape = {}) noexcept {
+                             const Record& record = {}) noexcept {
     using Rates = RodRates<S, NC>;
     const auto half = 0.5 * k;
     Rates k1, k2, k3, turn;
@@ -111,7 +112,7 @@ struct MagnusRk4 {
     else
       sincos(y.psi, k1.sin, k1.cos);
     curvature<false>(r, y.m, k1);
-    tape(0, y, k1);
+    record(0, y, k1);
     if constexpr (NC == 1) {
       const auto turned = [&](const Rates& a, Rates& b) {
         b.sin[0] = a.sin[0] * turn.cos[0] + a.cos[0] * turn.sin[0];
@@ -134,15 +135,15 @@ struct MagnusRk4 {
         y.w[i] = y.w[i] + k6 * (k1.F[i] + 4.0 * k2.F[i] + k3.F[i]);
       }
     }
-    tape(1, y, k2);
-    tape(2, y, k3);
+    record(1, y, k2);
+    record(2, y, k3);
     move_frame(frame, k1.u, k2.u, k3.u, k);
   }
 };
 
-/// MagnusRk4 with values and tangents always carried together: the reference that replay.hpp must equal.
+/// MagnusRk4 with values and tangents always carried together: the reference that tangent_pass.hpp must equal.
 struct DirectMagnusRk4 : MagnusRk4 {
-  static constexpr bool replayed = false;
+  static constexpr bool has_tangent_pass = false;
 };
 
 }  // namespace ctcr

@@ -1,25 +1,25 @@
 #pragma once
-// The tangents of a MagnusRk4 step as a second pass.
+// Tangents of a MagnusRk4 step as a pass of their own (forward mode).
 //
-// Carrying value and derivatives together (steppers.hpp with dual numbers) serves any scalar type. Where the robot's
-// parameters are plain numbers, taping what each stage of the values needs and replaying it for four columns at a time
-// keeps those columns in registers: less than half of the instructions. A test holds both equal.
+// Carrying values and derivatives together (steppers.hpp with dual numbers) serves any scalar type. Where the robot's
+// parameters are plain numbers, the values go first and each stage records what its tangents need; the tangent pass then
+// keeps four columns at a time in registers, for less than half of the instructions. A test holds both equal.
 #include <utility>
 
 #include "ctcr/mechanics/steppers.hpp"
 
 namespace ctcr {
 
-/// A frame that keeps the exponential it was last moved by.
+/// A frame that records the exponential that moved it last.
 template <TangentOf Of>
-struct TapedFrame {
+struct RecordedFrame {
   Frame<double>& frame;
   Exponential& step;
 };
 
 /// Moves the frame and keeps what the tangents need. Real time: yes.
 template <TangentOf Of>
-CTCR_INLINE void move_by_exponential(TapedFrame<Of>& g, const double (&o)[3], double vx, double vy, double vz) noexcept {
+CTCR_INLINE void move_by_exponential(RecordedFrame<Of>& g, const double (&o)[3], double vx, double vy, double vz) noexcept {
   exponential<Of>(o, {vx, vy, vz}, g.step);
   move(g.frame, g.step);
 }
@@ -39,7 +39,7 @@ struct Stage {
   }
 };
 
-/// One column group of everything carried along the rod: references into the duals that own it.
+/// Tangents of a RodState along one group of four columns.
 template <int NC>
 struct GroupState {
   std::array<Lanes, NC> psi, w;
@@ -47,19 +47,19 @@ struct GroupState {
   std::array<Lanes, 3> n, g;
 };
 
-/// Replays one step for one group of four columns.
+/// The tangents of one step, for one group of four columns.
 /// @tparam Dk  whether the step length has derivatives in this group
 template <bool Loaded, bool Gravity, bool Dk, int NC>
-class Replay {
+class TangentPass {
 public:
   using Section = RodSection<double, double, NC>;
-  using Tape = Stage<Loaded, Gravity, NC>;
+  using StageValues = Stage<Loaded, Gravity, NC>;
   using Group = GroupState<NC>;
   using Curvature = std::array<Lanes, 2>;
 
   /// @param straight_mz  tangent of the straight tubes' torsional moment
   /// @param u  out: tangents of the curvature at the start, 4 x the middle, the end
-  static CTCR_INLINE void loaded(const Section& r, const Tape (&s)[4], double k, Lanes dk, Lanes straight_mz, Group& y,
+  static CTCR_INLINE void loaded(const Section& r, const StageValues (&s)[4], double k, Lanes dk, Lanes straight_mz, Group& y,
                            Curvature (&u)[3]) noexcept {
     Group k1, sum = y;
     const double k6 = k / 6.0;
@@ -78,13 +78,13 @@ public:
       const Lanes sixth = dk * (1.0 / 6.0);
       const auto mean = [&](auto member) { return member(s[0]) + 2.0 * (member(s[1]) + member(s[2])) + member(s[3]); };
       for (std::size_t i = 0; i < NC; ++i) {
-        sum.psi[i] += sixth * mean([i](const Tape& q) { return q.w[i]; });
-        sum.w[i] += sixth * mean([i](const Tape& q) { return q.F[i]; });
+        sum.psi[i] += sixth * mean([i](const StageValues& q) { return q.w[i]; });
+        sum.w[i] += sixth * mean([i](const StageValues& q) { return q.F[i]; });
       }
-      for (std::size_t i = 0; i < 2; ++i) sum.m[i] += sixth * mean([i](const Tape& q) { return q.m[i]; });
-      for (std::size_t i = 0; i < 3; ++i) sum.n[i] += sixth * mean([i](const Tape& q) { return q.dn[i]; });
+      for (std::size_t i = 0; i < 2; ++i) sum.m[i] += sixth * mean([i](const StageValues& q) { return q.m[i]; });
+      for (std::size_t i = 0; i < 3; ++i) sum.n[i] += sixth * mean([i](const StageValues& q) { return q.dn[i]; });
       if constexpr (Gravity)
-        for (std::size_t i = 0; i < 3; ++i) sum.g[i] += sixth * mean([i](const Tape& q) { return q.dg[i]; });
+        for (std::size_t i = 0; i < 3; ++i) sum.g[i] += sixth * mean([i](const StageValues& q) { return q.dg[i]; });
     }
     y = sum;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -94,7 +94,7 @@ public:
     }
   }
 
-  static CTCR_INLINE void unloaded(const Section& r, const Tape (&s)[3], double k, Lanes dk, Group& y,
+  static CTCR_INLINE void unloaded(const Section& r, const StageValues (&s)[3], double k, Lanes dk, Group& y,
                              Curvature (&u)[3]) noexcept {
     std::array<Lanes, NC> f1, f2, f3, psi;
     u[0] = torsion(r, s[0], y.psi, f1);
@@ -173,7 +173,7 @@ private:
 
   /// State at a later stage; `f` holds the rates, those of w under the name w.
   static CTCR_INLINE Group at(const Group& y, double h, Lanes dh, const std::array<Lanes, NC>& w, const Group& f,
-                        const Tape& s) noexcept {
+                        const StageValues& s) noexcept {
     Group z;
     const auto add = [&](Lanes a, Lanes rate, double value) {
       Lanes r = a + h * rate;
@@ -191,7 +191,7 @@ private:
     return z;
   }
 
-  static CTCR_INLINE void torque(const Section& r, const Tape& s, const std::array<Lanes, NC>& psi, Lanes ux, Lanes uy,
+  static CTCR_INLINE void torque(const Section& r, const StageValues& s, const std::array<Lanes, NC>& psi, Lanes ux, Lanes uy,
                            std::array<Lanes, NC>& f) noexcept {
     for (std::size_t i = 0; i < NC; ++i) {
       const double S = r.rho[i] * s.sin[i], C = r.rho[i] * s.cos[i];
@@ -200,7 +200,7 @@ private:
   }
 
   /// Curvature and w' of an unloaded rod.
-  static CTCR_INLINE Curvature torsion(const Section& r, const Tape& s, const std::array<Lanes, NC>& psi,
+  static CTCR_INLINE Curvature torsion(const Section& r, const StageValues& s, const std::array<Lanes, NC>& psi,
                                  std::array<Lanes, NC>& f) noexcept {
     Curvature u;
     for (std::size_t i = 0; i < NC; ++i) {
@@ -214,7 +214,7 @@ private:
   }
 
   /// Rates of a loaded rod; those of w go to k.w.
-  static CTCR_INLINE Curvature rates(const Section& r, const Tape& s, Lanes mz, const Group& y, Group& k) noexcept {
+  static CTCR_INLINE Curvature rates(const Section& r, const StageValues& s, Lanes mz, const Group& y, Group& k) noexcept {
     Lanes ux = y.m[0] * r.compliance, uy = y.m[1] * r.compliance;
     double value_mz = r.straight_mz;
     for (std::size_t i = 0; i < NC; ++i) {

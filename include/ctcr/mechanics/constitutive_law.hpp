@@ -7,7 +7,7 @@
 #include "ctcr/effects/hooks.hpp"
 #include "ctcr/math/dual.hpp"
 
-namespace ctcr::bending {
+namespace ctcr::constitutive {
 
 template <class T, class S>
 T as(const S& x) noexcept {
@@ -19,7 +19,7 @@ T as(const S& x) noexcept {
 
 /// Whether a tube resists alike in all directions and however far it bends.
 template <class S>
-bool is_even(const Material<S>& m) noexcept {
+bool is_isotropic_and_linear(const Material<S>& m) noexcept {
   return vanishes(m.softening) && vanishes(m.anisotropy[0]) && vanishes(m.anisotropy[1]);
 }
 
@@ -103,4 +103,4 @@ Response<T> response(const Material<S>& m, const D& dx, const D& dy) noexcept {
   return {{k * e[0], k * e[1]}, slope};
 }
 
-}  // namespace ctcr::bending
+}  // namespace ctcr::constitutive

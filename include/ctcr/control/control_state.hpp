@@ -12,7 +12,7 @@ struct Reference {
 };
 
 template <int N, class Fx = Standard>
-struct Situation {
+struct ControlState {
   const Model<N, Fx>& model;
   const Settings& settings;
   TipLoad load;  ///< that the model was solved with

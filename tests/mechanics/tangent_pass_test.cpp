@@ -1,16 +1,16 @@
-// The taped tangents (replay.hpp) and values and tangents carried together (steppers.hpp with duals) are one map.
+// The separate tangents (tangent_pass.hpp) and values and tangents carried together (steppers.hpp with duals) are one map.
 #include <gtest/gtest.h>
 
 #include "support/laws.hpp"
 
 namespace ctcr {
-namespace replay_test {
+namespace tangent_pass_test {
 
 using test::Random, test::uniform;
 
 template <class T>
-struct Replayed : testing::Test {};
-TYPED_TEST_SUITE(Replayed, test::TwoAndThreeTubes);
+struct TangentPass : testing::Test {};
+TYPED_TEST_SUITE(TangentPass, test::TwoAndThreeTubes);
 
 /// Values of all entries in comparable rows, each row with its own scale.
 template <class Ev>
@@ -32,7 +32,7 @@ void expect_equal(const Ev& a, const Ev& b) {
 }
 
 template <Derivatives D, Loading L, int N>
-void expect_replay_equals_direct(unsigned seed) {
+void expect_pass_equals_direct(unsigned seed) {
   Random random(seed);
   for (int n = 0; n < test::cases(60); ++n) {
     Robot<N> robot = test::random_robot<N>(random);
@@ -43,28 +43,28 @@ void expect_replay_equals_direct(unsigned seed) {
     guess.rotation = rotation_matrix(test::random_vector(random, 3));
     for (int i = 1; i < N; ++i) guess.psi[i] = uniform(random, -3, 3);
     const int steps = 1 + n % 3;
-    Evaluation<N, L, D> taped, direct;
-    evaluate<D, L, MagnusRk4>(make_coefficients(robot), q, load, guess, steps, taped);
+    Evaluation<N, L, D> separate, direct;
+    evaluate<D, L, MagnusRk4>(make_coefficients(robot), q, load, guess, steps, separate);
     evaluate<D, L, DirectMagnusRk4>(make_coefficients(robot), q, load, guess, steps, direct);
-    expect_equal(direct, taped);
+    expect_equal(direct, separate);
     if (testing::Test::HasFailure()) FAIL() << "case " << n << " seed " << seed;
   }
 }
 
-TYPED_TEST(Replayed, Unloaded) {
-  expect_replay_equals_direct<Derivatives::none, Loading::none, TypeParam::N>(41);
-  expect_replay_equals_direct<Derivatives::jacobian, Loading::none, TypeParam::N>(42);
+TYPED_TEST(TangentPass, Unloaded) {
+  expect_pass_equals_direct<Derivatives::none, Loading::none, TypeParam::N>(41);
+  expect_pass_equals_direct<Derivatives::jacobian, Loading::none, TypeParam::N>(42);
 }
 
 template <Loading L, int N>
 void expect_all_derivatives(unsigned seed) {
-  expect_replay_equals_direct<Derivatives::none, L, N>(seed);
-  expect_replay_equals_direct<Derivatives::jacobian, L, N>(seed + 1);
-  expect_replay_equals_direct<Derivatives::compliance, L, N>(seed + 2);
+  expect_pass_equals_direct<Derivatives::none, L, N>(seed);
+  expect_pass_equals_direct<Derivatives::jacobian, L, N>(seed + 1);
+  expect_pass_equals_direct<Derivatives::compliance, L, N>(seed + 2);
 }
 
-TYPED_TEST(Replayed, UnderForce) { expect_all_derivatives<Loading::force, TypeParam::N>(43); }
-TYPED_TEST(Replayed, UnderAnyLoad) { expect_all_derivatives<Loading::weight, TypeParam::N>(49); }
+TYPED_TEST(TangentPass, UnderForce) { expect_all_derivatives<Loading::force, TypeParam::N>(43); }
+TYPED_TEST(TangentPass, UnderAnyLoad) { expect_all_derivatives<Loading::weight, TypeParam::N>(49); }
 
-}  // namespace replay_test
+}  // namespace tangent_pass_test
 }  // namespace ctcr
