@@ -1,6 +1,7 @@
+#include "ctcr/control/tasks.hpp"
+
 #include <gtest/gtest.h>
 
-#include "ctcr/control/task_list.hpp"
 #include "random_control.hpp"
 #include "support/solver.hpp"
 
@@ -18,7 +19,7 @@ struct Place {
   Solution<3> solution;
   Reference reference;
   explicit Place(const Joints<3>& at) : q(at) { (void)solve<Derivatives::jacobian>(model, q, TipLoad{}, ws, solution); }
-  [[nodiscard]] ControlState<3> situation() const {
+  [[nodiscard]] ControlState<3> state() const {
     return {model, settings, {}, q, solution.pose(), reference, ws, solution};
   }
 };
@@ -28,7 +29,7 @@ const Joints<3> somewhere{{-0.30, -0.21, -0.12}, {0.3, 1.2, -0.7}};
 template <class Task>
 JointVelocity<3> answer(const Task& task, const Place& place) {
   LeastSquares<3> goals;
-  task.add(place.situation(), goals);
+  task.add(place.state(), goals);
   goals.add_joint_goal(JointVelocity<3>::Zero(), {1e-9 + 1e-6 * goals.largest_weight(), 1e-9});
   JointVelocity<3> v;
   EXPECT_EQ(goals.minimum(v), Status::ok);
@@ -72,13 +73,13 @@ TEST(Tracking, FeedforwardAndBoundedFeedback) {
   place.reference = {place.solution.pose()};
   place.reference.velocity.head<3>() = Vec3(1e-3, -2e-3, 3e-3);
   const Tracking tracking;
-  EXPECT_LT((tracking.velocity(place.situation()) - place.reference.velocity).norm(), 1e-15);
+  EXPECT_LT((tracking.velocity(place.state()) - place.reference.velocity).norm(), 1e-15);
   const Vec3 tip = (place.solution.jacobian * answer(tracking, place)).head<3>();
   EXPECT_LT((tip - place.reference.velocity.head<3>()).norm(), 1e-5);
   place.reference.pose.position += Vec3(0.1, 0, 0);
-  const Vec3 far = tracking.velocity(place.situation()).head<3>() - place.reference.velocity.head<3>();
+  const Vec3 far = tracking.velocity(place.state()).head<3>() - place.reference.velocity.head<3>();
   EXPECT_NEAR(far.norm(), tracking.correction, 1e-12);
-  EXPECT_GT(tracking.shortfall(place.situation(), JointVelocity<3>::Zero().eval()), 1);
+  EXPECT_GT(tracking.shortfall(place.state(), JointVelocity<3>::Zero().eval()), 1);
 }
 
 TEST(Tracking, OfThePoseTurnsTheTip) {
@@ -92,7 +93,7 @@ TEST(Tracking, OfThePoseTurnsTheTip) {
 
 TEST(ObstacleAvoidance, PointsAwayAndFallsWithTheSquareOfTheDistance) {
   Place place(somewhere);
-  ObstacleAvoidance task{.obstacle = {place.solution.position + Vec3(0, 9e-3, 0), 5e-3}, .strength = 1e-6};
+  ObstacleAvoidance task{.obstacle = {place.solution.position + Vec3(0, 9e-3, 0), 5e-3}, .gain = 1e-6};
   const Vec3 near = (place.solution.jacobian * answer(task, place)).head<3>();
   EXPECT_LT((near.normalized() - Vec3(0, -1, 0)).norm(), 1e-2);
   EXPECT_NEAR(near.norm(), 1e-6 / (4e-3 * 4e-3), 0.01 * near.norm());

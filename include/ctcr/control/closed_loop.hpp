@@ -17,7 +17,7 @@ struct LoopRow {
 /// Runs from time 0 to the path's end.
 /// @param path    has at(time) -> Reference and duration()
 /// @param record  record(row) after each period; return false to stop
-/// @return ok, or what the device says when it can no longer go on. Real time: as path, device and record.
+/// @return ok, or the first status of the device that is not ok. Real time: as path, device and record.
 template <int N, class Tasks, class Fx, Device<N> D, class Path, class Record>
 Status run(Controller<N, Tasks, Fx>& controller, D& device, const Path& path, double period, const TipLoad& load,
            const Record& record) noexcept {

@@ -1,5 +1,5 @@
 #pragma once
-// What the tasks of one control period see.
+// The state on which the tasks of one control period act.
 #include "ctcr/control/gdls.hpp"
 #include "ctcr/mechanics/solve.hpp"
 

@@ -7,7 +7,7 @@
 #include "ctcr/control/force_estimate.hpp"
 #include "ctcr/control/limits.hpp"
 #include "ctcr/control/live_effects.hpp"
-#include "ctcr/control/task_list.hpp"
+#include "ctcr/control/tasks.hpp"
 #include "ctcr/system/predict.hpp"
 
 namespace ctcr {
@@ -15,7 +15,7 @@ namespace ctcr {
 /// What the controller makes of the force at the tip.
 enum class TipForce : std::uint8_t {
   unknown,   ///< the model has none
-  known,     ///< the caller says what it is
+  known,     ///< given by the caller
   estimated  ///< from the deflection of the tip and the compliance
 };
 
@@ -47,8 +47,8 @@ public:
   AtLimits at_limits = AtLimits::hold;
   TipForce tip_force = TipForce::unknown;
   ForceEstimate estimate;
-  /// How much older tracker readings are than the motor angles that come with them [s], up to 8 periods: the model says
-  /// what the tip has done since. Ref: Smith's predictor.
+  /// How much older tracker readings are than the motor angles that come with them [s], up to 8 periods: the model
+  /// predicts the motion of the tip since. Ref: Smith's predictor.
   double reading_age = 0;
 
   /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s]
@@ -100,16 +100,16 @@ public:
       return report;
     }
     tip.position += moved_since_reading();
-    ControlState<N, Fx> situation{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
+    ControlState<N, Fx> state{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
     JointVelocity<N> v;
-    Status found = minimum(situation, motors, v, report.limits);
+    Status found = minimum(state, motors, v, report.limits);
     if constexpr (Fx::template On<N>::follows_twist) {
       if (found == Status::ok && now_.model.effects().act_by_twist()) {
-        situation.reference.velocity.template head<3>() += missing(motors, v, acting);
-        found = minimum(situation, motors, v, report.limits);
+        state.reference.velocity.template head<3>() += missing(motors, v, acting);
+        found = minimum(state, motors, v, report.limits);
       }
     }
-    report.shortfall = tasks.shortfalls(situation, v);
+    report.shortfall = tasks.shortfalls(state, v);
     if (found != Status::ok) {
       report.status = found;
       return report;
@@ -159,10 +159,10 @@ private:
     return past_[0] - (later + (periods - double(k)) * (earlier - later));
   }
 
-  Status minimum(const ControlState<N, Fx>& situation, const Joints<N>& motors, JointVelocity<N>& v,
+  Status minimum(const ControlState<N, Fx>& state, const Joints<N>& motors, JointVelocity<N>& v,
                  LimitReport& limits) const noexcept {
     LeastSquares<N> goals;
-    tasks.add(situation, goals);
+    tasks.add(state, goals);
     limits = {};
     return limited_minimum(goals, allowed_, limits_, motors.beta, period_, at_limits, v, limits);
   }

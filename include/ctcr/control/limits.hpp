@@ -94,11 +94,11 @@ private:
 /// How a step meets a limit.
 enum class AtLimits : std::uint8_t {
   hold,         ///< the joint stays there, the others move as planned (the paper's scheme)
-  redistribute  ///< and the others take over what it cannot do: goals are weighed anew with that joint held
+  redistribute  ///< and the others take over its part: the goals are solved anew with that joint held
 };
 
 /// The minimum of the goals that keeps the limits over one period.
-/// @param beta      positions now [m]; where they are not allowed, the step leads back to what is, within the speed
+/// @param beta      positions now [m]; where they are not allowed, the step leads back to allowed ones, within the speed
 /// @param velocity  q'; 0 where there is no minimum
 /// @return as LeastSquares::minimum(). Real time: yes, at most N + 1 minima.
 template <int N>

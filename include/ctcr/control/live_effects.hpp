@@ -1,5 +1,5 @@
 #pragma once
-// A system's effects while it moves: what the past left behind in them, period after period.
+// The internal state of a system's effects while the robot moves, updated period after period.
 #include <array>
 
 #include "ctcr/friction/torsion_solver.hpp"
@@ -51,7 +51,7 @@ public:
                    [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
   }
 
-  /// With the past of now.
+  /// With the internal state of now.
   [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
   [[nodiscard]] const Occasion& occasion() const noexcept { return at_; }
 
