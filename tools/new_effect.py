@@ -161,9 +161,12 @@ def main(arguments: list[str], root: Path) -> int:
     header = root / "include/ctcr/effects" / f"{name}.hpp"
     test = root / "tests/effects" / f"{name}_test.cpp"
     catalogue = root / "include/ctcr/effects/catalogue.hpp"
-    taken = [path for path in (header, test) if path.exists()]
+    described = [path for path in header.parent.glob("*.hpp") if f'.id = "{name}"' in path.read_text(encoding="utf-8")]
+    taken = [*described, *(path for path in (header, test) if path.exists())]
     if taken:
-        print(f"new-effect: {taken[0].relative_to(root)} exists already; choose another name", file=sys.stderr)
+        print(
+            f"new-effect: {name} exists already, in {taken[0].relative_to(root)}; choose another name", file=sys.stderr
+        )
         return 1
     listed = with_effect(catalogue.read_text(encoding="utf-8"), name)
     header.write_text(written(HEADER, name), encoding="utf-8")

@@ -50,7 +50,10 @@ def test_the_skeleton_compiles_in_the_catalogue(tree: Path) -> None:
     assert compiled.returncode == 0, compiled.stderr
 
 
-@pytest.mark.parametrize(("name", "why"), [("Cable", "is no id"), ("a-b", "is no id"), ("friction", "exists already")])
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("Cable", "is no id"), ("a-b", "is no id"), ("friction", "exists already"), ("frame_jump", "exists already")],
+)
 def test_refuses_names(tree: Path, name: str, why: str) -> None:
     before = (tree / "include/ctcr/effects/catalogue.hpp").read_text()
     done = new_effect(tree, name)
