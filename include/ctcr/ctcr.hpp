@@ -1,7 +1,6 @@
 #pragma once
 // Everything that runs in real time. Needs Eigen alone.
 #include "ctcr/actuation/transmission.hpp"
-#include "ctcr/core/derivatives.hpp"
 #include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
 #include "ctcr/derivatives/parameters.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// Derivatives of a tube tip's pose by everything that the mechanics depends on, by the implicit function theorem:
+// Derivatives of a tube tip's pose by all parameters of the mechanics, by the implicit function theorem:
 // residual b(u, p) = 0 and pose x(u, p) are differentiated along the unknowns u and all p in one set of passes, and
 // eliminating u leaves dx/dp.
 #include <numbers>
@@ -50,7 +50,7 @@ private:
   double det_;
 };
 
-/// From what the mechanics uses of tube i to what its data sheet says.
+/// Chain rule from the coefficients of tube i to the parameters of its data sheet.
 template <int N, class System>
 void put_tube(const System& system, const Tube& t, int i, TipDerivatives<N>& out) noexcept {
   using V = typename System::V;

@@ -50,7 +50,7 @@ public:
       alpha_[std::size_t(i)] = variable(at.q.alpha[i], V::alpha + i);
     }
     for (int i = 0; i < 3; ++i) turn_[std::size_t(i)] = Loaded ? variable(0, V::turn + i) : S(0.0);
-    const auto place = [&](int event, double) noexcept {
+    const auto arc_length = [&](int event, double) noexcept {
       return event < N ? c.length[std::size_t(event)] + beta_[std::size_t(event)]
                        : c.curve_start[std::size_t(event - N)] + beta_[std::size_t(event - N)];
     };
@@ -64,10 +64,10 @@ public:
     };
     base_ = state_at_tip(robot, at, c);
     TubeTips<N> tips;
-    (void)Rod::run(c, sort_events(c, at.q.beta), place, steps, base_, frame_, tips, keep_tip);
+    (void)Rod::run(c, sort_events(c, at.q.beta), arc_length, steps, base_, frame_, tips, keep_tip);
   }
 
-  /// Writes the tangents of the equations and of the pose into their place in the rows. The equations: the tip turns as
+  /// Writes the tangents of the equations and of the pose into the rows. The equations: the tip turns as
   /// its unknowns say, and angle_i - angle_1 = alpha_i - alpha_1.
   /// @return R_base_tip
   Mat3 write(typename V::Row (&row)[V::rows]) const noexcept {

@@ -36,14 +36,13 @@ inline constexpr std::array parameters{
 };
 }  // namespace delay
 
-/// Poses are logged later than joints: the joints that count are those of a time ago, or where the tracker averages, the
-/// mean of those of two moments, delay (1 - spread) and delay (1 + spread) ago: to second order that of any filter. Before
-/// its first row a run is at rest.
+/// A reading shows the pose of joints `delay` ago. Where the tracker averages, the joints are the mean of those delay (1 -
+/// spread) and delay (1 + spread) ago, which agrees with any filter to second order. Before its first row a run is at rest.
 template <int N, class P = double>
 struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
   static constexpr const EffectInfo& info = delay::info;
 
-  /// state: joints then minus joints now, beta and alpha of each tube.
+  /// Internal state: joints then minus joints now, beta and alpha of each tube.
   void update_history(const Path<N, P>& path, std::size_t row) noexcept {
     auto& state = this->history.state;
     for (auto& x : state) x = 0.0;
@@ -53,7 +52,7 @@ struct Delay : EffectValues<delay::parameters, N, P, 2 * N> {
     const double now = path.time[row];
     const auto add_half = [&](const P& late) {
       const double then = now - value(late);
-      std::size_t k = row;  // then lies between places k - 1 and k, or before the first that is known
+      std::size_t k = row;  // `then` lies between rows k - 1 and k, or before the first known row
       while (k > first + 1 && path.time[k - 1] > then && path.time[k - 2] < path.time[k - 1]) --k;
       const bool at_rest = !path.first.empty() && then < path.time[first];
       const P part = at_rest ? P(1.0) : (path.time[k] - now + late) * (1 / (path.time[k] - path.time[k - 1]));

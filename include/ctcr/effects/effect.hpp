@@ -125,9 +125,10 @@ struct EffectValues {
 
   std::array<P, std::size_t(count)> values = neutral();
   History history{};
-  bool active = true;  ///< false: changes nothing, nor has derivatives, so that its hooks need not be called
+  bool active =
+      true;  ///< false: all amplitudes and details are neutral and carry no derivatives; hooks need not be called
 
-  /// Parameter K; that of a tube, from 0, if it is per tube.
+  /// Value of parameter K; that of a tube, from 0, if it is per tube.
   template <int K>
   [[nodiscard]] constexpr const P& get(int tube = 0) const noexcept {
     constexpr int first = index(K);

@@ -74,12 +74,13 @@ inline constexpr std::array parameters{
 };
 }  // namespace friction
 
-/// Torque exchanged where the bending moment of the tubes inside a contact jumps, C |jump| h, and all along the overlap
-/// of two tubes, so much per length times h, which changes linearly from contact to contact. h in [-1, 1] of each contact
-/// follows how the tube turns there in the next outer one (the outermost, in the guide), as far as their twist leaves of
-/// the rotation of their bases, so that the tube lags its base. That twist is one of what they rub, too: see wind_up.hpp.
-/// State: h of each of Contacts<N>, and of the outermost tube in the plate; then with the second law the share of each limit
-/// that insertion takes.
+/// Friction torque between a tube and the next outer one: C |jump| h at each contact where the bending moment of the tubes
+/// inside it jumps, and torque_per_length h along their overlap, h linear from contact to contact. h in [-1, 1] follows the
+/// relative rotation of the two tubes at the contact (of the outermost tube: in the guide), that is the rotation of their
+/// bases plus their relative torsion, so that a tube lags its base. Torsion and friction depend on one another: see
+/// friction/solve_friction.hpp.
+/// Internal state: h of each of Contacts<N>, and of the outermost tube in the plate; with the second law then the fraction
+/// of each limit that insertion takes.
 template <int N, class P = double>
 struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::count + 1)> {
   static constexpr const EffectInfo& info = friction::info;

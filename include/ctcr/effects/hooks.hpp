@@ -10,7 +10,7 @@
 //   base_compliance(torque, angle&)              angles of the tubes at their grasped ends, under the torque there
 //   tip_force(gravity, force&)                   a constant force at the robot tip, base frame [N]
 //   environment(position, force&)                a force at the robot tip that depends on where the tip is, base frame [N]
-//   sense(Occasion, Frame<P>& reading)           what the tracker makes of the sensor's pose, tracker frame
+//   sense(Occasion, Frame<P>& reading)           the reading of the tracker, on entry the pose of the sensor, tracker frame
 //   update_history(Path<N, P>, row)              takes history.state from the row before to this one
 #include <algorithm>
 #include <array>
@@ -27,7 +27,7 @@
 
 namespace ctcr {
 
-/// A place on a tube, which need not be deployed.
+/// A point along a tube, deployed or not.
 template <class P>
 struct TubePoint {
   int tube;     ///< from 0, innermost first
@@ -37,10 +37,10 @@ struct TubePoint {
   P part;       ///< the same as a fraction of that part, 0 at its start, 1 at its end
 };
 
-/// What a tube is made of at a place; on entry as its data sheet says. Its bending moment, tube frame x and y, is
-/// f EI A d, d = u - curvature, A = 1 + [a0 a1; a1 -a0]. What softening leaves of the stiffness, with z = d A d and
-/// q = 2 c z / (1 - r), is f = r + (1 - r) (1 + q^(p/2))^(-1/p): all of it at first, r in the end. The potential is
-/// convex: every moment has one curvature.
+/// Free shape and constitutive law of a tube at one point, on entry those of its data sheet. The bending moment in the tube
+/// frame (x, y) is f EI A d, d = u - curvature, A = 1 + [a0 a1; a1 -a0]. Softening reduces the stiffness by the factor
+/// f = r + (1 - r) (1 + q^(p/2))^(-1/p), q = 2 c z / (1 - r), z = d A d: from 1 for small d to r for large d. The elastic
+/// energy is convex, so every moment belongs to one curvature.
 template <class P>
 struct Material {
   P bending_stiffness;                      ///< EI, mean of all directions [N m^2]
@@ -48,10 +48,11 @@ struct Material {
   std::array<P, 2> curvature;               ///< of the free tube about its x and y axes [1/m]
   P softening = 0.0;                        ///< c [m^2]
   P plateau = 0.25;                         ///< r
-  P sharpness = 2.0;                        ///< p: how sudden the knee is
+  P sharpness = 2.0;                        ///< p: how sharp the transition is
 };
 
-/// A place where a tube ends or starts to be curved, or the front plate. Vectors in the Bishop frame on its far side.
+/// An arc length at which a tube ends or starts to be curved, or the front plate. Vectors in the Bishop frame on its far
+/// side, towards the robot tip.
 template <class P, int N>
 struct Breakpoint {
   enum class Kind { tube_tip, curve_start, plate } kind;
@@ -61,24 +62,25 @@ struct Breakpoint {
   std::array<P, 2> force;   ///< shear force there, Bishop frame [N]
   std::array<std::array<P, 2>, N> far_moment, near_moment;  ///< bending moment of each tube on both sides [N m]
   std::array<P, N> torque{};  ///< out: added to the torque of each tube towards the base [N m]
-  std::array<P, 2> kink{};    ///< out: turn of the far side against the near one, along `moment` [rad]
+  std::array<P, 2> kink{};    ///< out: rotation of the far side against the near one, along `moment` [rad]
   std::array<P, 2> shift{};   ///< out: displacement of the far side against the near one [m]; at the plate alone
 
-  /// Among those of Contacts<N>.
+  /// Its number among those of Contacts<N>.
   [[nodiscard]] int number() const noexcept {
     return kind == Kind::plate ? Contacts<N>::plate : kind == Kind::tube_tip ? tube : N + tube;
   }
 };
 
-/// When a row was measured, and how.
+/// When a row was measured, in which run and session.
 struct Occasion {
-  double time = 0;  ///< [s]; NaN: unknown
-  double part = 0;  ///< of the measurements' duration, 0 to 1
-  int run = 0;
+  double time = 0;             ///< [s]; NaN: unknown
+  double part = 0;             ///< fraction of the session that has passed, 0 to 1
+  int run = 0;                 ///< number of its run
   Vec3 centre = Vec3::Zero();  ///< of all measured positions, tracker frame [m]
 };
 
-/// The recorded path: joints move in a straight line from row to row. They have derivatives by the transmission.
+/// The path of the joints through a recording: a straight line from row to row. Joints carry derivatives by the
+/// transmission.
 template <int N, class P>
 struct Path {
   struct Row {
@@ -88,29 +90,29 @@ struct Path {
   };
   std::span<const Row> q;
   std::span<const double> time;        ///< [s]; empty: unknown
-  std::span<const std::size_t> first;  ///< place at which the run of each place begins; empty: unknown
+  std::span<const std::size_t> first;  ///< index of the row at which the run of each row begins; empty: unknown
   ContactRadii<N> radius{};
 };
 
-/// An effect of the tip's surroundings.
+/// A force that depends on where the tip is.
 template <class Effect, class P>
 concept HasEnvironment = requires(const Effect& effect, const std::array<P, 3>& position, std::array<P, 3>& force) {
   effect.environment(position, force);
 };
 
-/// An effect at breakpoints.
+/// Torques or kinks at breakpoints.
 template <class Effect, class P, int N>
 concept HasBreakpoint = requires(const Effect& effect, Breakpoint<P, N>& breakpoint) { effect.breakpoint(breakpoint); };
 
-/// An effect between tubes wherever both of them are.
+/// Friction between tubes along their overlap.
 template <class Effect, class P, int N>
 concept HasDistributedFriction =
     requires(const Effect& effect, std::array<P, N>& torque) { effect.distributed_friction(0, torque); };
 
-/// An effect on what tubes are made of.
+/// An effect on the free shape or the constitutive law of the tubes.
 template <class Effect, class P>
 concept HasMaterial =
-    requires(const Effect& effect, const TubePoint<P>& place, Material<P>& m) { effect.material(place, m); };
+    requires(const Effect& effect, const TubePoint<P>& at, Material<P>& m) { effect.material(at, m); };
 
 /// An effect whose history depends on how the tubes are turned against one another at their contacts.
 template <class Effect>
@@ -137,7 +139,7 @@ template <class Effect, class P, int N>
 concept ActsOnJoints =
     requires(const Effect& effect, const Occasion& at, std::array<P, N>& q) { effect.actuate(at, q, q); };
 
-/// An effect on what the tracker makes of the sensor's pose.
+/// An effect on the reading of the tracker.
 template <class Effect, class P>
 concept HasSense = requires(const Effect& effect, const Occasion& at, Frame<P>& reading) { effect.sense(at, reading); };
 
@@ -162,7 +164,7 @@ template <template <int, class> class... E>
 struct EffectList;
 
 namespace detail {
-/// Kept, and those of E that `picked` says.
+/// Kept, followed by those of E for which `picked` holds.
 template <auto picked, class Kept, template <int, class> class... E>
 struct Picked {
   using List = Kept;
@@ -182,13 +184,13 @@ struct EffectList {
   /// Those that change the equilibrium of the rod, in the same order.
   using OnRod =
       typename detail::Picked<[]<class Effect> { return ActsOnRod<Effect, double, 2>; }, EffectList<>, E...>::List;
-  /// Those of the tip's surroundings.
+  /// Those with a force that depends on where the tip is.
   using OnTip =
       typename detail::Picked<[]<class Effect> { return HasEnvironment<Effect, double>; }, EffectList<>, E...>::List;
   /// Those on joints.
   using OnJoints =
       typename detail::Picked<[]<class Effect> { return ActsOnJoints<Effect, double, 2>; }, EffectList<>, E...>::List;
-  /// Those on what the tracker reads.
+  /// Those on the reading of the tracker.
   using OnReading =
       typename detail::Picked<[]<class Effect> { return HasSense<Effect, double>; }, EffectList<>, E...>::List;
 
@@ -201,18 +203,18 @@ struct EffectList {
     /// Whether One is among them.
     template <class One>
     static constexpr bool contains = (false || ... || std::is_same_v<One, E<N, P>>);
-    /// Whether anything happens where tubes end or start to curve.
+    /// Whether any of them acts at breakpoints.
     static constexpr bool has_breakpoint = (false || ... || HasBreakpoint<E<N, P>, P, N>);
     /// Whether friction acts along the tubes.
     static constexpr bool has_distributed_friction = (false || ... || HasDistributedFriction<E<N, P>, P, N>);
-    /// Whether it matters how the tips are turned against one another.
+    /// Whether any of them depends on how the tubes are turned against one another.
     static constexpr bool follows_twist = (false || ... || FollowsTwist<E<N, P>>);
-    /// Place of the effect that does, in the list.
+    /// Index of the effect that does, in the list.
     static constexpr std::size_t follower = [] {
       constexpr std::array<bool, sizeof...(E)> follows{FollowsTwist<E<N, P>>...};
       return std::size_t(std::ranges::find(follows, true) - follows.begin());
     }();
-    /// Whether the tip's surroundings act on it.
+    /// Whether any force depends on where the tip is.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 
     /// Internal state of each effect, as the motion so far left it.
@@ -258,7 +260,7 @@ struct EffectList {
       return r;
     }
 
-    /// Those alone that change the equilibrium of the rod.
+    /// Those that change the equilibrium of the rod.
     [[nodiscard]] typename OnRod::template On<N, P> on_rod() const noexcept {
       typename OnRod::template On<N, P> r;
       std::apply([&](auto&... effect) { ((effect = std::get<std::remove_cvref_t<decltype(effect)>>(list)), ...); },
@@ -279,7 +281,7 @@ struct EffectList {
     [[nodiscard]] bool act_on_rod() const noexcept {
       return any([](const auto& e) { return ActsOnRod<std::remove_cvref_t<decltype(e)>, P, N> && acts(e); });
     }
-    /// Whether an effect that is active has something to do where tubes end or start to curve.
+    /// Whether an active effect acts at breakpoints.
     [[nodiscard]] bool acts_at_breakpoints() const noexcept {
       return any([](const auto& e) { return HasBreakpoint<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
@@ -288,7 +290,7 @@ struct EffectList {
       return any(
           [](const auto& e) { return HasDistributedFriction<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
     }
-    /// Whether an effect that is active changes what tubes are made of.
+    /// Whether an active effect changes the free shape or the constitutive law of a tube.
     [[nodiscard]] bool acts_on_material() const noexcept {
       return any([](const auto& e) { return HasMaterial<std::remove_cvref_t<decltype(e)>, P> && e.active; });
     }
@@ -301,7 +303,7 @@ struct EffectList {
       });
     }
 
-    /// Calls f(effect, place of its first value) for each.
+    /// Calls f(effect, index of its first value) for each.
     template <class F>
     constexpr void for_each(const F& f) noexcept {
       int first = 0;
@@ -313,10 +315,10 @@ struct EffectList {
       std::apply([&](const auto&... effect) { (f(effect, std::exchange(first, first + effect.count)), ...); }, list);
     }
 
-    void material(const TubePoint<P>& place, Material<P>& m) const noexcept {
+    void material(const TubePoint<P>& at, Material<P>& m) const noexcept {
       for_each([&](const auto& e, int) {
         if constexpr (HasMaterial<std::remove_cvref_t<decltype(e)>, P>)
-          if (e.active) e.material(place, m);
+          if (e.active) e.material(at, m);
       });
     }
     void breakpoint(Breakpoint<P, N>& s) const noexcept {

@@ -19,14 +19,14 @@ inline constexpr std::array parameters{
                     .unit = "rad/(N m)",
                     .neutral = 0,
                     .sigma = 2.0,
-                    .soft = {-2, 30},  // half of what the slender inner tube of Table II twists itself: -beta / GJ = 55
+                    .soft = {-2, 30},  // half the compliance of the inner tube of Table II: -beta / GJ = 55
                     .hard = {-30, 100},
                     .per_tube = true,
                     .meaning = "of the drive of a tube"},
 };
 }  // namespace torsional_compliance
 
-/// Twist of the drive under the torque of its tube, besides that of the tube itself.
+/// Torsion angle of the drive in proportion to the torque of its tube, in addition to the torsion of the tube.
 template <int N, class P = double>
 struct TorsionalCompliance : EffectValues<torsional_compliance::parameters, N, P> {
   static constexpr const EffectInfo& info = torsional_compliance::info;

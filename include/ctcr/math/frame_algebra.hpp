@@ -96,10 +96,10 @@ void shift(Frame<S>& f, const Triple<S>& by) noexcept {
 /// Turns a frame where it is by a rotation vector in the outer coordinates.
 template <class S>
 void turn_in_place(Frame<S>& f, const Triple<S>& by) noexcept {
-  const Triple<S> place = position_of(f);
-  shift(f, {-place[0], -place[1], -place[2]});
+  const Triple<S> at = position_of(f);
+  shift(f, {-at[0], -at[1], -at[2]});
   f = composed(displacement<S>({0.0, 0.0, 0.0}, by), f);
-  shift(f, place);
+  shift(f, at);
 }
 
 }  // namespace ctcr

@@ -1,5 +1,5 @@
 #pragma once
-// The numbers that the rod equations need of a robot, computed once.
+// Coefficients of the rod equations of a robot, computed once.
 #include <array>
 
 #include "ctcr/math/dual.hpp"

@@ -1,8 +1,17 @@
 #pragma once
-#include "ctcr/core/derivatives.hpp"
+// Which directions are differentiated, and which lanes they take.
+#include <cstdint>
+
 #include "ctcr/math/lanes.hpp"
 
 namespace ctcr {
+
+/// Which derivatives of the tip pose a solve also returns.
+enum class Derivatives : std::uint8_t {
+  none,
+  jacobian,    ///< J, by the joints
+  compliance,  ///< J and C, by the joints and by the tip load
+};
 
 /// What loads the robot: each kind has its own, cheapest, equations.
 enum class Loading {
@@ -11,11 +20,13 @@ enum class Loading {
   weight,  ///< tip force and moment and the tubes' own weight, any of them: three unknown turns of the tip
 };
 
-/// Where each direction of differentiation stands in the lanes of a pass and of the linear system behind it.
+/// Lanes of the directions of differentiation, in a pass of integration and in the linear system behind it:
 ///
-/// A pass integrates: turns of the tip or, for compliance, tip force and moment (6); the angles psi of tubes 2..N at
-/// their tips; and for the Jacobian the positions beta of tubes 2..N. Everything else follows without integration:
-/// alpha, a common shift of all beta, and turns of the tip from forces and moments.
+///   pass:    turns of the tip, or with compliance tip force and moment (6) | psi_2..N | beta_2..N (Jacobian) | residual
+///   system:  the lanes of the pass | alpha_1..N, common shift of all beta (Jacobian) | turns of the tip, where not above
+///
+/// psi are the angles of tubes 2..N at their tips. The pass integrates its own lanes alone; the further ones follow at the
+/// front plate: alpha and the common shift from the rates there, turns of the tip from the columns of force and moment.
 template <int N, Loading L, Derivatives D>
 struct Columns {
   static constexpr bool jacobian = D != Derivatives::none;
@@ -34,7 +45,6 @@ struct Columns {
   static constexpr int groups = lane_groups(newton + 1);
   static constexpr int first_beta_group = jacobian && N > 1 ? beta / lane_count : groups;
 
-  // The linear system has further lane groups behind those of the pass.
   static constexpr int alpha = groups * lane_count;  ///< of tube 1; only with the Jacobian
   static constexpr int common = alpha + N;           ///< all beta together
   static constexpr int joint_groups = jacobian ? lane_groups(N + 1) : 0;

@@ -1,5 +1,5 @@
 #pragma once
-// The law by which one tube resists bending: that of Material. T is the scalar of the answers, S or double (its value).
+// The constitutive law of one tube in bending, that of Material. T is the scalar of the results: S, or double (its value).
 #include <array>
 #include <cmath>
 #include <type_traits>
@@ -17,7 +17,7 @@ T as(const S& x) noexcept {
     return value(x);
 }
 
-/// Whether a tube resists alike in all directions and however far it bends.
+/// Whether the law is EI times the change of curvature, in all directions.
 template <class S>
 bool is_isotropic_and_linear(const Material<S>& m) noexcept {
   return vanishes(m.softening) && vanishes(m.anisotropy[0]) && vanishes(m.anisotropy[1]);
@@ -30,13 +30,13 @@ std::array<T, 2> weighed(const Material<S>& m, const D& x, const D& y) noexcept 
   return {(1.0 + a) * x + c * y, c * x + (1.0 - a) * y};
 }
 
-/// f, what softening leaves of a stiffness where d A d = z, and its slopes.
+/// The factor f by which softening reduces the stiffness where d A d = z, and its derivatives.
 struct Left {
   double f, by_z, by_softening, by_plateau, by_sharpness;
 };
 
 /// f = r + (1 - r) (1 + t)^(-1/p), t = (2 c z / (1 - r))^(p/2), with the softening c, the plateau r, the sharpness p.
-/// @param by_shape  whether the slope by the sharpness is wanted, too
+/// @param by_shape  whether the derivative by the sharpness is wanted, too
 inline Left stiffness_left(double z, double c, double r, double p, bool by_shape) noexcept {
   if (!(c * z > 1e-12)) return {1 - c * z, -c, -z, 0, 0};  // there the same, with the derivatives of p = 2
   const double rest = 1 - r, ratio = 2 * c * z / rest;
@@ -72,22 +72,22 @@ struct Slope {
   }
 };
 
-/// f EI A, the slope of the moment where softening leaves f and takes no more.
+/// f EI A, the tangent stiffness at a constant factor f.
 template <class S>
 Slope stiffness(const Material<S>& m, double f) noexcept {
   const double k = f * value(m.bending_stiffness), a = value(m.anisotropy[0]);
   return {k * (1 + a), k * value(m.anisotropy[1]), k * (1 - a)};
 }
 
-/// How a tube resists, its own axes.
+/// Moment and tangent stiffness of a tube, its own axes.
 template <class T>
 struct Response {
   std::array<T, 2> moment;  ///< [N m]
   Slope slope;              ///< of the moment by the curvature [N m^2]
 };
 
-/// Response of a tube whose curvature differs from that of the free one by (dx, dy), its own axes [1/m]. Where D is
-/// double, that difference has no derivatives, and the answer those by the material alone.
+/// Response of a tube to a change of curvature (dx, dy) from its free shape, its own axes [1/m]. Where D is double, that
+/// change carries no derivatives, and the response those by the material alone.
 template <class T, class S, class D>
 Response<T> response(const Material<S>& m, const D& dx, const D& dy) noexcept {
   const std::array<T, 2> e = weighed<T>(m, dx, dy);

@@ -218,18 +218,18 @@ CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joi
   out.turn = rotation_vector(out.rotation * guess.rotation.transpose());
   out.residual = std::sqrt(out.turn.squaredNorm() + out.angle_error.template tail<N - 1>().squaredNorm());
 
-  // Into the places of the fast path's columns.
+  // Into the lanes of the fast path.
   const auto take = [&](int from, int to) {
-    LaneRow<Col::system_groups>& place = out.row[to];
-    for (auto& x : place.x) x = Lanes{};
-    for (int j = 0; j < Pass::unknowns; ++j) place.add(Col::unknown(j), row[from][j]);
+    LaneRow<Col::system_groups>& lanes = out.row[to];
+    for (auto& x : lanes.x) x = Lanes{};
+    for (int j = 0; j < Pass::unknowns; ++j) lanes.add(Col::unknown(j), row[from][j]);
     if constexpr (Col::jacobian)
       for (int i = 0; i < N; ++i) {
-        place.add(Col::common, row[from][beta + i]);
-        if (i > 0) place.add(Col::beta + i - 1, row[from][beta + i]);
+        lanes.add(Col::common, row[from][beta + i]);
+        if (i > 0) lanes.add(Col::beta + i - 1, row[from][beta + i]);
       }
     if constexpr (Col::compliance)
-      for (int j = 0; j < 6; ++j) place.add(Col::force + j, row[from][force + j]);
+      for (int j = 0; j < 6; ++j) lanes.add(Col::force + j, row[from][force + j]);
   };
   for (int k = 0; k < Col::unknowns; ++k) {
     take(k, k);

@@ -1,5 +1,5 @@
 #pragma once
-// What the rod with effects depends on, and what is carried along it.
+// Inputs of the rod with effects, and the state that is integrated along it.
 #include <array>
 
 #include "ctcr/effects/hooks.hpp"
@@ -7,7 +7,7 @@
 
 namespace ctcr {
 
-/// All that the mechanics depends on.
+/// Everything that the equilibrium depends on.
 template <int N, class S, class Fx>
 struct RodInputs {
   std::array<TubeParameters<S>, N> tubes;
@@ -16,7 +16,7 @@ struct RodInputs {
   typename Fx::OnRod::template On<N, S> effects;
 };
 
-/// Carried along the rod; body vectors in the Bishop frame.
+/// State along the rod; vectors in the Bishop frame.
 template <int N, class S>
 struct EffectState {
   static constexpr int size = 2 * N + 8;

@@ -1,5 +1,5 @@
 #pragma once
-// Where tubes end and curve: the points that cut the robot into segments.
+// Arc lengths at which tubes end and start to curve; they divide the robot into segments.
 #include <array>
 
 #include "ctcr/mechanics/coefficients.hpp"
@@ -7,7 +7,7 @@
 
 namespace ctcr {
 
-/// The 2N events of a configuration in the order met from the robot tip to its base. At equal places tips come before
+/// The 2N events of a configuration in the order met from the robot tip to its base. At equal arc lengths tips come before
 /// curved starts and inner tubes before outer ones, so each event changes one tube and no segment is negative.
 template <int N>
 struct Events {

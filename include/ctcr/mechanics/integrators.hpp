@@ -27,7 +27,7 @@ private:
     using Section = RodSection<S, P, NC>;
     using State = RodState<S, NC>;
 
-    // Places in the vector that is integrated. The frame is that relative to the start of the step: R by columns, p.
+    // Indices in the vector that is integrated. The frame is that relative to the start of the step: R by columns, p.
     static constexpr std::size_t psi = 0, w = NC, R = 2 * NC, p = R + 9, m = p + 3, n = m + 2, g = n + 3;
     static constexpr std::size_t size = Gravity ? g + 3 : (Loaded ? g : m);
     using Vector = std::array<S, size>;

@@ -15,7 +15,7 @@ inline Coefficients<N> with_all_curves(const Robot<N>& robot) noexcept {
   return c;
 }
 
-/// The numbers that the general path needs of a robot, and its effects on the rod.
+/// Coefficients of the general path of a robot, and its effects on the rod.
 template <int N, class Fx>
 struct EffectCoefficients {
   std::array<TubeParameters<double>, N> tubes;
@@ -32,7 +32,7 @@ template <int N, class Fx>
 inline constexpr bool has_effects<EffectCoefficients<N, Fx>> = true;
 
 /// A robot ready to be solved: its description and the numbers derived from it. Immutable; share it between threads.
-/// @tparam Fx  EffectList<...> of what it has beyond the standard model
+/// @tparam Fx  EffectList<...> of its effects beyond the standard model
 template <int N, class Fx = Standard>
 class Model {
 public:

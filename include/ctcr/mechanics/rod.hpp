@@ -10,13 +10,13 @@
 
 namespace ctcr {
 
-/// What is carried along the rod inside a segment with NC curved tubes. Body vectors are in the Bishop frame.
+/// State along the rod inside a segment with NC curved tubes. Vectors in the Bishop frame.
 template <class S, int NC>
 struct RodState {
   std::array<S, NC> psi, w;  ///< angle of each curved tube [rad] and its twist rate [rad/m]
   std::array<S, 2> m;        ///< bending moment, sum over tubes [N m]
   std::array<S, 3> n;        ///< internal force [N]
-  std::array<S, 3> g;        ///< gravity seen from the body [m/s^2]
+  std::array<S, 3> g;        ///< gravity [m/s^2]
 };
 
 /// Derivatives by arc length of a RodState (psi' = w is not repeated), and the curvature they come from.
@@ -30,7 +30,7 @@ struct RodRates {
   std::array<S, 3> g;
 };
 
-/// The tubes of a segment: the curved ones one by one, the straight ones through what they add.
+/// Coefficients of a segment: the curved tubes one by one, the straight ones by their sums.
 template <class S, class P, int NC>
 struct RodSection {
   std::array<P, NC> a, rho, kz;
@@ -59,7 +59,7 @@ CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const std::array<S, 2>
     for (std::size_t i = 0; i < NC; ++i) k.F[i] = r.rho[i] * (s[i] * k.u[0] - c[i] * k.u[1]);
 }
 
-/// Curvature and torsional rate at a place. Real time: yes.
+/// Curvature and torsional rate for angles psi. Real time: yes.
 template <bool Loaded, class S, class P, int NC, class Angles>
 CTCR_INLINE void curvature(const RodSection<S, P, NC>& r, const Angles& psi, const std::array<S, 2>& m,
                       RodRates<S, NC>& k) noexcept {

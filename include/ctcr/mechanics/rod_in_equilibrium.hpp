@@ -1,5 +1,5 @@
 #pragma once
-// The rod of a model, whose equilibrium is known, ready to be integrated once more along its length.
+// The rod of a model whose equilibrium is known, ready to be integrated once more along its length.
 #include "ctcr/mechanics/effect_rod.hpp"
 #include "ctcr/mechanics/model.hpp"
 #include "ctcr/mechanics/solution.hpp"
@@ -32,7 +32,7 @@ struct RodInEquilibrium {
   RodInEquilibrium(const RodInEquilibrium&) = delete;  // the rod refers to its inputs
   RodInEquilibrium& operator=(const RodInEquilibrium&) = delete;
 
-  /// From where to integrate.
+  /// State at the robot tip, from which to integrate.
   [[nodiscard]] State at_tip(const TipGuess<N>& guess) const noexcept {
     State tip;
     const Mat3 R_tip_base = guess.rotation.transpose();

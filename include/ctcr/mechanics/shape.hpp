@@ -1,5 +1,5 @@
 #pragma once
-// The shape of the robot in equilibrium: where every tube is, how it is bent and what it carries, at any arc length.
+// The shape of the robot in equilibrium: frame, curvature and internal moment of every tube at any arc length.
 #include <algorithm>
 #include <span>
 
@@ -57,7 +57,7 @@ inline RobotState<double, N> tip_values(const Coefficients<N>& c, const TipLoad&
   return tip;
 }
 
-/// From what the integration sees, which starts at the tip, to the base frame.
+/// Transform from the frame of the integration, which starts at the tip, to the base frame.
 struct BaseView {
   Pose T_base_tip;
   double turn;  ///< of the integrated Bishop frame against that which starts as the base frame [rad]

@@ -13,7 +13,7 @@ namespace ctcr {
 /// which at the tip is tube 1's material frame.
 template <class S, int N>
 struct RobotState {
-  std::array<S, N> psi, w;  ///< angle [rad] and twist rate [rad/m] of each tube; before its tip: what they are there
+  std::array<S, N> psi, w;  ///< angle [rad] and twist rate [rad/m] of each tube; beyond its tip: their values there
   std::array<S, 2> m;       ///< bending moment, x and y [N m]
   std::array<S, 3> n;       ///< force [N]
   std::array<S, 3> g;       ///< gravity [m/s^2]
@@ -26,7 +26,7 @@ struct BaseRates {
   std::array<S, 2> u;  ///< curvature of the centreline [1/m]
 };
 
-/// The tips of tubes 2..N, as seen from the robot tip: a Bishop frame and the tube's angle in it.
+/// The tips of tubes 2..N in the frame of the robot tip: a Bishop frame and the angle of the tube in it.
 template <int N>
 struct TubeTips {
   std::array<Frame<double>, N - 1> frame;

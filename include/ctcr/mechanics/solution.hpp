@@ -10,7 +10,7 @@ namespace ctcr {
 
 struct Settings {
   int max_iterations = 50;   ///< evaluations allowed to each attempt of a solve
-  double tolerance = 1e-10;  ///< on ||b|| [rad]; on what the tip's surroundings push [N]
+  double tolerance = 1e-10;  ///< on ||b|| [rad], and on the force of contacts at the tip [N]
   int steps = 1;             ///< integration steps per segment, >= 1
 };
 

@@ -5,13 +5,13 @@
 
 namespace ctcr {
 
-/// Observer of stages that does nothing.
+/// Records nothing of the stages of a step.
 struct NoStageRecord {
   template <class... A>
   CTCR_INLINE void operator()(const A&...) const noexcept {}
 };
 
-/// Moves the frame by the fourth-order Magnus exponential of the curvatures met at the start, the middle and the end.
+/// Moves the frame by the fourth-order Magnus exponential of the curvatures at the start, the middle and the end of a step.
 /// @param k  step [m], negative towards the base
 template <class F, class S, class H>
 CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::array<S, 2>& u_mid, const std::array<S, 2>& u1,
@@ -23,7 +23,7 @@ CTCR_INLINE void move_frame(F& frame, const std::array<S, 2>& u0, const std::arr
   move_by_exponential(frame, omega, S(kk12 * (u0[1] - u1[1])), S(kk12 * (u1[0] - u0[0])), k);
 }
 
-/// Sines and cosines of the angles at two places at once.
+/// Sines and cosines of the angles of two stages at once.
 template <class S, int NC>
 CTCR_INLINE void sincos_of_two(const std::array<S, std::size_t(NC)>& a, const std::array<S, std::size_t(NC)>& b,
                           RodRates<S, NC>& at_a, RodRates<S, NC>& at_b) noexcept {

@@ -1,6 +1,6 @@
 #pragma once
 // The one list of the named numbers that describe a robot and its devices. Whatever speaks of a parameter
-// (derivatives, calibration, the Python module) takes its name, unit and place in a vector from here.
+// (derivatives, calibration, the Python module) takes its name, unit and index in a vector from here.
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -79,23 +79,23 @@ struct ParameterVector {
 private:
   /// Where each kind begins, and the end.
   static constexpr auto first = [] {
-    std::array<int, parameter_kinds.size() + 1> place{};
+    std::array<int, parameter_kinds.size() + 1> first{};
     for (std::size_t k = 0; k < parameter_kinds.size(); ++k) {
       const std::string_view name = parameter_kinds[k].name;
-      place[k + 1] = place[k] + (name.find('#') != name.npos ? N : name.find('*') != name.npos ? 3 : 1);
+      first[k + 1] = first[k] + (name.find('#') != name.npos ? N : name.find('*') != name.npos ? 3 : 1);
     }
-    return place;
+    return first;
   }();
 
 public:
   /// Entries of a kind.
   static constexpr int size(Parameter kind) noexcept { return first[std::size_t(kind) + 1] - first[std::size_t(kind)]; }
-  /// Place of a kind's entry i: tube i + 1, or axis i.
+  /// Index of a kind's entry i: tube i + 1, or axis i.
   static constexpr int index(Parameter kind, int i = 0) noexcept { return first[std::size_t(kind)] + i; }
   static constexpr int robot_count = index(Parameter::translation_ratio);      ///< those of Robot<N>: tubes and gravity
   static constexpr int count = index(Parameter(int(parameter_kinds.size())));  ///< all
 
-  /// The kind at a place, and the entry within it.
+  /// The kind at an index, and the entry within it.
   struct Entry {
     Parameter kind;
     int i;

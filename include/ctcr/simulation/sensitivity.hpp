@@ -27,12 +27,12 @@ struct DistanceStatistics {
     sum += distance;
     sum_of_squares += distance * distance;
     maximum = std::max(maximum, distance);
-    const double place = std::log(std::max(distance, smallest) / smallest) / std::log(largest / smallest);
-    ++histogram[std::size_t(std::min(int(place * bins), bins - 1))];
+    const double part = std::log(std::max(distance, smallest) / smallest) / std::log(largest / smallest);
+    ++histogram[std::size_t(std::min(int(part * bins), bins - 1))];
   }
 };
 
-/// Joints anywhere in their range, uniform over what the order of the tubes allows, and a tip force of uniform size and
+/// Joints uniform over the range that the order of the tubes allows, and a tip force of uniform size and
 /// direction. Ref: Boyer et al., Section II; Burgner-Kahrs et al. 2014.
 template <int N, class Random>
 void draw_configuration(const Robot<N>& robot, double most_force, Random& random, Joints<N>& q,

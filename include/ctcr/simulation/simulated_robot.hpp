@@ -9,7 +9,7 @@
 
 namespace ctcr {
 
-/// Standard deviations of what the tracker adds, along and about each axis.
+/// Standard deviations of the noise of the tracker, along and about each axis.
 struct TrackerNoise {
   double position = 0;  ///< [m]
   double rotation = 0;  ///< [rad]
