@@ -106,7 +106,8 @@ TEST(Controller, LimitsThatExcludeTheStartAreRefused) {
   EXPECT_EQ(none.check_start(loop.start), Status::joints_out_of_order);
 }
 
-TEST(Controller, KeepsItsLimitsOnTheWayToWhatItCannotReachAndSaysSo) {
+/// On the way to a reference out of reach it keeps its limits and reports them.
+TEST(Controller, KeepsItsLimits) {
   for (const auto at_limits : {AtLimits::hold, AtLimits::redistribute}) {
     Loop loop;
     const Limits<3> limits{.base_gap = 20e-3, .tip_gap = 10e-3};

@@ -23,7 +23,8 @@ TEST(LeastSquares, NoOtherVelocityCostsLess) {
   }
 }
 
-TEST(LeastSquares, AgreesWithTheSingularValuesOfTheStackedGoals) {
+/// Solved by singular values.
+TEST(LeastSquares, AgreesWithTheStackedGoals) {
   Random random(2);
   for (int n = 0; n < test::cases(100); ++n) {
     const test::RandomGoals g(random);

@@ -97,7 +97,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   }
 }
 
-TEST(LiveEffects, FrictionThatIsKnownIsFollowedInClosedLoop) {
+TEST(LiveEffects, KnownFrictionInClosedLoop) {
   constexpr double period = 0.025;
   const System<3, Rubbing> real = rubbing_robot();
   const MotorAngles<3> start = motor_angles(real.transmission, Joints<3>{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}});

@@ -91,7 +91,8 @@ TEST(Tracking, OfThePoseTurnsTheTip) {
   EXPECT_LT((moved.tail<3>() - 2 * turn).norm(), 0.05 * turn.norm());
 }
 
-TEST(ObstacleAvoidance, PointsAwayAndFallsWithTheSquareOfTheDistance) {
+/// And points away from the obstacle.
+TEST(ObstacleAvoidance, FallsWithTheSquaredDistance) {
   Place place(somewhere);
   ObstacleAvoidance task{.obstacle = {place.solution.position + Vec3(0, 9e-3, 0), 5e-3}, .gain = 1e-6};
   const Vec3 near = (place.solution.jacobian * answer(task, place)).head<3>();

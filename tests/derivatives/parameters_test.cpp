@@ -148,7 +148,8 @@ Vec6 all_together(const TipDerivatives<N>& d, const Robot<N>& robot, Parameter k
   return sum;
 }
 
-TEST(TipDerivatives, OnlyRatiosOfStiffnessesMatterWithoutLoad) {
+/// Without load only ratios of stiffnesses matter.
+TEST(TipDerivatives, StiffnessRatiosMatterUnloaded) {
   test::Random random(2);
   for (int n = 0; n < 50; ++n) {
     Solved<3> c = random_case<3>(Acting::nothing, {}, true, random);

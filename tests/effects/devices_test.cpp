@@ -71,7 +71,8 @@ Pose random_pose(Random& random) {
   return {rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.3)};
 }
 
-TEST(FieldDistortion, IsAPolynomialOfThePlaceAndAPieceOfMetal) {
+/// A polynomial of the position read, and a piece of metal.
+TEST(FieldDistortion, IsPolynomialPlusMetal) {
   Random random(5);
   for (int n = 0; n < test::cases(20); ++n) {
     FieldDistortion<2> effect;
@@ -149,7 +150,8 @@ TEST(FrameDrift, IsNothingHalfWay) {
   EXPECT_LE((middle.position - centre - 0.5 * Vec3(1e-3, 2e-3, -1e-3)).norm(), 1e-15);
 }
 
-TEST(FrameDrift, EndsWhereItWouldEvenlyButFasterAtFirstWhereItSettles) {
+/// A drift that settles is faster at first and ends where a constant one does.
+TEST(FrameDrift, SettlesToTheSameEnd) {
   FrameDrift<1> even, settling;
   even.values = settling.values = {1e-3, 2e-3, -1e-3, 0, 0, 0, 0};
   settling.values[6] = 1;
@@ -174,7 +176,8 @@ TEST(FrameJump, HappensOnce) {
   EXPECT_LE((after.position - sensed(effect, {.part = 1}, pose).position).norm(), 1e-15);
 }
 
-TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
+/// In proportion to the depth.
+TEST(Contact, PushesBackAndNeverPulls) {
   Random random(5);
   for (int n = 0; n < test::cases(6); ++n) {
     auto recorded = test::random_recording<2>({}, n % 2, random);
@@ -205,7 +208,8 @@ TEST(Contact, PushesBackInProportionToItsDepthAndNeverPulls) {
   }
 }
 
-TEST(Contact, SetsInOverItsRoundingWithoutAJumpOfTheSlope) {
+/// Over its rounding the slope has no jump.
+TEST(Contact, SetsInSmoothly) {
   constexpr double stiffness = 20, distance = 0.1, r = 2e-3;
   Contact<1> effect;
   effect.values = {stiffness, distance, 0, 0, r};

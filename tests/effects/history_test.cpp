@@ -27,7 +27,8 @@ TEST(Friction, FollowsTheDirectionOfTheLastRotation) {
   EXPECT_NEAR(outer[in_plate], 1, 1e-6);
 }
 
-TEST(Friction, HoldsTheTipBackByTheTorqueThatItTransmits) {
+/// By the torque that it transmits.
+TEST(Friction, HoldsTheTipBack) {
   // One tube whose curve is half in the plate: behind it the moment EI kappa, in front of it none.
   Robot<1> robot;
   robot.tubes[0] = test::paper_robot().tubes[0];
@@ -74,7 +75,8 @@ TEST(Friction, FollowsWhatTheTwistLeavesOfARotation) {
   EXPECT_NEAR(walk.remembered<Friction>()[0], straight.to(at(0, 0)).to(at(0.06, 0)).remembered<Friction>()[0], 1e-12);
 }
 
-TEST(Friction, TurnsAwayFromRotationByWhatSlidesAtTheContact) {
+/// Sliding by insertion takes its share of the limit.
+TEST(Friction, SlidingTurnsItAwayFromRotation) {
   for (const double radius : {0.4e-3, 1.2e-3}) {
     Walk<2> walk(two_tubes(), with_friction(0.03, 1, 1));
     const auto slid = [&](double turn, double slide) {
@@ -203,7 +205,8 @@ TEST(Friction, LagsAndNeverLeads) {
   }
 }
 
-TEST(Friction, DoesNotDependOnSpeedNorOnHowAMoveIsDivided) {
+/// Not on the speed, nor on how a move is divided into rows.
+TEST(Friction, DependsOnThePathAlone) {
   for (const auto& [insertion, law] : {std::pair(0.0, 0.0), {0.7, 0.0}, {0.0, 1.0}, {0.7, 1.0}}) {
     Walk<2> once(two_tubes(), with_friction(0.03, insertion, law)), slowly = once, divided = once;
     once.to(at(0, 0)).to(at(0.5, -0.1), 1).to(at(0.2, 0.3, -0.34, -0.24), 2);
@@ -243,7 +246,8 @@ TEST(Friction, OfAContactIsElasticUntilItSlips) {
   EXPECT_NEAR(walk.remembered<Friction>()[0], 0.8, 1e-12);
 }
 
-TEST(Friction, OfAContactHasAStiffnessThatDoesNotGrowWithItsLimit) {
+/// With the second law the stiffness of a contact does not grow with its limit.
+TEST(Friction, StiffnessIsIndependentOfTheLimit) {
   constexpr double usual = MomentJumps<2>::usual;
   const auto torque = [](double before, double after, double turn, double along = 0) {
     Catalogue::On<2> effects = with_friction(0.03, 1, 1);

@@ -21,7 +21,8 @@ Mat3 field(const Vec3& at) {
 Triple<double> triple(const Vec3& v) { return {v[0], v[1], v[2]}; }
 Vec3 vector(const Triple<double>& v) { return {v[0], v[1], v[2]}; }
 
-TEST(Metal, MisleadsAsTheBestPoseForTheSumOfFieldsDoes) {
+/// The closed form is the pose that explains the sum of the fields best.
+TEST(Metal, ErrorIsThatOfTheBestPose) {
   Random random(1);
   for (int n = 0; n < 50; ++n) {
     // So far away that the size of the metal does not matter.

@@ -80,7 +80,8 @@ TYPED_TEST(NeutralEffects, GiveTheStandardModelWithoutLoad) {
   }
 }
 
-TYPED_TEST(NeutralEffects, TakeTheFastPathWhereNoEffectChangesTheRod) {
+/// Where no effect changes the rod.
+TYPED_TEST(NeutralEffects, TakeTheFastPath) {
   constexpr int N = TypeParam::N;
   Random random(23 + N);
   const auto c = test::smooth_case<N>(random, 0.1, 0.002, test::tilted_gravity);

@@ -62,7 +62,8 @@ TEST(Dual, SineAndCosine) {
   });
 }
 
-TEST(Dual, LengthsWithDerivativesInTheLastGroupsOnly) {
+/// Lengths with derivatives in the last groups only.
+TEST(Dual, TailLengths) {
   std::mt19937_64 random(4);
   std::uniform_real_distribution<double> uniform(-1, 1);
   const auto full = [](const Tail& x) {

@@ -79,7 +79,8 @@ TEST(OneTube, IsAnArcInThePlaneOfItsAngle) {
   }
 }
 
-TYPED_TEST(ClosedForm, StraightTubesStayStraightAndTurnWithTheInnermost) {
+/// And their tip turns with the innermost tube.
+TYPED_TEST(ClosedForm, StraightTubesStayStraight) {
   constexpr int N = TypeParam::N;
   Random random(2);
   for (int n = 0; n < test::cases(30); ++n) {

@@ -71,7 +71,8 @@ TYPED_TEST(Coincident, ACurvedStartAtOrBehindThePlate) {
   }
 }
 
-TYPED_TEST(Coincident, WhatIsCurvedBehindThePlateDoesNotMatter) {
+/// Do not matter.
+TYPED_TEST(Coincident, CurvesBehindThePlate) {
   constexpr int N = TypeParam::N;
   Random random(84);
   for (int n = 0; n < test::cases(50); ++n) {

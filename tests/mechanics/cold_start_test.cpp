@@ -48,7 +48,7 @@ TEST(ColdStart, PaperRobotUnderTipForce) {
 }
 
 // From the straight robot Newton's method meets a fold or an unstable equilibrium here, beside stable ones.
-TEST(ColdStart, FindsAStableEquilibriumBesideAnUnstableOne) {
+TEST(ColdStart, LeavesUnstableEquilibria) {
   Robot<3> robot = test::paper_robot();
   for (Tube& tube : robot.tubes) tube.curvature *= 2;
   Random random(53);

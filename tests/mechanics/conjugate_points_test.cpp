@@ -48,7 +48,8 @@ struct Pair {
   }
 };
 
-TEST(ConjugatePoints, OpposedTubesLoseStabilityAtTheClosedForm) {
+/// At the length of the transmission that the closed form says.
+TEST(ConjugatePoints, OpposedTubesLoseStability) {
   const double root = std::sqrt(Pair(0.1).c);
   const double critical = 1 / (root * std::tan(root * 0.08));
   ASSERT_GT(critical, 0.01);
@@ -63,7 +64,8 @@ TEST(ConjugatePoints, OpposedTubesLoseStabilityAtTheClosedForm) {
   EXPECT_NEAR(low / critical, 1, 1e-5);
 }
 
-TEST(ConjugatePoints, DeterminantOfOpposedTubesIsTheClosedForm) {
+/// Their determinant has a closed form.
+TEST(ConjugatePoints, OpposedTubes) {
   for (const double transmission : {0.02, 0.1, 0.3}) {
     Pair pair(transmission);
     pair.q.alpha << -0.3, -0.3 + std::numbers::pi;

@@ -111,7 +111,8 @@ TYPED_TEST(TipDerivative, ComplianceOfAnUnloadedRobot) {
   }
 }
 
-TYPED_TEST(TipDerivative, ComplianceIsSymmetricWhereTheLoadsHaveAPotential) {
+/// Where the loads have a potential.
+TYPED_TEST(TipDerivative, ComplianceIsSymmetric) {
   constexpr int N = TypeParam::N;
   Random random(27);
   for (int n = 0; n < test::cases(20); ++n) {

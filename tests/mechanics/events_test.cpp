@@ -36,7 +36,8 @@ TYPED_TEST(EventOrder, DescendsAndNamesEachEventOnce) {
   }
 }
 
-TEST(Events, TipsComeBeforeCurvedStartsAndInnerTubesFirst) {
+/// At equal arc lengths tips come before curved starts, and inner tubes before outer ones.
+TEST(Events, OrderOfTies) {
   Robot<3> robot = test::paper_robot();
   for (Tube& tube : robot.tubes) tube.length = 0.2, tube.curved_length = 0.2;
   const Events<3> flush = sort_events(make_coefficients(robot), VecN<3>(-0.1, -0.1, -0.1));

@@ -126,7 +126,8 @@ TYPED_TEST(Symmetry, AVanishingMomentLeavesTheForceAlone) {
   }
 }
 
-TYPED_TEST(Symmetry, AVanishingWeightLeavesTheWeightlessRobot) {
+/// In the limit the robot is the weightless one.
+TYPED_TEST(Symmetry, VanishingWeight) {
   constexpr int N = TypeParam::N;
   Random random(16);
   for (int n = 0; n < test::cases(20); ++n) {

@@ -69,7 +69,8 @@ TEST(Torsion, FollowsThePendulum) {
   }
 }
 
-TEST(Torsion, StabilityIsTheSlopeOfTheBaseAngleByTheTipAngle) {
+/// Stability is the derivative of the base angle by the tip angle.
+TEST(Torsion, StabilityIsASlope) {
   const TwoTubes two;
   const double c = two.coupling(), root = std::sqrt(c), deployed = 0.05, x = root * deployed;
   const double transmission = two.base_angle(0, 1);  // base angle per theta' [m]
@@ -84,7 +85,8 @@ TEST(Torsion, StabilityIsTheSlopeOfTheBaseAngleByTheTipAngle) {
   EXPECT_NEAR(s.stability, opposed, 1e-7);
 }
 
-TEST(Torsion, OpposedTubesThatMustSnapAreNeverCalledOk) {
+/// Opposed tubes that must snap are never called ok.
+TEST(Torsion, UnstableIsNeverOk) {
   const TwoTubes two;
   const double deployed = 0.9 * pi / std::sqrt(two.coupling());
   const Solution<2> s = test::solved<Derivatives::none>(two.robot(deployed), two.joints(pi), {}, 16);

@@ -98,13 +98,15 @@ double mean_error_of_step(const Robot<N>& robot, double max_force, unsigned seed
   return sum / cases;
 }
 
-TEST(Step, IsGoodToATenthOfAMicrometreAfterOneMillimetreAndOneDegree) {
+/// After 1 mm and 1 degree one step is good to 0.1 um.
+TEST(Step, IsAccurateAfterASmallMove) {
   EXPECT_LT((mean_error_of_step<Derivatives::jacobian, 3>(test::paper_robot(), 0.3, 63)), 1e-7);
   EXPECT_LT((mean_error_of_step<Derivatives::compliance, 3>(test::paper_robot(), 0.3, 64)), 1e-7);
   EXPECT_LT((mean_error_of_step<Derivatives::jacobian, 3>(test::paper_robot(), 0, 65)), 1e-7);
 }
 
-TYPED_TEST(WarmStart, StepTakesOneEvaluationAndItsResidualTellsItsError) {
+/// And its residual bounds its error.
+TYPED_TEST(WarmStart, StepTakesOneEvaluation) {
   constexpr int N = TypeParam::N;
   Random random(66);
   for (int n = 0; n < test::cases(50); ++n) {

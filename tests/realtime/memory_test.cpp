@@ -66,7 +66,8 @@ std::size_t stack_used(void* (*run)(void*), void* argument) {
   return size - page - untouched;
 }
 
-TEST(Memory, OneThreadWithThreeTubesNeedsLessThan64kB) {
+/// Per thread.
+TEST(Memory, ThreeTubesNeedLessThan64kB) {
   if (!honest_stack) GTEST_SKIP() << "the stack of an optimised build is what counts";
   bool solved = false;
   const std::size_t used = stack_used(solve_hard_cases, &solved);  // with what a thread needs for itself

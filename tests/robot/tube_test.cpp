@@ -18,7 +18,8 @@ TEST(Tube, StiffnessAndMassOfAnAnnulus) {
   EXPECT_NEAR(tube.mass_per_length(), 6450 * pi / 4 * (outer * outer - inner * inner), 1e-12);
 }
 
-TEST(Tube, TorsionFollowsFromShearModulusAndPolarMoment) {
+/// From shear modulus and polar moment.
+TEST(Tube, TorsionalStiffness) {
   test::Random random(1);
   for (int n = 0; n < 20; ++n) {
     const Tube tube = test::random_robot<1>(random).tubes[0];
@@ -27,7 +28,7 @@ TEST(Tube, TorsionFollowsFromShearModulusAndPolarMoment) {
   }
 }
 
-TEST(Tube, AKnownBendingStiffnessGoesBeforeTheDiameters) {
+TEST(Tube, KnownStiffnessOverridesDiameters) {
   Tube tube = test::paper_robot().tubes[0];
   tube.bending_stiffness = 0.123;
   EXPECT_EQ(tube.EI(), 0.123);

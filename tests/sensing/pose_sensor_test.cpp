@@ -57,7 +57,7 @@ TEST(PoseSensor, DerivativesAreThoseOfTheReading) {
   }
 }
 
-TEST(Residual, IsWhatTurnsThePredictionIntoTheMeasurement) {
+TEST(Residual, MapsPredictionToMeasurement) {
   test::Random random(3);
   for (int n = 0; n < 100; ++n) {
     const Pose measured = random_pose(random), predicted = random_pose(random);
@@ -69,7 +69,8 @@ TEST(Residual, IsWhatTurnsThePredictionIntoTheMeasurement) {
   }
 }
 
-TEST(Residual, DerivativeIsThatOfItsDefinitionFarAndNear) {
+/// For small and for large errors.
+TEST(Residual, DerivativeIsExact) {
   test::Random random(4);
   for (const double angle : {0.0, 1e-8, 1e-3, 0.03, 0.5, 2.0, 3.1})
     for (int n = 0; n < 20; ++n) {

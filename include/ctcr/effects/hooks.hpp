@@ -1,6 +1,7 @@
 #pragma once
 // The hooks by which an effect acts. Each is a const noexcept member of the effect, but for update_history(). P is the
-// scalar of its parameters: double, or a dual number, so that one code gives values and exact derivatives.
+// scalar of its parameters: double, or a dual number, so that one code gives values and exact derivatives. Vectors are in
+// the Bishop frame unless said otherwise. Real time: yes, all hooks: noexcept, no allocation, bounded.
 //
 //   actuate(Occasion, beta&, alpha&)            joints that the tubes really have [m], [rad]
 //   material(TubePoint<P>, Material<P>&)         free shape and constitutive law of a tube at a point along it

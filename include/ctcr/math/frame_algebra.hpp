@@ -1,5 +1,5 @@
 #pragma once
-// Frames that carry derivatives: made, composed and moved.
+// Frames that carry derivatives: made, composed and moved. Real time: yes, all of it.
 #include <array>
 
 #include "ctcr/math/se3.hpp"

@@ -1,5 +1,5 @@
 #pragma once
-// Functions of a scalar S, a plain number or a dual one.
+// Functions of a scalar S, a plain number or a dual one. Real time: yes, all of it.
 #include <algorithm>
 #include <array>
 #include <cmath>

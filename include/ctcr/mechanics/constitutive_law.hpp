@@ -1,5 +1,6 @@
 #pragma once
 // The constitutive law of one tube in bending, that of Material. T is the scalar of the results: S, or double (its value).
+// Real time: yes, all of it.
 #include <array>
 #include <cmath>
 #include <type_traits>

@@ -167,8 +167,8 @@ private:
 
 }  // namespace detail
 
-/// As for the standard model; the general path has one integration scheme. Where no effect changes the rod, it is that of
-/// the standard model.
+/// As evaluate() of the standard model (evaluation.hpp). The general path has one integration scheme; where no effect
+/// changes the rod, this is the evaluation of the standard model. Real time: yes.
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joints<N>& q, const TipLoad& load,
                                    const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {

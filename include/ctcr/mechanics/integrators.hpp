@@ -2,6 +2,7 @@
 // Textbook explicit Runge-Kutta schemes, for comparison with the default (steppers.hpp): Stepper arguments of solve().
 // They integrate the whole state as plain ordinary differential equations, position and rotation matrix included, so
 // the rotation drifts from orthogonality as far as the scheme errs. Ref: Boyer et al., Figure 2.
+// Real time: yes.
 #include "ctcr/mechanics/steppers.hpp"
 
 namespace ctcr {

@@ -1,5 +1,6 @@
 #pragma once
 // The rod of a model whose equilibrium is known, ready to be integrated once more along its length.
+// Real time: yes.
 #include "ctcr/mechanics/effect_rod.hpp"
 #include "ctcr/mechanics/model.hpp"
 #include "ctcr/mechanics/solution.hpp"

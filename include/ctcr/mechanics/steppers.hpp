@@ -1,5 +1,5 @@
 #pragma once
-// One integration step along a segment, from the tip side to the base side.
+// One integration step along a segment, from the tip side to the base side. Real time: yes, all of it.
 #include "ctcr/math/se3.hpp"
 #include "ctcr/mechanics/rod.hpp"
 
