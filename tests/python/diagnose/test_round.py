@@ -57,7 +57,7 @@ def test_contenders_converge(weighted, monkeypatch):
     monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)
     before = weighted.fit()
     screened = rounds.screen(weighted, before, pool(weighted, "tip_load", "softening"), {})
-    tried = rounds.refit_all(weighted, before, screened, {}, lambda _: None)
+    tried = rounds.Refits(weighted, before, {}, lambda _: None).of_all(screened)
     best = max(tried, key=lambda one: one.score)
     assert best.id == "tip_load" and best.fit.converged
     assert all(one.fit.iterations <= 1 for one in tried if one.score < settings.CONTENDS * best.score)
@@ -69,7 +69,7 @@ def test_best_of_few_rows(robot, plan, monkeypatch):
     engine = engine_for(robot, plan, {})
     before = engine.fit()
     screened = rounds.screen(engine, before, pool(engine, "tip_load", "softening", "straight_curvature"), {})
-    kept = rounds._in_reach(engine, before, screened, {}, lambda _: None)
+    kept = rounds.Refits(engine, before, {}, lambda _: None).in_reach(screened)
     assert kept and {one.candidate for one in kept} <= {one.candidate for one in screened}
 
 

@@ -130,9 +130,9 @@ def with_residual(engine, fit, residual):
     return engine.linear_fit(fit, more=residual - fit.residual, **same)
 
 
-def test_diagnosis(robot, recorded, capsys):
+def test_diagnosis(robot, plan, capsys):
     """The terminal, the report and the JSON say what varies."""
-    found = diagnose(robot, readings_of(robot, recorded, twisted(recorded)))
+    found = diagnose(robot, readings_of(robot, plan, twisted(plan)))
     assert found.verdict.word != "identified"
     assert "length1" in found.as_json()["leftover"]["depends_on"]
     terminal.show(output.console(), found)

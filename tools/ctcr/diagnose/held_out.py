@@ -15,8 +15,6 @@ from ctcr.model.noise import with_field
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Another noise must predict left-out runs so much better to be preferred to that of the most evidence.
-
 
 def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
     """Mean square position errors [mm^2] of fitted runs, each left out with a few others, of the model linearised at a

@@ -143,9 +143,8 @@ def run_round(
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
         return Round(before, [], reason="no effect is left to try")
-    chosen = _worth_a_refit(screened)
-    chosen = _in_reach(engine, before, chosen, fixed, progress)
-    tried = refit_all(engine, before, chosen, fixed, progress)
+    refits = Refits(engine, before, fixed, progress)
+    tried = refits.of_all(refits.in_reach(_worth_a_refit(screened)))
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
     fitted = [one.candidate for one in tried]
@@ -204,76 +203,68 @@ def _worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
     return chosen
 
 
-def _in_reach(
-    engine: Engine, before: joint.Fit, chosen: list[CandidateFit], fixed: dict[str, float], progress: Progress
-) -> list[CandidateFit]:
-    """Those that a refit to a few of many rows does not leave far behind the best, with the fit where that ended."""
-    few = folds.few_of(engine.fitted)
-    if few is None or len(chosen) < 2:
-        return chosen
-    small = replace(engine, rows=few)
-    base = small.fit_like(before, effects_in(before), start=values_of(before), fixed=fixed, near=True)
-    tried = refit_all(small, base, chosen, fixed, progress)
-    best = max(one.score for one in tried)
-    reach = min(best, settings.IN_REACH * best)  # the best itself always is
-    return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
+@dataclass
+class Refits:
+    """Joint fits of candidates with calibration and accepted effects, at the weights and noise of the fit before."""
 
+    engine: Engine
+    before: joint.Fit
+    fixed: dict[str, float]
+    progress: Progress
 
-def refit_all(
-    engine: Engine, before: joint.Fit, chosen: list[CandidateFit], fixed: dict[str, float], progress: Progress
-) -> list[CandidateFit]:
-    """Each after a joint fit with calibration and accepted effects, at the same weights and noise. Those that contend
-    are refitted to convergence: a candidate that is slow to fit must not lose to one that is quick."""
-    evidence = segment_delays.log_evidence(engine, before)
-    tried = [_refit(engine, before, evidence, one, fixed, progress, settings.FIRST_ITERATIONS) for one in chosen]
-    near = settings.CONTENDS * max((one.score for one in tried), default=0.0)
-    return [
-        _refit(engine, before, evidence, one, fixed, progress, settings.ITERATIONS)
-        if one.fit and not one.fit.converged and one.score > near
-        else one
-        for one in tried
-    ]
+    def __post_init__(self) -> None:
+        self._log_evidence = segment_delays.log_evidence(self.engine, self.before)
 
+    def in_reach(self, chosen: list[CandidateFit]) -> list[CandidateFit]:
+        """Those that a refit to a few of many rows does not leave far behind the best, with that fit as a start."""
+        few, before = folds.few_of(self.engine.fitted), self.before
+        if few is None or len(chosen) < 2:
+            return chosen
+        engine = replace(self.engine, rows=few)
+        base = engine.fit_like(before, effects_in(before), start=values_of(before), fixed=self.fixed, near=True)
+        tried = Refits(engine, base, self.fixed, self.progress).of_all(chosen)
+        best = max(one.score for one in tried)
+        reach = min(best, settings.IN_REACH * best)  # the best itself always is
+        return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
 
-def _refit(
-    engine: Engine,
-    before: joint.Fit,
-    evidence: float,
-    one: CandidateFit,
-    fixed: dict[str, float],
-    progress: Progress,
-    iterations: int,
-) -> CandidateFit:
-    """One of them; `evidence` is that of the fit before."""
-    candidate = one.candidate
-    progress(f"fitting {candidate.label}")
-    first = values_of(one.fit) if one.fit else linearised_end(engine, before, one)
-    for start in (first, values_of(before)):
-        try:
-            fit = engine.fit_like(
-                before,
-                [*effects_in(before), *candidate.names],
-                start=start,
-                fixed=fixed | dict(candidate.shape),
-                max_iterations=iterations,
-                tolerance=settings.COARSE,
-                near=one.fit is not None,
-            )
-            break
-        except InputError:
-            continue  # the model has no solution there
-    else:
-        return replace(one, fit=None)
-    explained = fraction_explained(before, fit, len(candidate.names))
-    return replace(
-        one,
-        refit=segment_delays.log_evidence(engine, fit) - evidence - candidate.penalty,
-        explained=explained,
-        # A chi-square removed has a standard deviation of twice its root.
-        explained_sd=2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0)),
-        fit=fit,
-        implausible=tuple(_implausible(engine, fit, candidate)),
-    )
+    def of_all(self, chosen: list[CandidateFit]) -> list[CandidateFit]:
+        """Each after its fit. Those that contend are fitted to convergence: a candidate that is slow to fit must not
+        lose to one that is quick."""
+        tried = [self._of(one, settings.FIRST_ITERATIONS) for one in chosen]
+        near = settings.CONTENDS * max((one.score for one in tried), default=0.0)
+        return [
+            self._of(one, settings.ITERATIONS) if one.fit and not one.fit.converged and one.score > near else one
+            for one in tried
+        ]
+
+    def _of(self, one: CandidateFit, iterations: int) -> CandidateFit:
+        engine, before, candidate = self.engine, self.before, one.candidate
+        self.progress(f"fitting {candidate.label}")
+        options = {
+            "fixed": self.fixed | dict(candidate.shape),
+            "max_iterations": iterations,
+            "tolerance": settings.COARSE,
+            "near": one.fit is not None,
+        }
+        first = values_of(one.fit) if one.fit else linearised_end(engine, before, one)
+        for start in (first, values_of(before)):
+            try:
+                fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start=start, **options)
+                break
+            except InputError:
+                continue  # the model has no solution there
+        else:
+            return replace(one, fit=None)
+        explained = fraction_explained(before, fit, len(candidate.names))
+        return replace(
+            one,
+            refit=segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty,
+            explained=explained,
+            # A chi-square removed has a standard deviation of twice its root.
+            explained_sd=2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0)),
+            fit=fit,
+            implausible=tuple(_implausible(engine, fit, candidate)),
+        )
 
 
 def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict[str, float]:
@@ -287,14 +278,11 @@ def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict
 
 def _implausible(engine: Engine, fit: joint.Fit, candidate: Candidate) -> list[str]:
     """Values beyond the soft bounds of their effect, by more than two standard deviations."""
-    known = catalogue.parameter_of(engine.robot.n_tubes)
-    found = []
-    for name, value, sd in zip(fit.names, fit.values, fit.sd, strict=True):
-        if name not in candidate.names or name not in known:
-            continue
-        low, high = known[name].soft
-        if value + 2 * sd < low or value - 2 * sd > high:
-            found.append(f"{name} = {value:.3g} {known[name].unit}".rstrip())
+    known, found = catalogue.parameter_of(engine.robot.n_tubes), []
+    for name in candidate.names:
+        i, (low, high) = fit.names.index(name), known[name].soft
+        if fit.values[i] + 2 * fit.sd[i] < low or fit.values[i] - 2 * fit.sd[i] > high:
+            found.append(f"{name} = {fit.values[i]:.3g} {known[name].unit}".rstrip())
     return found
 
 

@@ -85,26 +85,21 @@ class Selection:
         variants = round_.rejected_variants
         one = Accepted(best, round_.ids, best.refit, round_.margin, best.explained, rejected_variants=variants)
         self.accepted.append(one)
-        converged = self._refit_to_convergence(best.fit, before)
+        names, fixed = parameters_of(self.fits)
+        options = {"fixed": fixed, "near": True}
+        converged = best.fit
+        if not converged.converged:
+            converged = engine.fit_like(before, names, start=values_of(converged), **options)
         self.fit = self.calibrate(self.fits, values_of(converged))
         if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
-            names, fixed = parameters_of(self.fits)
-            self.fit = engine.fit_like(before, names, start=values_of(converged), fixed=fixed, near=True)
+            self.fit = engine.fit_like(before, names, start=values_of(converged), **options)
         rejected = engine.rejects(self.fit)
-        if "order" in catalogue.get(one.id, engine.robot.n_tubes).needs and engine.revise_initial_history(
-            self.fit, *parameters_of(self.fits)
-        ):
+        needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
+        if needs_history and engine.revise_initial_history(self.fit, names, fixed):
             self.fit = self.calibrate(self.fits, values_of(self.fit))
         self.refine_form(one)
         one.residual = self.fit.residual[:, :3]
         return rejected
-
-    def _refit_to_convergence(self, fit: joint.Fit, before: joint.Fit) -> joint.Fit:
-        """The end of the refit of a round, at the weights of the fit before."""
-        if fit.converged:
-            return fit
-        names, fixed = parameters_of(self.fits)
-        return self.engine.fit_like(before, names, start=values_of(fit), fixed=fixed, near=True)
 
     def refine_form(self, one: Accepted) -> None:
         """Frees the shape of an accepted effect, and tries its other constitutive laws, where that helps.
@@ -116,9 +111,8 @@ class Selection:
         others = other_amplitudes(effect, given) if one is self.accepted[-1] else []
         ended: list[tuple[joint.Fit, CandidateFit, joint.Fit]] = []  # calibrated anew, form, fit of the form
         for variant in (given, *others):
-            freed = self._fit_forms(
-                one, [form for form in forms(effect, variant, one.rejected_variants) if form != given]
-            )
+            tried = [form for form in forms(effect, variant, one.rejected_variants) if form != given]
+            freed = self._fit_forms(one, tried)
             gain = max((there.log_evidence for _, there in freed), default=-np.inf) - fit.log_evidence
             if variant is given and gain < settings.TIE:
                 freed, ended = [], [(fit, one.best, fit)]

@@ -11,7 +11,6 @@ from ctcr.diagnose.selection import Accepted
 from ctcr.fit import joint
 from ctcr.show.wording import listed
 
-# Fraction of the unexplained chi-square of held-out runs that effects must explain not to be spurious, and
 SHOWN = 6  # runs that are named
 
 
