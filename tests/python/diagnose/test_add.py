@@ -27,7 +27,8 @@ def robot():
     [{"sensor_offset__x": "0.001"}, {"backlash_rotation": "0.01,0.02,0.01"}, {"anisotropy__along": "0.05,-0.05,0.05"}],
     ids=lambda given: next(iter(given)),
 )
-def test_a_hidden_effect_is_found(robot, plan, given, hidden):
+def test_hidden_effect(robot, plan, given, hidden):
+    """Values are found within their uncertainty, and the error is judged on held-out runs."""
     true = hidden(robot, **given)
     (identity,) = true.effects
     made = simulation.simulate(true, plan, "jitter", seed=1)
@@ -42,8 +43,8 @@ def test_a_hidden_effect_is_found(robot, plan, given, hidden):
     assert added.held_out == f"runs {', '.join(map(str, locked))}" and len(locked) == 2
 
 
-def places_to_find(robot, plan) -> dict[str, dict[str, float]]:
-    """Effects that are somewhere: at a moment, at a plane, beside the tracker."""
+def effects_to_find(robot, plan) -> dict[str, dict[str, float]]:
+    """Effects whose start a search finds: a moment, a plane, a source of field beside the tracker."""
     tips = ctcr.Model(robot).predict(plan.beta, plan.alpha, plan.force).position
     read = effect_model.readings(robot, plan).position
     normal = np.array([np.cos(0.5) * np.cos(1.2), np.cos(0.5) * np.sin(1.2), np.sin(0.5)])
@@ -56,8 +57,9 @@ def places_to_find(robot, plan) -> dict[str, dict[str, float]]:
 
 
 @pytest.mark.parametrize("identity", ["frame_jump", "contact", "field_distortion"])
-def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
-    given = {f"effects.{identity}.{name}": x for name, x in places_to_find(robot, plan)[identity].items()}
+def test_search(robot, plan, identity):
+    """The moment of a jump, the plane of a contact and the position of metal need not be given."""
+    given = {f"effects.{identity}.{name}": x for name, x in effects_to_find(robot, plan)[identity].items()}
     made = simulation.simulate(add.with_values(robot, [identity], given), plan, "jitter", seed=1)
     added = add.add(robot, made, [identity], free=CALIBRATION)
     rms = added.rms("rms_mm")
@@ -68,8 +70,8 @@ def test_where_an_effect_is_need_not_be_given(robot, plan, identity):
         np.testing.assert_array_equal(part > added.robot.effects["frame_jump"]["when"], part > 0.371)
 
 
-def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan, hidden):
-    """The errors without the effect stay what they are, and the fit arrives where it does on its own."""
+def test_given_start(robot, plan, hidden):
+    """A fit that starts where a diagnosis ended converges to the same values; errors without the effect stay."""
     true = hidden(robot, softening__gamma="0.004,0.004,0.004", softening__sharpness="5")
     made = simulation.simulate(true, plan, "jitter", seed=1)
     there = {name: value for name, value in catalogue.value_of(true).items() if ".softening." in name}
@@ -80,7 +82,8 @@ def test_a_fit_may_begin_where_a_diagnosis_ended(robot, plan, hidden):
         assert abs(found["value"] - alone.parameters()[name]["value"]) < 0.5 * found["sd"], name
 
 
-def test_what_the_data_cannot_say_is_said(robot, plan):
+def test_notices(robot, plan):
+    """Data that say nothing of an effect are said to; a single run is judged on blocks of time."""
     timeless = replace(simulation.simulate(robot, plan, "jitter"), t=np.full(len(plan), np.nan))
     one_run = replace(timeless, run=0 * plan.run)
     added = add.add(robot, one_run, ["delay"], free=["tracker.position.*"])
@@ -88,8 +91,8 @@ def test_what_the_data_cannot_say_is_said(robot, plan):
     assert added.held_out == "one of every four blocks of time" and np.isfinite(added.rms("rms_mm")["delay"])
 
 
-def test_of_many_coefficients_the_clearest_are_shown(capsys):
-    """All parameters of a few; of a field of many terms those that stand out, and how many do not."""
+def test_fitted_on_terminal(capsys):
+    """All parameters of a small effect are shown; of a field of many terms the clearest, and how many are not."""
     field = catalogue.get("field_distortion", 3)
     many = [(name, 1e-4 * (k % 7), 1e-4) for k, name in enumerate(field.names())]
     console = output.console(None)

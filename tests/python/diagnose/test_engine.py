@@ -1,4 +1,4 @@
-"""What a diagnosis asks of its fits: slopes by parameters that were fitted or are neutral, and memory given back."""
+"""Fits of a diagnosis: derivatives by fitted and by neutral parameters, released memory, the history before row 1."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,8 +30,9 @@ def fit(engine):
 
 
 @pytest.mark.parametrize("names", [ADDED, ADDED[::-1], ["tracker.position.x", ADDED[1]]])
-def test_slopes_are_those_of_the_residual_in_prior_deviations(engine, fit, names):
-    slopes = engine.derivatives(fit, names)
+def test_derivatives(engine, fit, names):
+    """Derivatives are those of the residual, in units of prior sd, in fitted rows alone."""
+    columns = engine.derivatives(fit, names)
     everything = list(dict.fromkeys([*fit.names, *names]))
     neutral, sd, _, _ = engine.priors(everything)
     at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
@@ -42,12 +43,13 @@ def test_slopes_are_those_of_the_residual_in_prior_deviations(engine, fit, names
         step[everything.index(name)] = 1e-3 * sd[everything.index(name)]
         there = [table.residual(values + side * step)[0].reshape(-1, 6) for side in (-1, 1)]
         difference = (there[1] - there[0]) / 2e-3
-        np.testing.assert_allclose(slopes[engine.rows, :, k], difference[engine.rows], rtol=1e-4, atol=1e-8)
+        np.testing.assert_allclose(columns[engine.rows, :, k], difference[engine.rows], rtol=1e-4, atol=1e-8)
         assert np.abs(difference).max() > 1e-5
-    assert (slopes[~engine.rows] == 0).all()
+    assert (columns[~engine.rows] == 0).all()
 
 
-def test_a_fit_at_rest_holds_no_table_and_says_the_same(fit):
+def test_released_memory(fit):
+    """A fit at rest holds no large array, and computes the same again."""
     before = fit.jacobian_all.copy()
     assert any(np.size(part) >= before.size for part in fit.__dict__["_report"])
     rested = fit.at_rest()
@@ -57,7 +59,8 @@ def test_a_fit_at_rest_holds_no_table_and_says_the_same(fit):
 
 
 @pytest.mark.parametrize("from_home", [True, False])
-def test_readings_say_how_the_robot_came_to_its_first_row(engine, plan, from_home):
+def test_initial_history(engine, plan, from_home):
+    """The readings say whether the robot came to its first row from home or was at rest there."""
     play = [f"effects.backlash_translation.play.{i}" for i in (1, 2, 3)]
     made = add.with_values(engine.robot, ["backlash_translation"], dict.fromkeys(play, 2e-4))
     readings = simulation.simulate(made, replace(plan, from_home=from_home), "jitter", seed=3)

@@ -26,7 +26,8 @@ def demo(robot):
     return measurements.load(EXAMPLES / "data" / "demo" / "measurements.csv", robot.n_tubes)
 
 
-def test_evidence_is_that_of_the_marginal_distribution():
+def test_evidence():
+    """The evidence of a run is that of the marginal distribution of its readings."""
     random = np.random.default_rng(1)
     for _ in range(20):
         J, r = random.normal(size=(24, 5)), random.normal(size=24)
@@ -39,7 +40,8 @@ def test_evidence_is_that_of_the_marginal_distribution():
             assert contest.evidence(runs) == pytest.approx(0.5 * r[rows] @ np.linalg.solve(sigma, r[rows]))
 
 
-def test_further_runs_never_take_evidence_away():
+def test_more_runs():
+    """Further runs never reduce the evidence."""
     random = np.random.default_rng(2)
     run = np.repeat(np.arange(8), 6)
     contest = Contest(random.normal(size=48), random.normal(size=(48, 5)), run, np.eye(5))
@@ -47,7 +49,8 @@ def test_further_runs_never_take_evidence_away():
     assert all(a <= b for a, b in pairwise(evidence))
 
 
-def test_runs_go_out_and_back_within_the_measured_joints(robot, demo):
+def test_random_runs(robot, demo):
+    """Runs go out and back through the same stops, within the measured joints and their order."""
     runs = random_runs(robot, demo, 30, np.array([0.0, 0.01]), np.random.default_rng(3))
     assert len(runs) == 30 and {run.mass for run in runs} == {0.0, 0.01}
     lengths = np.array([tube.length for tube in robot.tubes])
@@ -59,7 +62,8 @@ def test_runs_go_out_and_back_within_the_measured_joints(robot, demo):
         assert (np.diff(run.beta + lengths, axis=1) <= np.diff(demo.beta + lengths, axis=1).max(axis=0)).all()
 
 
-def test_a_plan_is_a_table_that_can_be_read_again(robot, demo, tmp_path):
+def test_table(robot, demo, tmp_path):
+    """A plan is a table that can be read again."""
     runs = random_runs(robot, demo, 3, np.array([0.02]), np.random.default_rng(4))
     plan = table(robot, runs, first_run=7)
     simulation.write(plan, tmp_path / "plan.csv", robot.n_tubes)
@@ -69,13 +73,14 @@ def test_a_plan_is_a_table_that_can_be_read_again(robot, demo, tmp_path):
     assert list(np.unique(again.run)) == [7, 8, 9]
 
 
-def test_masses_must_be_grams(tmp_path, capsys):
+def test_masses(tmp_path, capsys):
+    """Masses must be grams."""
     assert cli.run(["next", "robot.yaml", "table.csv", "--masses", "ten"]) == 1
     assert "grams" in capsys.readouterr().err
 
 
 @pytest.mark.slow
-def test_the_proposed_runs_decide(robot, tmp_path):
+def test_proposed_runs(robot, tmp_path):
     """Without loads, an entry that yields and one that has play look alike; the proposed runs tell them apart."""
     hidden = ["--hide", "entry_compliance=0.8", "--noise", "jitter"]
     random, source = np.random.default_rng(5), tmp_path / "robot.yaml"
