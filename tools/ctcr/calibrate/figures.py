@@ -15,54 +15,33 @@ MOST_POINTS = 4000
 
 
 def waterfall(figure, c: Calibration) -> None:
-    """The error from the robot file's values down to the noise floor."""
+    """The error from the robot file's values down to the error to be expected of a right model."""
     axes = figure.subplots()
-    steps = [(stage.name, stage.rms_mm) for stage in c.stages]
+    names = {"nominal": "robot file", "frame alone": "tracker frame\nalone"}
+    steps = [(names.get(stage.name, stage.name), stage.rms_mm) for stage in c.stages]
     if c.held_out:
-        steps.append(("held out", c.held_out.error.rms_mm))
-    floor = c.held_out.floor.rms_mm if c.held_out else c.floor.rms_mm
-    for place, (name, size) in enumerate(steps):
-        previous = steps[place - 1][1] if place else 0.0
-        final = name == steps[-1][0]
-        axes.bar(place, size, width=0.62, color=ERROR if place == 0 else GOOD if final else OUT, zorder=2)
-        if place:
-            axes.bar(place, previous - size, bottom=size, width=0.62, color=FAINT, alpha=0.45, zorder=1)
-            axes.plot([place - 1 + 0.31, place + 0.31], [previous, previous], color=NOISE, lw=0.8)
-            change = 100 * (size / previous - 1)
-            axes.annotate(
-                f"{change:+.0f} %",
-                (place, max(size, previous)),
-                (0, 4),
-                textcoords="offset points",
-                ha="center",
-                fontsize=9,
-                color=NOISE,
-            )
-        inside = size > 0.12 * steps[0][1]
-        axes.annotate(
-            mm(size),
-            (place, size),
-            (0, -13 if inside else 3),
-            textcoords="offset points",
-            ha="center",
-            color="white" if inside else INK,
-            fontweight="bold",
-            zorder=3,
-        )
-    last = len(steps)
-    axes.bar(last, floor, width=0.62, color=NOISE)
-    axes.annotate(mm(floor), (last, floor), (0, 3), textcoords="offset points", ha="center", fontweight="bold")
+        steps.append((f"held out\n({c.held_out.kind})", c.held_out.error.rms_mm))
+    last, floor = len(steps), (c.held_out or c).floor.rms_mm
+
+    def bar(x: int, size: float, colour: str, ink: str = INK) -> None:
+        inside = ink == "white" and size > 0.12 * steps[0][1]
+        axes.bar(x, size, width=0.62, color=colour, zorder=2)
+        style = {"textcoords": "offset points", "ha": "center", "fontweight": "bold", "zorder": 3}
+        axes.annotate(mm(size), (x, size), (0, -13 if inside else 3), color=ink if inside else INK, **style)
+
+    for x, (_, size) in enumerate(steps):
+        bar(x, size, ERROR if x == 0 else GOOD if x == last - 1 else OUT, "white")
+        if x:
+            before = steps[x - 1][1]
+            axes.bar(x, before - size, bottom=size, width=0.62, color=FAINT, alpha=0.45, zorder=1)
+            axes.plot([x - 1 + 0.31, x + 0.31], [before, before], color=NOISE, lw=0.8)
+            style = {"textcoords": "offset points", "ha": "center", "fontsize": 9, "color": NOISE}
+            axes.annotate(f"{100 * (size / before - 1):+.0f} %", (x, max(size, before)), (0, 4), **style)
+    bar(last, floor, NOISE)
     axes.axhline(floor, color=NOISE, ls="--", lw=1)
-    labels = [_label(name, c) for name, _ in steps] + ["noise floor"]
-    axes.set_xticks(range(last + 1), labels)
+    axes.set_xticks(range(last + 1), [*(name for name, _ in steps), "expected"])
     axes.set(ylabel="error, mm RMS", ylim=(0, 1.12 * max(size for _, size in steps)))
     axes.grid(axis="x", visible=False)
-
-
-def _label(name: str, c: Calibration) -> str:
-    if name == "held out":
-        return f"held out\n({c.held_out.kind})"
-    return {"nominal": "robot file", "frame alone": "tracker frame\nalone"}.get(name, name)
 
 
 def histogram(figure, c: Calibration) -> None:
@@ -92,26 +71,20 @@ def course(figure, c: Calibration) -> None:
             axes.axvspan(start, stop - 1, color="#f2f4f7", lw=0)
     for values, colour, label in zip(size, (ERROR, GOOD), ("robot file", "calibrated"), strict=True):
         axes.plot(rows, values[rows], color=colour, lw=0.9, label=label)
-    axes.axhline(c.floor.rms_mm, color=NOISE, ls="--", lw=1, label="noise floor, RMS")
+    axes.axhline(c.floor.rms_mm, color=NOISE, ls="--", lw=1, label="expected, RMS")
     axes.set(xlabel="reading (runs shaded in turn)", ylabel="error, mm", ylim=(0, None))
     axes.margins(x=0.01)
     axes.legend(fontsize=9)
 
 
 def shifts(figure, c: Calibration) -> None:
-    """How far each parameter moved and how well it is known now, in units of what was known before."""
+    """How far each parameter moved and its posterior standard deviation, in prior standard deviations."""
     items = c.fitted[:MOST_NAMES][::-1]
     axes = figure.subplots()
-    for place, item in enumerate(items):
+    for y, item in enumerate(items):
         colour = ERROR if item.implausible or item.moved_far else FAINT if item.says_nothing else OUT
-        axes.plot(
-            [item.shift - item.ratio, item.shift + item.ratio],
-            [place, place],
-            color=colour,
-            lw=2.2,
-            solid_capstyle="butt",
-        )
-        axes.plot(item.shift, place, "o", color=colour, ms=4.5)
+        axes.hlines(y, item.shift - item.ratio, item.shift + item.ratio, color=colour, lw=2.2)
+        axes.plot(item.shift, y, "o", color=colour, ms=4.5)
     reach = max(3.0, 1.1 * max(abs(item.shift) + item.ratio for item in items))
     axes.axvspan(-2, 2, color="#eef2f5", lw=0, zorder=0)
     axes.axvspan(-1, 1, color="#dfe6eb", lw=0, zorder=0)
@@ -126,7 +99,7 @@ def shifts(figure, c: Calibration) -> None:
 
 
 def correlations(figure, c: Calibration) -> None:
-    """What goes together: the correlations of the fitted values; right, how much of the old doubt is left."""
+    """Posterior correlations; right, posterior over prior standard deviation."""
     count = min(len(c.fitted), MOST_NAMES)
     names = [item.name for item in c.fitted[:count]]
     sd = np.sqrt(np.diag(c.fit.covariance))[:count]

@@ -14,9 +14,11 @@ from ctcr.show.html_page import bullets, cards, figure, table
 from ctcr.show.output import atomic_writer
 from ctcr.show.wording import mm
 
+WIDE = 10.4  # [in] of a figure as wide as the page
+
 
 def write(c: Calibration, target: str | Path, source: str) -> None:
-    """Write the report; source says what was fitted. Raises InputError when the file cannot be written."""
+    """Writes the report; source says what was fitted. Raises InputError when the file cannot be written."""
     with atomic_writer(target) as file:
         file.write(page(c, source))
 
@@ -24,85 +26,66 @@ def write(c: Calibration, target: str | Path, source: str) -> None:
 def page(c: Calibration, source: str) -> str:
     """The whole HTML text."""
     title = f"Calibration: {c.before.name}"
-    sections = [
-        _opening(c, title),
-        _doubts(c),
-        _waterfall(c),
-        _parameters(c),
-        _together(c),
-        _halves(c),
-        _residuals(c),
-        _numbers(c),
-    ]
+    sections = [_opening(c, title), _doubts(c), *_fit(c), _halves(c), _residuals(c), _numbers(c)]
     return html_page.page(title, sections, source, "ctcr calibrate fit", view(c))
 
 
 def _opening(c: Calibration, title: str) -> str:
-    error, floor = (c.held_out.error, c.held_out.floor) if c.held_out else (c.stages[-1], c.floor)
     numbers = [
         ("error", f"{c.stages[0].rms_mm:.3g} mm", "RMS error with the values of the robot file"),
         ("good", f"{c.stages[-1].rms_mm:.3g} mm", f"RMS error with {len(c.fitted)} parameters fitted"),
     ]
     if c.held_out:
-        numbers.append(("good", f"{error.rms_mm:.3g} mm", f"RMS error on {c.held_out.kind} that a fit has not seen"))
-    smooth = " and smooth error" if c.fit.noise.position_field > 0 else ""
-    numbers.append(("noise", f"{floor.rms_mm:.2g} mm", f"noise floor: what the tracker's jitter{smooth} would give"))
-    numbers.append(("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"))
+        numbers.append(("good", f"{c.held_out.error.rms_mm:.3g} mm", f"RMS error on held-out {c.held_out.kind}"))
+    smooth = ", smooth error" if c.fit.noise.position_field > 0 else ""
+    expected = f"{(c.held_out or c).floor.rms_mm:.2g} mm"
+    numbers += [
+        ("noise", expected, f"noise floor: expected error of a right model (jitter{smooth}, parameters)"),
+        ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"),
+    ]
     return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(terminal.headline(c))}</p>{cards(numbers)}'
 
 
 def _doubts(c: Calibration) -> str:
-    text = ""
-    for title, lines in (("Doubts", doubts(c.fitted)), ("To know", c.notices)):
-        if lines:
-            text += f"<h2>{title}</h2>" + bullets(lines)
-    return text
+    lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
+    return "".join(f"<h2>{title}</h2>" + bullets(lines) for title, lines in lists if lines)
 
 
-def _waterfall(c: Calibration) -> str:
-    caption = "From the robot file's values to what noise leaves. What counts is the error of readings not seen."
-    return "<h2>What calibration brings</h2>" + figure(figures.waterfall, c, 10.4, 4.2, caption, wide=True)
-
-
-def _parameters(c: Calibration) -> str:
-    height = 1.0 + 0.24 * min(len(c.fitted), figures.MOST_NAMES)
-    caption = (
-        "Where each value went and its standard deviation now, in standard deviations of what the robot file says "
-        "(grey: one and two of them). Red: moved further than can well be, or implausible. Pale: the data say nothing."
+def _fit(c: Calibration) -> list[str]:
+    """What the fit gains, the parameters, and how far the data determine them."""
+    shown, lines = min(len(c.fitted), figures.MOST_NAMES), terminal.undetermined(c)
+    gain = "From the robot file's values to the expected error. The error that counts is the one of held-out readings."
+    values = (
+        "Fitted values and their standard deviations, in standard deviations of the robot file's values (grey: one and "
+        "two of them). Red: further than two, or implausible. Pale: the data say nothing."
     )
-    return (
-        "<h2>The parameters</h2>"
-        + figure(figures.shifts, c, 10.4, height, caption, wide=True)
-        + table("Values ± one standard deviation", terminal.PARAMETER_COLUMNS, terminal.parameter_rows(c), 2)
-    )
-
-
-def _together(c: Calibration) -> str:
-    size = 2.8 + 0.2 * min(len(c.fitted), figures.MOST_NAMES)
-    caption = "Dark red and dark blue: the data determine only the sum or the difference of the two."
-    text = "<h2>What the data cannot tell apart</h2>"
-    lines = terminal.undetermined(c)
-    return text + (bullets(lines) if lines else "") + figure(figures.correlations, c, 10.4, size, caption, wide=True)
+    together = "Dark red and dark blue: the data determine only the sum or the difference of the two."
+    return [
+        "<h2>What calibration brings</h2>" + figure(figures.waterfall, c, WIDE, 4.2, gain, wide=True),
+        "<h2>The parameters</h2>" + figure(figures.shifts, c, WIDE, 1.0 + 0.24 * shown, values, wide=True),
+        table("Values ± one standard deviation", terminal.PARAMETER_COLUMNS, terminal.parameter_rows(c), 2),
+        "<h2>What the data cannot tell apart</h2>" + (bullets(lines) if lines else ""),
+        figure(figures.correlations, c, WIDE, 2.8 + 0.2 * shown, together, wide=True),
+    ]
 
 
 def _halves(c: Calibration) -> str:
     if c.halves is None:
         return ""
     h = c.halves
-    beyond = np.sqrt(max(h.rms_mm**2 - h.noise_mm**2, 0.0))
+    beyond = mm(float(np.sqrt(max(h.rms_mm**2 - h.noise_mm**2, 0.0))))
     verdict = (
         "so noise explains it: more readings of the same kind would help"
         if h.rms_mm <= 1.5 * h.noise_mm
-        else f"so {mm(float(beyond))} of it is error of the model: it fits one part of the data at the cost of another"
+        else f"so {beyond} of it is error of the model: it fits one part of the data at the cost of another"
     )
     text = (
         f"Two models, each fitted to half of the {h.kind}, differ by {mm(h.rms_mm)} RMS over the joints visited. "
         f"Noise alone would make it {mm(h.noise_mm)}, {verdict}."
     )
     caption = "Left, middle: where the two disagree. Right: against what noise can do (line) and twice that (dashed)."
-    return f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>" + figure(
-        figures.half_difference, c, 10.4, 4.6, caption, wide=True
-    )
+    picture = figure(figures.half_difference, c, WIDE, 4.6, caption, wide=True)
+    return f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>{picture}"
 
 
 def _residuals(c: Calibration) -> str:
@@ -121,17 +104,15 @@ def _numbers(c: Calibration) -> str:
     rows = [
         ["readings", str(c.n_readings)],
         ["numbers measured", str(fit.observations)],
-        ["parameters in effect", f"{fit.effective_parameters:.1f} of {len(c.fitted)}"],
+        ["effective parameters", f"{fit.effective_parameters:.1f} of {len(c.fitted)}"],
         ["chi-square", f"{fit.chi_square:.5g}"],
-        ["reduced chi-square", f"{c.fit.reduced_chi_square:.3g}"],
+        ["reduced chi-square", f"{fit.reduced_chi_square:.3g}"],
         ["seconds of the last fit", f"{fit.seconds:.2g}"],
     ]
-    frames = ""
-    if c.fit.frames:
-        frames = table("Frames of the runs against the typical one", list(c.fit.frames.COLUMNS), c.fit.frames.rows(), 0)
-    return (
-        "<h2>Numbers</h2>"
-        + table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1)
-        + table("The fit", ["", ""], rows, 1)
-        + frames
-    )
+    tables = [
+        table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1),
+        table("The fit", ["", ""], rows, 1),
+    ]
+    if fit.frames:
+        tables.append(table("Frames of the runs against the typical one", fit.frames.COLUMNS, fit.frames.rows(), 0))
+    return "<h2>Numbers</h2>" + "".join(tables)

@@ -2,7 +2,7 @@
 
 from math import isfinite
 
-from ctcr.calibrate.joint_fit import Calibration
+from ctcr.calibrate.joint_fit import Calibration, Stage
 from ctcr.calibrate.outcome import deviation, number
 from ctcr.model.fields import doubts
 from ctcr.show.output import table
@@ -15,7 +15,7 @@ NEEDED_WIDTH = 108  # of the table of parameters; a narrower terminal wraps its 
 
 
 def show(console, c: Calibration) -> None:
-    """Print a calibration on a rich console."""
+    """Prints a calibration on a rich console."""
     console.print(f"[bold]{c.before.name}[/bold]", highlight=False)
     console.print(headline(c), markup=False)
     console.print(table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c)))
@@ -25,15 +25,12 @@ def show(console, c: Calibration) -> None:
     made.columns[-1].justify = "left"
     console.width = max(console.width, NEEDED_WIDTH)
     console.print(made)
-    for title, lines in (
-        ("Doubts", doubts(c.fitted)),
-        ("What the data do not determine", undetermined(c)),
-        ("To know", c.notices),
-    ):
+    lists = ("Doubts", doubts(c.fitted)), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
+    for title, lines in lists:
         if lines:
             console.print(f"[bold]{title}[/bold]")
-            for line in lines:
-                console.print(f"  • {line}", markup=False)
+        for line in lines:
+            console.print(f"  • {line}", markup=False)
 
 
 def headline(c: Calibration) -> str:
@@ -41,23 +38,22 @@ def headline(c: Calibration) -> str:
     before, after = c.stages[0].rms_mm, c.stages[-1].rms_mm
     text = f"{len(c.fitted)} parameters fitted: the error falls from {mm(before)} to {mm(after)} RMS"
     if c.held_out:
-        seen = f"{c.held_out.kind} that a fit has not seen"
-        text += f", {mm(c.held_out.error.rms_mm)} on {seen}, where noise alone gives {mm(c.held_out.floor.rms_mm)}."
+        error, floor = mm(c.held_out.error.rms_mm), mm(c.held_out.floor.rms_mm)
+        text += f", {error} on held-out {c.held_out.kind}, where a right model would leave {floor}."
     else:
-        text += f". Noise alone gives {mm(c.floor.rms_mm)}."
+        text += f". A right model would leave {mm(c.floor.rms_mm)}."
     return text + f" Reduced chi-square {c.fit.reduced_chi_square:.3g}."
 
 
 def error_rows(c: Calibration) -> list[list[str]]:
-    """The errors by stage, ending at the noise floor."""
+    """The errors by stage, ending at the error to be expected of a right model."""
     rows = [[stage.name, *_sizes(stage), str(c.n_readings)] for stage in c.stages]
     if c.held_out:
         name = f"held out ({c.held_out.kind}, {c.held_out.fits} fits)"
         rows.append([name, *_sizes(c.held_out.error), str(c.held_out.readings)])
-        rows.append(["noise floor there", *_sizes(c.held_out.floor), ""])
-    smooth = c.fit.noise.position_field > 0
-    kind = "noise floor: jitter and smooth error of the tracker" if smooth else "noise floor: jitter alone"
-    return [*rows, [kind, *_sizes(c.floor), ""]]
+        rows.append(["expected there", *_sizes(c.held_out.floor), ""])
+    smooth = " and field" if c.fit.noise.position_field > 0 else ""
+    return [*rows, [f"expected (jitter{smooth})", *_sizes(c.floor), ""]]
 
 
 def parameter_rows(c: Calibration) -> list[list[str]]:
@@ -77,10 +73,10 @@ def parameter_rows(c: Calibration) -> list[list[str]]:
 
 
 def undetermined(c: Calibration) -> list[str]:
-    """Directions, and pairs that go together, in words."""
-    lines = [f"{d.text}: sd {100 * d.ratio:.0f} % of what was known" for d in c.fit.directions]
+    """Undetermined directions and correlated pairs, in words."""
+    lines = [f"{d.text}: sd {100 * d.ratio:.0f} % of the prior's" for d in c.fit.directions]
     lines += [
-        f"{first} and {second} go together (correlation {r:+.2f})"
+        f"{first} and {second} are correlated ({r:+.2f})"
         for first, second, r in c.fit.correlations
         if not any(first in d.text and second in d.text for d in c.fit.directions)
     ]
@@ -91,6 +87,6 @@ def _with_deviation(value: float, sd: float) -> str:
     return f"{number(value, sd)} ± {deviation(sd)}" if isfinite(sd) else number(value)
 
 
-def _sizes(stage) -> list[str]:
+def _sizes(stage: Stage) -> list[str]:
     values = (stage.rms_mm, stage.mean_mm, stage.max_mm, stage.rms_deg)
     return [f"{value:.3f}" if isfinite(value) else "-" for value in values]
