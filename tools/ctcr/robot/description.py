@@ -54,6 +54,11 @@ class Section(BaseModel):
         return value
 
 
+def _si(field: str, factor: float, meaning: str) -> property:
+    """A field in SI units, 0 where it is unknown."""
+    return property(lambda section: factor * (getattr(section, field) or 0.0), doc=meaning)
+
+
 class Tube(Section):
     """One tube: straight from the grasped point, precurved over `curved_length_mm` before the tip.
 
@@ -70,35 +75,12 @@ class Tube(Section):
     curved_length_mm: Annotated[float, Quantity("mm", usual=(1, 1000), least=0)]
     curvature_per_m: Annotated[float, Quantity("1/m", usual=(0.1, 200))]
 
-    @property
-    def length(self) -> float:
-        """Length from the grasped point to the tip [m]."""
-        return 1e-3 * self.length_mm
-
-    @property
-    def curved_length(self) -> float:
-        """Length of the precurved part, which ends at the tip [m]."""
-        return 1e-3 * self.curved_length_mm
-
-    @property
-    def curvature(self) -> float:
-        """Precurvature about the tube's x axis [1/m]."""
-        return self.curvature_per_m
-
-    @property
-    def youngs_modulus(self) -> float:
-        """Young's modulus [Pa]; 0 where the file gives the bending stiffness instead."""
-        return 1e9 * (self.youngs_modulus_GPa or 0.0)
-
-    @property
-    def inner_diameter(self) -> float:
-        """Inner diameter [m]; 0 where unknown."""
-        return 1e-3 * (self.inner_diameter_mm or 0.0)
-
-    @property
-    def outer_diameter(self) -> float:
-        """Outer diameter [m]; 0 where unknown."""
-        return 1e-3 * (self.outer_diameter_mm or 0.0)
+    length = _si("length_mm", 1e-3, "Length from the grasped point to the tip [m].")
+    curved_length = _si("curved_length_mm", 1e-3, "Length of the precurved part, which ends at the tip [m].")
+    curvature = _si("curvature_per_m", 1.0, "Precurvature about the tube's x axis [1/m].")
+    youngs_modulus = _si("youngs_modulus_GPa", 1e9, "Young's modulus [Pa]; 0 where the bending stiffness is given.")
+    inner_diameter = _si("inner_diameter_mm", 1e-3, "Inner diameter [m]; 0 where unknown.")
+    outer_diameter = _si("outer_diameter_mm", 1e-3, "Outer diameter [m]; 0 where unknown.")
 
     @property
     def bending_stiffness(self) -> float:
