@@ -1,4 +1,4 @@
-"""The pictures of the procedures that measure one thing at a time: what was read, what was fitted, what is left."""
+"""The pictures of the procedures that measure one quantity each: readings, fit and residuals."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -34,7 +34,7 @@ class Circle:
         return 1e3 * (self.position - self.centre) @ np.column_stack([first, np.cross(self.normal, first)])
 
     def behind(self) -> Array:
-        """How far the tip's angle differs from a constant offset (K,) [deg]."""
+        """Angle of the tip less a constant offset from its motor (K,) [deg]."""
         x, y = self.in_plane().T
         seen = np.arctan2(y, x)
         off = [np.angle(np.exp(1j * (sign * seen - self.angle))) for sign in (1, -1)]
@@ -43,7 +43,7 @@ class Circle:
 
 
 def circle_of(name: str, position: Array, angle: Array, forward: NDArray[np.bool_], fit, robot) -> Circle:
-    """Of a rotation offset's fit to readings (K, 3) [m], tracker frame, at the tube's angles (K,) [rad]."""
+    """The circle of a fit to readings (K, 3) [m], tracker frame, at the tube's angles (K,) [rad]."""
     if fit.in_base_frame:
         position = (position - robot.tracker.position) @ robot.tracker.rotation
     used = ~np.isin(np.arange(len(angle)), fit.outliers)
@@ -51,7 +51,7 @@ def circle_of(name: str, position: Array, angle: Array, forward: NDArray[np.bool
 
 
 def circles(figure, found: list[Circle]) -> None:
-    """Each tube's readings on its circle, and by how much its tip lags behind its motor."""
+    """The readings of each tube on its circle, and the lag of its tip behind its motor."""
     panels = figure.subplots(len(found), 2, width_ratios=(1, 1.6), squeeze=False)
     turn = np.linspace(0, 2 * np.pi, 200)
     for (left, right), circle in zip(panels, found, strict=True):
@@ -72,17 +72,17 @@ def circles(figure, found: list[Circle]) -> None:
 
 
 def points(figure, found: tuple[Array, Any]) -> None:
-    """What is left at each point of a registration: CAD points (K, 3) [mm], base frame, and the fit."""
-    place, fit = found
+    """The residual at each point of a registration: CAD points (K, 3) [mm], base frame, and the fit."""
+    cad, fit = found
     names, residual = list(fit.names), 1e3 * fit.residuals @ fit.T_ref[:3, :3]
     outlier = np.isin(names, fit.outliers)
     left, right = figure.add_subplot(1, 2, 1, projection="3d"), figure.add_subplot(1, 2, 2)
     size, kept = np.linalg.norm(residual, axis=1), ~outlier
-    scale = LONGEST_ARROW * np.ptp(place, axis=0).max() / max(size[kept].max(), 1e-9)
+    scale = LONGEST_ARROW * np.ptp(cad, axis=0).max() / max(size[kept].max(), 1e-9)
     colours = np.where(outlier, ERROR, OUT)
-    left.scatter(*place.T, c=colours, s=18, depthshade=False)
-    left.quiver(*place[kept].T, *(scale * residual[kept]).T, color=INK, lw=1)
-    for name, at in zip(names, place, strict=True):
+    left.scatter(*cad.T, c=colours, s=18, depthshade=False)
+    left.quiver(*cad[kept].T, *(scale * residual[kept]).T, color=INK, lw=1)
+    for name, at in zip(names, cad, strict=True):
         left.text(*at, f"  {name}", fontsize=8, color=NOISE)
     left.set(aspect="equal", xlabel="x (base), mm", ylabel="y (base), mm", zlabel="z (base), mm")
     left.set_title(f"residuals, {scale:.0f} times as long")
@@ -90,20 +90,20 @@ def points(figure, found: tuple[Array, Any]) -> None:
     right.barh(range(len(names)), size, color=colours, height=0.6)
     right.set_yticks(range(len(names)), names, fontsize=8)
     right.invert_yaxis()
-    right.set(xlabel="distance between CAD and reading, mm", title="what is left (red: left out)")
+    right.set(xlabel="distance between CAD and reading, mm", title="residual (red: excluded)")
     right.grid(axis="y", visible=False)
 
 
 def homes(figure, found: tuple[list[int], Array, Array, Array, Array]) -> None:
-    """Where each tube is at home: grasped point and tip [mm] (N,), their deviations, and the old ones (N, 2) or NaN."""
+    """The tubes at home: grasped points and tips (N,) [mm], standard deviations and old values (N, 2), NaN: none."""
     tubes, grasped, tip, sd, old = found
     axes = figure.subplots()
     axes.axvspan(0, max(5.0, 1.25 * tip.max()), color="#eef2f5", lw=0)
     axes.axvline(0, color=INK, lw=1.5)
     for row in range(len(tubes)):
-        axes.plot([grasped[row], tip[row]], [row, row], color=OUT, lw=5, solid_capstyle="butt")
-        axes.errorbar(grasped[row], row, xerr=2 * sd[row, 0], color=INK, capsize=4, lw=1)
-        axes.errorbar(tip[row], row, xerr=2 * sd[row, 1], color=INK, capsize=4, lw=1)
+        ends = (grasped[row], tip[row])
+        axes.plot(ends, [row, row], color=OUT, lw=5, solid_capstyle="butt")
+        axes.errorbar(ends, [row, row], xerr=2 * sd[row], color=INK, capsize=4, lw=0, elinewidth=1)
         axes.plot(old[row], [row + 0.25] * 2, "|-", color=NOISE, lw=1, ms=9)
         axes.annotate(f"{tip[row]:.1f} mm", (tip[row], row), (7, -3), textcoords="offset points", fontsize=9)
     axes.set_yticks(range(len(tubes)), [f"tube {tube}" for tube in tubes])
@@ -144,7 +144,7 @@ def outline(figure, found: tuple[Array, Array, Array, float, list[int]]) -> None
     used = np.setdiff1d(np.arange(len(clicked)), outliers)
     axes.plot(*clicked[used].T, "o", color=FAINT, ms=6, label="points")
     if outliers:
-        axes.plot(*clicked[outliers].T, "x", color=ERROR, label="left out")
+        axes.plot(*clicked[outliers].T, "x", color=ERROR, label="excluded")
     axes.plot(*np.stack([start, junction]).T, color=NOISE, lw=1.6, label="straight part")
     axes.plot(*arc.T, color=OUT, lw=1.6, label="curved part")
     axes.plot(*junction, "|", color=INK, ms=14)
@@ -155,7 +155,7 @@ def outline(figure, found: tuple[Array, Array, Array, float, list[int]]) -> None
 
 def _arc(start: Array, end: Array, centre: Array, long: int) -> Array:
     """The shorter or longer arc (200, 2) from start to end about a centre."""
-    first, last = (np.arctan2(*(place - centre)[::-1]) for place in (start, end))
+    first, last = (np.arctan2(*(point - centre)[::-1]) for point in (start, end))
     turn = np.angle(np.exp(1j * (last - first)))
     if long:
         turn -= 2 * np.pi * np.sign(turn)

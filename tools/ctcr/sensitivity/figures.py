@@ -12,11 +12,11 @@ def bars(figure: Figure, study: OpenLoop) -> None:
     """Mean, 95 % and largest tip error of each parameter, logarithmic."""
     axes = figure.subplots()
     order = [study.together, *sorted(study.influences, key=lambda one: one.p95)]
-    place = np.arange(len(order))
-    axes.barh(place, [max(one.p95, 1e-4) for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
-    axes.plot([max(one.mean, 1e-4) for one in order], place, "D", color="#1c2733", ms=3.5, label="mean")
-    axes.plot([max(one.maximum, 1e-4) for one in order], place, "|", color="#1c2733", ms=8, label="largest")
-    axes.set_yticks(place, [one.name for one in order])
+    row = np.arange(len(order))
+    axes.barh(row, [max(one.p95, 1e-4) for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
+    axes.plot([max(one.mean, 1e-4) for one in order], row, "D", color="#1c2733", ms=3.5, label="mean")
+    axes.plot([max(one.maximum, 1e-4) for one in order], row, "|", color="#1c2733", ms=8, label="largest")
+    axes.set_yticks(row, [one.name for one in order])
     axes.set(xscale="log", xlabel="tip error, mm")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 2 / len(order)), fontsize=9)  # above the last bar
 
@@ -27,19 +27,12 @@ def curves(figure: Figure, study: ClosedLoop) -> None:
     panels = figure.subplots(-(-len(kinds) // 4), 4, squeeze=False, sharey=True).ravel()
     for panel, kind in zip(panels, kinds, strict=False):
         for curve in (one for one in study.curves if one.varied.kind == kind):
-            change = [curve.varied.change(fraction) for fraction in curve.fraction]
-            panel.plot(
-                change,
-                1e3 * curve.maximum,
-                "o-",
-                ms=3,
-                color=AXES[(curve.varied.tube - 1) % 3],
-                label=f"tube {curve.varied.tube}",
-            )
-        unit = next(one.varied.unit for one in study.curves if one.varied.kind == kind)
+            varied, colour = curve.varied, AXES[(curve.varied.tube - 1) % 3]
+            change = [varied.change(fraction) for fraction in curve.fraction]
+            panel.plot(change, 1e3 * curve.maximum, "o-", ms=3, color=colour, label=f"tube {varied.tube}")
         panel.axhline(0, color=FAINT, lw=1)
         panel.set_title(kind, fontsize=9.5)
-        panel.set(xlabel=unit or "change")
+        panel.set(xlabel=varied.unit or "change")
     for panel in panels[len(kinds) :]:
         panel.set_visible(False)
     panels[0].legend(fontsize=8)

@@ -1,7 +1,7 @@
 """Tip errors of wrong parameters over random configurations: sums, not samples, so memory does not grow with them."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -81,30 +81,11 @@ class OpenLoop:
     seconds: float = field(compare=False)  # of processors
 
 
-@dataclass(frozen=True)
-class Job:
-    """One piece of the study: everything a worker needs."""
-
-    tubes: int
-    nominal: Array
-    varied: Array
-    low: Array
-    high: Array
-    most_force: float
-    seed: int
-    first_block: int
-    blocks: int
-    configurations: int
-    threads: int
-
-
-def work(job: Job) -> dict[str, Any]:
-    """Runs one job."""
-    clock = time.thread_time if job.threads == 1 else time.process_time
-    start = clock()
-    options = {name: value for name, value in vars(job).items() if name not in ("tubes", "nominal")}
-    nominal = _core.SystemValues(parameters=job.nominal, effects=np.empty(0))
-    result = _core.sensitivity(job.tubes, nominal=nominal, **options)
+def work(job: dict[str, Any]) -> dict[str, Any]:
+    """Runs one job, plain data that a worker needs: the arguments of `_core.sensitivity`."""
+    clock = time.thread_time if job["threads"] == 1 else time.process_time
+    start, nominal = clock(), _core.SystemValues(parameters=job["nominal"], effects=np.empty(0))
+    result = _core.sensitivity(**job | {"nominal": nominal})
     names = ("count", "unsolved", "sum", "sum_of_squares", "maximum", "histogram", "evaluations")
     return {name: getattr(result, name) for name in names} | {"seconds": clock() - start}
 
@@ -125,40 +106,32 @@ def study(
     `keep` names a file of progress: an interrupted study with the same options resumes from there. `dask` is the
     address of a scheduler. The result depends neither on `dask` nor on the number of cores.
     """
-    ends = np.array([one.at(fraction) for one in varied for fraction in (-1.0, 1.0)])
+    ends, nominal = np.array([one.at(end) for one in varied for end in (-1.0, 1.0)]), parameters.values(robot)
     low, high = together(robot, varied)
-    jobs = [
-        Job(robot.n_tubes, parameters.values(robot), ends, low, high, most_force, seed, first, blocks, size, 1)
-        for first, blocks, size in _pieces(configurations)
-    ]
-    settings = {
-        "study": "open loop",
-        "nominal": jobs[0].nominal.tolist(),
-        "ends": ends.tolist(),
-        "configurations": configurations,
-        "most_force": most_force,
-        "seed": seed,
-    }
-    kept = ProgressFile(keep, settings)
+    options = {"most_force": most_force, "seed": seed}
+    shared = options | {"nominal": nominal, "varied": ends, "low": low, "high": high, "threads": 1}
+    jobs = [{"tubes": robot.n_tubes, **shared, **piece} for piece in _pieces(configurations)]
+    settings = {"nominal": nominal.tolist(), "ends": ends.tolist(), "configurations": configurations, **options}
+    kept = ProgressFile(keep, {"study": "open loop", **settings})
     state = kept.load()
     totals = Totals.from_state(state) if state else Totals.empty(len(ends) + 1)
     done = totals.jobs
-    advance(sum(job.blocks * job.configurations for job in jobs[:done]))
+    advance(sum(job["blocks"] * job["configurations"] for job in jobs[:done]))
     with workers(dask) as in_order:
         for job, part in zip(jobs[done:], in_order(work, jobs[done:]), strict=True):
             totals.add(part)
             kept.save(totals.as_state())
-            advance(job.blocks * job.configurations)
+            advance(job["blocks"] * job["configurations"])
     return _summary(varied, configurations, totals)
 
 
-def _pieces(configurations: int):
-    """(first block, blocks, configurations a block) of each job; the last block may be smaller."""
+def _pieces(configurations: int) -> Iterator[dict[str, int]]:
+    """The blocks of each job and the configurations of a block; the last block may be smaller."""
     whole, rest = divmod(configurations, BLOCK)
     for first in range(0, whole, CHUNK):
-        yield first, min(CHUNK, whole - first), BLOCK
+        yield {"first_block": first, "blocks": min(CHUNK, whole - first), "configurations": BLOCK}
     if rest:
-        yield whole, 1, rest
+        yield {"first_block": whole, "blocks": 1, "configurations": rest}
 
 
 def _summary(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:

@@ -25,84 +25,68 @@ class Varied:
     low: float  # change at -1, in that unit
     high: float  # at 1
     at: Callable[[float], Array]
-    bounds: Callable[[float], list[tuple[int, float]]]  # places and values of what varies together
+    index: int  # of the parameter
+    ends: tuple[float, float]  # its values at -1 and 1; a turn of the tracker frame counts from that frame [rad]
 
     def change(self, fraction: float) -> float:
-        """The change that a fraction in [-1, 1] of the range stands for, in `unit`."""
+        """The change in `unit` at a fraction in [-1, 1] of the range."""
         return fraction * (self.high if fraction > 0 else -self.low)
 
 
 def all_varied(robot: Robot) -> list[Varied]:
-    """The parameters of a robot: of each tube, then those of the tracker frame T_ref."""
-    names, nominal = parameters.names_of(robot.n_tubes), parameters.values(robot)
-    place = {name: i for i, name in enumerate(names)}
-    found: list[Varied] = []
+    """The parameters of a robot: those of each tube, then those of the tracker frame T_ref."""
+    nominal, found = parameters.values(robot), []
+    index = {name: i for i, name in enumerate(parameters.names_of(robot.n_tubes))}
 
-    def add(kind: str, tube: int | None, unit: str, low: float, high: float, changed: dict[str, Callable]) -> None:
-        """`changed` {name: value at a change}."""
-
-        def values(fraction: float) -> list[tuple[int, float]]:
-            change = fraction * (high if fraction > 0 else -low)
-            return [(place[name], value(change)) for name, value in changed.items()]
+    def add(kind: str, tube: int | None, unit: str, low: float, high: float, name: str, changed: Callable) -> None:
+        """`changed(value, change)`: the new value."""
+        i, label = index[name], f"{kind}, tube {tube}" if tube else kind
 
         def at(fraction: float) -> Array:
             x = nominal.copy()
-            for i, value in values(fraction):
-                x[i] = value
+            x[i] = changed(x[i], fraction * (high if fraction > 0 else -low))
             return x
 
-        label = f"{kind}, tube {tube}" if tube else kind
-        found.append(Varied(label, kind, tube, unit, low, high, at, values))
+        found.append(Varied(label, kind, tube, unit, low, high, at, i, (at(-1)[i], at(1)[i])))
 
-    def shift(name: str, scale: float) -> dict[str, Callable]:
-        return {name: lambda change: nominal[place[name]] + scale * change}
+    def shift(scale: float) -> Callable:
+        return lambda value, change: value + scale * change
 
-    def percent(name: str) -> dict[str, Callable]:
-        return {name: lambda change: nominal[place[name]] * (1 + change / 100)}
+    def percent(value: float, change: float) -> float:
+        return value * (1 + change / 100)
 
     for i, tube in enumerate(robot.tubes, start=1):
-        add("translation offset", i, "mm", -5, 5, shift(f"actuation.home_translation.{i}", 1e-3))
-        add("rotation offset", i, "deg", -5, 5, shift(f"actuation.home_rotation.{i}", pi / 180))
-        add("length", i, "mm", -5, 5, shift(f"tubes.{i}.length", 1e-3))
+        add("translation offset", i, "mm", -5, 5, f"actuation.home_translation.{i}", shift(1e-3))
+        add("rotation offset", i, "deg", -5, 5, f"actuation.home_rotation.{i}", shift(pi / 180))
+        add("length", i, "mm", -5, 5, f"tubes.{i}.length", shift(1e-3))
         if tube.curvature and tube.curved_length:
-            add("curved length", i, "mm", -5, 5, shift(f"tubes.{i}.curved_length", 1e-3))
-            add("precurvature", i, "%", -10, 10, percent(f"tubes.{i}.curvature"))
+            add("curved length", i, "mm", -5, 5, f"tubes.{i}.curved_length", shift(1e-3))
+            add("precurvature", i, "%", -10, 10, f"tubes.{i}.curvature", percent)
         if tube.bending_stiffness_Nm2 is None:
-            add("Young's modulus", i, "GPa", -15, 15, shift(f"tubes.{i}.youngs_modulus", 1e9))
-            inner, outer = tube.inner_diameter, tube.outer_diameter
-            wall = {f"tubes.{i}.inner_diameter": lambda change, d=inner, o=outer: o - (o - d) * (1 + change / 100)}
-            add("wall thickness", i, "%", -15, 15, wall)
+            add("Young's modulus", i, "GPa", -15, 15, f"tubes.{i}.youngs_modulus", shift(1e9))
+
+            def wall(inner: float, change: float, outer: float = tube.outer_diameter) -> float:
+                return outer - percent(outer - inner, change)
+
+            add("wall thickness", i, "%", -15, 15, f"tubes.{i}.inner_diameter", wall)
         else:
-            add("bending stiffness", i, "%", -25, 25, percent(f"tubes.{i}.bending_stiffness"))
+            add("bending stiffness", i, "%", -25, 25, f"tubes.{i}.bending_stiffness", percent)
         nu = tube.poisson_ratio
-        add("Poisson's ratio", i, "", -nu, 0.5 - nu, shift(f"tubes.{i}.poisson_ratio", 1.0))
+        add("Poisson's ratio", i, "", -nu, 0.5 - nu, f"tubes.{i}.poisson_ratio", shift(1.0))
     for axis in "xyz":
-        add(f"tracker position {axis}", None, "mm", -3, 3, shift(f"tracker.position.{axis}", 1e-3))
-    for k, axis in enumerate("xyz"):
-        found.append(_turned(nominal, [place[f"tracker.rotation.{a}"] for a in "xyz"], k, axis))
+        add(f"tracker position {axis}", None, "mm", -3, 3, f"tracker.position.{axis}", shift(1e-3))
+    vector, limit = [index[f"tracker.rotation.{axis}"] for axis in "xyz"], 3 * pi / 180
+    for axis, i, direction in zip("xyz", vector, np.eye(3), strict=True):
+
+        def turned(fraction: float, direction: Array = direction) -> Array:
+            x = nominal.copy()
+            turn = Rotation.from_rotvec(fraction * limit * direction)
+            x[vector] = (turn * Rotation.from_rotvec(nominal[vector])).as_rotvec()
+            return x
+
+        name = f"tracker rotation {axis}"
+        found.append(Varied(name, name, None, "deg", -3, 3, turned, i, (-limit, limit)))
     return found
-
-
-def _turned(nominal: Array, places: list[int], k: int, axis: str) -> Varied:
-    """The tracker frame turned about one of the tracker's axes."""
-    limit = 3 * pi / 180
-
-    def at(fraction: float) -> Array:
-        x = nominal.copy()
-        turn = Rotation.from_rotvec(fraction * limit * np.eye(3)[k])
-        x[places] = (turn * Rotation.from_rotvec(nominal[places])).as_rotvec()
-        return x
-
-    return Varied(
-        f"tracker rotation {axis}",
-        f"tracker rotation {axis}",
-        None,
-        "deg",
-        -3,
-        3,
-        at,
-        lambda fraction: [(places[k], fraction * limit)],
-    )
 
 
 def together(robot: Robot, varied: list[Varied]) -> tuple[Array, Array]:
@@ -113,6 +97,5 @@ def together(robot: Robot, varied: list[Varied]) -> tuple[Array, Array]:
             low[i] = 0.0
     high = low.copy()
     for one in varied:
-        for (i, a), (_, b) in zip(one.bounds(-1), one.bounds(1), strict=True):
-            low[i], high[i] = min(a, b), max(a, b)
+        low[one.index], high[one.index] = min(one.ends), max(one.ends)
     return low, high
