@@ -52,7 +52,8 @@ def rms_mm(robot, readings) -> float:
     return 1e3 * float(np.sqrt(np.mean(np.sum((readings.position - tip) ** 2, axis=1))))
 
 
-def test_the_truth_is_within_its_standard_deviations(calibration):
+def test_truth(calibration):
+    """The truth is within its standard deviations."""
     fitted = {item.name: item for item in calibration.fitted}
     pulls = []
     for kind, name in (
@@ -69,7 +70,8 @@ def test_the_truth_is_within_its_standard_deviations(calibration):
     assert np.max(np.abs(pulls)) < 3.2 and np.mean(np.square(pulls)) < 2
 
 
-def test_held_out_error_comes_near_the_noise_floor(calibration):
+def test_held_out_error(calibration):
+    """Held out error comes near the noise floor."""
     held_out = calibration.held_out
     assert held_out.kind == "runs" and held_out.fits == 4 and held_out.readings == 120
     assert held_out.error.rms_mm < 2 * held_out.floor.rms_mm  # one smooth field error has few degrees of freedom
@@ -79,7 +81,7 @@ def test_held_out_error_comes_near_the_noise_floor(calibration):
     assert calibration.halves.rms_mm < 1.5 * calibration.halves.noise_mm
 
 
-def test_the_robot_file_holds_what_the_fit_found(calibration, readings, tmp_path):
+def test_written_file(calibration, readings, tmp_path):
     """Homes, turned frame and recorded homes together: the file's model has the error that the fit reports."""
     joint_fit.write_robot(calibration, tmp_path / "new.yaml", TABLE)
     written = robot_file.load(tmp_path / "new.yaml")
@@ -90,13 +92,15 @@ def test_the_robot_file_holds_what_the_fit_found(calibration, readings, tmp_path
     assert list(figures) == ["nominal", "frame_alone", "calibrated", "held_out", "noise_floor"]
 
 
-def test_a_calibrated_file_is_a_fixed_point(calibration, readings):
+def test_fixed_point(calibration, readings):
+    """A calibrated file is a fixed point."""
     again = joint_fit.calibrate(calibration.after, readings, FEW, hold_out=0, halves=False)
     assert again.stages[0].rms_mm == pytest.approx(calibration.stages[-1].rms_mm, abs=1e-6)
     assert np.max(np.abs(again.fit.shift)) < 1
 
 
-def test_the_report_is_one_page_that_needs_nothing_else(calibration):
+def test_report(calibration):
+    """The report is one page that needs nothing else."""
     page = report.page(calibration, "a table fitted with a robot")
     shown = page.split("<script>")[0]
     for title in (
@@ -112,7 +116,8 @@ def test_the_report_is_one_page_that_needs_nothing_else(calibration):
     assert len(drawing["data"]) == 4 and drawing["data"][3]["visible"] and not drawing["data"][0]["visible"]
 
 
-def test_json_holds_the_figures_and_standard_output_stays_clean(capsys):
+def test_json(capsys):
+    """Json holds the figures and standard output stays clean."""
     code = cli.run(
         ["calibrate", "fit", str(ROBOT), str(TABLE), "--free", ",".join(FEW), "--hold-out", "3", "--json", "-"]
     )
@@ -137,7 +142,8 @@ def said(calibration) -> str:
     return " ".join([*calibration.notices, *terminal.undetermined(calibration), *fields.doubts(calibration.fitted)])
 
 
-def test_one_run_is_told_and_places_are_held_out_instead(robot, readings):
+def test_one_run(robot, readings):
+    """One run is told and places are held out instead."""
     one = replace(readings, run=np.zeros_like(readings.run))
     found = outcome(robot, one, hold_out=None)
     assert "only one run" in said(found) and found.held_out.kind == "places"
@@ -145,7 +151,8 @@ def test_one_run_is_told_and_places_are_held_out_instead(robot, readings):
         outcome(robot, one, hold_out=1)
 
 
-def test_no_orientation_is_told(robot, readings):
+def test_no_orientation(robot, readings):
+    """No orientation is told."""
     found = outcome(robot, replace(readings, quaternion=None))
     assert "no orientation was measured" in said(found).lower() and np.isnan(found.stages[-1].rms_deg)
     assert "look like outliers" not in said(found)
@@ -165,7 +172,8 @@ def spun(readings, roll):
 
 
 @pytest.mark.parametrize("roll_deg", [-175.0, 57.0])
-def test_an_unknown_roll_is_found_and_written(robot, loose, readings, roll_deg, tmp_path):
+def test_unknown_roll(robot, loose, readings, roll_deg, tmp_path):
+    """An unknown roll is found and written."""
     plain, turned = outcome(robot, readings), spun(readings, np.radians(roll_deg))
     found = outcome(loose, turned)
     (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_roll")
@@ -180,7 +188,8 @@ def test_an_unknown_roll_is_found_and_written(robot, loose, readings, roll_deg, 
     assert again.stages[0].rms_deg == pytest.approx(found.stages[-1].rms_deg, abs=1e-4)
 
 
-def test_a_roll_that_differs_from_reading_to_reading_leaves_positions(loose, readings):
+def test_varying_roll(loose, readings):
+    """A roll that differs from reading to reading leaves positions."""
     rolls = np.random.default_rng(3).uniform(-np.pi, np.pi, len(readings))
     found = outcome(loose, spun(readings, rolls))
     assert "differs from reading to reading" in said(found) and np.isnan(found.stages[-1].rms_deg)
@@ -189,7 +198,8 @@ def test_a_roll_that_differs_from_reading_to_reading_leaves_positions(loose, rea
     assert "roll" not in said(found) and np.isnan(found.stages[-1].rms_deg)
 
 
-def test_constant_joints_leave_most_undetermined(robot, readings):
+def test_constant_joints(robot, readings):
+    """Constant joints leave most undetermined."""
     noise = np.random.default_rng(1).normal(0, 3.5e-5, (30, 3))
     one = some(readings, np.zeros(30, int))
     one = replace(one, t=np.arange(30.0), position=one.position + noise)
@@ -198,7 +208,8 @@ def test_constant_joints_leave_most_undetermined(robot, readings):
     assert sum(item.says_nothing for item in found.fitted) > 10
 
 
-def test_a_frame_further_off_than_the_file_allows_is_told(robot, readings):
+def test_frame_too_far(robot, readings):
+    """A frame further off than the file allows is told."""
     moved = robot.model_copy(deep=True)
     moved.tracker.position_mm = [value + 12.0 for value in robot.tracker.position_mm]
     found = outcome(moved, readings)
@@ -206,7 +217,8 @@ def test_a_frame_further_off_than_the_file_allows_is_told(robot, readings):
     assert "Another tracker frame" not in said(outcome(robot, readings))
 
 
-def test_too_few_rows_are_told(robot, readings):
+def test_few_rows(robot, readings):
+    """Too few rows are told."""
     found = outcome(robot, some(readings, np.arange(2)), ["standard"], hold_out=None)
     assert "for 24 parameters: the prior decides" in said(found) and found.held_out is None
     found = outcome(robot, some(readings, np.arange(5)), ["standard"])
@@ -214,12 +226,14 @@ def test_too_few_rows_are_told(robot, readings):
     assert "numbers were measured" not in said(outcome(robot, some(readings, np.arange(20)), ["standard"]))
 
 
-def test_a_frame_that_is_metres_off_is_refused(robot, readings):
+def test_frame_refused(robot, readings):
+    """A frame that is metres off is refused."""
     with pytest.raises(InputError, match="the measured tips lie [0-9]+ mm from those predicted.*registration"):
         outcome(robot, replace(readings, position=readings.position + [2.0, 0, 0]))
 
 
-def test_effects_that_the_robot_has_take_part_fixed_or_freed(robot, readings, tmp_path):
+def test_effects(robot, readings, tmp_path):
+    """Effects that the robot has take part fixed or freed."""
     beside = robot.model_copy(update={"effects": {"sensor_offset": {"x": 2e-3}}})
     beside._source = robot._source
     seen = effect_model.readings(beside, readings)
@@ -242,12 +256,14 @@ def test_effects_that_the_robot_has_take_part_fixed_or_freed(robot, readings, tm
         outcome(beside, made, ["effects.friction.coefficient.1"])
 
 
-def test_nothing_measured_is_refused(robot, readings):
+def test_nothing_measured(robot, readings):
+    """Nothing measured is refused."""
     with pytest.raises(InputError, match="no position is measured"):
         outcome(robot, replace(readings, position=None, quaternion=None))
 
 
-def test_repeated_rows_count_once(robot, readings):
+def test_repeated_rows(robot, readings):
+    """Repeated rows count once."""
     twice = some(readings, np.r_[0:120, 30:60])
     found, once = outcome(robot, twice), outcome(robot, readings)
     assert "30 rows" in said(found) and "repeat earlier rows exactly" in said(found)
@@ -255,7 +271,8 @@ def test_repeated_rows_count_once(robot, readings):
     np.testing.assert_allclose(found.fit.sd, once.fit.sd, rtol=1e-3)
 
 
-def test_outliers_are_named_and_hardly_move_the_result(robot, readings):
+def test_outliers(robot, readings):
+    """Outliers are named and hardly move the result."""
     rng = np.random.default_rng(5)
     bad = rng.choice(120, 12, replace=False)
     position = readings.position.copy()
@@ -275,19 +292,22 @@ def test_outliers_are_named_and_hardly_move_the_result(robot, readings):
         (["tubes.1.poisson_ratio"], "tubes.1.poisson_ratio: the robot file does not state its uncertainty"),
     ],
 )
-def test_names_that_cannot_be_freed(robot, readings, free, message):
+def test_bad_names(robot, readings, free, message):
+    """Names that cannot be freed."""
     with pytest.raises(InputError, match=message):
         outcome(robot, readings, free)
 
 
-def test_a_prior_of_zero_width_is_refused(readings):
+def test_zero_width(readings):
+    """A prior of zero width is refused."""
     text = re.sub(r"rotation_offset_deg: .*", "rotation_offset_deg: 0.0", ROBOT.read_text())
     with pytest.raises(InputError, match="home_rotation.1: its prior standard deviation is 0, but must be above 0"):
         outcome(robot_file.parse(text.encode()), readings)
 
 
 @pytest.mark.parametrize("option", ["-o", "--json", "--report"])
-def test_refused_input_writes_nothing(tmp_path, capsys, option):
+def test_refused_input(tmp_path, capsys, option):
+    """Refused input writes nothing."""
     lines = [",".join(line.split(",")[:11]) for line in TABLE.read_text().splitlines()]  # nothing is measured
     (tmp_path / "table.csv").write_text("\n".join(lines))
     arguments = ["calibrate", "fit", str(ROBOT), str(tmp_path / "table.csv"), option, str(tmp_path / "out")]
@@ -305,7 +325,8 @@ def moved_runs(readings) -> tuple:
     return replace(readings, position=position, quaternion=quaternion), shift, turn
 
 
-def test_runs_with_frames_of_their_own_are_told_and_fitted(robot, readings):
+def test_run_frames(robot, readings):
+    """Runs with frames of their own are told and fitted."""
     moved, shift, turn = moved_runs(readings)
     plain = outcome(robot, moved)
     assert "The runs do not share one frame" in said(plain)
@@ -320,7 +341,8 @@ def test_runs_with_frames_of_their_own_are_told_and_fitted(robot, readings):
         outcome(robot, moved, ["tracker.frame"], frame_per_run=True)
 
 
-def test_places_hold_every_pass_through_them(readings):
+def test_split_places(readings):
+    """Places hold every pass through them."""
     there = np.r_[0:120, 119:-1:-1]
     both_ways = replace(some(readings, there), run=np.zeros(240, int))
     split = folds.parts_of(both_ways, lever=0.05, parts=4)
@@ -328,13 +350,15 @@ def test_places_hold_every_pass_through_them(readings):
     assert np.bincount(split.part).min() > 30
 
 
-def test_runs_left_out_are_spread(readings):
+def test_split_runs(readings):
+    """Runs left out are spread."""
     for count in range(1, 12):
         split = folds.runs_left_out(readings, count)
         assert len(np.unique(readings.run[split.part == 1])) == count
 
 
-def test_what_the_file_does_not_state_can_be_given(robot, readings):
+def test_given_sd(robot, readings):
+    """What the file does not state can be given."""
     sd = {"tubes.*.poisson_ratio": 0.05, "tubes.1.length": 0.25}
     found = outcome(robot, readings, ["tubes.*.poisson_ratio", "tubes.1.length", *FEW], sd=sd)
     fitted = {item.name: item for item in found.fitted}
@@ -342,7 +366,8 @@ def test_what_the_file_does_not_state_can_be_given(robot, readings):
     assert fitted["tubes.1.length"].prior_sd == pytest.approx(0.25)
 
 
-def test_a_malformed_width_is_one_sentence(capsys):
+def test_malformed_sd(capsys):
+    """A malformed width is one sentence."""
     assert cli.run(["calibrate", "fit", str(ROBOT), str(TABLE), "--sd", "tubes.1.length"]) == 1
     assert "'tubes.1.length' is not NAME=SD" in capsys.readouterr().err
 
@@ -364,7 +389,8 @@ def doubtful(name: str, value: float, shift: float = 0.0, ratio: float = 0.5) ->
         (("tracker.position.x", 0.3), "", ""),
     ],
 )
-def test_doubts_are_flagged_and_told(item, flag, words):
+def test_doubts(item, flag, words):
+    """Doubts are flagged and told."""
     fitted = doubtful(*item)
     assert fitted[0].flag == flag and words in " ".join(fields.doubts(fitted))
     assert bool(words) == bool(fields.doubts(fitted))

@@ -49,7 +49,8 @@ def fit_of(curved_length, offset, random, offset_sd=1e-3):
     return joint.fit_joint(Kinked(curved_length, offset, random), priors, NOISE, np.zeros((21, 3)))
 
 
-def test_a_length_bounded_on_one_side_is_within_its_deviation_as_often_as_that_says():
+def test_one_sided_coverage():
+    """A length bounded on one side is within its deviation as often as that says."""
     random = np.random.default_rng(4)
     truths = random.normal([0.0493, 0.0], [2.5e-3, 1e-3], (300, 2))
     plain, honest = np.empty((2, 300, 2))
@@ -63,7 +64,8 @@ def test_a_length_bounded_on_one_side_is_within_its_deviation_as_often_as_that_s
     np.testing.assert_allclose(honest[:, 1], plain[:, 1], rtol=1e-12)
 
 
-def test_a_length_bounded_on_both_sides_is_left_alone_and_an_open_side_is_told():
+def test_one_sided_told():
+    """A length bounded on both sides is left alone and an open side is told."""
     random = np.random.default_rng(5)
     inside = fit_of(0.042, 0.0, random)
     assert one_sided.widened(inside) is inside
@@ -81,7 +83,8 @@ def test_a_length_bounded_on_both_sides_is_left_alone_and_an_open_side_is_told()
     assert shown > 5
 
 
-def test_a_value_without_prior_has_no_share_of_one_left():
+def test_one_sided_no_prior():
+    """A value without prior has no share of one left."""
     random, told = np.random.default_rng(5), 0
     for _ in range(40):
         fit = one_sided.widened(fit_of(0.052, 0.0, random, offset_sd=np.inf))
@@ -90,7 +93,7 @@ def test_a_value_without_prior_has_no_share_of_one_left():
     assert told > 5
 
 
-def test_a_curve_that_the_file_has_behind_the_plate_is_found_where_the_readings_show_it():
+def test_kink_restart():
     """From the flat side no slope leads to the truth; a truth on that side stays there."""
     random = np.random.default_rng(6)
     for truth in random.uniform(0.046, 0.054, 40):
@@ -103,7 +106,7 @@ def test_a_curve_that_the_file_has_behind_the_plate_is_found_where_the_readings_
             return joint.fit_joint(model, priors, NOISE, np.zeros((21, 3)), start=start, **frozen)
 
         stuck = fitted_from(np.array([0.0515, 0.0]))
-        found = one_sided.crossed(stuck, fitted_from)
+        found = one_sided.restarted(stuck, fitted_from)
         assert stuck.values[0] == pytest.approx(0.0515) and stuck.ratio[0] > 0.99
         if truth < 0.047:  # shows in enough readings not to look like outliers
             assert abs(found.values[0] - truth) < 4 * found.sd[0] < 1e-3
@@ -112,7 +115,7 @@ def test_a_curve_that_the_file_has_behind_the_plate_is_found_where_the_readings_
 
 
 @pytest.mark.parametrize(("modulus", "more"), [(1.0, False), (0.1, True)])
-def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
+def test_integration_steps(modulus, more):
     """Softer tubes under a weight bend more, and take more steps; readings of a coarser tracker fewer."""
     robot = robot_file.load(DATA / "robot.yaml")
     for tube in robot.tubes:
@@ -136,7 +139,8 @@ def test_as_many_integration_steps_as_the_readings_call_for(modulus, more):
 
 
 @pytest.mark.slow
-def test_true_values_are_within_two_deviations_on_random_robots_of_the_oracle():
+def test_oracle_coverage():
+    """True values are within two deviations on random robots of the oracle."""
     import calibration_study as study
 
     answers = study.study(200)

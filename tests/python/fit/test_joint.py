@@ -102,7 +102,8 @@ def _taken(tips, rows):
     return {name: getattr(tips, name)[rows] for name in ("position", "quaternion", "status", "stability")}
 
 
-def test_names_are_expanded_in_the_order_of_the_library():
+def test_expand():
+    """Names are expanded in the order of the library."""
     assert parameters.expand("tubes.*.length", robot()) == ["tubes.1.length", "tubes.2.length"]
     assert parameters.expand(["tracker.frame", "tracker.position.x"], robot()) == [
         f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"
@@ -111,7 +112,8 @@ def test_names_are_expanded_in_the_order_of_the_library():
     assert parameters.expand("tubes.1.*,gravity.x", robot())[-1] == "gravity.x"
 
 
-def test_standard_leaves_out_what_does_not_exist():
+def test_standard():
+    """Standard leaves out what does not exist."""
     bench = robot()
     bench.tubes[1].curvature_per_m = 0.0
     bench.tubes[0].bending_stiffness_Nm2 = 0.01
@@ -123,12 +125,14 @@ def test_standard_leaves_out_what_does_not_exist():
 @pytest.mark.parametrize(
     ("name", "hint"), [("tubes.1.lenght", "tubes.1.length"), ("standart", "standard"), ("zzz", "names are")]
 )
-def test_an_unknown_name_is_refused_with_the_nearest(name, hint):
+def test_unknown_name(name, hint):
+    """An unknown name is refused with the nearest."""
     with pytest.raises(InputError, match=hint):
         parameters.expand(name, robot())
 
 
-def test_priors_come_from_the_file_or_from_the_caller():
+def test_priors():
+    """Priors come from the file or from the caller."""
     names = ["tubes.1.youngs_modulus", "tubes.1.curvature", "actuation.home_rotation.2", "tracker.rotation.x"]
     mean, sd, _, _ = parameters.priors(robot(), names)
     np.testing.assert_allclose(mean, [58e9, 10, np.deg2rad(10), 0])
@@ -141,7 +145,8 @@ def test_priors_come_from_the_file_or_from_the_caller():
         parameters.priors(robot(length_mm=0.0), ["tubes.1.length"])
 
 
-def test_values_go_into_the_robot_and_come_back():
+def test_values_round_trip():
+    """Values go into the robot and come back."""
     bench = robot()
     names = [name for name in parameters.names_of(2) if not name.startswith("tracker.rotation")]
     values = parameters.values(bench)[[parameters.names_of(2).index(name) for name in names]]
@@ -154,7 +159,8 @@ def test_values_go_into_the_robot_and_come_back():
     assert bench.tubes[0].length_mm == 400.0
 
 
-def test_a_fit_finds_the_robot_that_was_measured():
+def test_truth_recovered():
+    """A fit finds the robot that was measured."""
     bench = robot()
     names = ["tubes.1.curvature", "actuation.home_rotation.2", "tracker.position.x", "tracker.rotation.y"]
     truth = parameters.applied(bench, names, [10.4, np.deg2rad(11.0), -0.0475, 0.004])
@@ -174,7 +180,8 @@ def test_a_fit_finds_the_robot_that_was_measured():
     np.testing.assert_allclose(again.nominal_residual, fit.residual, atol=1e-7)
 
 
-def test_whitened_columns_are_those_of_the_fit():
+def test_whitening():
+    """Whitened columns are those of the fit."""
     bench = robot()
     fit = joint.fit(bench, table(bench), ["tubes.*.length", "tracker.frame"])
     residual, jacobian = fit.whitened()
@@ -185,7 +192,7 @@ def test_whitened_columns_are_those_of_the_fit():
     # They take rows that were fitted alone; all that is said of every row is said after them, too.
     some = joint.fit(bench, table(bench), "tracker.frame", rows=table(bench).run < 2)
     residual, jacobian = some.whitened()
-    slope = some.slope_where_used("tracker.position.x")
+    slope = some.derivative_where_used("tracker.position.x")
     assert np.isnan(some._of_used[0].reshape(-1, 6)[~some.used]).all() and np.isfinite(some.residual).all()
     np.testing.assert_allclose(some.whiten(some.residual)[:, 0], residual, atol=1e-9)
     column = some.names.index("tracker.position.x")
@@ -195,14 +202,16 @@ def test_whitened_columns_are_those_of_the_fit():
     assert not slope[~some.used].any() and every[~some.used].any()
 
 
-def test_the_gauge_of_a_robot_is_named():
+def test_gauge_named():
+    """The gauge of a robot is named."""
     bench = robot()
     fit = joint.fit(bench, table(bench), "standard", starts=1)
     assert any(d.text.startswith("common rotation of all tubes = yaw") for d in fit.directions)
     assert any(d.text.startswith("translation offset of tube 2 against its length") for d in fit.directions)
 
 
-def test_a_model_error_is_admitted_and_told():
+def test_model_error():
+    """A model error is admitted and told."""
     bench = robot()
     readings = table(bench)
     bent = replace(readings, position=readings.position + 2e-3 * np.sin(40 * readings.alpha[:, :1]))
@@ -214,7 +223,8 @@ def test_a_model_error_is_admitted_and_told():
     assert same.log_evidence == pytest.approx(fit.log_evidence, abs=0.01)
 
 
-def test_outliers_count_for_little():
+def test_outliers():
+    """Outliers count for little."""
     bench = robot()
     readings = table(bench)
     clean = joint.fit(bench, readings, "tracker.frame", noise=NOISE)
@@ -224,7 +234,7 @@ def test_outliers_count_for_little():
     assert (np.abs(fit.values - clean.values) < clean.sd).all()
 
 
-def test_joints_that_a_table_holds_stay_possible():
+def test_admissible_joints():
     """Tips that are recorded flush, grasped points at the plate, tubes curved over all their length."""
     bench = robot()
     bench.tubes[1].curved_length_mm = 300.0
@@ -265,7 +275,8 @@ def test_joints_that_a_table_holds_stay_possible():
     assert after.tubes[1].curved_length <= after.tubes[1].length + 1e-9
 
 
-def test_missing_and_unsolved_rows_are_left_out():
+def test_missing_rows():
+    """Missing and unsolved rows are left out."""
     bench = robot()
     readings = table(bench)
     readings.position[3] = np.nan
@@ -279,7 +290,8 @@ def test_missing_and_unsolved_rows_are_left_out():
     assert only_positions.observations == 3 * 78 and np.isnan(only_positions.rms_deg())
 
 
-def test_doubtful_tables_are_commented():
+def test_doubtful_tables():
+    """Doubtful tables are commented."""
     bench = robot()
     readings = table(bench, rows=5)
     one = replace(readings, run=np.zeros(5, int), beta=readings.beta[[0] * 5], alpha=readings.alpha[[0] * 5])
@@ -294,7 +306,8 @@ def test_doubtful_tables_are_commented():
         joint.fit(bench, readings, "standard")
 
 
-def test_any_model_can_be_fitted():
+def test_any_model():
+    """Any model can be fitted."""
     slope = np.random.default_rng(1).standard_normal((60, 2))
     measured, zero = slope @ [1.0, -0.5], np.zeros(2)
     model = LinearModel(measured, -slope, zero, zero)
@@ -315,7 +328,7 @@ def _with_field(readings, noise, random):
 
 
 @pytest.mark.slow
-def test_truth_and_unseen_readings_lie_where_the_fits_say():
+def test_coverage():
     """A long study over 200 robots."""
     nominal = robot()
     names = parameters.expand("standard", nominal)
@@ -354,7 +367,7 @@ def _values(truth, nominal, names):
     return values
 
 
-def test_many_rows_are_fitted_as_few_are(monkeypatch):
+def test_many_rows(monkeypatch):
     """Where the starts are compared on a part of the rows, the fit of all of them is the same."""
     nominal = robot()
     readings = table(nominal, rows=200)
@@ -365,7 +378,8 @@ def test_many_rows_are_fitted_as_few_are(monkeypatch):
     np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)
 
 
-def test_a_frame_far_off_is_found_first():
+def test_frame_first():
+    """A frame far off is found first."""
     bench = robot()
     readings = table(bench, rows=40)
     moved = bench.model_copy(deep=True)

@@ -23,7 +23,8 @@ def slope(plus, minus, width: float) -> np.ndarray:
 
 @pytest.mark.parametrize(("n_tubes", "sensor"), [(1, 1), (2, 1), (2, 2), (3, 1), (3, 2), (3, 3), (4, 1), (4, 3)])
 @pytest.mark.parametrize("loaded", [False, True])
-def test_derivatives_are_those_of_the_prediction(n_tubes, sensor, loaded):
+def test_by_joints(n_tubes, sensor, loaded):
+    """Derivatives are those of the prediction."""
     robot = make_robot(n_tubes, gravity=[0.0, 0.0, -9.81] if loaded else None, sensor=sensor)
     model = Model(robot, steps=8)  # fine: with and without load the equations are integrated differently
     beta, alpha = random_joints(robot, 20)
@@ -46,7 +47,8 @@ def test_derivatives_are_those_of_the_prediction(n_tubes, sensor, loaded):
 
 @pytest.mark.parametrize("sensor", [1, 3])
 @pytest.mark.parametrize("loaded", [False, True])
-def test_derivatives_by_all_parameters_are_those_of_the_prediction(sensor, loaded):
+def test_by_all_parameters(sensor, loaded):
+    """Derivatives by all parameters are those of the prediction."""
     robot = make_robot(3, gravity=[1.0, -2.0, -9.0] if loaded else None, sensor=sensor)
     robot.actuation = Actuation.model_validate(
         {
@@ -89,7 +91,8 @@ def _transmission(robot: Robot, kind: str) -> tuple[float, np.ndarray]:
     return ratio, np.array(home)
 
 
-def test_compliance_to_forces_is_symmetric_without_load():
+def test_compliance_symmetric():
+    """Compliance to forces is symmetric without load."""
     robot = make_robot(3)
     answer = Model(robot, steps=20).predict(*random_joints(robot, 50), derivatives=True)
     np.testing.assert_allclose(answer.compliance, answer.compliance.transpose(0, 2, 1), atol=1e-5)

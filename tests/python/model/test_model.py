@@ -15,7 +15,8 @@ def turn_about_z(angle: float) -> np.ndarray:
     return quaternion_from_rotation_vector([0.0, 0.0, angle])
 
 
-def test_one_tube_is_straight_then_an_arc():
+def test_one_tube():
+    """One tube is straight then an arc."""
     robot = make_robot(1)
     tube = robot.tubes[0]
     beta, alpha = random_joints(robot, 200)
@@ -37,7 +38,8 @@ def test_one_tube_is_straight_then_an_arc():
 
 
 @pytest.mark.parametrize("n_tubes", [1, 2, 3, 4])
-def test_turning_everything_turns_the_answer(n_tubes):
+def test_turned(n_tubes):
+    """Turning everything turns the answer."""
     gravity = np.array([3.0, -2.0, -9.0])
     robot = make_robot(n_tubes, gravity=gravity.tolist())
     beta, alpha = random_joints(robot, 50)
@@ -51,7 +53,8 @@ def test_turning_everything_turns_the_answer(n_tubes):
     assert angle_between(after.quaternion, product(turn_about_z(0.7), before.quaternion)).max() < 1e-8
 
 
-def test_tubes_share_the_tip_where_they_are_flush():
+def test_flush_tips():
+    """Tubes share the tip where they are flush."""
     lengths = [450.0, 300.0]
     beta, alpha = np.array([[-0.35, -0.2]]), np.array([[0.4, -1.0]])
     on_first, on_second = (
@@ -63,7 +66,8 @@ def test_tubes_share_the_tip_where_they_are_flush():
     assert np.linalg.norm(first[:, 0] - second[:, 0]) > 0.1  # but each keeps its own angle
 
 
-def test_a_straight_inner_tube_goes_on_along_the_tangent():
+def test_straight_inner_tube():
+    """A straight inner tube goes on along the tangent."""
     shapes = dict(curvature_per_m=[0.0, 6.0])
     beta, alpha = np.array([[-0.20, -0.1]]), np.array([[0.4, -1.0]])
     inner = Model(make_robot(2, **shapes)).predict(beta, alpha)
@@ -73,7 +77,8 @@ def test_a_straight_inner_tube_goes_on_along_the_tangent():
     np.testing.assert_allclose(inner.position[0], outer.position[0] + beyond * tangent, atol=1e-12)
 
 
-def test_stiffness_may_be_given_directly():
+def test_direct_stiffness():
+    """Stiffness may be given directly."""
     robot = make_robot(3)
     stiffness = [tube.bending_stiffness for tube in robot.tubes]
     direct = make_robot(3, bending_stiffness_Nm2=stiffness, youngs_modulus_GPa=[None] * 3)
@@ -82,14 +87,16 @@ def test_stiffness_may_be_given_directly():
     np.testing.assert_allclose(Model(direct).predict(*joints, force).position, expected.position, atol=1e-12)
 
 
-def test_unloaded_only_ratios_of_stiffness_matter():
+def test_stiffness_ratios():
+    """Unloaded only ratios of stiffness matter."""
     robot, stiff = make_robot(3), make_robot(3, youngs_modulus_GPa=[580.0] * 3)
     joints = random_joints(robot, 20)
     expected = Model(robot).predict(*joints)
     np.testing.assert_allclose(Model(stiff).predict(*joints).position, expected.position, atol=1e-9)
 
 
-def test_finer_steps_converge():
+def test_finer_steps():
+    """Finer steps converge."""
     robot = make_robot(3)
     joints, force = random_joints(robot, 100), random_force(100)
     coarse, fine, finest = (Model(robot, steps=steps).predict(*joints, force).position for steps in (1, 8, 32))
@@ -97,7 +104,8 @@ def test_finer_steps_converge():
 
 
 @pytest.mark.parametrize("derivatives", [False, True])
-def test_answers_do_not_depend_on_the_number_of_threads(derivatives):
+def test_threads(derivatives):
+    """Answers do not depend on the number of threads."""
     robot = make_robot(3)
     beta, alpha = random_joints(robot, 500)
     alpha[:250] = alpha[0] + np.linspace(0, 2, 250)[:, None]  # a path, solved from row to row
@@ -110,7 +118,8 @@ def test_answers_do_not_depend_on_the_number_of_threads(derivatives):
             np.testing.assert_array_equal(getattr(answer, name), value, err_msg=name)
 
 
-def test_bad_rows_are_told_and_do_not_disturb_the_others():
+def test_bad_rows():
+    """Bad rows are told and do not disturb the others."""
     robot = make_robot(3)
     beta, alpha = random_joints(robot, 6)
     force = np.zeros((6, 3))
@@ -129,14 +138,16 @@ def test_bad_rows_are_told_and_do_not_disturb_the_others():
         np.testing.assert_allclose(value[[0, 5]], getattr(good, name)[[0, 5]], atol=1e-9, err_msg=name)
 
 
-def test_quaternions_are_unit_with_w_first():
+def test_quaternions():
+    """Quaternions are unit with w first."""
     robot = make_robot(3)
     quaternion = Model(robot).predict(*random_joints(robot, 500)).quaternion
     np.testing.assert_allclose(np.linalg.norm(quaternion, axis=1), 1, atol=1e-12)
     assert (quaternion[:, 0] >= 0).all()
 
 
-def test_arrays_of_any_kind_are_converted():
+def test_conversion():
+    """Arrays of any kind are converted."""
     robot = make_robot(2)
     model = Model(robot)
     beta, alpha = random_joints(robot, 8)
@@ -154,7 +165,8 @@ def test_arrays_of_any_kind_are_converted():
     np.testing.assert_allclose(single.position, expected.position, atol=1e-6)
 
 
-def test_one_load_serves_all_rows():
+def test_one_load():
+    """One load serves all rows."""
     robot = make_robot(2)
     joints = random_joints(robot, 5)
     one = Model(robot).predict(*joints, [0.01, 0.02, 0.0], [0.0, 1e-3, 0.0])
@@ -162,7 +174,8 @@ def test_one_load_serves_all_rows():
     np.testing.assert_array_equal(one.position, many.position)
 
 
-def test_no_rows_give_no_rows():
+def test_no_rows():
+    """No rows give no rows."""
     answer = Model(make_robot(3)).predict(np.empty((0, 3)), np.empty((0, 3)), derivatives=True)
     assert answer.position.shape == (0, 3) and answer.jacobian.shape == (0, 6, 6) and len(answer.status) == 0
 
@@ -179,19 +192,22 @@ def test_no_rows_give_no_rows():
         dict(beta=[["a", "b", "c"]] * 4),
     ],
 )
-def test_shapes_that_do_not_fit_are_refused(arguments):
+def test_bad_shapes(arguments):
+    """Shapes that do not fit are refused."""
     good = dict(beta=np.full((4, 3), -0.1), alpha=np.zeros((4, 3)))
     with pytest.raises(ValueError):
         Model(make_robot(3)).predict(**good | arguments)
 
 
-def test_steps_below_one_are_refused():
+def test_bad_steps():
+    """Steps below one are refused."""
     robot = make_robot(1)
     with pytest.raises(ValueError, match="steps"):
         Model(robot, steps=0).predict(*random_joints(robot, 1))
 
 
-def test_the_core_takes_only_what_needs_no_conversion():
+def test_core_arrays():
+    """The core takes only what needs no conversion."""
     parameters = make_robot(1).core_parameters()
     with pytest.raises(TypeError):
         _core.Model(**parameters | {"length": parameters["length"].astype(np.float32)})
@@ -201,7 +217,8 @@ def test_the_core_takes_only_what_needs_no_conversion():
         _core.Model(**{name: np.zeros(5 if name != "gravity" else 3) for name in parameters})
 
 
-def test_memory_is_that_of_the_answers():
+def test_memory():
+    """Memory is that of the answers."""
     robot = make_robot(3)
     beta, alpha = random_joints(robot, 2000)
     model = Model(robot)
@@ -212,7 +229,8 @@ def test_memory_is_that_of_the_answers():
     assert peak < 1.05 * sum(value.nbytes for value in vars(answer).values() if value is not None)
 
 
-def test_other_threads_run_meanwhile():
+def test_parallel_threads():
+    """Other threads run meanwhile."""
     robot = make_robot(3)
     joints = random_joints(robot, 20_000)
     started, done = threading.Event(), threading.Event()
@@ -234,7 +252,8 @@ def test_other_threads_run_meanwhile():
 
 @pytest.mark.parametrize("n_tubes", [1, 2, 3, 4])
 @pytest.mark.parametrize("loaded", [False, True])
-def test_the_shape_runs_from_the_plate_to_the_tip(n_tubes, loaded):
+def test_shape_ends(n_tubes, loaded):
+    """The shape runs from the plate to the tip."""
     robot = make_robot(n_tubes, gravity=[2.0, 0.0, -9.0] if loaded else None)
     fine = Model(robot, steps=32)
     beta, alpha = random_joints(robot, 10)
@@ -259,7 +278,8 @@ def test_the_shape_runs_from_the_plate_to_the_tip(n_tubes, loaded):
             np.testing.assert_allclose(np.sin((at_base - alpha[row, tube]) / 2), 0, atol=1e-7)
 
 
-def test_the_shape_satisfies_statics():
+def test_shape_statics():
+    """The shape satisfies statics."""
     robot = make_robot(3)
     beta, alpha = random_joints(robot, 1)
     force, moment = np.array([0.03, -0.02, 0.01]), np.array([1e-3, 2e-3, -1e-3])
@@ -278,7 +298,8 @@ def test_the_shape_satisfies_statics():
     np.testing.assert_allclose(tangent, (axes[1:] + axes[:-1]) / 2, atol=1e-5)
 
 
-def test_the_shape_of_a_row_without_solution_is_refused():
+def test_shape_unsolved():
+    """The shape of a row without solution is refused."""
     model = Model(make_robot(2))
     with pytest.raises(ValueError, match="joints out of order"):
         model.shape([-0.1, -0.2], [0, 0])

@@ -115,7 +115,7 @@ class Engine:
             return self.fit_like(like, added, start=from_there, fixed=fixed, near=True, tolerance=settings.COARSE)
 
         full = self.fit(added, start=start, fixed=fixed, near=bool(start))
-        full = one_sided.crossed(full, again)
+        full = one_sided.restarted(full, again)
         noise = self.likeliest_noise(full)
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
         if noise is full.noise:

@@ -123,7 +123,7 @@ def segment_lags(engine: Engine, fit: Fit) -> SegmentLags | None:
     (delay,) = delays
     plain, segment = engine.linear(fit), segments(engine.measurements)
     each = np.arange(segment.max() + 1)
-    columns, derivative = np.empty((len(plain.residual), len(each))), fit.slope_where_used(fit.names[delay])
+    columns, derivative = np.empty((len(plain.residual), len(each))), fit.derivative_where_used(fit.names[delay])
     for some in np.array_split(each, max(1, len(each) // settings.SEGMENTS_AT_ONCE)):
         columns[:, some] = fit.whiten(derivative[:, :, None] * (segment[:, None] == some)[:, None, :])
     middle = np.array([time[segment == k].mean() for k in each])

@@ -72,7 +72,7 @@ def fit(
         return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **frozen)
 
     start = _with_frame(model(), priors, noise, positions, rows, **given)
-    fitted = one_sided.widened(one_sided.crossed(fit_from(start, starts=starts), fit_from))
+    fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
 

@@ -45,7 +45,7 @@ def widened(fit: Fit) -> Fit:
     return replace(fit, covariance=covariance, sd=sd, ratio=ratio, warnings=[*fit.warnings, *warnings])
 
 
-def crossed(fit: Fit, refit: Callable[[Array, Fit | None], Fit]) -> Fit:
+def restarted(fit: Fit, refit: Callable[[Array, Fit | None], Fit]) -> Fit:
     """The fit, or the better one beyond a kink: restarted with a curve shorter by its prior sd, so that it may show.
 
     refit(start (n,), like): from there, at the weights and inflation of the fit `like`; None: as that fit was made.

@@ -211,10 +211,10 @@ class Fit:
         both = self.whiten(np.column_stack([residual, jacobian]).reshape(len(self.weights), 6, -1))
         return both[:, 0], both[:, 1:]
 
-    def slope_where_used(self, name: str) -> Array:
+    def derivative_where_used(self, name: str) -> Array:
         """Derivative (M, 6) of `residual` by one parameter in the rows that were fitted; 0 in others."""
-        slope = np.nan_to_num(self._of_used[1][:, self.names.index(name)].reshape(-1, 6))
-        return np.where(self.used[:, None], slope, 0.0)
+        derivative = np.nan_to_num(self._of_used[1][:, self.names.index(name)].reshape(-1, 6))
+        return np.where(self.used[:, None], derivative, 0.0)
 
     @cached_property
     def _fitted_numbers(self) -> NDArray[np.int64]:

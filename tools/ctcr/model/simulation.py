@@ -88,9 +88,9 @@ class ReadingNoise:
         if self._realistic:
             if not self._fields:
                 self._fields = tuple(_field(noise.correlation_length, rng) for _ in range(2))
-            places = np.nan_to_num(position)
-            shift += noise.position_field * self._fields[0](places)
-            turn += noise.rotation_field * self._fields[1](places)
+            positions = np.nan_to_num(position)
+            shift += noise.position_field * self._fields[0](positions)
+            turn += noise.rotation_field * self._fields[1](positions)
             off = rng.random(len(position)) < OUTLIERS
             direction = rng.standard_normal(shape)
             direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -101,11 +101,11 @@ class ReadingNoise:
 
 
 def _field(length: float, rng: np.random.Generator) -> Field:
-    """Three smooth random functions of places (M, 3), variance 1, correlation exp(-d^2 / (2 length^2))."""
+    """Three smooth random functions of positions (M, 3), variance 1, correlation exp(-d^2 / (2 length^2))."""
     waves = [(rng.standard_normal((3, WAVES)) / length, rng.uniform(0, 2 * np.pi, WAVES)) for _ in range(3)]
 
-    def value(places: Array) -> Array:
-        columns = [np.sqrt(2 / WAVES) * np.cos(places @ wave + phase).sum(axis=1) for wave, phase in waves]
+    def value(positions: Array) -> Array:
+        columns = [np.sqrt(2 / WAVES) * np.cos(positions @ wave + phase).sum(axis=1) for wave, phase in waves]
         return np.stack(columns, axis=1)
 
     return value
