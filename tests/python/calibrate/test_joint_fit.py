@@ -71,7 +71,7 @@ def test_truth(calibration):
 
 
 def test_held_out_error(calibration):
-    """Held out error comes near the noise floor."""
+    """The held-out error is near the expected error of a right model."""
     held_out = calibration.held_out
     assert held_out.kind == "runs" and held_out.fits == 4 and held_out.readings == 120
     assert held_out.error.rms_mm < 2 * held_out.floor.rms_mm  # one smooth field error has few degrees of freedom
@@ -117,7 +117,7 @@ def test_report(calibration):
 
 
 def test_json(capsys):
-    """Json holds the figures and standard output stays clean."""
+    """JSON holds the figures; standard output holds nothing else."""
     code = cli.run(
         ["calibrate", "fit", str(ROBOT), str(TABLE), "--free", ",".join(FEW), "--hold-out", "3", "--json", "-"]
     )
@@ -143,7 +143,7 @@ def said(calibration) -> str:
 
 
 def test_one_run(robot, readings):
-    """One run is told and places are held out instead."""
+    """With one run a warning says so, and regions of joint space are held out instead."""
     one = replace(readings, run=np.zeros_like(readings.run))
     found = outcome(robot, one, hold_out=None)
     assert "only one run" in said(found) and found.held_out.kind == "places"
@@ -152,7 +152,7 @@ def test_one_run(robot, readings):
 
 
 def test_no_orientation(robot, readings):
-    """No orientation is told."""
+    """A table without orientations gets a warning."""
     found = outcome(robot, replace(readings, quaternion=None))
     assert "no orientation was measured" in said(found).lower() and np.isnan(found.stages[-1].rms_deg)
     assert "look like outliers" not in said(found)
@@ -173,7 +173,7 @@ def spun(readings, roll):
 
 @pytest.mark.parametrize("roll_deg", [-175.0, 57.0])
 def test_unknown_roll(robot, loose, readings, roll_deg, tmp_path):
-    """An unknown roll is found and written."""
+    """The fit finds an unknown sensor roll and writes it to the robot file."""
     plain, turned = outcome(robot, readings), spun(readings, np.radians(roll_deg))
     found = outcome(loose, turned)
     (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_roll")
@@ -189,7 +189,7 @@ def test_unknown_roll(robot, loose, readings, roll_deg, tmp_path):
 
 
 def test_varying_roll(loose, readings):
-    """A roll that differs from reading to reading leaves positions."""
+    """Where the roll differs from reading to reading, positions alone are fitted."""
     rolls = np.random.default_rng(3).uniform(-np.pi, np.pi, len(readings))
     found = outcome(loose, spun(readings, rolls))
     assert "differs from reading to reading" in said(found) and np.isnan(found.stages[-1].rms_deg)
@@ -209,7 +209,7 @@ def test_constant_joints(robot, readings):
 
 
 def test_frame_too_far(robot, readings):
-    """A frame further off than the file allows is told."""
+    """A notice says where another frame, further off than the prior allows, explains the error."""
     moved = robot.model_copy(deep=True)
     moved.tracker.position_mm = [value + 12.0 for value in robot.tracker.position_mm]
     found = outcome(moved, readings)
@@ -218,7 +218,7 @@ def test_frame_too_far(robot, readings):
 
 
 def test_few_rows(robot, readings):
-    """Too few rows are told."""
+    """Warnings say where the prior decides because few numbers were measured."""
     found = outcome(robot, some(readings, np.arange(2)), ["standard"], hold_out=None)
     assert "for 24 parameters: the prior decides" in said(found) and found.held_out is None
     found = outcome(robot, some(readings, np.arange(5)), ["standard"])
@@ -233,7 +233,7 @@ def test_frame_refused(robot, readings):
 
 
 def test_effects(robot, readings, tmp_path):
-    """Effects that the robot has take part fixed or freed."""
+    """Effects of the robot file act in the fit, with fixed or fitted values."""
     beside = robot.model_copy(update={"effects": {"sensor_offset": {"x": 2e-3}}})
     beside._source = robot._source
     seen = effect_model.readings(beside, readings)
@@ -293,7 +293,7 @@ def test_outliers(robot, readings):
     ],
 )
 def test_bad_names(robot, readings, free, message):
-    """Names that cannot be freed."""
+    """Names that do not exist, or lack a prior, are refused."""
     with pytest.raises(InputError, match=message):
         outcome(robot, readings, free)
 
@@ -326,7 +326,7 @@ def moved_runs(readings) -> tuple:
 
 
 def test_run_frames(robot, readings):
-    """Runs with frames of their own are told and fitted."""
+    """Runs that do not share a frame are detected, and fitted with a frame for each."""
     moved, shift, turn = moved_runs(readings)
     plain = outcome(robot, moved)
     assert "The runs do not share one frame" in said(plain)
@@ -342,7 +342,7 @@ def test_run_frames(robot, readings):
 
 
 def test_split_places(readings):
-    """Places hold every pass through them."""
+    """A region of joint space holds every pass through it."""
     there = np.r_[0:120, 119:-1:-1]
     both_ways = replace(some(readings, there), run=np.zeros(240, int))
     split = folds.parts_of(both_ways, lever=0.05, parts=4)
@@ -358,7 +358,7 @@ def test_split_runs(readings):
 
 
 def test_given_sd(robot, readings):
-    """What the file does not state can be given."""
+    """Prior standard deviations that the file does not state can be given."""
     sd = {"tubes.*.poisson_ratio": 0.05, "tubes.1.length": 0.25}
     found = outcome(robot, readings, ["tubes.*.poisson_ratio", "tubes.1.length", *FEW], sd=sd)
     fitted = {item.name: item for item in found.fitted}
@@ -390,7 +390,7 @@ def doubtful(name: str, value: float, shift: float = 0.0, ratio: float = 0.5) ->
     ],
 )
 def test_doubts(item, flag, words):
-    """Doubts are flagged and told."""
+    """Implausible values, far moves and silent data are flagged and put into words."""
     fitted = doubtful(*item)
     assert fitted[0].flag == flag and words in " ".join(fields.doubts(fitted))
     assert bool(words) == bool(fields.doubts(fitted))

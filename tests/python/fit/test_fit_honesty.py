@@ -50,7 +50,7 @@ def fit_of(curved_length, offset, random, offset_sd=1e-3):
 
 
 def test_one_sided_coverage():
-    """A length bounded on one side is within its deviation as often as that says."""
+    """The widened standard deviation of a length bounded on one side has the right coverage."""
     random = np.random.default_rng(4)
     truths = random.normal([0.0493, 0.0], [2.5e-3, 1e-3], (300, 2))
     plain, honest = np.empty((2, 300, 2))
@@ -65,7 +65,7 @@ def test_one_sided_coverage():
 
 
 def test_one_sided_told():
-    """A length bounded on both sides is left alone and an open side is told."""
+    """A length bounded on both sides keeps its sd; a flat side widens it, with a warning."""
     random = np.random.default_rng(5)
     inside = fit_of(0.042, 0.0, random)
     assert one_sided.widened(inside) is inside
@@ -84,7 +84,7 @@ def test_one_sided_told():
 
 
 def test_one_sided_no_prior():
-    """A value without prior has no share of one left."""
+    """Without a prior the ratio of posterior to prior sd is NaN."""
     random, told = np.random.default_rng(5), 0
     for _ in range(40):
         fit = one_sided.widened(fit_of(0.052, 0.0, random, offset_sd=np.inf))

@@ -181,7 +181,7 @@ def test_truth_recovered():
 
 
 def test_whitening():
-    """Whitened columns are those of the fit."""
+    """Whitened residual and derivatives reproduce chi-square and covariance."""
     bench = robot()
     fit = joint.fit(bench, table(bench), ["tubes.*.length", "tracker.frame"])
     residual, jacobian = fit.whitened()
@@ -211,7 +211,7 @@ def test_gauge_named():
 
 
 def test_model_error():
-    """A model error is admitted and told."""
+    """A model error inflates the noise, and a warning says so."""
     bench = robot()
     readings = table(bench)
     bent = replace(readings, position=readings.position + 2e-3 * np.sin(40 * readings.alpha[:, :1]))
@@ -291,7 +291,7 @@ def test_missing_rows():
 
 
 def test_doubtful_tables():
-    """Doubtful tables are commented."""
+    """Warnings name the shortcomings of a table."""
     bench = robot()
     readings = table(bench, rows=5)
     one = replace(readings, run=np.zeros(5, int), beta=readings.beta[[0] * 5], alpha=readings.alpha[[0] * 5])
@@ -379,7 +379,7 @@ def test_many_rows(monkeypatch):
 
 
 def test_frame_first():
-    """A frame far off is found first."""
+    """A tracker frame that is far off is fitted before the other parameters."""
     bench = robot()
     readings = table(bench, rows=40)
     moved = bench.model_copy(deep=True)

@@ -119,7 +119,7 @@ def test_threads(derivatives):
 
 
 def test_bad_rows():
-    """Bad rows are told and do not disturb the others."""
+    """Rows without a solution have a status and do not disturb the others."""
     robot = make_robot(3)
     beta, alpha = random_joints(robot, 6)
     force = np.zeros((6, 3))
