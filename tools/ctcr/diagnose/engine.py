@@ -116,7 +116,7 @@ class Engine:
 
         full = self.fit(added, start=start, fixed=fixed, near=bool(start))
         full = one_sided.restarted(full, again)
-        noise = self.likeliest_noise(full)
+        noise = joint.likeliest_field(full)
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
         if noise is full.noise:
             return full
@@ -137,10 +137,6 @@ class Engine:
     def linear_fit(self, at: joint.Fit, **options: Any) -> joint.Fit:
         """joint.linear_fit() of the rows of this engine."""
         return joint.linear_fit(at, rows=self.rows, **options)
-
-    def likeliest_noise(self, fit: joint.Fit) -> Any:
-        """The noise of a fit with that part of its field error which makes the readings likeliest."""
-        return joint.likeliest_field(fit)
 
     def thinned(self, fit: joint.Fit, least: int = settings.LINEARISATION_ROWS) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""

@@ -50,9 +50,6 @@ class CandidateFit:
 class Round:
     before: joint.Fit
     tried: list[CandidateFit]  # the best first
-    overlap: dict[str, float] = field(
-        default_factory=dict
-    )  # by id: fraction of signal shared with the best, see decide
     accepted: CandidateFit | None = None
     ids: list[str] = field(default_factory=list)  # the accepted effect and those that the data cannot tell from it
     margin: float = np.inf  # log evidence over the best candidate outside these
@@ -330,8 +327,8 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
             round_.reason = f"the best candidate, {refitted[0].id}, would need an implausible value, {values}"
         return
     best = fitted[0]
-    alike = [one for one in fitted if one.id == best.id and best.score - one.score < settings.SAME_FORM]
-    best = min(alike, key=lambda one: len(one.candidate.shape))
+    its_forms = [one for one in fitted if one.id == best.id and best.score - one.score < settings.SAME_FORM]
+    best = min(its_forms, key=lambda one: len(one.candidate.shape))
     if best.score < threshold:
         round_.reason = (
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
@@ -348,12 +345,8 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
         )
         return
     rivals = [one for one in refitted if one.id != best.id]
-    for rival in rivals:
-        overlap = min(imitated(best, rival), imitated(rival, best))
-        round_.overlap[rival.id] = max(overlap, round_.overlap.get(rival.id, 0.0))
-    same = [
-        one for one in rivals if best.score - one.score < settings.TIE or round_.overlap[one.id] >= settings.SAME_SIGNAL
-    ]
+    alike = {one.id for one in rivals if min(imitated(best, one), imitated(one, best)) >= settings.SAME_SIGNAL}
+    same = [one for one in rivals if best.score - one.score < settings.TIE or one.id in alike]
     round_.accepted = best
     round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
     others = [one.score for one in rivals if one.id not in round_.ids]

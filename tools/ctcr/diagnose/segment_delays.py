@@ -15,7 +15,7 @@ from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain, Linear, laplace
 from ctcr.effects import catalogue
 from ctcr.fit import folds
-from ctcr.fit.joint import Fit
+from ctcr.fit.joint import Fit, likeliest_field
 from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ def corrected(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
     if lags is None or lags.log_evidence < settings.DECISIVE:
         return fit, []
     more = lags.lag[:, None] * np.nan_to_num(fit.jacobian_all[:, lags.delay].reshape(-1, 6))
-    noise = engine.likeliest_noise(engine.linear_fit(fit, more=more, noise=engine.noise))
+    noise = likeliest_field(engine.linear_fit(fit, more=more, noise=engine.noise))
     there = engine.linear_fit(fit, more=more, noise=noise)
     if _unexplained(engine, there) > settings.LAGS_LEAVE * _unexplained(engine, fit):
         return fit, []

@@ -4,20 +4,20 @@ A bar, a table or several pieces do not act as one dipole, but their error too i
 another. So the residual of a fit with a distorted field is modelled as a Gaussian process in space.
 """
 
-from typing import Any
+from itertools import product
 
 import numpy as np
 
-from ctcr import _core, settings
+from ctcr import settings
 from ctcr.diagnose.engine import Engine
 from ctcr.effects import catalogue
 from ctcr.fit.joint import Fit
-from ctcr.model.noise import with_field
+from ctcr.model.noise import Noise, with_field
 
 CORRECTED = "Errors with the effects found are corrected for it: those of held-out runs by readings nearby."
 
 
-def likeliest_noise(engine: Engine, fit: Fit) -> Any:
+def likeliest_noise(engine: Engine, fit: Fit) -> Noise | None:
     """The tracker's noise with the smooth error that a linearised fit with a distorted field leaves; None where that
     effect is not in the fit, or no smooth error is sure."""
     effects = catalogue.all_effects(engine.robot.n_tubes).values()
@@ -27,24 +27,23 @@ def likeliest_noise(engine: Engine, fit: Fit) -> Any:
     engine, at = engine.thinned(fit)
     stated = engine.noise
     ratio = stated.rotation_field / stated.position_field if stated.position_field > 0 else 0.0
-    best = engine.linear_fit(at, weights=at.weights)
-    least = best.log_evidence + settings.DECISIVE
-    for length in settings.SMOOTH_LENGTHS:
-        for size in settings.SMOOTH_SIZES:
-            for turned in {0.0, ratio}:
-                noise = _core.Noise(
-                    position_jitter=stated.position_jitter,
-                    rotation_jitter=stated.rotation_jitter,
-                    position_field=size,
-                    rotation_field=turned * size,
-                    correlation_length=length,
-                )
-                tried = engine.linear_fit(at, noise=noise, weights=at.weights)
-                best = max(best, tried, key=lambda one: one.log_evidence)
-    return best.noise if best.log_evidence > least else None
+    tried = (
+        Noise(
+            position_jitter=stated.position_jitter,
+            rotation_jitter=stated.rotation_jitter,
+            position_field=size,
+            rotation_field=turned * size,
+            correlation_length=length,
+        )
+        for length, size, turned in product(settings.SMOOTH_LENGTHS, settings.SMOOTH_SIZES, {0.0, ratio})
+    )
+    fits = (engine.linear_fit(at, noise=noise, weights=at.weights) for noise in tried)
+    best = max(fits, key=lambda fit: fit.log_evidence)
+    plain = engine.linear_fit(at, weights=at.weights)
+    return best.noise if best.log_evidence > plain.log_evidence + settings.DECISIVE else None
 
 
-def corrected(engine: Engine, fit: Fit, noise: Any) -> Fit:
+def corrected(engine: Engine, fit: Fit, noise: Noise) -> Fit:
     """The linearised fit under that noise, to readings without the smooth error; rows that were not fitted are
     corrected by those near to them."""
     there = engine.linear_fit(fit, noise=noise, weights=fit.weights, inflation=fit.inflation)
@@ -58,7 +57,7 @@ def corrected(engine: Engine, fit: Fit, noise: Any) -> Fit:
     )
 
 
-def message(noise: Any) -> str:
+def message(noise: Noise) -> str:
     return (
         "The field is distorted by more than the small piece of metal that was fitted: the residual is smooth in "
         f"space, {1e3 * noise.position_field:.2g} mm an axis (standard deviation), and changes within "
