@@ -78,7 +78,12 @@ def test_faults(table, text, faults):
 
 
 def test_no_table(tmp_path):
-    for content, message in ((b"PK\x03\x04", "is a spreadsheet"), (b"\xff\xfea", "not text"), (b"a\0b", "not text")):
+    for content, message in (
+        (b"PK\x03\x04", "is a spreadsheet"),
+        (b"\xff\xfea", "is text in UTF-16"),
+        (b"tube\n\xe4", "not text"),
+        (b"a\0b", "not text"),
+    ):
         (tmp_path / "a").write_bytes(content)
         with pytest.raises(InputError, match=message):
             tables.read(tmp_path / "a", HOME)

@@ -137,6 +137,8 @@ def still_reading(tracker: Tracker, frames: int, within: float) -> StillReading:
 
 
 class _Turner:
+    """Brings the tubes out one by one, turns them and reads the sensor at each angle."""
+
     def __init__(self, robot: Robot, motors: Motors, tracker: Tracker, person: Person, circles: Circles):
         self._robot, self._motors, self._tracker, self._person = robot, motors, tracker, person
         self._circles, self._limits = circles, motors.settings.axes.limits

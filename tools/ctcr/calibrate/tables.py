@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
-from ctcr.table.csv_table import Faults
+from ctcr.table.csv_table import Faults, header_names
 
 Array = NDArray[np.float64]
 MAX_BYTES = 16 << 20
@@ -102,24 +102,14 @@ def _lines(path: str | Path) -> list[list[str]]:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise file_fault(error, path, "read") from None
-    text = content.decode("utf-8-sig", "replace")
-    first = text.partition("\n")[0]
-    fault = None
     if len(content) > MAX_BYTES:
-        fault = f"is over {MAX_BYTES >> 20} MB: this is not a table of a calibration procedure"
-    elif content.startswith(b"PK"):
-        fault = "is a spreadsheet, not text: save it as CSV"
-    elif "\ufffd" in text:
-        fault = "is not text in UTF-8"
-    elif "\0" in text:
-        fault = "is not text"
-    elif not text.strip():
-        fault = "is empty"
-    elif "," not in first and (";" in first or "\t" in first):
-        fault = "separates its columns by semicolons or tabs: use commas, and points for decimals"
-    if fault:
-        raise InputError(Problem(fault, str(path)))
-    return list(csv.reader(text.splitlines()))
+        text = f"is over {MAX_BYTES >> 20} MB: this is not a table of a calibration procedure"
+        raise InputError(Problem(text, str(path)))
+    header_names(content.partition(b"\n")[0], str(path))
+    try:
+        return list(csv.reader(content.decode("utf-8-sig").splitlines()))
+    except UnicodeDecodeError:
+        raise InputError(Problem("is not text in UTF-8", str(path))) from None
 
 
 def _find(header: list[str], columns: Sequence[Column], file: str) -> dict[Column, str]:

@@ -107,7 +107,7 @@ def open_table(path: str | Path) -> NumberTable:
     try:
         with open(path, "rb") as file:
             header = file.readline(MAX_HEADER_BYTES)
-            columns = _columns(header, str(path))
+            columns = header_names(header, str(path))
             start = file.tell()
             end = _end_of_content(file, start)
             n_rows = _count_lines(file, start, end)
@@ -118,7 +118,8 @@ def open_table(path: str | Path) -> NumberTable:
     return NumberTable(Path(path), columns, n_rows, start, end)
 
 
-def _columns(header: bytes, file: str) -> tuple[str, ...]:
+def header_names(header: bytes, file: str) -> tuple[str, ...]:
+    """The names of the columns, from the first line of a table. Raises InputError where it is no such line."""
     try:
         text = header.decode("utf-8-sig").strip()
     except UnicodeDecodeError:
