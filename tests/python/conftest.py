@@ -49,3 +49,16 @@ def hidden():
         return add.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
 
     return with_them
+
+
+@pytest.fixture
+def run(capsys):
+    """run("info", path): exit code, standard output and standard error of a command."""
+    from ctcr import cli
+
+    def run(*arguments) -> tuple[int, str, str]:
+        code = cli.run([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run

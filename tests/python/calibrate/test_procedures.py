@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr import cli
 from ctcr.robot import robot_file
 
 ROOT = Path(__file__).parents[3]
@@ -21,13 +20,8 @@ def truth(name: str) -> list[float]:
 
 
 @pytest.fixture
-def run(capsys):
-    def run(*arguments) -> tuple[int, str, str]:
-        code = cli.run(["calibrate", *(str(argument) for argument in arguments)])
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return run
+def run(run):
+    return lambda *arguments: run("calibrate", *arguments)
 
 
 @pytest.fixture

@@ -50,16 +50,6 @@ def straight(monkeypatch):
 
 
 @pytest.fixture
-def run(capsys):
-    def run(*arguments) -> tuple[int, str, str]:
-        code = cli.run([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return run
-
-
-@pytest.fixture
 def table(tmp_path):
     """A table of 50 rows whose rows 11 and 40 have no solution."""
     rng = np.random.default_rng(6)

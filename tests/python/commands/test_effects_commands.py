@@ -7,7 +7,6 @@ from pathlib import Path
 import ctcr
 import numpy as np
 import pytest
-from ctcr import cli
 from ctcr.diagnose import add
 from ctcr.effects import catalogue
 from ctcr.effects.settings import settings
@@ -32,16 +31,6 @@ def table(plan, tmp_path):
     path = tmp_path / "plan.csv"
     simulation.write(replace(plan, position=None, quaternion=None), path, 3)
     return path
-
-
-@pytest.fixture
-def run(capsys):
-    def run(*arguments) -> tuple[int, str, str]:
-        code = cli.run([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return code, printed.out, printed.err
-
-    return run
 
 
 # ---- ctcr effects

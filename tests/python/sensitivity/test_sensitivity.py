@@ -13,6 +13,7 @@ from ctcr.errors import InputError
 from ctcr.frames import base_to_tracker
 from ctcr.model import parameters
 from ctcr.model.model import Model
+from ctcr.reproduce.paper import random_rows
 from ctcr.robot import robot_file
 from ctcr.sensitivity import closed_loop, open_loop
 from ctcr.sensitivity.advice import advise, grouped
@@ -66,10 +67,7 @@ def test_tracker_shift(whole):
 
 def test_influence(robot, varied, whole):
     """Other random configurations, solved by the model one by one: means agree within their spread."""
-    random = np.random.default_rng(3)
-    beta, alpha = uniform_joints(robot, 3000, random)
-    direction = random.standard_normal((len(beta), 3))
-    force = 0.3 * random.uniform(size=(len(beta), 1)) * direction / np.linalg.norm(direction, axis=1)[:, None]
+    beta, alpha, force = random_rows(robot, 3000, np.random.default_rng(3), 0.3)
     nominal = Model(robot, steps=1).predict(beta, alpha, force)
     for name, other in (
         ("precurvature, tube 3", parameters.applied(robot, ["tubes.3.curvature"], [7.7])),
@@ -81,16 +79,6 @@ def test_influence(robot, varied, whole):
         distance = 1e3 * np.linalg.norm(a - b, axis=1)
         one = single_end(robot, varied, name)
         assert one.mean == pytest.approx(distance.mean(), rel=0.1), name
-
-
-def uniform_joints(robot, count, random):
-    """Uniform over what the order of the tubes allows, by rejection."""
-    lengths = np.array([tube.length for tube in robot.tubes])
-    beta = -lengths * random.uniform(size=(200 * count, 3))
-    bases = np.hstack([beta, np.zeros((len(beta), 1))])
-    tips = np.hstack([lengths + beta, np.zeros((len(beta), 1))])
-    good = (np.diff(bases) >= 0).all(axis=1) & (np.diff(tips) <= 0).all(axis=1)
-    return beta[good][:count], random.uniform(-np.pi, np.pi, (count, 3))
 
 
 def single_end(robot, varied, name):
