@@ -161,7 +161,7 @@ FAULTS = [
     Fault("one terminal lost", on("ethercat", lost_after=4), False, "does not answer|no frame"),
     Fault("power of the terminals lost", on("ethercat", power_loss=True), False, "does not answer", off_and_on=True),
     Fault("no process data for 0.4 s (watchdog)", starve, False, "watchdog|no frame came back"),
-    Fault("a motor is jammed (lag)", on("ethercat", stall=2), False, "does not follow"),
+    Fault("a motor is jammed (following error)", on("ethercat", stall=2), False, "does not follow"),
     Fault("over-current in a coil", on("ethercat", over_current=3), False, "over-current in coil A", off_and_on=True),
     Fault("motor supply off", on("ethercat", under_voltage=5), False, "motor supply too low", off_and_on=True),
     Fault("an encoder jumps", on("ethercat", encoder_jump=4), False, "encoder jumped|does not follow", off_and_on=True),
@@ -219,7 +219,7 @@ def strike(wires: Wires, fault: Fault) -> Outcome:
     lost = 0 if final.startswith(kept) and kept.startswith(seen) else rows_of(seen)
     return Outcome(
         fault.name,
-        "went on by itself" if went_on else "stopped; the same command went on",
+        "continued" if went_on else "stopped; the same command resumed it",
         message,
         rows_of(seen),
         rows_of(kept),
@@ -287,8 +287,8 @@ def kill(wires: Wires, times: int) -> Outcome:
     lost += 0 if final.startswith(kept) else before
     return Outcome(
         f"recorder killed {times} times (SIGKILL)",
-        "motors stopped; the same command went on",
-        "none: it is dead",
+        "motors stopped; the same command resumed it",
+        "none",
         before,
         before,
         lost + wires.rows - rows_of(final),
@@ -300,9 +300,9 @@ HEAD = """# Faults on the bench
 
 Each fault struck a recording of `ctcr record` on the simulated bench, through the serial line and the bus, when some
 rows were on the disk. Then it was mended, and the same command was run again until the plan was done. *Lost* counts
-rows that were on the disk and are not in the table in the end, and rows of the plan that are missing there. Where the
-recording stopped, the motors were at rest 0.2 s later; behind a recorder that is killed they brake first, for 0.2 s
-more. Half of the kills strike its start, half its measuring. Written by `tools/bench_faults.py`.
+rows that were on the disk and are missing in the final table, and rows of the plan that are missing there. Where the
+recording stopped, the motors were at rest 0.2 s later; after a kill of the recorder they brake first, for 0.2 s more.
+Half of the kills struck its start, half its measuring. Written by `tools/bench_faults.py`.
 
 | fault | the recording | message | rows when it struck | rows when it ended | lost |
 |---|---|---|---|---|---|

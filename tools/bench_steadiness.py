@@ -1,7 +1,7 @@
-"""Writes docs/bench_steadiness.md: how steady the loops are while the bench controls and records for ten minutes.
+"""Writes docs/bench_steadiness.md: jitter and losses of the loops while the bench controls and records for ten minutes.
 
-Both simulators, the bus owner, the tracker reader and the 40 Hz controller with its recorder run beside each other on
-the cores that there are; `ctcr track --live` follows the cube of `ctcr demo bench` again and again.
+Both simulators, the bus process, the tracker reader and the 40 Hz controller with its recorder share the cores;
+`ctcr track --live` follows the cube of `ctcr demo bench` again and again.
 """
 
 import argparse
@@ -20,7 +20,7 @@ ROUND_S = 21.5  # of one tour of the cube, about
 HEAD = """# How steady the bench is
 
 {minutes:.0f} minutes of `ctcr track --live` at 40 Hz on the simulated bench, with everything on {cores} cores: both
-simulators, the owner of the bus, the reader of the tracker, and the controller that records. Real-time priority:
+simulators, the bus process, the reader of the tracker, and the controller that records. Real-time priority:
 {real_time}. Load of the computer at the start and at the end: {load}; the bench itself makes
 about 1 of it. {beside} Written by `tools/bench_steadiness.py`.
 

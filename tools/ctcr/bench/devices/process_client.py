@@ -37,4 +37,4 @@ class ProcessClient:
         self.close()
 
     def gone(self) -> DeviceFault:
-        return DeviceFault(self._device, "its process is not there", "connect again")
+        return DeviceFault(self._device, "its process has ended", "connect again")

@@ -1,4 +1,4 @@
-"""Recordings of one session as one table: between them the robot stood still, so that what it remembers goes on."""
+"""Recordings of one session as one table. The robot stood still between them, so the history of its effects goes on."""
 
 import json
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ def joined(tables: Sequence[Measurements], starts: Sequence[float | None]) -> Me
     """The rows of all tables, one table after the other.
 
     tables  in the order in which they were recorded; a column that one of them lacks is left out
-    starts  when t_s of each was 0, by one clock [s]; None where it is not known
+    starts  the time at which t_s of each was 0, by one clock [s]; None: not known
     """
     moved, end, number, row = [], 0.0, 0, 2
     for table, start in zip(tables, starts, strict=True):
@@ -37,7 +37,7 @@ def joined(tables: Sequence[Measurements], starts: Sequence[float | None]) -> Me
 
 
 def start_of(table: str | Path) -> float | None:
-    """When t_s of a recorded table was 0 [s, Unix time]: what `session.json` beside it says."""
+    """The time at which t_s of a recorded table was 0 [s, Unix time], from the `session.json` beside it."""
     try:
         return float(json.loads((Path(table).parent / ABOUT).read_text(encoding="utf-8"))["started_unix_s"])
     except (OSError, ValueError, LookupError, TypeError):

@@ -1,9 +1,10 @@
-"""A recording while it is made, as a page that the browser loads anew by itself: a file, so nothing listens."""
+"""A recording in progress as a page that the browser reloads: a file, so nothing listens on the network."""
 
 import time
 from html import escape
 from math import isnan
 from pathlib import Path
+from typing import Self
 
 from ctcr.bench.record.session import Progress
 from ctcr.show import html_page
@@ -15,13 +16,13 @@ WIDTH, HEIGHT, LEFT, BOTTOM = 860, 300, 60, 30  # of the picture and its margins
 
 
 class LivePage:
-    """`show` as often as there is news; in a block, whose end makes the page rest."""
+    """Shows the newest progress every EVERY_S; in a `with` block, whose end stops the reloading."""
 
     def __init__(self, path: str | Path, title: str):
         self._path, self._title = path, title
         self._next, self._last = 0.0, Progress(0)
 
-    def __enter__(self) -> "LivePage":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_) -> None:
@@ -56,9 +57,8 @@ def page(progress: Progress, title: str, reload_s: int) -> str:
         html_page.cards(numbers),
         picture(errors[-SHOWN:], len(errors)) if known else "",
     ]
-    return html_page.page(
-        title, sections, "Error against the model at the joints of the encoders", "ctcr record", reload_s=reload_s
-    )
+    footer = "Error against the model at the joints of the encoders"
+    return html_page.page(title, sections, footer, "ctcr record", reload_s=reload_s)
 
 
 def picture(errors_mm: list[float], count: int) -> str:
@@ -66,17 +66,16 @@ def picture(errors_mm: list[float], count: int) -> str:
     top = max(error for error in errors_mm if not isnan(error)) or 1.0
     step = (WIDTH - LEFT) / max(1, len(errors_mm) - 1)
 
-    def place(i: int, error: float) -> tuple[float, float]:
-        return LEFT + i * step, 10 + (HEIGHT - BOTTOM - 10) * (1 - error / top)
+    def height(error: float) -> float:
+        return 10 + (HEIGHT - BOTTOM - 10) * (1 - error / top)
 
-    points = [place(i, error) for i, error in enumerate(errors_mm) if not isnan(error)]
+    points = [(LEFT + i * step, height(error)) for i, error in enumerate(errors_mm) if not isnan(error)]
     dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5"/>' for x, y in points)
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     levels = "".join(
         f'<line x1="{LEFT}" x2="{WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e1e6ea"/>'
         f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:.2f}</text>'
-        for value in (0.0, top / 2, top)
-        for _, y in [place(0, value)]
+        for value, y in ((value, height(value)) for value in (0.0, top / 2, top))
     )
     first, base = count - len(errors_mm) + 1, HEIGHT - 8
     return (

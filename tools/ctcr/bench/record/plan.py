@@ -1,6 +1,5 @@
-"""What is to be measured: the rows of a plan, each with the way it is approached."""
+"""The plan of a recording: its rows, each with its approach, checked against the limits."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-DIRECTIONS = {"planned": 0.0, "forward": -1.0, "backward": 1.0}  # where the way point lies from the target
+DIRECTIONS = {"planned": 0.0, "forward": -1.0, "backward": 1.0}  # sign of the way point minus the target
 
 
 @dataclass(frozen=True)
@@ -39,25 +38,24 @@ class Step:
     way_point: Array | None  # (2N,)
     force: Array  # (3,) [N]
 
+    def problem(self, limits: JointLimits) -> str | None:
+        """Which limit it violates; None where it is allowed."""
+        if text := limits.problem(self.joints):
+            return text
+        text = None if self.way_point is None else limits.problem(self.way_point)
+        return text and f"on its approach {text}"
+
 
 def steps_of(plan: Measurements, approach: Approach, limits: JointLimits, file: str) -> list[Step]:
     """Raises InputError with every row that the limits forbid."""
-    steps, problems = [], []
-    for i in range(len(plan)):
-        joints = np.concatenate([plan.beta[i], plan.alpha[i]])
-        n = plan.beta.shape[1]
-        shift = DIRECTIONS[approach.direction] * np.repeat([approach.translation, approach.rotation], n)
-        way_point = joints + shift if approach.has_way_point else None
-        step = Step(int(plan.row[i]), int(plan.run[i]), joints, way_point, plan.force[i])
-        problems += [Problem(text, file, step.row, line_name="row") for text in _faults(step, limits)]
-        steps.append(step)
-    if problems:
-        raise InputError(problems[:SHOWN], omitted=max(0, len(problems) - SHOWN))
+    n = plan.beta.shape[1]
+    shift = DIRECTIONS[approach.direction] * np.repeat([approach.translation, approach.rotation], n)
+    steps = []
+    for row, run, *parts, force in zip(plan.row, plan.run, plan.beta, plan.alpha, plan.force, strict=True):
+        joints = np.concatenate(parts)
+        steps.append(Step(int(row), int(run), joints, joints + shift if approach.has_way_point else None, force))
+    texts = [(step.row, text) for step in steps if (text := step.problem(limits))]
+    if texts:
+        problems = [Problem(text, file, row, line_name="row") for row, text in texts[:SHOWN]]
+        raise InputError(problems, omitted=len(texts) - len(problems))
     return steps
-
-
-def _faults(step: Step, limits: JointLimits) -> Iterator[str]:
-    if text := limits.problem(step.joints):
-        yield text
-    elif step.way_point is not None and (text := limits.problem(step.way_point)):
-        yield f"on its approach {text}"

@@ -1,4 +1,4 @@
-"""A table while it is being made: what has been written stays, whatever happens next."""
+"""A table that grows row by row: written rows survive whatever happens next."""
 
 import csv
 import io
@@ -15,10 +15,10 @@ class RowFile:
     """Rows are appended in groups, those of one row of a plan. A group is on the disk when `append` returns."""
 
     def __init__(self, path: Path, columns: Sequence[str], group: int = 1, synced: bool = True):
-        """Goes on behind the last whole group of a file that is there; `group` rows make one. Raises InputError.
+        """Resumes behind the last whole group of an existing file; a group has `group` rows. Raises InputError.
 
-        Not `synced`, a group outlives this process when `append` returns, and a power cut when `sync` does: for
-        loops that cannot wait for a disk.
+        Not `synced`, a group survives the end of this process when `append` returns, and a power cut when `sync` does:
+        for loops that cannot wait for a disk.
         """
         self.path, self._synced = path, synced
         header = (",".join(columns) + "\n").encode()
@@ -28,17 +28,15 @@ class RowFile:
             if not content.startswith(header[: len(content)]):
                 text = f"holds other columns than {','.join(columns)}: choose another name"
                 raise InputError(Problem(text, str(path), 1, line_name="row"))
-            lines = content[len(header) :].splitlines(keepends=True)
-            whole = [line for line in lines if line.endswith(b"\n")]
+            whole = [line for line in content[len(header) :].splitlines(keepends=True) if line.endswith(b"\n")]
             self.groups = len(whole) // group
-            kept = header + b"".join(whole[: self.groups * group])
+            whole = whole[: self.groups * group]
+            kept = header + b"".join(whole)
             if content != kept:  # the power was cut while a group was being written
                 os.ftruncate(self._file, 0)
                 os.pwrite(self._file, kept, 0)
-            self.dropped = len(lines) - self.groups * group
             self._end = len(kept)
-            last = [whole[self.groups * group - 1].decode()] if self.groups else []
-            self.last: list[str] | None = next(csv.reader(last), None)
+            self.last: list[str] | None = next(csv.reader([whole[-1].decode()])) if whole else None
             os.fsync(self._file)
         except OSError as error:
             raise file_fault(error, path, "write") from None

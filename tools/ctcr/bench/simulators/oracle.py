@@ -1,4 +1,4 @@
-"""A robot whose physics another program knows: it stands on the simulated bench instead of the model."""
+"""A robot whose pose another program computes, on the simulated bench instead of the model."""
 
 import json
 import subprocess
@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 
 class Oracle:
-    """Moves and reads as MovingModel does; the program answers a line of JSON to a line of JSON.
+    """Moves and reads like MovingModel; the program answers each line of JSON with one.
 
-    Asked with t [s], beta (N,) [m], alpha (N,) [rad], force (3,) [N], it answers position (3,) [m] and rotation (3, 3)
+    Given t [s], beta (N,) [m], alpha (N,) [rad], force (3,) [N], it answers position (3,) [m] and rotation (3, 3)
     of the sensor in the base frame, or null where it has no solution.
     """
 
