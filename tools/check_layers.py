@@ -8,7 +8,7 @@ import re
 import sys
 from pathlib import Path
 
-ROW = re.compile(r"\| ((?:`\w+`(?:, )?)+) \|")
+ROW = re.compile(r"\| ((?:`[\w/]+`(?:, )?)+) \|")
 INCLUDE = re.compile(r'\s*#\s*include\s*[<"](?:\.\./)*(?:ctcr/)?(\w+)/(?:\w+/)*\w+\.hpp[>"]')
 HEADER_TABLE = re.compile(r"`(\w+)`[^`\n]*:\n\n\| header \|.*\n\|[-|]+\|\n((?:\|.*\n)+)")
 
@@ -17,7 +17,13 @@ def rooms_of(readme: Path, heading: str) -> dict[str, int]:
     """The rooms of the table under a heading of a README, each with its row in that table."""
     text = readme.read_text(encoding="utf-8").partition(f"## {heading}\n")[2].partition("\n## ")[0]
     rows = [match[1] for line in text.splitlines() if (match := ROW.match(line))]
-    return {room: height for height, row in enumerate(rows) for room in re.findall(r"\w+", row)}
+    return {room: height for height, row in enumerate(rows) for room in re.findall(r"[\w/]+", row)}
+
+
+def room_of(parts: tuple[str, ...], rooms: dict[str, int]) -> str:
+    """The room of a path below the root of a tree; a folder of a room may be a room of its own."""
+    inner = "/".join(parts[:2])
+    return inner if inner in rooms else parts[0]
 
 
 def may_see(rooms: dict[str, int], own: str, other: str) -> bool:
@@ -82,7 +88,7 @@ def python_problems(tools: Path) -> list[str]:
     }
     found, graph = [], {}
     for module, path in files.items():
-        own = path.relative_to(root).parts[0].removesuffix(".py")
+        own = room_of(path.relative_to(root).with_suffix("").parts, rooms)
         if path.parent != root and own not in rooms:
             found.append(f"{path}:1: room '{own}' is missing in the table of {root / 'README.md'}")
             continue
@@ -93,7 +99,7 @@ def python_problems(tools: Path) -> list[str]:
             if name not in files:
                 continue
             graph[module][name] = line
-            other = name.split(".")[1] if name.count(".") > 0 else ""
+            other = room_of((*name.split(".")[1:], "")[:2], rooms)
             if own in rooms and other in rooms and not may_see(rooms, own, other):
                 found.append(f"{path}:{line}: room '{own}' must not import room '{other}', which stands below it")
     for circle in circles(graph):

@@ -31,7 +31,8 @@ class Tracker(ProcessClient):
 
     def connect(self) -> None:
         """Waits until the tracker tracks. Raises DeviceFault where it cannot be reached."""
-        self.start(tracker_process.run, self.port, self._section)
+        section = self._section
+        self.start(tracker_process.run, self.port, section.baud, section.replies, int(section.tool, 16))
         start = time.monotonic()
         while not self.version and (waited := time.monotonic() - start) < CONNECT_S:
             self._receive(0.1)

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr.bench.devices.aurora import Aurora
-from ctcr.bench.devices.bench_file import TrackerPort
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.shared.ndi import RATE_HZ, SYSTEM_STATUS, ToolReading
 from ctcr.bench.shared.real_time import TRACKER, real_time
@@ -88,16 +87,19 @@ class FrameClock:
         self.due += BACK_S
 
 
-def run(port: str, section: TrackerPort, pipe: Connection) -> None:
-    """The process: sends ("connected", version), TrackedFrame and DeviceFault until the pipe closes."""
+def run(port: str, baud: int, replies: str, tool: int, pipe: Connection) -> None:
+    """The process: sends ("connected", version), TrackedFrame and DeviceFault until the pipe closes.
+
+    `tool`: handle of the sensor; the others are as in Aurora.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
-    with Aurora(port, section.baud, section.replies) as aurora, real_time(TRACKER):
+    with Aurora(port, baud, replies) as aurora, real_time(TRACKER):
         try:
             while not pipe.poll(0):
                 try:
                     aurora.connect()
                     pipe.send(("connected", aurora.version))
-                    _read(aurora, int(section.tool, 16), pipe)
+                    _read(aurora, tool, pipe)
                 except DeviceFault as fault:
                     pipe.send(fault)
                     pipe.poll(AGAIN_S)
