@@ -89,7 +89,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
         out.say(f"stability      {tip.stability[0]:.3g}  (0: about to snap)")
     if picture:
         out.say(f"picture: {picture}")
-    if acting := [name for name in kept if name not in effect_model.OF_THE_TRACKER]:
+    if acting := [name for name in kept if name not in effect_model.of_the_reading(loaded)]:
         sensor = f"With {', '.join(acting)} the sensor is at {_listed(1e3 * tip.position[0], 3)} mm"
         out.say(f"{sensor}; the shape is that of the standard model.")
     if with_history:

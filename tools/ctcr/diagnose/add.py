@@ -18,7 +18,7 @@ from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.held_out import fit_to_predict
 from ctcr.diagnose.round import linearised_end, screen
 from ctcr.effects import catalogue
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import InputError, Problem, suggestion
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
 from ctcr.model import fields
@@ -177,8 +177,7 @@ def remove(robot: Robot, ids: Sequence[str], target: str | Path, in_place: bool 
     """
     absent = [identity for identity in ids if identity not in robot.effects]
     if absent:
-        meant = did_you_mean(absent[0], robot.effects)
-        hint = f"did you mean {meant}?" if meant else f"it has {', '.join(robot.effects) or 'none'}"
+        hint = suggestion(absent[0], robot.effects, f"it has {', '.join(robot.effects) or 'none'}")
         raise InputError(Problem(f"the robot has no effect {absent[0]}: {hint}"))
     section = {name: given for name, given in robot.effects.items() if name not in ids}
     changes, notices = [], []

@@ -164,7 +164,8 @@ def screen(
     """All candidates with their linearised gain, best first."""
     n_tubes, linear = engine.robot.n_tubes, segment_delays.linearised(engine, before)
     candidates = [c for c in candidates if not set(c.names) & set(before.names)]
-    forces, everywhere = starts.tip_forces_of(n_tubes), dict.fromkeys(starts.moments_of(n_tubes), starts.EVERYWHERE)
+    forces = catalogue.names_with("tip_force", n_tubes)
+    everywhere = dict.fromkeys(catalogue.names_with("moment", n_tubes), starts.EVERYWHERE)
     names = list(dict.fromkeys([*(name for c in candidates for name in c.names), *forces]))
     derivatives = engine.derivatives(before, names, fixed | everywhere)
 

@@ -25,20 +25,6 @@ Option = tuple[Candidate, Array]  # with its derivatives (M, 6, k)
 EVERYWHERE = -1.0  # a moment before the session: the effect acts on all rows
 
 
-def moments_of(n_tubes: int) -> list[str]:
-    """Full names of the moments of all effects, from which these act."""
-    return _names_with("moment", n_tubes)
-
-
-def tip_forces_of(n_tubes: int) -> list[str]:
-    """Full names of a force at the tip by x, y, z: the base frame."""
-    return _names_with("tip_force", n_tubes)
-
-
-def _names_with(quantity: str, n_tubes: int) -> list[str]:
-    return [name for effect in catalogue.all_effects(n_tubes).values() for name in effect.names_with(quantity)]
-
-
 def options(engine: Engine, candidate: Candidate, columns: Array, by_force: Array, worth: Worth) -> list[list[Option]]:
     """Ways to begin; of each list the best one enters the round.
 

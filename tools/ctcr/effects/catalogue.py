@@ -124,6 +124,11 @@ def all_effects(n_tubes: int) -> dict[str, Effect]:
     return catalogue(n_tubes) | {e.id: e.described(n_tubes) for e in robot_file.user_effects.values()}
 
 
+def names_with(quantity: str, n_tubes: int) -> list[str]:
+    """Full names of all parameters with this quantity, in the order that it defines."""
+    return [name for effect in all_effects(n_tubes).values() for name in effect.names_with(quantity)]
+
+
 @cache
 def names_of(n_tubes: int) -> tuple[str, ...]:
     """All parameters of all effects, in the order of the library."""

@@ -17,8 +17,6 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-OF_THE_TRACKER = ("sensor_offset", "field_distortion", "frame_drift", "frame_jump")  # not of where the tube is
-
 
 @dataclass(frozen=True)
 class Readings:
@@ -48,16 +46,21 @@ def usable(robot: Robot, integrator: str) -> dict[str, Any]:
             "order: use `ctcr predict`, or ctcr.effect_model.readings"
         )
         raise InputError(Problem(text))
-    return {identity: given for identity, given in robot.effects.items() if identity not in OF_THE_TRACKER}
+    return {identity: given for identity, given in robot.effects.items() if identity not in of_the_reading(robot)}
+
+
+def of_the_reading(robot: Robot) -> set[str]:
+    """Effects of the library that change the tracker's reading, not the pose of the tube."""
+    return {e.id for e in catalogue.catalogue(robot.n_tubes).values() if e.acts_on == {"reading"}}
 
 
 def of_the_path(robot: Robot) -> list[str]:
     """Those of a robot's effects that depend on how a configuration was reached, and those of the user's own."""
-    known = catalogue.catalogue(robot.n_tubes)
+    known, only_reading = catalogue.catalogue(robot.n_tubes), of_the_reading(robot)
     return [
         identity
         for identity in robot.effects
-        if identity not in OF_THE_TRACKER and (identity not in known or known[identity].needs & {"order", "time"})
+        if identity not in only_reading and (identity not in known or known[identity].needs & {"order", "time"})
     ]
 
 

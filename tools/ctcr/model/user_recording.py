@@ -77,7 +77,7 @@ class UserRecording(ResidualModel):
         # Joints and forces that the user's functions change act through these parameters of the compiled recording.
         homes = [f"actuation.home_{kind}.{i + 1}" for kind in ("translation", "rotation") for i in range(robot.n_tubes)]
         self._joints = homes if hooks.has("joints") else []
-        self._forces = [f"effects.tip_load.force_{axis}" for axis in "xyz"] if hooks.has("force", "base") else []
+        self._forces = catalogue.names_with("tip_force", robot.n_tubes) if hooks.has("force", "base") else []
         given = [name for name in self._names if name in library]
         self._inner = list(dict.fromkeys([*given, *self._joints, *self._forces]))
         hooks.check_neutral(self._nominal)
