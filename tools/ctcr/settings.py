@@ -14,7 +14,7 @@ MOVED_FAR = 2.0  # prior standard deviations beyond which a fitted value contrad
 
 STEPS = 2  # integration steps per segment, at least
 MOST_STEPS = 16  # ... and at most: no known robot needs more
-INTEGRATION_ERROR = 0.25  # of integration errors over all rows: shifts no parameter by more than half its sd
+INTEGRATION_ERROR = 0.25  # chi-square of integration errors over all rows: shifts no parameter by more than half its sd
 INTEGRATION_ERROR_COARSE = 1.0  # the same where log evidences are only compared: their error is a half of it
 INTEGRATION_SAMPLE = 300  # rows on which integration errors are estimated
 DIFFERENCE_STEP = 1e-4  # [prior sd] of central differences of a user's functions
@@ -37,7 +37,7 @@ DETOUR_SIGNIFICANCE = 0.01  # p-value below which missing motion is added to the
 
 # ---- Noise of the tracker
 
-CORRELATION_LENGTH = 0.1  # [m] over which the smooth field error changes: the size of a workspace, as of an Aurora
+CORRELATION_LENGTH = 0.1  # [m] over which the smooth field error changes: about the size of a workspace
 FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are tried, halves of a decade apart
 
 # ---- Joint fit

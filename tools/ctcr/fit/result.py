@@ -181,9 +181,6 @@ class Fit:
     def nominal_rms_mm(self, rows: Mask | None = None) -> float:
         return 1e3 * rms(self.nominal_residual[:, :3], rows)
 
-    def nominal_rms_deg(self, rows: Mask | None = None) -> float:
-        return float(np.rad2deg(rms(self.nominal_residual[:, 3:], rows)))
-
     def expected_mm(self, rows: Mask | None = None) -> float:
         """RMS position error to be expected of a right model: see `expected_square`."""
         return 1e3 * self._expected(0, rows)

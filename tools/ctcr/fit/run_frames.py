@@ -39,11 +39,6 @@ class RunFrames:
 
     COLUMNS = ("run", "x, mm", "y, mm", "z, mm", "turn x, deg", "turn y, deg", "turn z, deg")
 
-    @property
-    def spread_mm(self) -> float:
-        """RMS distance of the runs' origins from the common one."""
-        return 1e3 * rms(self.shift)
-
     def rows(self) -> list[list[str]]:
         numbers = np.hstack([1e3 * self.shift, np.degrees(self.turn)])
         return [[str(run), *(f"{x:+.2f}" for x in row)] for run, row in zip(self.run, numbers, strict=True)]
