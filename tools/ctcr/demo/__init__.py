@@ -1,1 +1,1 @@
-"""Demonstrations: what the tools do together, told as one story."""
+"""A demonstration: the tools together, told as one story."""

@@ -25,7 +25,7 @@ def _bits(index: int, count: int, padding: int = 0) -> list[int]:
 
 def _mappings(positioning: int) -> dict[int, tuple[str, list[int]]]:
     """Every PDO with its entries. The numbers of the last two differ between variants of the terminal."""
-    encoder, command, place = _bits(ENCODER, 4, 12), _bits(POSITIONING, 2, 14), _entry(POSITIONING, 0x11, 32)
+    encoder, command, target = _bits(ENCODER, 4, 12), _bits(POSITIONING, 2, 14), _entry(POSITIONING, 0x11, 32)
     read, status = _bits(0x6000, 16), _bits(0x6020, 8, 8)
     more_status = [_entry(0x6020, 0x11, 32), _entry(0x6020, 0x21, 16), _entry(0x6020, 0x22, 32)]
     return {
@@ -34,8 +34,8 @@ def _mappings(positioning: int) -> dict[int, tuple[str, list[int]]]:
         0x1602: ("STM Control", _bits(STEPPER, 3, 13)),
         0x1603: ("STM Position", [_entry(STEPPER, 0x11, 32)]),
         0x1604: ("STM Velocity", [_entry(STEPPER, 0x21, 16)]),
-        0x1605: ("POS Control compact", [*command, place]),
-        0x1606: ("POS Control", [*command, place, *(_entry(POSITIONING, i, 16) for i in range(0x21, 0x25))]),
+        0x1605: ("POS Control compact", [*command, target]),
+        0x1606: ("POS Control", [*command, target, *(_entry(POSITIONING, i, 16) for i in range(0x21, 0x25))]),
         0x1A00: ("ENC Status compact", [*read, _entry(0x6000, 0x11, 16), _entry(0x6000, 0x12, 16)]),
         0x1A01: ("ENC Status", [*read, _entry(0x6000, 0x11, 32), _entry(0x6000, 0x12, 32)]),
         0x1A03: ("STM Status", _bits(0x6010, 16)),
