@@ -55,7 +55,7 @@ class Diagnosis:
         explained = self.accepted[0].explained if self.accepted else 0.0
         others_fit = np.max(self.rounds[0].before.inflation) < settings.INFLATION_EXPLAINED
         is_wrong = before > settings.MANY_OUTLIERS and np.max(self.final.inflation) > settings.INFLATION_WRONG
-        many = before > settings.MOST_OUTLIERS and after > max(settings.MOST_OUTLIERS, 0.5 * before)
+        many = before > settings.MOST_OUTLIERS and after > max(settings.MOST_OUTLIERS, settings.OUTLIERS_LEFT * before)
         return many and bool(explained < settings.HARDLY_EXPLAINED or others_fit or is_wrong)
 
     @property

@@ -189,14 +189,14 @@ def screen(
 
 
 def _worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
-    """The best effects, two of each at most. Forms of the same parameters come last: once an effect is accepted,
+    """The best effects, few variants of each. Forms of the same parameters come last: once an effect is accepted,
     all its forms are tried."""
-    worth = [one for one in screened if one.linear > max(1.0, settings.NEAR * screened[0].linear)]
+    worth = [one for one in screened if one.linear > max(settings.REFIT_GAIN, settings.NEAR * screened[0].linear)]
     first = {one.candidate.names: one for one in reversed(worth)}
     chosen: list[CandidateFit] = []
     for one in sorted(worth, key=lambda one: first[one.candidate.names] is not one):
         same = [other for other in chosen if other.id == one.id]
-        if len(same) < 2 and (same or len({other.id for other in chosen}) < settings.REFITS):
+        if len(same) < settings.REFIT_VARIANTS and (same or len({other.id for other in chosen}) < settings.REFITS):
             chosen.append(one)
     return chosen
 
