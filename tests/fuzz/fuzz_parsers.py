@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from ctcr.errors import InputError
+from ctcr.model import parameters
 from ctcr.robot import robot_file
 from ctcr.table import csv_table, measurements
 
@@ -80,7 +81,7 @@ def read_robot(content: bytes) -> None:
     """Parses, and uses what was accepted."""
     robot = robot_file.parse(content)
     robot_file.warnings(robot)
-    assert all(np.isfinite(value).all() for value in robot.core_parameters().values())
+    assert np.isfinite(parameters.values(robot)).all()
 
 
 def read_table(content: bytes) -> None:

@@ -132,11 +132,8 @@ def test_model_has_no_sensor(robot, plan, hidden):
 def test_refusals_of_a_model(robot, hidden):
     with pytest.raises(InputError, match="friction, delay need the rows in their order"):
         ctcr.Model(hidden(robot, friction__coefficient="0.01", delay="0.05"))
-    model = ctcr.Model(hidden(robot, softening="0.01"))
-    with pytest.raises(InputError, match="softening a model gives poses under forces"):
-        model.predict(np.zeros((1, 3)), np.zeros((1, 3)), derivatives=True)
-    with pytest.raises(InputError, match="standard model alone"):
-        model.shape([-0.3, -0.2, -0.1], [0, 0, 0])
+    with pytest.raises(InputError, match="default integrator, not with rk4"):
+        ctcr.Model(hidden(robot, softening="0.01"), integrator="rk4")
 
 
 def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):

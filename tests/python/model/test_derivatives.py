@@ -3,22 +3,9 @@
 import numpy as np
 import pytest
 from ctcr import Model
-from ctcr.frames import matrix_from_quaternion
 from ctcr.model import parameters
 from ctcr.robot.description import Actuation, Robot
-from model_bench import make_robot, random_force, random_joints
-
-
-def pose_of(answer) -> tuple[np.ndarray, np.ndarray]:
-    assert answer.solved.all()
-    return answer.position, matrix_from_quaternion(answer.quaternion)
-
-
-def slope(plus, minus, width: float) -> np.ndarray:
-    """Derivative (M, 6) between two sets of poses, rows as of a Jacobian."""
-    spin = (plus[1] - minus[1]) / width @ (0.5 * (plus[1] + minus[1])).transpose(0, 2, 1)
-    turn = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-    return np.hstack([(plus[0] - minus[0]) / width, turn])
+from model_bench import make_robot, pose_of, random_force, random_joints, slope
 
 
 @pytest.mark.parametrize(("n_tubes", "sensor"), [(1, 1), (2, 1), (2, 2), (3, 1), (3, 2), (3, 3), (4, 1), (4, 3)])

@@ -206,15 +206,17 @@ def test_bad_steps():
         Model(robot, steps=0).predict(*random_joints(robot, 1))
 
 
-def test_core_arrays():
-    """The core takes only what needs no conversion."""
-    parameters = make_robot(1).core_parameters()
-    with pytest.raises(TypeError):
-        _core.Model(**parameters | {"length": parameters["length"].astype(np.float32)})
-    with pytest.raises(TypeError):
-        _core.Model(**parameters | {"length": [0.4]})
+def test_core_refusals():
+    """The compiled model refuses arrays that do not fit together."""
     with pytest.raises(ValueError, match="1 to 4 tubes"):
-        _core.Model(**{name: np.zeros(5 if name != "gravity" else 3) for name in parameters})
+        _core.Model(5, np.zeros(48))
+    with pytest.raises(ValueError, match="do not fit"):
+        _core.Model(2, np.zeros(12))
+    model = Model(make_robot(2))._core
+    with pytest.raises(ValueError, match="one column a tube"):
+        model.predict(beta=np.zeros((1, 3)), alpha=np.zeros((1, 3)))
+    with pytest.raises(ValueError, match="tubes, gravity and effects"):
+        model.predict(beta=np.zeros((1, 2)), alpha=np.zeros((1, 2)), derivatives=True, by_parameters=[25])
 
 
 def test_memory():

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.errors import InputError
+from ctcr.model import parameters
 from ctcr.robot import robot_file, yaml_document
 from ctcr.robot.description import Robot
 
@@ -45,14 +46,10 @@ def test_si_units():
         area = pi * (outer**2 - inner**2) / 4
         assert tube.mass_per_length == pytest.approx(tube.density_kg_m3 * area, rel=1e-12)
         assert tube.length == pytest.approx(1e-3 * tube.length_mm)
-    parameters = robot.core_parameters()
-    assert {name: value.shape for name, value in parameters.items()} == {
-        **dict.fromkeys(parameters, (3,)),
-        "gravity": (3,),
-    }
-    assert parameters["youngs_modulus"][0] == pytest.approx(58e9)
-    assert not parameters["bending_stiffness"].any()
-    assert all(value.dtype == np.float64 for value in parameters.values())
+    known = dict(zip(parameters.names_of(3), parameters.values(robot), strict=True))
+    assert known["tubes.1.youngs_modulus"] == pytest.approx(58e9)
+    assert known["tubes.2.length"] == pytest.approx(robot.tubes[1].length)
+    assert known["tubes.3.bending_stiffness"] == 0
 
 
 def test_bending_stiffness():
@@ -61,7 +58,7 @@ def test_bending_stiffness():
     text = "\n".join(lines).replace("youngs_modulus_GPa: 58.0", "bending_stiffness_Nm2: 0.05")
     robot = parse(re.sub(r"gravity:.*\n(- .*\n)+", "gravity: null\n", text + "\n"))
     assert [tube.bending_stiffness for tube in robot.tubes] == [0.05] * 3
-    assert robot.core_parameters()["bending_stiffness"].tolist() == [0.05] * 3
+    assert parameters.values(robot, ["tubes.2.bending_stiffness", "tubes.2.outer_diameter"]).tolist() == [0.05, 0]
     assert not robot.gravity_vector.any()
 
 

@@ -1,6 +1,7 @@
 """Robots, joints and loads for the tests of the compiled model."""
 
 import numpy as np
+from ctcr.frames import matrix_from_quaternion
 from ctcr.robot.description import Actuation, Robot, Tracker, Tube, Uncertainty
 
 
@@ -47,3 +48,15 @@ def random_joints(robot: Robot, rows: int, seed: int = 1) -> tuple[np.ndarray, n
 
 def random_force(rows: int, seed: int = 2) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-0.05, 0.05, (rows, 3))
+
+
+def pose_of(answer) -> tuple[np.ndarray, np.ndarray]:
+    assert answer.solved.all()
+    return answer.position, matrix_from_quaternion(answer.quaternion)
+
+
+def slope(plus, minus, width: float) -> np.ndarray:
+    """Derivative (M, 6) between two sets of poses, rows as of a Jacobian."""
+    spin = (plus[1] - minus[1]) / width @ (0.5 * (plus[1] + minus[1])).transpose(0, 2, 1)
+    turn = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+    return np.hstack([(plus[0] - minus[0]) / width, turn])

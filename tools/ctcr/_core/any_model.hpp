@@ -1,70 +1,62 @@
 #pragma once
 // A model whose number of tubes is known at run time: the border between numpy arrays and the templates.
-#include <cstddef>
+#include <Eigen/Core>
 #include <cstdint>
 #include <ctcr/core/status.hpp>
-#include <ctcr/core/types.hpp>
-#include <ctcr/robot/tube.hpp>
 #include <memory>
-#include <span>
-#include <utility>
+#include <vector>
 
 namespace ctcr::python {
 
-/// Rows of joints and loads, each array row-major.
-struct Rows {
-  std::ptrdiff_t count;
-  const double* beta;    ///< (count, N) [m]
-  const double* alpha;   ///< (count, N) [rad]
-  const double* force;   ///< (count, 3) [N], base frame; null: none
-  const double* moment;  ///< (count, 3) [N m], base frame; null: none
-};
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Where the answers go, each array row-major. NaN where there is no solution.
-struct Answers {
-  double* position;    ///< (count, 3) [m], base frame
-  double* quaternion;  ///< (count, 4), w first and not negative
-  std::uint8_t* status;
-  double* stability;      ///< (count,)
-  double* jacobian;       ///< (count, 6, 2N); null: no derivative
-  double* compliance;     ///< (count, 6, 6)
-  double* by_parameters;  ///< (count, 6, parameters of tubes and gravity); null: not those
+/// Joints and loads of M configurations.
+struct Configurations {
+  RowMajor beta, alpha;    ///< (M, N) [m], [rad]
+  RowMajor force, moment;  ///< (M, 3) at the robot tip [N], [N m], base frame; or empty: none
 };
 
 enum class Integrator : std::uint8_t { standard, ssp_rk3, classical_rk4, prince_dormand8 };
 
-/// What all rows share.
-struct Options {
-  Integrator integrator = Integrator::standard;  ///< derivatives need the standard one
+struct PredictOptions {
+  Integrator integrator = Integrator::standard;  ///< derivatives and effects need the standard one
   int steps = 1;                                 ///< integration steps per segment
   int tip_of = 0;                                ///< tube whose tip is asked for, from 0
   int threads = 0;                               ///< 0: all cores
+  bool derivatives = false;                      ///< by joints and load
+  std::vector<int> by_parameters{};  ///< and by these: of tubes, gravity and effects, as SystemParameters<N, Catalogue>
 };
 
-/// Where a shape goes, each array row-major with `room` places. NaN where a tube is not present.
+/// Poses of M tips, base frame. NaN where there is no solution.
+struct Poses {
+  RowMajor position, quaternion;  ///< (M, 3) [m]; (M, 4), w first and not negative
+  Eigen::VectorX<std::uint8_t> status;
+  Eigen::VectorXd stability;
+  RowMajor jacobian, compliance, by_parameters;  ///< (M, 6 x any): a row-major matrix of six rows each; or empty
+};
+
+/// A robot at K arc lengths. NaN where a tube is not present.
 struct ShapeArrays {
-  std::size_t room;        ///< at least points + 2N
-  double* arc_length;      ///< (room,) [m]
-  double* position;        ///< (room, 3) [m], base frame
-  double* quaternion;      ///< (room, 4), frame that does not twist, w first and not negative
-  double* force;           ///< (room, 3) [N], internal, base frame
-  double* moment;          ///< (room, 3) [N m], internal, base frame
-  double* tube_angle;      ///< (N, room) [rad]
-  double* tube_curvature;  ///< (N, room, 3) [1/m], tube frame
-  double* tube_moment;     ///< (N, room, 3) [N m], tube frame
+  Status status;
+  Eigen::VectorXd arc_length;            ///< (K) [m]
+  RowMajor position, quaternion;         ///< (K, 3) [m]; (K, 4) of the Bishop frame, w first and not negative
+  RowMajor force, moment;                ///< (K, 3) internal, of all tubes, base frame [N], [N m]
+  RowMajor tube_angle;                   ///< (N, K) [rad]
+  RowMajor tube_curvature, tube_moment;  ///< (N, 3 K) [1/m], [N m], tube frame
 };
 
 class AnyModel {
 public:
   virtual ~AnyModel() = default;
-  virtual void predict(const Rows& rows, const Answers& answers, const Options& options) const = 0;
-  /// Shape at the one row of `row`, at `points` places and the breakpoints. @return status and places written
-  virtual std::pair<Status, std::size_t> shape(const Rows& row, std::size_t points, int steps,
-                                               const ShapeArrays& arrays) const = 0;
+  /// @throws std::invalid_argument unless the arrays and options fit together
+  [[nodiscard]] virtual Poses predict(const Configurations& rows, const PredictOptions& options) const = 0;
+  /// Shape at the one configuration of `row`, at `points` uniform arc lengths and the breakpoints.
+  [[nodiscard]] virtual ShapeArrays shape(const Configurations& row, int points, int steps) const = 0;
 };
 
-/// Defined for N = 1..4, which is the size of `tubes`.
+/// Defined for N = 1..4.
+/// @param parameters  of tubes and gravity, the first of ParameterVector<N>   @param effects  values of all of the catalogue; empty: the standard model
 template <int N>
-std::unique_ptr<AnyModel> make_model(std::span<const Tube> tubes, const Vec3& gravity);
+std::unique_ptr<AnyModel> make_model(const Eigen::VectorXd& parameters, const Eigen::VectorXd& effects);
 
 }  // namespace ctcr::python

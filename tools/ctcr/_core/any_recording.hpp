@@ -4,12 +4,11 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
-namespace ctcr::python {
+#include "any_model.hpp"
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+namespace ctcr::python {
 
 /// What Recording<N, Fx> is made of; NaN where not measured.
 struct Table {
@@ -47,19 +46,13 @@ public:
   virtual void predicted(RowMajor& position, RowMajor& quaternion) const = 0;
 };
 
-/// What Python holds.
-class BoundRecording {
-public:
-  explicit BoundRecording(std::unique_ptr<AnyRecording> recording) : recording_(std::move(recording)) {}
-  AnyRecording& operator*() const { return *recording_; }
-
-private:
-  std::unique_ptr<AnyRecording> recording_;
-};
-
-/// Names and units of ParameterVector<N>.
-struct ParameterNames {
-  std::vector<std::string> names, units;
+/// A parameter of ParameterVector<N>.
+struct ParameterInfo {
+  std::string name;        ///< such as "tubes.2.length"
+  std::string kind;        ///< its name in parameter_kinds: '#' for the number of the tube, '*' for the axis
+  std::string unit;        ///< SI
+  int index;               ///< of its tube or axis, from 0
+  double lowest, highest;  ///< possible values
 };
 
 /// Values of a parameter of an effect.
@@ -85,7 +78,7 @@ struct CatalogueEntry {
 template <int N>
 std::unique_ptr<AnyRecording> make_recording(const Table& table);
 template <int N>
-ParameterNames parameter_names();
+std::vector<ParameterInfo> robot_parameters();
 template <int N>
 std::vector<CatalogueParameter> catalogue_parameters();
 

@@ -46,14 +46,13 @@ std::vector<FreeParameter> free_parameters(const std::vector<std::string>& names
 using Known = std::vector<std::pair<std::string, Eigen::VectorXd>>;
 using Within = std::vector<std::tuple<std::string, Eigen::VectorXd, double>>;
 
-Identification identify_any(const nb::object& predict, const std::vector<std::string>& names,
-                            const Eigen::VectorXd& mean, const Eigen::VectorXd& sd, const Eigen::VectorXd& low,
-                            const Eigen::VectorXd& high, const Noise& noise, const Eigen::MatrixX3d& places,
-                            bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
-                            const std::optional<Eigen::Vector2d>& inflation,
-                            const std::optional<Eigen::VectorXd>& start,
-                            const std::optional<Eigen::MatrixX2d>& first_weights, int starts, int max_iterations,
-                            double tolerance, const Known& known, const Within& within, std::vector<int>& excluded) {
+std::pair<Identification, std::vector<int>> identify_any(
+    const nb::object& predict, const std::vector<std::string>& names, const Eigen::VectorXd& mean,
+    const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
+    const Eigen::MatrixX3d& places, bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
+    const std::optional<Eigen::Vector2d>& inflation, const std::optional<Eigen::VectorXd>& start,
+    const std::optional<Eigen::MatrixX2d>& first_weights, int starts, int max_iterations, double tolerance,
+    const Known& known, const Within& within) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
   options.robust = robust;
@@ -70,17 +69,19 @@ Identification identify_any(const nb::object& predict, const std::vector<std::st
     options.known.push_back({text, change});
   }
   for (const auto& [text, change, least] : within) options.within.push_back({text, change, least});
-  if (nb::isinstance<BoundRecording>(predict)) {
-    AnyRecording& recording = **nb::cast<BoundRecording*>(predict);
+  if (nb::isinstance<AnyRecording>(predict)) {
+    AnyRecording& recording = nb::cast<AnyRecording&>(predict);
     const nb::gil_scoped_release released;
-    return identify_with_exclusions(recording, parameters, noise, places, options, excluded);
+    std::vector<int> excluded;
+    Identification fit = identify_with_exclusions(recording, parameters, noise, places, options, excluded);
+    return {std::move(fit), std::move(excluded)};
   }
-  return identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, places, options);
+  return {identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, places, options), {}};
 }
 
 RowReport report_any(const Identification& fit, const nb::object& predict) {
-  if (nb::isinstance<BoundRecording>(predict)) {
-    AnyRecording& recording = **nb::cast<BoundRecording*>(predict);
+  if (nb::isinstance<AnyRecording>(predict)) {
+    AnyRecording& recording = nb::cast<AnyRecording&>(predict);
     const nb::gil_scoped_release released;
     return report_rows(fit, std::ref(recording));
   }
@@ -104,9 +105,10 @@ void bind_identify(nb::module_& m) {
       .def_ro("position_field", &Noise::position_field)
       .def_ro("rotation_field", &Noise::rotation_field)
       .def_ro("correlation_length", &Noise::correlation_length);
-  m.def("field_of_accuracy", &field_of_accuracy, "accuracy_95"_a, "jitter"_a);
+  m.def("field_of_accuracy", &field_of_accuracy, "accuracy_95"_a, "jitter"_a,
+        "Sd per axis of the field error that a 95 % accuracy leaves beside the jitter, in their unit.");
 
-  nb::class_<Correlation>(m, "Correlation")
+  nb::class_<Correlation>(m, "Correlation", "Two parameters that the readings hardly distinguish.")
       .def_ro("first", &Correlation::first)
       .def_ro("second", &Correlation::second)
       .def_ro("coefficient", &Correlation::coefficient);
@@ -114,35 +116,40 @@ void bind_identify(nb::module_& m) {
       .def_ro("text", &Direction::text)
       .def_ro("ratio", &Direction::ratio, "Posterior / prior standard deviation along it.")
       .def_ro("coefficients", &Direction::coefficients, "Unit vector in prior standard deviations.");
-  nb::class_<Start>(m, "Start")
-      .def_ro("cost", &Start::cost)
-      .def_ro("distance", &Start::distance)
+  nb::class_<Start>(m, "Start", "The minimum that another start led to.")
+      .def_ro("cost", &Start::cost, "-log posterior density, up to a constant that all starts share.")
+      .def_ro("distance", &Start::distance, "To the result, in posterior sd.")
       .def_ro("converged", &Start::converged);
 
   nb::class_<Identification>(m, "Identification", "A fit; arrays are copies.")
       .def_ro("converged", &Identification::converged)
-      .def_ro("status", &Identification::status)
-      .def_ro("warnings", &Identification::warnings)
-      .def_ro("values", &Identification::values)
-      .def_ro("sd", &Identification::sd)
-      .def_ro("shift", &Identification::shift)
-      .def_ro("ratio", &Identification::ratio)
-      .def_ro("covariance", &Identification::covariance)
-      .def_ro("correlations", &Identification::correlations)
-      .def_ro("directions", &Identification::directions)
-      .def_ro("chi_square", &Identification::chi_square)
-      .def_ro("admitted_chi_square", &Identification::admitted_chi_square)
-      .def_ro("shift_square", &Identification::shift_square)
-      .def_ro("observations", &Identification::observations)
-      .def_ro("bulk_observations", &Identification::bulk_observations)
-      .def_prop_ro("inflation", [](const Identification& self) { return Eigen::Vector2d(self.inflation); })
-      .def_ro("effective_parameters", &Identification::effective_parameters)
-      .def_ro("reduced_chi_square", &Identification::reduced_chi_square)
-      .def_ro("log_evidence", &Identification::log_evidence)
-      .def_ro("weights", &Identification::weights)
-      .def_ro("starts", &Identification::starts)
+      .def_ro("status", &Identification::status, "In words.")
+      .def_ro("warnings", &Identification::warnings, "Whole sentences.")
+      .def_ro("values", &Identification::values, "In the units of the parameters.")
+      .def_ro("sd", &Identification::sd, "Of the values; inf: not determined.")
+      .def_ro("shift", &Identification::shift, "(value - prior mean) / prior sd; NaN without a prior.")
+      .def_ro("ratio", &Identification::ratio, "Posterior / prior sd; NaN without a prior.")
+      .def_ro("covariance", &Identification::covariance, "In the units of the parameters.")
+      .def_ro("correlations", &Identification::correlations, "Strong ones.")
+      .def_ro("directions", &Identification::directions, "Undetermined ones.")
+      .def_ro("chi_square", &Identification::chi_square,
+              "Of the residuals under the noise as stated, outliers with less weight.")
+      .def_ro("admitted_chi_square", &Identification::admitted_chi_square, "Under the inflated noise.")
+      .def_ro("shift_square", &Identification::shift_square, "Sum of the squared shifts.")
+      .def_ro("observations", &Identification::observations, "Numbers fitted.")
+      .def_ro("bulk_observations", &Identification::bulk_observations, "Numbers fitted without the outliers.")
+      .def_prop_ro(
+          "inflation", [](const Identification& self) { return Eigen::Vector2d(self.inflation); },
+          "Factor on the sd of the jitter of positions and rotations that the fit had to admit.")
+      .def_ro("effective_parameters", &Identification::effective_parameters, "Trace of the hat matrix.")
+      .def_ro("reduced_chi_square", &Identification::reduced_chi_square,
+              "chi_square / (bulk_observations - effective_parameters).")
+      .def_ro("log_evidence", &Identification::log_evidence,
+              "Log marginal likelihood by the Laplace approximation; NaN where a prior is infinite.")
+      .def_ro("weights", &Identification::weights, "(rows, 2) of positions and rotations.")
+      .def_ro("starts", &Identification::starts, "Minima that other starts led to.")
       .def_ro("iterations", &Identification::iterations)
-      .def_ro("evaluations", &Identification::evaluations)
+      .def_ro("evaluations", &Identification::evaluations, "Predictions made.")
       .def(
           "whiten",
           [](const Identification& self, Eigen::MatrixXd columns) {
@@ -163,25 +170,12 @@ void bind_identify(nb::module_& m) {
           "(residual, jacobian, field, expected_square) at the fitted values, of every row that is predicted.");
 
   m.def(
-      "identify",
-      [](const nb::object& predict, const std::vector<std::string>& names, const Eigen::VectorXd& mean,
-         const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
-         const Eigen::MatrixX3d& places, bool robust, bool admit_model_error,
-         const std::optional<Eigen::MatrixX2d>& weights, const std::optional<Eigen::Vector2d>& inflation,
-         const std::optional<Eigen::VectorXd>& start, const std::optional<Eigen::MatrixX2d>& first_weights, int starts,
-         int max_iterations, double tolerance, const Known& known, const Within& within) {
-        std::vector<int> excluded;
-        Identification fit =
-            identify_any(predict, names, mean, sd, low, high, noise, places, robust, admit_model_error, weights,
-                         inflation, start, first_weights, starts, max_iterations, tolerance, known, within, excluded);
-        return std::pair(std::move(fit), std::move(excluded));
-      },
-      nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a, "places"_a,
-      "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
+      "identify", &identify_any, nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a,
+      "places"_a, "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
       "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "first_weights"_a.none() = nb::none(),
       "starts"_a = 3, "max_iterations"_a = 50, "tolerance"_a = 0.02, "known"_a = Known{}, "within"_a = Within{},
-      "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and excluded "
-      "rows.");
+      "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and the rows "
+      "left out because they could not be solved. Raises ValueError where no fit is possible.");
 }
 
 }  // namespace ctcr::python

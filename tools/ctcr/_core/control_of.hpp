@@ -1,5 +1,5 @@
 #pragma once
-// Closed loops of a robot of N tubes. Each N is compiled in a file of its own.
+// Closed loops of a robot of N tubes.
 #include <ctcr/control/closed_loop.hpp>
 #include <ctcr/control/path.hpp>
 #include <ctcr/parallel/thread_pool.hpp>
@@ -7,8 +7,8 @@
 #include <ctcr/simulation/simulated_robot.hpp>
 #include <variant>
 
-#include "all_effects.hpp"
 #include "any_control.hpp"
+#include "systems_of.hpp"
 
 namespace ctcr::python {
 
@@ -45,15 +45,6 @@ AllTasks<N> tasks_of(const TaskValues& v) {
            Posture<N>{weight(5), {v.posture_beta, v.posture_alpha}, v.posture_rate}}};
 }
 
-template <int N>
-System<N, AllEffects> system_of(const SystemValues& values) {
-  System<N, AllEffects> system = with_effects<N>(plain_system<N>(values.parameters, 0, values.steps), values.effects);
-  // Switches off what does not act.
-  const auto acting = system.model.effects().template seeded<double>([](double x, int) { return x; });
-  system.model = Model<N, AllEffects>(system.model.robot(), acting);
-  return system;
-}
-
 /// AnyDevice as a Device.
 template <int N>
 class OuterDevice {
@@ -84,7 +75,10 @@ LoopResult closed_loop(const LoopRequest& r) {
                          r.limits.rotation_speed, r.limits.beta_low, r.limits.beta_high};
   const TipLoad load{r.force, Vec3::Zero()};
 
-  const System<N, AllEffects> system = system_of<N>(r.controller), real = system_of<N>(r.plant);
+  const auto system_with = [](const SystemValues& v) {
+    return with_constant_effects<N>(system_of<N>(v.parameters, 0, v.steps), v.effects);
+  };
+  const System<N, AllEffects> system = system_with(r.controller), real = system_with(r.plant);
   // The path and the obstacle stand in space: a controller with another T_ref sees them elsewhere.
   const Pose T_base_world = system.sensor.T_tracker_base.inverse() * real.sensor.T_tracker_base;
   std::vector<Vec3> points;
@@ -164,9 +158,7 @@ LoopResult closed_loop(const LoopRequest& r) {
 
 template <int N>
 SensitivityResult sensitivity(const SensitivityRequest& r) {
-  const auto system = [&](const Eigen::VectorXd& parameters) {
-    return plain_system<N>(parameters, 0, r.nominal.steps);
-  };
+  const auto system = [&](const Eigen::VectorXd& parameters) { return system_of<N>(parameters, 0, r.nominal.steps); };
   Variations<N> v{system(r.nominal.parameters), {}, r.low, r.high, r.most_force};
   for (Eigen::Index i = 0; i < r.varied.rows(); ++i) v.systems.push_back(system(r.varied.row(i).transpose()));
   const auto columns = v.systems.size() + 1;
@@ -200,3 +192,7 @@ SensitivityResult sensitivity(const SensitivityRequest& r) {
 }
 
 }  // namespace ctcr::python
+
+#define CTCR_INSTANTIATE_CONTROL(N)                                                                 \
+  template ctcr::python::LoopResult ctcr::python::closed_loop<N>(const ctcr::python::LoopRequest&); \
+  template ctcr::python::SensitivityResult ctcr::python::sensitivity<N>(const ctcr::python::SensitivityRequest&);

@@ -1,12 +1,12 @@
 #pragma once
-// Recordings of a robot of N tubes behind AnyRecording. Each N is compiled in a file of its own.
+// Recordings of a robot of N tubes behind AnyRecording.
 #include <algorithm>
 #include <ctcr/calibration/identification/recording.hpp>
 #include <ctcr/friction/frictionless_torsion.hpp>
 #include <stdexcept>
 
-#include "all_effects.hpp"
 #include "any_recording.hpp"
+#include "systems_of.hpp"
 
 namespace ctcr::python {
 
@@ -25,7 +25,7 @@ bool any_effect(const Table& table, const auto& chosen) {
 
 template <int N>
 std::vector<RecordedRow<N>> rows_of(const Table& table) {
-  const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
+  const System<N> plain = system_of<N>(table.parameters, table.sensor_tube, table.steps);
   const Transmission<N>& transmission = plain.transmission;
   std::vector<RecordedRow<N>> rows(std::size_t(table.beta.rows()));
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -53,7 +53,7 @@ inline std::vector<Pose> measured_of(const Table& table) {
 template <int N>
 Profiles<N> profiles_of(const Table& table) {
   Profiles<N> out;
-  const auto tubes = plain_system<N>(table.parameters, table.sensor_tube, table.steps).model.robot().tubes;
+  const auto tubes = system_of<N>(table.parameters, table.sensor_tube, table.steps).model.robot().tubes;
   for (std::size_t i = 0; i < std::size_t(N) && table.profiles.rows() > 1; ++i) {
     out.length[i] = tubes[i].length;
     for (Eigen::Index k = 0; k < table.profiles.rows(); ++k) {
@@ -86,31 +86,27 @@ public:
   Eigen::VectorXd nominal() const override { return recording_.nominal(); }
   const std::vector<int>& unsolved() const override { return recording_.unsolved(); }
   const std::vector<bool>& active() const override { return recording_.active(); }
-  void activate(const std::vector<bool>& rows) override { recording_.activate(rows); }
+  void activate(const std::vector<bool>& rows) override {
+    if (Eigen::Index(rows.size()) != recording_.size()) throw std::invalid_argument("activate needs one flag a row");
+    recording_.activate(rows);
+  }
   void predicted(RowMajor& position, RowMajor& quaternion) const override {
     const auto count = recording_.size();
-    position.resize(count, 3);
-    quaternion.resize(count, 4);
+    position.setConstant(count, 3, std::numeric_limits<double>::quiet_NaN());
+    quaternion.setConstant(count, 4, std::numeric_limits<double>::quiet_NaN());
+    std::vector<bool> solved = recording_.active();
+    for (const int i : recording_.unsolved()) solved[std::size_t(i)] = false;
     for (Eigen::Index i = 0; i < count; ++i) {
+      if (!solved[std::size_t(i)]) continue;
       const Pose& pose = recording_.predicted()[std::size_t(i)];
-      const Eigen::Quaterniond q(pose.rotation);
       position.row(i) = pose.position.transpose();
-      quaternion.row(i) = (q.w() < 0 ? -1.0 : 1.0) * Eigen::RowVector4d(q.w(), q.x(), q.y(), q.z());
+      quaternion.row(i) = ctcr::python::quaternion(pose.rotation);
     }
-    for (const int i : recording_.unsolved()) clear(position, quaternion, i);
-    for (Eigen::Index i = 0; i < count; ++i)
-      if (!recording_.active()[std::size_t(i)]) clear(position, quaternion, i);
   }
 
 private:
-  static void clear(RowMajor& position, RowMajor& quaternion, Eigen::Index i) {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    position.row(i).setConstant(nan);
-    quaternion.row(i).setConstant(nan);
-  }
-
   static System<N, Fx> system(const Table& table, const Profiles<N>& profiles) {
-    const System<N> plain = plain_system<N>(table.parameters, table.sensor_tube, table.steps);
+    const System<N> plain = system_of<N>(table.parameters, table.sensor_tube, table.steps);
     if constexpr (Fx::none)
       return plain;
     else
@@ -148,11 +144,14 @@ std::unique_ptr<AnyRecording> make_recording(const Table& table) {
 }
 
 template <int N>
-ParameterNames parameter_names() {
-  ParameterNames out;
-  for (int i = 0; i < ParameterVector<N>::count; ++i) {
-    out.names.emplace_back(std::string_view(ParameterVector<N>::name(i)));
-    out.units.emplace_back(ParameterVector<N>::info(ParameterVector<N>::entry(i).kind).unit);
+std::vector<ParameterInfo> robot_parameters() {
+  using P = ParameterVector<N>;
+  std::vector<ParameterInfo> out;
+  for (int k = 0; k < P::count; ++k) {
+    const auto [kind, i] = P::entry(k);
+    const ParameterKind& info = P::info(kind);
+    out.push_back({std::string(std::string_view(P::name(k))), std::string(info.name), std::string(info.unit), i,
+                   info.lowest, info.highest});
   }
   return out;
 }
@@ -176,10 +175,7 @@ std::vector<CatalogueParameter> catalogue_parameters() {
 
 }  // namespace ctcr::python
 
-#define CTCR_RECORDING_OF(N)                                                                                        \
-  namespace ctcr {                                                                                                  \
-  CTCR_EFFECT_EVALUATIONS(template, N)                                                                              \
-  }                                                                                                                 \
+#define CTCR_INSTANTIATE_RECORDING(N)                                                                               \
   template std::unique_ptr<ctcr::python::AnyRecording> ctcr::python::make_recording<N>(const ctcr::python::Table&); \
-  template ctcr::python::ParameterNames ctcr::python::parameter_names<N>();                                         \
+  template std::vector<ctcr::python::ParameterInfo> ctcr::python::robot_parameters<N>();                            \
   template std::vector<ctcr::python::CatalogueParameter> ctcr::python::catalogue_parameters<N>();

@@ -52,10 +52,12 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     force = _finite("force", force, 3)
     with_history = effect_model.of_the_path(loaded) if loaded.effects else []
     kept = {name: given for name, given in loaded.effects.items() if name not in with_history}
-    tip = Model(loaded.model_copy(update={"effects": kept}), steps=steps).predict(beta[None], alpha[None], force[None])
+    used = loaded.model_copy(update={"effects": kept})
+    model = Model(used, steps=steps)
+    tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
-    shape = Model(loaded.standard, steps=steps).shape(beta, alpha, force, points=SAMPLES)
+    shape = model.shape(beta, alpha, force, points=SAMPLES)
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
     rotation = matrix_from_quaternion(shape.quaternion)
     if picture:
@@ -85,13 +87,11 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     out.table("Where the tubes end", ["", "out [mm]", "x [mm]", "y [mm]", "z [mm]"], rows)
     out.say("tip direction  " + _listed(rotation[-1][:, 2], 5))
     out.say("tip quaternion " + _listed(tip.quaternion[0], 5) + "  (w, x, y, z)")
-    if np.isfinite(tip.stability[0]):  # not known with effects
-        out.say(f"stability      {tip.stability[0]:.3g}  (0: about to snap)")
+    out.say(f"stability      {tip.stability[0]:.3g}  (0: about to snap)")
     if picture:
         out.say(f"picture: {picture}")
-    if acting := [name for name in kept if name not in effect_model.of_the_reading(loaded)]:
-        sensor = f"With {', '.join(acting)} the sensor is at {_listed(1e3 * tip.position[0], 3)} mm"
-        out.say(f"{sensor}; the shape is that of the standard model.")
+    if acting := effect_model.of_the_poses(used):
+        out.say(f"With the effects {', '.join(acting)}")
     if with_history:
         out.say(f"Left out, as it depends on how the joints were reached: {', '.join(with_history)}")
 

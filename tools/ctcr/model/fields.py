@@ -1,42 +1,14 @@
-"""The fitted parameters as the robot file and its reader know them: place in the file, unit, doubts."""
+"""The fitted parameters in the fields and units of the robot file, and what is doubtful about them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import isfinite
 
 from ctcr import settings
-from ctcr.effects import catalogue
 from ctcr.model import parameters
-from ctcr.robot.description import MAX_TUBES, Robot, Tube
+from ctcr.model.parameters import Field, field_of, value_at
+from ctcr.robot.description import Robot, Tube
 from ctcr.robot.ledger import Change
-from ctcr.robot.yaml_document import FieldPath
-
-_TUBE = {
-    "youngs_modulus": ("youngs_modulus_GPa", "GPa", 1e-9),
-    "poisson_ratio": ("poisson_ratio", "", 1.0),
-    "density": ("density_kg_m3", "kg/m^3", 1.0),
-    "inner_diameter": ("inner_diameter_mm", "mm", 1e3),
-    "outer_diameter": ("outer_diameter_mm", "mm", 1e3),
-    "length": ("length_mm", "mm", 1e3),
-    "curved_length": ("curved_length_mm", "mm", 1e3),
-    "curvature": ("curvature_per_m", "1/m", 1.0),
-    "bending_stiffness": ("bending_stiffness_Nm2", "N m^2", 1.0),
-}
-_ACTUATION = {
-    "translation_ratio": ("translation_mm_per_rev", "mm/rev", 2e3 * pi),
-    "rotation_ratio": ("rotation_rev_per_rev", "", 1.0),
-    "home_translation": ("home_translation_mm", "mm", 1e3),
-    "home_rotation": ("home_rotation_deg", "deg", 180 / pi),
-}
-
-
-@dataclass(frozen=True)
-class Field:
-    """Where a parameter stands in the file (None: in no field of its own), its unit there, and that unit per SI."""
-
-    path: FieldPath | None
-    unit: str
-    factor: float
 
 
 @dataclass(frozen=True)
@@ -84,39 +56,6 @@ def doubts(items: list[Fitted]) -> list[str]:
     if silent:
         said.append(f"The data say nothing of {', '.join(silent)}.")
     return said
-
-
-def field_of(name: str) -> Field:
-    """The field of a parameter such as "tubes.2.length" or "tracker.rotation.x"."""
-    group, *rest = name.split(".")
-    if group == "tubes" and rest[-1] in _TUBE:
-        key, unit, factor = _TUBE[rest[-1]]
-        return Field(("tubes", int(rest[0]) - 1, key), unit, factor)
-    if group == "actuation" and rest[0] in _ACTUATION:
-        key, unit, factor = _ACTUATION[rest[0]]
-        return Field(("actuation", key, *(int(number) - 1 for number in rest[1:])), unit, factor)
-    if group == "gravity":
-        return Field(("gravity", "xyz".index(rest[0])), "m/s^2", 1.0)
-    if name.startswith("tracker.position."):
-        return Field(("tracker", "position_mm", "xyz".index(rest[1])), "mm", 1e3)
-    if name == "tracker.sensor_roll":
-        return Field(("tracker", "sensor_roll_deg"), "deg", 180 / pi)
-    if name.startswith("tracker.rotation."):
-        return Field(None, "deg", 180 / pi)
-    return Field(None, _effect_unit(name), 1.0)
-
-
-def _effect_unit(name: str) -> str:
-    known = catalogue.parameter_of(MAX_TUBES)
-    return known[name].unit if name in known else ""
-
-
-def value_at(robot: Robot, path: FieldPath) -> float:
-    """The number at a place of the file."""
-    value = robot
-    for step in path:
-        value = value[step] if isinstance(step, int) else getattr(value, step)
-    return value
 
 
 def in_si(values: Mapping[str, float], robot: Robot) -> dict[str, float]:

@@ -1,15 +1,18 @@
 """The kinetostatic model of a robot: poses, derivatives and shapes from joints and tip loads."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ctcr import _core
+from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.frames import product
-from ctcr.model import effect_model
 from ctcr.model import parameters as free_parameters
+from ctcr.model import recording
+from ctcr.model.effect_model import of_the_path, of_the_poses
 from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
@@ -29,7 +32,7 @@ class Prediction:
     position: Array  # (M, 3) [m], tip of the tube that carries the sensor
     quaternion: Array  # (M, 4), w first and not negative
     status: NDArray[np.uint8]  # (M,), 0: solved; `status_text` says what the others mean
-    stability: Array  # (M,), 1 without interaction between tubes, 0 where the robot snaps; NaN with effects
+    stability: Array  # (M,), 1 without interaction between tubes, 0 where the robot snaps
     jacobian: Array | None  # (M, 6, 2N), rows: velocity [m], turn [rad]; columns: beta [m], alpha [rad]
     compliance: Array | None  # (M, 6, 6), rows as above; columns: force [N] and moment [N m] at the robot tip
     by_parameters: Array | None = None  # (M, 6, P), rows as above; columns: `Model.parameters`, SI
@@ -75,9 +78,9 @@ class Model:
     `integrator` is one of INTEGRATORS; those beside the default serve to compare and give poses alone.
     Joints are `beta` [m], <= 0, where each tube is grasped, and `alpha` [rad], the angle of its base; innermost tube
     first. Loads act at the robot tip: `force` [N] and `moment` [N m], base frame. Arrays of other types than float64
-    are converted. A robot's effects (see `effects.catalogue`) act on the poses, but for those of the tracker: poses are
-    those of the tube. Raises ValueError where shapes do not fit, and InputError where a robot's effects cannot be used:
-    those that depend on the path, of which single configurations know nothing.
+    are converted. A robot's effects (see `effects.catalogue`) act on poses, derivatives and shapes, but for those
+    of the tracker: poses are those of the tube. Raises ValueError where shapes do not fit, and InputError where the
+    robot has effects that depend on the path, which single configurations do not have: see `effect_model.readings`.
     """
 
     def __init__(self, robot: Robot, *, steps: int = 1, integrator: str = "default"):
@@ -85,9 +88,15 @@ class Model:
             raise ValueError(f"integrator must be one of {', '.join(INTEGRATORS)}, not {integrator!r}")
         self.robot = robot
         self.steps = steps
-        self._effects = effect_model.usable(robot, integrator) if robot.effects else {}
         self.integrator = integrator
-        self._core = _core.Model(**robot.core_parameters())
+        acting = _acting(robot, integrator)
+        self._effects = [name for identity in acting for name in catalogue.get(identity, robot.n_tubes).names()]
+        own = [name for name in free_parameters.names_of(robot.n_tubes) if name.startswith(("tubes.", "gravity."))]
+        self._core = _core.Model(
+            robot.n_tubes,
+            free_parameters.values(robot, own),
+            catalogue.values(robot.model_copy(update={"effects": acting})) if acting else None,
+        )
 
     def predict(
         self,
@@ -109,29 +118,9 @@ class Model:
         n = self.robot.n_tubes
         beta, alpha = _rows("beta", beta, n), _rows("alpha", alpha, n)
         rows = len(beta)
-        derivatives = derivatives or by_parameters
-        own = sum(name.startswith(("tubes.", "gravity.")) for name in self.parameters)
-        answer = Prediction(
-            position=np.empty((rows, 3)),
-            quaternion=np.empty((rows, 4)),
-            status=np.empty(rows, np.uint8),
-            stability=np.empty(rows),
-            jacobian=np.empty((rows, 6, 2 * n)) if derivatives else None,
-            compliance=np.empty((rows, 6, 6)) if derivatives else None,
-            by_parameters=np.empty((rows, 6, own)) if by_parameters else None,
-        )
-        if self._effects:
-            if derivatives or moment is not None:
-                text = (
-                    f"with the effects {', '.join(self._effects)} a model gives poses under forces, neither "
-                    "derivatives nor poses under moments"
-                )
-                raise InputError(Problem(text))
-            loads = _load("force", force, rows)
-            options = {"steps": self.steps, "threads": threads}
-            effect_model.predict(self.robot, self._effects, beta, alpha, loads, answer, **options)
-            return answer
-        self._core.predict(
+        own = [name for name in self.parameters if not name.startswith("actuation.")] if by_parameters else []
+        known = recording.names_of(n)
+        *pose, jacobian, compliance, by_own = self._core.predict(
             beta=beta,
             alpha=alpha,
             force=_load("force", force, rows),
@@ -140,25 +129,31 @@ class Model:
             steps=self.steps,
             tip_of=self.robot.tracker.sensor_on_tube - 1,
             threads=threads,
-            **vars(answer),
+            derivatives=derivatives or by_parameters,
+            by_parameters=[known.index(name) for name in own],
         )
-        return replace(answer, by_parameters=self._with_motors(answer, beta, alpha)) if by_parameters else answer
+        if not (derivatives or by_parameters):
+            return Prediction(*pose, jacobian=None, compliance=None)
+        jacobian = jacobian.reshape(rows, 6, 2 * n)
+        by = self._with_motors(by_own.reshape(rows, 6, len(own)), jacobian, beta, alpha) if by_parameters else None
+        return Prediction(*pose, jacobian, compliance.reshape(rows, 6, 6), by)
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the parameters that the pose depends on, base frame: tubes, gravity and motors."""
+        """Names of the parameters that the pose depends on, base frame: tubes, gravity, motors and effects."""
         names = free_parameters.names_of(self.robot.n_tubes)
-        return tuple(name for name in names if not name.startswith("tracker."))
+        return (*(name for name in names if not name.startswith("tracker.")), *self._effects)
 
-    def _with_motors(self, answer: Prediction, beta: Array, alpha: Array) -> Array:
+    def _with_motors(self, by_own: Array, jacobian: Array, beta: Array, alpha: Array) -> Array:
         """Derivatives by all parameters (M, 6, P): q = rho theta + Delta, and theta stays."""
-        columns = [answer.by_parameters]
+        by_robot, by_effects = np.split(by_own, [by_own.shape[2] - len(self._effects)], axis=2)
+        columns = [by_robot]
         motions = ("translation", beta), ("rotation", alpha)
-        for (kind, q), by in zip(motions, np.split(answer.jacobian, 2, axis=2), strict=True):
+        for (kind, q), by in zip(motions, np.split(jacobian, 2, axis=2), strict=True):
             names = [f"actuation.home_{kind}.{i + 1}" for i in range(self.robot.n_tubes)]
             *home, ratio = free_parameters.values(self.robot, [*names, f"actuation.{kind}_ratio"])
             columns.append(np.einsum("mij,mj->mi", by, (q - home) / ratio)[:, :, None])
-        return np.concatenate([*columns, answer.jacobian], axis=2)
+        return np.concatenate([*columns, jacobian, by_effects], axis=2)
 
     def shape(
         self,
@@ -173,39 +168,33 @@ class Model:
 
         Integrated finely with the default integrator, whatever `steps`. Raises ValueError where there is no solution.
         """
-        if self._effects:
-            text = (
-                "the shape along the robot is known of the standard model alone, and this robot has the effects "
-                f"{', '.join(self._effects)}"
-            )
-            raise InputError(Problem(text))
         n = self.robot.n_tubes
-        room = points + 2 * n  # there are two breakpoints a tube
-        shape = Shape(
-            arc_length=np.empty(room),
-            position=np.empty((room, 3)),
-            quaternion=np.empty((room, 4)),
-            internal_force=np.empty((room, 3)),
-            internal_moment=np.empty((room, 3)),
-            tube_angle=np.empty((n, room)),
-            tube_curvature=np.empty((n, room, 3)),
-            tube_moment=np.empty((n, room, 3)),
-        )
-        status, count = self._core.shape(
-            beta=_vector("beta", beta, n),
-            alpha=_vector("alpha", alpha, n),
-            force=_vector("force", (0, 0, 0) if force is None else force, 3),
-            moment=_vector("moment", (0, 0, 0) if moment is None else moment, 3),
+        status, arc_length, position, quaternion, force, moment, angle, curvature, tube_moment = self._core.shape(
+            beta=_vector("beta", beta, n)[None],
+            alpha=_vector("alpha", alpha, n)[None],
+            force=None if force is None else _vector("force", force, 3)[None],
+            moment=None if moment is None else _vector("moment", moment, 3)[None],
             points=points,
             steps=self.steps,
-            **vars(shape),
         )
         if status not in (_core.Status.ok, _core.Status.singular):
             raise ValueError(f"no shape at these joints: {_core.status_text(status)}")
-        used = {
-            name: value[:, :count] if name.startswith("tube") else value[:count] for name, value in vars(shape).items()
-        }
-        return Shape(**used)
+        by_tube = (n, len(arc_length), 3)
+        curvature, tube_moment = curvature.reshape(by_tube), tube_moment.reshape(by_tube)
+        return Shape(arc_length, position, quaternion, force, moment, angle, curvature, tube_moment)
+
+
+def _acting(robot: Robot, integrator: str) -> dict[str, Any]:
+    """The effects of a robot that act on single poses. Raises InputError where a model cannot take them."""
+    if robot.effects and integrator != "default":
+        raise InputError(Problem(f"effects are integrated with the default integrator, not with {integrator}"))
+    if path := of_the_path(robot):
+        text = (
+            f"a model solves configurations one by one, but the effects {', '.join(path)} need the rows in their "
+            "order: use `ctcr predict`, or ctcr.model.effect_model.readings"
+        )
+        raise InputError(Problem(text))
+    return of_the_poses(robot)
 
 
 def _vector(name: str, values: ArrayLike, size: int) -> Array:

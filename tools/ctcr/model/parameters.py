@@ -5,9 +5,11 @@ of the file, about the tracker's axes, as a rotation vector.
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
 from math import inf, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +19,8 @@ from ctcr import _core
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.frames import matrix_from_rotation_vector
-from ctcr.robot.description import Robot
+from ctcr.robot.description import MAX_TUBES, Robot
+from ctcr.robot.yaml_document import FieldPath
 
 Array = NDArray[np.float64]
 
@@ -27,31 +30,77 @@ GROUPS = {  # short names
 }
 STANDARD = "standard"  # the parameters of the paper's calibration
 _STANDARD_TUBE = ("stiffness", "curvature", "curved_length", "length")
-_FIELDS = {  # of a tube: field of the file, SI unit per unit of that field
-    "youngs_modulus": ("youngs_modulus_GPa", 1e9),
-    "poisson_ratio": ("poisson_ratio", 1.0),
-    "density": ("density_kg_m3", 1.0),
-    "inner_diameter": ("inner_diameter_mm", 1e-3),
-    "outer_diameter": ("outer_diameter_mm", 1e-3),
-    "length": ("length_mm", 1e-3),
-    "curved_length": ("curved_length_mm", 1e-3),
-    "curvature": ("curvature_per_m", 1.0),
-    "bending_stiffness": ("bending_stiffness_Nm2", 1.0),
+_FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), unit there, that unit per SI unit
+    "tubes.#.youngs_modulus": (("tubes", "#", "youngs_modulus_GPa"), "GPa", 1e-9),
+    "tubes.#.poisson_ratio": (("tubes", "#", "poisson_ratio"), "", 1.0),
+    "tubes.#.density": (("tubes", "#", "density_kg_m3"), "kg/m^3", 1.0),
+    "tubes.#.inner_diameter": (("tubes", "#", "inner_diameter_mm"), "mm", 1e3),
+    "tubes.#.outer_diameter": (("tubes", "#", "outer_diameter_mm"), "mm", 1e3),
+    "tubes.#.length": (("tubes", "#", "length_mm"), "mm", 1e3),
+    "tubes.#.curved_length": (("tubes", "#", "curved_length_mm"), "mm", 1e3),
+    "tubes.#.curvature": (("tubes", "#", "curvature_per_m"), "1/m", 1.0),
+    "tubes.#.bending_stiffness": (("tubes", "#", "bending_stiffness_Nm2"), "N m^2", 1.0),
+    "gravity.*": (("gravity", "#"), "m/s^2", 1.0),
+    "actuation.translation_ratio": (("actuation", "translation_mm_per_rev"), "mm/rev", 2e3 * pi),
+    "actuation.rotation_ratio": (("actuation", "rotation_rev_per_rev"), "", 1.0),
+    "actuation.home_translation.#": (("actuation", "home_translation_mm", "#"), "mm", 1e3),
+    "actuation.home_rotation.#": (("actuation", "home_rotation_deg", "#"), "deg", 180 / pi),
+    "tracker.position.*": (("tracker", "position_mm", "#"), "mm", 1e3),
+    "tracker.sensor_roll": (("tracker", "sensor_roll_deg"), "deg", 180 / pi),
+    "tracker.rotation.*": (None, "deg", 180 / pi),  # a turn of the rotation vector, not one of its numbers
 }
 ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
-_POSITIVE = ("youngs_modulus", "bending_stiffness", "density", "length", "curved_length", "outer_diameter")
+
+
+@dataclass(frozen=True)
+class Field:
+    """A parameter's field of the robot file (None: no field of its own), its unit there, and that unit per SI unit."""
+
+    path: FieldPath | None
+    unit: str
+    factor: float
+    lowest: float = -inf  # possible values, SI
+    highest: float = inf
 
 
 @cache
 def names_of(n_tubes: int) -> tuple[str, ...]:
     """All parameters of a robot, in the order of the library."""
-    return tuple(_core.parameter_names(n_tubes)[0])
+    return tuple(p.name for p in _core.robot_parameters(n_tubes))
 
 
 @cache
 def units_of(n_tubes: int) -> tuple[str, ...]:
     """Their SI units."""
-    return tuple(_core.parameter_names(n_tubes)[1])
+    return tuple(p.unit for p in _core.robot_parameters(n_tubes))
+
+
+@cache
+def _fields() -> dict[str, Field]:
+    """The field of every parameter of any robot."""
+    found = {}
+    for p in _core.robot_parameters(MAX_TUBES):
+        path, unit, factor = _FIELDS[p.kind]
+        path = path and tuple(p.index if step == "#" else step for step in path)
+        found[p.name] = Field(path, unit, factor, p.lowest, p.highest)
+    return found
+
+
+def field_of(name: str) -> Field:
+    """The field of a parameter such as "tubes.2.length", "tracker.rotation.x" or one of an effect."""
+    if name in _fields():
+        return _fields()[name]
+    of_effects = catalogue.parameter_of(MAX_TUBES)
+    return Field(None, of_effects[name].unit if name in of_effects else "", 1.0)
+
+
+def value_at(robot: Robot, path: FieldPath) -> Any:
+    """What the robot has in a field of its file; None where it, or what would hold it, is left out."""
+    value = robot
+    for step in path:
+        if value is not None:
+            value = value[step] if isinstance(step, int) else getattr(value, step)
+    return value
 
 
 def units_with_effects(robot: Robot) -> dict[str, str]:
@@ -137,31 +186,13 @@ def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robo
     own = {name: values.pop(name) for name in [*values] if name.startswith("effects.")}
     if own:
         changed.effects = catalogue.as_section(own.keys(), own.values(), robot)
-    actuation, turn = changed.actuation, np.zeros(3)
+    turn = np.zeros(3)
     for name, value in values.items():
-        group, *rest = name.split(".")
-        if group == "tubes":
-            field, unit = _FIELDS[rest[1]]
-            setattr(changed.tubes[int(rest[0]) - 1], field, value / unit)
-        elif name == "actuation.translation_ratio":
-            actuation.translation_mm_per_rev = value * 2e3 * pi
-        elif name == "actuation.rotation_ratio":
-            actuation.rotation_rev_per_rev = value
-        elif group == "actuation":
-            field, unit = ("home_translation_mm", 1e-3) if "translation" in name else ("home_rotation_deg", pi / 180)
-            homes = list(getattr(actuation, field))
-            if getattr(actuation, f"recorded_{field}") is None:
-                setattr(actuation, f"recorded_{field}", list(homes))
-            homes[int(rest[1]) - 1] = value / unit
-            setattr(actuation, field, homes)
-        elif group == "gravity":
-            changed.gravity = _replaced(changed.gravity_vector, rest[0], value)
-        elif rest[0] == "sensor_roll":
-            changed.tracker.sensor_roll_deg = value * 180 / pi
-        elif rest[0] == "position":
-            changed.tracker.position_mm = _replaced(changed.tracker.position_mm, rest[1], 1e3 * value)
+        field = field_of(name)
+        if field.path:
+            _set(changed, field.path, value * field.factor)
         else:
-            turn["xyz".index(rest[1])] = value
+            turn["xyz".index(name[-1])] = value
     if turn.any():
         frame = matrix_from_rotation_vector(turn) @ robot.tracker.rotation
         changed.tracker.rotation_vector_rad = Rotation.from_matrix(frame).as_rotvec().tolist()
@@ -251,25 +282,26 @@ def _mean(robot: Robot, name: str) -> float:
 
 
 def _value(robot: Robot, name: str) -> float:
-    group, *rest = name.split(".")
-    if group == "tubes":
-        field, unit = _FIELDS[rest[1]]
-        return unit * float(getattr(robot.tubes[int(rest[0]) - 1], field) or 0.0)
-    if group == "gravity":
-        return float(robot.gravity_vector["xyz".index(rest[0])])
-    if name == "tracker.sensor_roll":
-        return float(robot.tracker.roll)
-    if group == "tracker":
-        vector = robot.tracker.position if rest[0] == "position" else robot.tracker.rotation_vector_rad
-        return float(vector["xyz".index(rest[1])])
-    actuation = robot.actuation
-    if rest[0] == "translation_ratio":
-        return 1e-3 * (actuation.translation_mm_per_rev or 2e3 * pi) / (2 * pi)
-    if rest[0] == "rotation_ratio":
-        return actuation.rotation_rev_per_rev or 1.0
-    if rest[0] == "home_translation":
-        return 1e-3 * actuation.home_translation_mm[int(rest[1]) - 1]
-    return pi / 180 * actuation.home_rotation_deg[int(rest[1]) - 1]
+    """The value of a parameter of the robot in SI; what the file leaves out is 0, and a ratio 1."""
+    field = field_of(name)
+    if field.path is None:
+        return float(robot.tracker.rotation_vector_rad["xyz".index(name[-1])])
+    value = value_at(robot, field.path)
+    return float(name.endswith("_ratio")) if value is None else float(value) / field.factor
+
+
+def _set(robot: Robot, path: FieldPath, value: float) -> None:
+    """Writes a number of the robot file. A new home leaves the old ones as those of the tables."""
+    if path[0] == "gravity":
+        robot.gravity = _replaced(robot.gravity_vector, path[1], value)
+    elif not isinstance(path[-1], int):
+        setattr(value_at(robot, path[:-1]), path[-1], value)
+    else:
+        section, key, i = getattr(robot, path[0]), path[1], path[2]
+        old = list(getattr(section, key))
+        if key.startswith("home_") and getattr(section, f"recorded_{key}") is None:
+            setattr(section, f"recorded_{key}", old)
+        setattr(section, key, _replaced(old, i, value))
 
 
 def _stated_sd(robot: Robot, name: str) -> float | None:
@@ -293,11 +325,9 @@ def _stated_sd(robot: Robot, name: str) -> float | None:
 
 def _bounds(name: str, value: float) -> tuple[float, float]:
     """Beyond these no robot file may hold the value."""
-    kind = name.rpartition(".")[2]
-    if kind == "poisson_ratio":
-        return -0.9, 0.5
-    return (1e-3 * value if kind in _POSITIVE else -inf), inf
+    field = field_of(name)
+    return 1e-3 * value if field.lowest == 0 else field.lowest, field.highest
 
 
-def _replaced(vector: Iterable[float], axis: str, value: float) -> list[float]:
-    return [value if "xyz"[i] == axis else float(old) for i, old in enumerate(vector)]
+def _replaced(vector: Iterable[float], index: int, value: float) -> list[float]:
+    return [value if i == index else float(old) for i, old in enumerate(vector)]

@@ -226,14 +226,3 @@ class Robot(Section):
         beta = beta + self.actuation.translation_correction
         beta = np.where((beta > 0) & (beta < AT_PLATE), 0.0, beta)
         return beta, alpha + self.actuation.rotation_correction
-
-    def core_parameters(self) -> dict[str, Array]:
-        """Parameters of the compiled model in SI units: arrays (N,) of tube properties, and gravity (3,).
-
-        `bending_stiffness` is 0 where it follows from Young's modulus and the diameters.
-        """
-        names = "youngs_modulus poisson_ratio inner_diameter outer_diameter length curved_length curvature".split()
-        parameters = {name: np.array([float(getattr(tube, name)) for tube in self.tubes]) for name in names}
-        parameters["density"] = np.array([tube.density_kg_m3 or 0.0 for tube in self.tubes])
-        parameters["bending_stiffness"] = np.array([tube.bending_stiffness_Nm2 or 0.0 for tube in self.tubes])
-        return parameters | {"gravity": self.gravity_vector}

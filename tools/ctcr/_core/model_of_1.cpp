@@ -1,3 +1,0 @@
-#include "model_of.hpp"
-
-template std::unique_ptr<ctcr::python::AnyModel> ctcr::python::make_model<1>(std::span<const Tube>, const Vec3&);

@@ -1,3 +1,0 @@
-#include "recording_of.hpp"
-
-CTCR_RECORDING_OF(4)

@@ -1,5 +1,0 @@
-#include "solver_of.hpp"
-
-namespace ctcr {
-CTCR_SOLVER_OF(template, 1)
-}  // namespace ctcr
