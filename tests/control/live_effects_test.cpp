@@ -54,7 +54,7 @@ TEST(LiveEffects, RememberWhatRecordedRowsDo) {
 
 using Rubbing = EffectList<Friction>;
 
-/// Friction whose feedback by the twist is so strong that a twist of the period before would change sides each period.
+/// Friction whose feedback by the torsion is so strong that the torsion of the period before would change sides each period.
 System<3, Rubbing> rubbing_robot(double coefficient = 0.02) {
   Rubbing::On<3> effects;
   std::get<0>(effects.list).values = {coefficient, coefficient, coefficient, 0, 0.1, 1, 0};
@@ -75,9 +75,9 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
     }
     rows.push_back({motor_angles(system.transmission, q), {}, {.time = 0.025 * k}});
   }
-  add_twist<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
+  set_frictionless_torsion<3>({system.transmission, Model<3>(system.model.robot()), {}, system.settings}, rows);
   ThreadPool pool(1);
-  EXPECT_GT(wind_up(system, std::span(rows), pool), 0.05);
+  EXPECT_GT(solve_friction(system, std::span(rows), pool), 0.05);
   const auto recorded = histories(system, std::span<const RecordedRow<3>>(rows));
   LiveEffects<3, Rubbing> live(system.model);
   Workspace<3> ws;

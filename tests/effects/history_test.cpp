@@ -68,10 +68,10 @@ TEST(Friction, AlongTheLengthWindsTheInnerTubeUp) {
 TEST(Friction, FollowsWhatTheTwistLeavesOfARotation) {
   Walk<2> walk(two_tubes(), with_friction(0.03, 0, 1)), straight = walk;
   walk.to(at(0, 0)).to(at(0.12, 0)).to(at(0.2, 0));
-  walk.rows[1].twist.resize(1);
-  walk.rows[2].twist.resize(1);
-  walk.rows[1].twist[0].fill(-0.06);  // half of it
-  walk.rows[2].twist[0].fill(-0.14);  // no more motion where they touch
+  walk.rows[1].torsion.resize(1);
+  walk.rows[2].torsion.resize(1);
+  walk.rows[1].torsion[0].fill(-0.06);  // half of it
+  walk.rows[2].torsion[0].fill(-0.14);  // no more motion where they touch
   EXPECT_NEAR(walk.remembered<Friction>()[0], straight.to(at(0, 0)).to(at(0.06, 0)).remembered<Friction>()[0], 1e-12);
 }
 
@@ -106,18 +106,18 @@ TEST(History, AFirstRowMayComeFromHome) {
   from_home.rows[0].from_home = true;
   const System<2> plain{transmission, Model<2>(two_tubes()), {}, recorded.system.settings};
   ThreadPool pool(1);
-  for (const bool wound : {false, true}) {
-    if (wound)
+  for (const bool is_solved : {false, true}) {
+    if (is_solved)
       for (Walk<2>* walk : {&recorded, &from_home}) {
-        add_twist<2>(plain, walk->rows);
-        wind_up(walk->system, std::span(walk->rows), pool);
+        set_frictionless_torsion<2>(plain, walk->rows);
+        solve_friction(walk->system, std::span(walk->rows), pool);
       }
     for (std::size_t k = 0; k < 4; ++k)
-      EXPECT_NEAR(from_home.remembered<Friction>()[k], recorded.remembered<Friction>()[k], 1e-4) << wound;
+      EXPECT_NEAR(from_home.remembered<Friction>()[k], recorded.remembered<Friction>()[k], 1e-4) << is_solved;
     for (std::size_t i = 0; i < 2; ++i)
       EXPECT_NEAR(from_home.remembered<BacklashRotation>()[i], recorded.remembered<BacklashRotation>()[i], 1e-12);
   }
-  EXPECT_GT(from_home.rows[0].twist.size(), 5u) << "a long way is cut into parts";
+  EXPECT_GT(from_home.rows[0].torsion.size(), 5u) << "a long way is cut into parts";
 }
 
 TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
@@ -126,9 +126,9 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
   for (int k = 0; k <= 30; ++k) rows.push_back({{at(0, 0).beta, at(0.4 * k, 0.05 * k).alpha}, {}, {}});
   rows[0].theta.translation[0] = -1;  // unsolvable
   rows[20].theta.translation[0] = -1;
-  add_twist<2>(system, rows);
-  EXPECT_EQ(rows[0].twist.back(), rows[1].twist.front());
-  EXPECT_EQ(rows[20].twist.back(), rows[20].twist[rows[20].twist.size() - 2]);
+  set_frictionless_torsion<2>(system, rows);
+  EXPECT_EQ(rows[0].torsion.back(), rows[1].torsion.front());
+  EXPECT_EQ(rows[20].torsion.back(), rows[20].torsion[rows[20].torsion.size() - 2]);
   Workspace<2> ws;
   Solution<2> solution;
   double largest = 0;
@@ -147,9 +147,9 @@ TEST(Friction, KnowsTheTwistOfTheEquilibrium) {
                 Status::ok);
       const double turned = here[0].tube[0].angle - here[0].tube[1].angle;
       const double at_base = row.theta.rotation[0] - row.theta.rotation[1];
-      const double twist = row.twist.back()[Contacts<2>::index(0, breakpoint)];
-      EXPECT_NEAR(std::remainder(twist - (turned - at_base), 2 * std::numbers::pi), 0, 1e-5) << breakpoint;
-      largest = std::max(largest, std::abs(twist));
+      const double torsion = row.torsion.back()[Contacts<2>::index(0, breakpoint)];
+      EXPECT_NEAR(std::remainder(torsion - (turned - at_base), 2 * std::numbers::pi), 0, 1e-5) << breakpoint;
+      largest = std::max(largest, std::abs(torsion));
     }
   }
   EXPECT_GT(largest, 0.2);
@@ -159,7 +159,7 @@ TEST(Friction, KnowsHowHardTubesPress) {
   const System<2> system{{1, 1, VecN<2>::Zero(), VecN<2>::Zero()}, Model<2>(two_tubes()), {}, {.tolerance = 1e-12}};
   std::vector<RecordedRow<2>> rows;
   for (int k = 0; k < 10; ++k) rows.push_back({{at(0, 0).beta, at(0.6 * k, -0.1 * k).alpha}, {}, {}});
-  add_twist<2>(system, rows);
+  set_frictionless_torsion<2>(system, rows);
   const Robot<2>& robot = two_tubes();
   Workspace<2> ws;
   Solution<2> solution;
@@ -256,7 +256,7 @@ TEST(Friction, StiffnessIsIndependentOfTheLimit) {
     walk.to(at(0, 0)).to(at(0.03, 0)).to(at(0.03 + turn, 0));
     const double jumps[] = {before, before, after};
     for (std::size_t i = 0; i < 3; ++i) {
-      walk.rows[i].twist.resize(1);
+      walk.rows[i].torsion.resize(1);
       walk.rows[i].jumps.resize(1);
       walk.rows[i].jumps[0].fill(jumps[i]);
     }

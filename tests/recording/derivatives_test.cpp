@@ -10,11 +10,11 @@
 #include "support/catalogue_cases.hpp"
 #include "support/no_alloc.hpp"
 
-namespace recorded_test {
+namespace recorded_derivatives_test {
 
 using namespace ctcr;
 
-using Slopes = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+using Columns = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
 template <int N>
 using P = SystemParameters<N, Catalogue>;
@@ -82,23 +82,33 @@ void touch(test::Recorded<N>& recorded, double depth, double stiffness, double r
   recorded.system.model = Model<N, Catalogue>(recorded.system.model.robot(), effects);
 }
 
-/// Derivatives of the last row, with those of what came before.
 template <int N>
-Status slopes_of_last(const System<N, Catalogue>& system, const std::vector<RecordedRow<N>>& rows,
-                      const Workspace<N>& ws, const RecordedPrediction<N, Catalogue>& prediction,
-                      const std::vector<int>& parameters, Slopes& out) {
-  const auto past = past_slopes<N, Catalogue>(system, rows, parameters);
-  return differentiate<N, Catalogue>(system, rows.back(), ws, prediction, parameters, out, past.at(rows.size() - 1));
+auto sensitivities(const System<N, Catalogue>& system, const std::vector<RecordedRow<N>>& rows,
+                   const std::vector<int>& parameters) {
+  const RecordedPath<N> path = recorded_path<N, Catalogue>(system, rows);
+  const LinearisedTorsion<N> torsion;
+  HistorySensitivities<N, Catalogue> all(system, rows, path, torsion, parameters, std::vector<bool>(rows.size(), true));
+  for (int window = 0; window < all.windows(); ++window) all.fill(window);
+  return all;
+}
+
+/// Derivatives of the last row, with those of its history.
+template <int N>
+Status derivatives_of_last(const System<N, Catalogue>& system, const std::vector<RecordedRow<N>>& rows,
+                           const Workspace<N>& ws, const RecordedPrediction<N, Catalogue>& prediction,
+                           const std::vector<int>& parameters, Columns& out) {
+  const auto history = sensitivities(system, rows, parameters);
+  return differentiate<N, Catalogue>(system, rows.back(), ws, prediction, parameters, out, history.at(rows.size() - 1));
 }
 
 template <int N>
-void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
+void expect_derivatives(const test::Recorded<N>& recorded, const std::string& what) {
   const auto& [system, rows] = recorded;
   Workspace<N> ws;
   RecordedPrediction<N, Catalogue> prediction;
   ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok) << what;
-  Slopes exact(6, P<N>::count);
-  ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, all_parameters<N>(), exact), Status::ok);
+  Columns exact(6, P<N>::count);
+  ASSERT_EQ(derivatives_of_last(system, rows, ws, prediction, all_parameters<N>(), exact), Status::ok);
   const Eigen::VectorXd x = P<N>::values(system);
   for (int place = 0; place < P<N>::count; ++place) {
     if (ParameterVector<N>::index(Parameter::bending_stiffness) <= place &&
@@ -125,26 +135,28 @@ void expect_slopes(const test::Recorded<N>& recorded, const std::string& what) {
 }
 
 template <int N>
-void expect_slopes(int cases) {
+void expect_derivatives(int cases) {
   test::Random random(std::uint64_t(40 + N));
   for (int n = 0; n < cases; ++n) {
     const std::string what = std::to_string(N) + " tubes, case " + std::to_string(n);
     auto neutral = test::random_recording<N>({}, n % N, random);
     touch(neutral, 2e-3, 0.0, 0.0);  // a plane that gives way altogether, yet might not
-    expect_slopes(neutral, what + ", neutral");
+    expect_derivatives(neutral, what + ", neutral");
     auto recorded = test::random_recording<N>(test::random_effects<N>(random), n % N, random);
     n % 2 == 0 ? touch(recorded, 2e-3, 3.0, 0.0) : touch(recorded, 2e-3, 1000.0, 4e-3);
-    expect_slopes(recorded, what);
+    expect_derivatives(recorded, what);
   }
 }
 
-TEST(RecordedDerivatives, AreSlopesByEveryParameterWithHistoryLoadsAndContact) {
-  expect_slopes<1>(test::cases(2));
-  expect_slopes<2>(test::cases(4));
-  expect_slopes<3>(test::cases(4));
+/// Against differences, by every parameter, with history, loads and contact.
+TEST(RecordedDerivatives, Differences) {
+  expect_derivatives<1>(test::cases(2));
+  expect_derivatives<2>(test::cases(4));
+  expect_derivatives<3>(test::cases(4));
 }
 
-TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
+/// A few columns are those of all.
+TEST(RecordedDerivatives, Subsets) {
   test::Random random(3);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
   touch(recorded, 1e-3, 30, 0.0);
@@ -152,11 +164,11 @@ TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
   Workspace<3> ws;
   RecordedPrediction<3, Catalogue> prediction;
   ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
-  Slopes all(6, P<3>::count);
-  (void)slopes_of_last(system, rows, ws, prediction, all_parameters<3>(), all);
+  Columns all(6, P<3>::count);
+  (void)derivatives_of_last(system, rows, ws, prediction, all_parameters<3>(), all);
   for (const std::vector<int>& few : {std::vector<int>{}, {P<3>::count - 1}, {80, 3, 41}}) {
-    Slopes some(6, Eigen::Index(few.size()));
-    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, few, some), Status::ok);
+    Columns some(6, Eigen::Index(few.size()));
+    ASSERT_EQ(derivatives_of_last(system, rows, ws, prediction, few, some), Status::ok);
     for (std::size_t k = 0; k < few.size(); ++k)
       EXPECT_LE((some.col(Eigen::Index(k)) - all.col(few[k])).norm(), 1e-12 * (1 + all.col(few[k]).norm()));
   }
@@ -164,7 +176,7 @@ TEST(RecordedDerivatives, AreTheSameByAFewParametersAsByAll) {
 
 // Where no effect is asked for that changes the equations, the standard model's own derivatives are taken.
 template <int N>
-void expect_same_slopes_by_the_standard_model(int cases) {
+void expect_those_of_the_standard_model(int cases) {
   test::Random random(11 * N);
   for (int n = 0; n < cases; ++n) {
     auto effects = test::random_effects<N>(random);
@@ -186,9 +198,9 @@ void expect_same_slopes_by_the_standard_model(int cases) {
     Workspace<N> ws;
     RecordedPrediction<N, Catalogue> prediction;
     ASSERT_EQ(test::predict_last(system, rows, ws, prediction), Status::ok);
-    Slopes some(6, Eigen::Index(few.size())), every(6, Eigen::Index(all.size()));
-    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, few, some), Status::ok);
-    ASSERT_EQ(slopes_of_last(system, rows, ws, prediction, all, every), Status::ok);
+    Columns some(6, Eigen::Index(few.size())), every(6, Eigen::Index(all.size()));
+    ASSERT_EQ(derivatives_of_last(system, rows, ws, prediction, few, some), Status::ok);
+    ASSERT_EQ(derivatives_of_last(system, rows, ws, prediction, all, every), Status::ok);
     EXPECT_LT(few.size(), all.size());
     for (std::size_t k = 0; k < few.size(); ++k) {
       const Vec6 expected = every.col(few[k]);
@@ -199,13 +211,14 @@ void expect_same_slopes_by_the_standard_model(int cases) {
   }
 }
 
-TEST(RecordedDerivatives, AreThoseOfTheStandardModelWhereNothingChangesItsEquations) {
-  expect_same_slopes_by_the_standard_model<1>(4);
-  expect_same_slopes_by_the_standard_model<2>(6);
-  expect_same_slopes_by_the_standard_model<3>(6);
+TEST(RecordedDerivatives, StandardModel) {
+  expect_those_of_the_standard_model<1>(4);
+  expect_those_of_the_standard_model<2>(6);
+  expect_those_of_the_standard_model<3>(6);
 }
 
-TEST(Recorded, AnswersParametersThatAreNoNumbers) {
+/// NaN and infinite parameters give a status and defined outputs.
+TEST(Recorded, NotFinite) {
   test::Random random(4);
   const auto recorded = test::random_recording<2>({}, 0, random);
   for (int place = 0; place < Catalogue::On<2>::count; ++place)
@@ -219,28 +232,29 @@ TEST(Recorded, AnswersParametersThatAreNoNumbers) {
           << P<2>::name(ParameterVector<2>::count + place);
       EXPECT_TRUE(prediction.reading.position.allFinite() && prediction.reading.rotation.allFinite());
       EXPECT_TRUE(prediction.solution.position.isZero(0));
-      Slopes slopes(6, 1);
-      EXPECT_EQ((differentiate<2, Catalogue>(system, recorded.rows.back(), ws, prediction, std::vector{0}, slopes)),
-                Status::not_finite);
-      EXPECT_TRUE(slopes.isZero(0));
+      Columns derivatives(6, 1);
+      EXPECT_EQ(
+          (differentiate<2, Catalogue>(system, recorded.rows.back(), ws, prediction, std::vector{0}, derivatives)),
+          Status::not_finite);
+      EXPECT_TRUE(derivatives.isZero(0));
     }
 }
 
-TEST(Recorded, DoesNotTouchTheHeap) {
+TEST(Recorded, NoAllocation) {
   test::Random random(5);
   auto recorded = test::random_recording<3>(test::random_effects<3>(random), 1, random);
   touch(recorded, 1e-3, 30, 0.0);
   const auto& [system, rows] = recorded;
-  const auto memory = histories<3, Catalogue>(system, rows);
+  const auto states = histories<3, Catalogue>(system, rows);
   const std::vector<int> all = all_parameters<3>();
-  const auto past = past_slopes<3, Catalogue>(system, rows, all);
-  Slopes slopes(6, P<3>::count);
+  const auto history = sensitivities(system, rows, all);
+  Columns derivatives(6, P<3>::count);
   Workspace<3> ws;
   RecordedPrediction<3, Catalogue> prediction;
   const test::HeapGuard guard;
-  const Status predicted = predict(system, rows.back(), memory.back(), ws, prediction);
+  const Status predicted = predict(system, rows.back(), states.back(), ws, prediction);
   const Status differentiated =
-      differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all, slopes, past.at(rows.size() - 1));
+      differentiate<3, Catalogue>(system, rows.back(), ws, prediction, all, derivatives, history.at(rows.size() - 1));
   EXPECT_EQ(guard.uses(), 0);
   EXPECT_EQ(predicted, Status::ok);
   EXPECT_EQ(differentiated, Status::ok);
@@ -251,9 +265,9 @@ constexpr bool never_throws = false;
 template <class R, class... A>
 constexpr bool never_throws<R (*)(A...) noexcept> = true;
 
-TEST(Recorded, PromisesNotToThrow) {
+TEST(Recorded, Noexcept) {
   static_assert(never_throws<decltype(&predict<3, Catalogue>)>);
   static_assert(never_throws<decltype(&differentiate<3, Catalogue>)>);
 }
 
-}  // namespace recorded_test
+}  // namespace recorded_derivatives_test

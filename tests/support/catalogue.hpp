@@ -18,9 +18,9 @@
   kind Status differentiate<N, Catalogue>(const System<N, Catalogue>&, const RecordedRow<N>&, const Workspace<N>&, \
                                           const RecordedPrediction<N, Catalogue>&, std::span<const int>,           \
                                           Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,                    \
-                                          const PastSlopesOfRow&, Mat6*) noexcept;                                 \
+                                          const RowHistorySensitivities&, Mat6*) noexcept;                         \
   kind std::vector<Catalogue::On<N>::History> histories<N, Catalogue>(                                             \
-      const System<N, Catalogue>&, std::span<const RecordedRow<N>>, const Winding<N>&);
+      const System<N, Catalogue>&, std::span<const RecordedRow<N>>, const RecordedPath<N>&);
 
 namespace ctcr {
 CTCR_TEST_CATALOGUE(extern template, 1)

@@ -44,7 +44,8 @@ Prediction<N> predicted(const System<N>& system, const MotorAngles<N>& theta, co
   return prediction;
 }
 
-TEST(Predict, GoesFromMotorsToReading) {
+/// Reading from motor angles, step by step.
+TEST(Predict, Reading) {
   test::Random random(1);
   for (int n = 0; n < 12; ++n) {
     const auto [system, theta, load] = random_command<3>(n % 2 == 0, n % 3, random);
@@ -117,14 +118,16 @@ void expect_derivatives_of_the_residual(bool loaded, int cases) {
   }
 }
 
-TEST(Differentiate, GivesTheSlopesOfTheResidualByMotorsAndByEveryParameter) {
+/// Of the residual, by motor angles and by every parameter, against differences.
+TEST(Predict, Derivatives) {
   for (const bool loaded : {false, true}) {
     expect_derivatives_of_the_residual<1>(loaded, 3);
     expect_derivatives_of_the_residual<3>(loaded, 6);
   }
 }
 
-TEST(Differentiate, RefusesAFailedPrediction) {
+/// A failed prediction is passed on, with derivatives of zero.
+TEST(Predict, Failure) {
   test::Random random(2);
   const auto [system, theta, load] = random_command<3>(false, 0, random);
   Workspace<3> ws;
@@ -139,7 +142,7 @@ TEST(Differentiate, RefusesAFailedPrediction) {
   EXPECT_TRUE(derivatives.by_motors.isZero(0));
 }
 
-TEST(Pipeline, DoesNotTouchTheHeap) {
+TEST(Predict, NoAllocation) {
   test::Random random(3);
   for (const bool loaded : {false, true}) {
     const auto [system, theta, load] = random_command<3>(loaded, 1, random);

@@ -23,25 +23,25 @@ public:
   Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, int steps,
                     const auto& equilibrium) noexcept {
     const std::size_t row = add(motors, time);
-    const auto remembered = [&](const Twist<N>& twist) {
+    const auto effects_at = [&](const RelativeTorsion<N>& torsion) {
       Effects now = effects_;
-      rows_[row].twist = twist;
+      rows_[row].torsion = torsion;
       now.update_history(
           {{rows_.data(), count_}, {times_.data(), count_}, {start.data(), forgot_ ? 0 : count_}, radius_}, row);
       return now;
     };
-    if constexpr (Effects::follows_twist) {
-      if (effects_.act_by_twist()) {
+    if constexpr (Effects::depends_on_torsion) {
+      if (effects_.act_by_torsion()) {
         const Model<N, Fx>* last = nullptr;
         const auto found = [&](const Effects& with) { return last = equilibrium(with, tubes(with, motors)); };
         rows_[row].jumps = jumps_;  // of the period before: they change slowly
-        effects_ = balance_.solve(found, remembered, ws, steps, twist_, most);
+        effects_ = torsion_solver_.solve(found, effects_at, ws, steps, torsion_, most);
         if (last) jumps_ = moment_jumps(*last, ws, steps, jumps_);
-        rows_[row].twist = twist_;
+        rows_[row].torsion = torsion_;
         return tubes(effects_, motors);
       }
     }
-    effects_ = remembered(twist_);
+    effects_ = effects_at(torsion_);
     return tubes(effects_, motors);
   }
 
@@ -88,9 +88,9 @@ private:
   std::array<double, window> times_{};
   std::size_t count_ = 0;
   bool forgot_ = false;  // the first period
-  Twist<N> twist_{};
+  RelativeTorsion<N> torsion_{};
   MomentJumps<N> jumps_;
-  TwistBalance<N, Fx> balance_;
+  TorsionSolver<N, Fx> torsion_solver_;
   Occasion at_;
 };
 

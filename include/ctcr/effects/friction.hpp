@@ -10,8 +10,11 @@ inline constexpr EffectInfo info{
     .id = "friction",
     .title = "Friction between the tubes",
     .physics =
-        "Tubes that turn inside one another rub: where they press on each other, at their ends, where they start to "
-        "curve and in the front plate, or all along. The inner tube lags behind its base.",
+        "Friction resists the rotation and insertion of a tube in the next outer one: at contacts, where the tubes "
+        "press "
+        "on each other (their ends, the starts of their curves and the front plate), or all along their overlap. The "
+        "tip "
+        "of the inner tube lags behind its base.",
     .signature =
         "The same joints give another pose when they are reached from the other side; the difference lasts until the "
         "motion reverses, and grows with the bending moments or with the length over which tubes overlap.",
@@ -32,16 +35,17 @@ inline constexpr std::array parameters{
                     .soft = {0, 0.1},
                     .hard = {0, 0.3},
                     .per_tube = true,
-                    .meaning = "friction torque per jump of the bending moment of all tubes inside the contact, of a "
-                               "tube in the next outer one (of the outermost: in the front plate)"},
+                    .meaning =
+                        "friction torque of a tube against the next outer one (of the outermost tube: against the "
+                        "front plate) at a contact, divided by the jump of the bending moment there"},
     EffectParameter{.name = "torque_per_length",
                     .unit = "N",
                     .neutral = 0,
                     .sigma = 0.01,
                     .soft = {0, 0.05},
                     .hard = {0, 0.5},
-                    .meaning = "friction torque per length between a tube and the next outer one, all along, however "
-                               "hard they press"},
+                    .meaning = "friction torque per length between a tube and the next outer one, all along their "
+                               "overlap, independent of the contact force"},
     EffectParameter{.name = "slip_angle",
                     .unit = "rad",
                     .neutral = 6 * 0.017453292519943295,
@@ -50,8 +54,8 @@ inline constexpr std::array parameters{
                     .hard = {0.005, 3},
                     .role = Role::shape,
                     .meaning =
-                        "rotation of the tubes where they touch after which friction has turned round to 63 %; with "
-                        "the second law of a contact whose moment jumps by 0.05 N m, in others in proportion"},
+                        "relative rotation at a contact after which friction has reversed to 63 %; with law 1 at a "
+                        "contact whose moment jumps by 0.05 N m, at others in proportion to their jump"},
     EffectParameter{.name = "insertion",
                     .unit = "",
                     .neutral = 1,
@@ -59,8 +63,9 @@ inline constexpr std::array parameters{
                     .soft = {0, 1.5},
                     .hard = {0, 4},
                     .role = Role::shape,
-                    .meaning = "share of the sliding by insertion that turns friction away from rotation: 0 none, 1 "
-                               "as much as sliding by rotation at the outer radius of the inner tube"},
+                    .meaning =
+                        "weight of sliding by insertion against sliding by rotation: 0 insertion does not matter, "
+                        "1 it counts as much as rotation at the outer radius of the inner tube"},
     EffectParameter{.name = "law",
                     .unit = "",
                     .neutral = 0,
@@ -69,22 +74,21 @@ inline constexpr std::array parameters{
                     .hard = {0, 1},
                     .role = Role::choice,
                     .meaning =
-                        "0: a bristle that bends ever less; 1: an elastic contact of constant stiffness that slips at "
-                        "once, rotation and insertion sharing one limit"},
+                        "constitutive law: 0 a bristle, stiffness decreasing towards the limit (Dahl); 1 elastic with "
+                        "constant stiffness up to the limit, which rotation and insertion share"},
 };
 }  // namespace friction
 
-/// Friction torque between a tube and the next outer one: C |jump| h at each contact where the bending moment of the tubes
-/// inside it jumps, and torque_per_length h along their overlap, h linear from contact to contact. h in [-1, 1] follows the
-/// relative rotation of the two tubes at the contact (of the outermost tube: in the guide), that is the rotation of their
-/// bases plus their relative torsion, so that a tube lags its base. Torsion and friction depend on one another: see
-/// friction/solve_friction.hpp.
-/// Internal state: h of each of Contacts<N>, and of the outermost tube in the plate; with the second law then the fraction
-/// of each limit that insertion takes.
+/// Friction torque between a tube and the next outer one (the outermost tube: the front plate). At a contact it is
+/// coefficient x |jump of the bending moment of all tubes inside the contact| x h, along the overlap torque_per_length x h,
+/// with h linear between contacts. The internal state h in [-1, 1] of each contact follows the relative rotation there: that
+/// of the bases plus the relative torsion, which depends on friction in turn (friction/solve_friction.hpp).
+/// State: h of each of Contacts<N>, then that of the outermost tube in the plate; then, in the same order and with law 1
+/// alone, the part k of each limit that insertion takes.
 template <int N, class P = double>
 struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::count + 1)> {
   static constexpr const EffectInfo& info = friction::info;
-  static constexpr bool follows_twist = true;
+  static constexpr bool depends_on_torsion = true;
 
   void breakpoint(Breakpoint<P, N>& s) const noexcept {
     P dx = 0.0, dy = 0.0;
@@ -92,7 +96,7 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
       const auto i = std::size_t(j);
       dx = dx + (s.far_moment[i][0] - s.near_moment[i][0]);
       dy = dy + (s.far_moment[i][1] - s.near_moment[i][1]);
-      // Both tubes must be there; the outermost rubs on the front plate alone.
+      // Both tubes must be there; the outermost touches the front plate alone.
       if (j + 1 < N ? j + 1 >= s.near : s.kind != Breakpoint<P, N>::Kind::plate) continue;
       constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
       const P& h = this->history.state[j + 1 < N ? Contacts<N>::index(j, s.number()) : in_plate];
@@ -109,7 +113,7 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
     }
   }
 
-  /// Exactly along each straight move.
+  /// Integrates the constitutive law exactly along a straight motion.
   void update_history(const Path<N, P>& path, std::size_t row) noexcept {
     if (row == 0) return;
     const auto &from = path.q[row - 1], &to = path.q[row];
@@ -130,7 +134,7 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
       const P slide = (against_next(to.beta) - against_next(from.beta)) * (1 / path.radius[i]);
       for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
         const std::size_t contact = Contacts<N>::index(j, breakpoint);
-        follow(j, contact, turn + (to.twist[contact] - from.twist[contact]), slide);
+        follow(j, contact, turn + (to.torsion[contact] - from.torsion[contact]), slide);
       }
     }
   }
@@ -140,24 +144,24 @@ private:
   static constexpr std::size_t limits = Contacts<N>::count + 1;
   static constexpr double rest = 1e-12;  // [rad]: no division by 0 where nothing moves
 
-  /// h' = turn' / slip - h (|turn'| + share |slide'|) / slip.
+  /// Law 0: h' = turn' / slip_angle - h (|turn'| + insertion |slide'|) / slip_angle.
   void bend(const P& turn, const P& slide, P& h) const noexcept {
     const P travel = magnitude(turn) + this->template get<3>() * magnitude(slide) + rest;
     const P target = turn * inverse(travel);
     h = target + (h - target) * exponential_of(-(travel * inverse(this->template get<2>())));
   }
 
-  /// Of a contact of a tube: limit / stiffness. The stiffness is that of a contact whose moment jumps as is usual.
+  /// Law 1: limit / stiffness of a contact. The stiffness is the same at all contacts: that of the usual moment jump.
   [[nodiscard]] P slip_angle(int tube, double jump) const noexcept {
-    constexpr double usual = MomentJumps<N>::usual, least = 0.05;  // share of it: no division by 0
-    constexpr double overlap = 0.05;                               // [m] of a contact, of what is rubbed all along
+    constexpr double usual = MomentJumps<N>::usual, least = 0.05;  // fraction of it: no division by 0
+    constexpr double overlap = 0.05;  // [m] of distributed friction that counts with a contact
     const double grown = std::max(jump / usual, least);
     const P pressed = usual * this->template get<0>(tube), along = overlap * this->template get<1>();
     if (value(along) == 0) return grown * this->template get<2>();
     return this->template get<2>() * (grown * pressed + along) * inverse(pressed + along);
   }
 
-  /// The limit of a contact changes; its stretch does not, as far as the new limit holds it.
+  /// Law 1: the limit of a contact changes by 1 / factor; its elastic deformation does not, within the new limit.
   static void stretch(const P& factor, P& h, P& k) noexcept {
     h = factor * h;
     k = factor * k;
@@ -168,8 +172,8 @@ private:
     k = within * k;
   }
 
-  /// (h, k)' = (turn', share slide') / slip within the unit circle; on it the part that points out is slip. There the angle
-  /// to the motion falls as tan(angle / 2)' = -tan(angle / 2) / slip.
+  /// Law 1: (h, k)' = (turn', insertion slide') / angle within the unit circle, the yield surface; on it the outward part is
+  /// slip. There the angle a of (h, k) to the motion falls as tan(a / 2)' = -tan(a / 2) / angle.
   void slip(const P& turn, const P& slide, const P& angle, P& h, P& k) const noexcept {
     const P shared = this->template get<3>() * slide, square = turn * turn + shared * shared;
     if (!(value(square) > rest * rest)) return;

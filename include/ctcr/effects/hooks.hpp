@@ -85,9 +85,9 @@ struct Occasion {
 template <int N, class P>
 struct Path {
   struct Row {
-    std::array<P, N> beta, alpha;  ///< [m], [rad]
-    Twist<N, P> twist{};           ///< as in RecordedRow
-    MomentJumps<N> jumps;          ///< the same
+    std::array<P, N> beta, alpha;     ///< [m], [rad]
+    RelativeTorsion<N, P> torsion{};  ///< as in RecordedRow
+    MomentJumps<N> jumps;             ///< the same
   };
   std::span<const Row> q;
   std::span<const double> time;        ///< [s]; empty: unknown
@@ -117,7 +117,7 @@ concept HasMaterial =
 
 /// An effect whose history depends on how the tubes are turned against one another at their contacts.
 template <class Effect>
-concept FollowsTwist = requires { Effect::follows_twist; };
+concept DependsOnTorsion = requires { Effect::depends_on_torsion; };
 
 /// An effect on the angles at the grasped ends.
 template <class Effect, class P, int N>
@@ -191,6 +191,9 @@ struct EffectList {
   /// Those on joints.
   using OnJoints =
       typename detail::Picked<[]<class Effect> { return ActsOnJoints<Effect, double, 2>; }, EffectList<>, E...>::List;
+  /// The one whose history depends on the relative torsion of the tubes, or none.
+  using OnTorsion =
+      typename detail::Picked<[]<class Effect> { return DependsOnTorsion<Effect>; }, EffectList<>, E...>::List;
   /// Those on the reading of the tracker.
   using OnReading =
       typename detail::Picked<[]<class Effect> { return HasSense<Effect, double>; }, EffectList<>, E...>::List;
@@ -208,13 +211,8 @@ struct EffectList {
     static constexpr bool has_breakpoint = (false || ... || HasBreakpoint<E<N, P>, P, N>);
     /// Whether friction acts along the tubes.
     static constexpr bool has_distributed_friction = (false || ... || HasDistributedFriction<E<N, P>, P, N>);
-    /// Whether any of them depends on how the tubes are turned against one another.
-    static constexpr bool follows_twist = (false || ... || FollowsTwist<E<N, P>>);
-    /// Index of the effect that does, in the list.
-    static constexpr std::size_t follower = [] {
-      constexpr std::array<bool, sizeof...(E)> follows{FollowsTwist<E<N, P>>...};
-      return std::size_t(std::ranges::find(follows, true) - follows.begin());
-    }();
+    /// Whether the history of one depends on the relative torsion of the tubes.
+    static constexpr bool depends_on_torsion = (false || ... || DependsOnTorsion<E<N, P>>);
     /// Whether any force depends on where the tip is.
     static constexpr bool has_environment = (false || ... || HasEnvironment<E<N, P>, P>);
 
@@ -296,10 +294,10 @@ struct EffectList {
       return any([](const auto& e) { return HasMaterial<std::remove_cvref_t<decltype(e)>, P> && e.active; });
     }
 
-    /// Whether any effect that follows the twist of the tubes acts.
-    [[nodiscard]] bool act_by_twist() const noexcept {
+    /// Whether an effect acts whose history depends on the relative torsion of the tubes.
+    [[nodiscard]] bool act_by_torsion() const noexcept {
       return any([](const auto& e) {
-        if constexpr (FollowsTwist<std::remove_cvref_t<decltype(e)>>) return acts(e);
+        if constexpr (DependsOnTorsion<std::remove_cvref_t<decltype(e)>>) return acts(e);
         return false;
       });
     }
@@ -386,6 +384,10 @@ struct EffectList {
     }
   };
 };
+
+/// The effect of a list whose history depends on the relative torsion of the tubes.
+template <class Fx, int N, class P = double>
+using TorsionEffect = std::tuple_element_t<0, decltype(Fx::OnTorsion::template On<N, P>::list)>;
 
 /// The standard model.
 using Standard = EffectList<>;

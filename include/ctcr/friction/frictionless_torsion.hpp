@@ -9,42 +9,43 @@
 
 namespace ctcr {
 
-/// Gives each row the twist and the jumps of a robot without effects in its equilibrium on the way there; a place without
-/// one keeps those of the place before; and where the tubes touch. On a long way tubes do not turn evenly against one another: it is cut into parts. Real time: no.
+/// Divides the way to each row into samples and gives these the torsion and the moment jumps of a robot without effects. A
+/// sample without an equilibrium keeps those of the sample before. The relative rotation of the tubes is not linear along a
+/// long way, therefore the samples. Real time: no.
 template <int N>
-void add_twist(const System<N>& system, std::span<RecordedRow<N>> rows) {
-  constexpr double most_rotation = 0.175, most_translation = 5e-3;  // of a part [rad], [m]
+void set_frictionless_torsion(const System<N>& system, std::span<RecordedRow<N>> rows) {
+  constexpr double most_rotation = 0.175, most_translation = 5e-3;  // between samples [rad], [m]
   Workspace<N> ws;
   Solution<N> solution;
-  Twist<N> twist{};
+  RelativeTorsion<N> torsion{};
   MomentJumps<N> jumps;
   bool known = false;
   for (std::size_t row = 0; row < rows.size(); ++row) {
     rows[row].radius = ContactRadii<N>(system.model.robot());
-    double parts = 1;
+    double samples = 1;
     const bool from_home = row == 0 && rows[row].from_home;
     if (row > 0 || from_home) {
       const MotorAngles<N> home{VecN<N>::Zero(), VecN<N>::Zero()};
       const Joints<N> from = joints(system.transmission, from_home ? home : rows[row - 1].theta),
                       to = joints(system.transmission, rows[row].theta);
-      parts = std::max({parts, (to.alpha - from.alpha).cwiseAbs().maxCoeff() / most_rotation,
-                        (to.beta - from.beta).cwiseAbs().maxCoeff() / most_translation});
+      samples = std::max({samples, (to.alpha - from.alpha).cwiseAbs().maxCoeff() / most_rotation,
+                          (to.beta - from.beta).cwiseAbs().maxCoeff() / most_translation});
     }
-    rows[row].twist.resize(std::size_t(std::ceil(parts)) + from_home);
-    rows[row].jumps.resize(rows[row].twist.size());
-    for (std::size_t place = 0; place < rows[row].twist.size(); ++place) {
-      const RecordedRow<N> here = on_the_way<N>(rows, row, place);
+    rows[row].torsion.resize(std::size_t(std::ceil(samples)) + from_home);
+    rows[row].jumps.resize(rows[row].torsion.size());
+    for (std::size_t k = 0; k < rows[row].torsion.size(); ++k) {
+      const RecordedRow<N> here = sample_of<N>(rows, row, k);
       if (solve(system.model, joints(system.transmission, here.theta), here.load, ws, solution, system.settings) ==
           Status::ok) {
-        twist = twist_of(system.model, ws, system.settings.steps, twist);
+        torsion = relative_torsion(system.model, ws, system.settings.steps, torsion);
         jumps = moment_jumps(system.model, ws, system.settings.steps, jumps);
         if (!known)
           for (RecordedRow<N>& earlier : rows.first(row + 1))
-            std::ranges::fill(earlier.twist, twist), std::ranges::fill(earlier.jumps, jumps);
+            std::ranges::fill(earlier.torsion, torsion), std::ranges::fill(earlier.jumps, jumps);
         known = true;
       }
-      rows[row].twist[place] = twist;
-      rows[row].jumps[place] = jumps;
+      rows[row].torsion[k] = torsion;
+      rows[row].jumps[k] = jumps;
     }
   }
 }

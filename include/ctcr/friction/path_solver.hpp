@@ -1,5 +1,5 @@
 #pragma once
-// Who walks along a recording and winds up tubes that rub, place after place.
+// Friction along a path, from sample to sample.
 #include <optional>
 
 #include "ctcr/friction/torsion_solver.hpp"
@@ -8,15 +8,15 @@
 
 namespace ctcr::detail {
 
-/// Slopes of the twist in the equilibrium of a row that was predicted; what the surroundings push, and what other effects
-/// remember, is held.
+/// Derivatives of the torsion in the equilibrium of a row that was predicted. The force of the surroundings and the history
+/// of the other effects are held.
 /// @param variables  in lanes from first_variable<N> on   Real time: yes without variables, else it allocates.
 template <int N, class Fx>
-TwistSlopes<N> twist_slopes(const System<N, Fx>& system, const RecordedRow<N>& here,
-                            const RecordedPrediction<N, Fx>& prediction, const Workspace<N>& ws,
-                            const Variables<N, Fx>& variables) noexcept {
+TorsionDerivatives<N> torsion_derivatives(const System<N, Fx>& system, const RecordedRow<N>& here,
+                                          const RecordedPrediction<N, Fx>& prediction, const Workspace<N>& ws,
+                                          const Variables<N, Fx>& variables) noexcept {
   const auto& effects = prediction.model.effects();
-  return ctcr::twist_slopes<SystemParameters<N, Fx>::count>(
+  return ctcr::torsion_derivatives<SystemParameters<N, Fx>::count>(
       prediction.model, ws, system.settings.steps, variables.size(), [&](const auto& window) {
         using S = typename std::remove_cvref_t<decltype(window)>::S;
         auto in = rod_inputs<S>(system, here, prediction.load, variables.seeding(window), [&](auto& beta, auto& alpha) {
@@ -27,130 +27,136 @@ TwistSlopes<N> twist_slopes(const System<N, Fx>& system, const RecordedRow<N>& h
       });
 }
 
-/// Stands at a place of a recording, and knows what the effects remember there. A copy goes on from where this one stands.
+/// Solves friction and equilibrium at the samples of a path, one after the other. A copy goes on from the same sample.
 template <int N, class Fx>
-class Winder {
-  using On = typename Fx::template On<N>;
-  using Row = typename Path<N, double>::Row;
+class PathSolver {
+  using Effects = typename Fx::template On<N>;
+  using Sample = typename Path<N, double>::Row;
   using Vec = VecN<Contacts<N>::count>;
-  using Follower = std::tuple_element_t<On::follower, decltype(On::list)>;
 
 public:
-  using Slopes = TwistSlopes<N>;
-  struct Stand {
-    decltype(Follower::History::state) rubbed;  ///< on the way to here
-    Twist<N> twist;
+  /// What the next samples depend on.
+  struct State {
+    decltype(TorsionEffect<Fx, N>::History::state) friction;
+    RelativeTorsion<N> torsion;
   };
 
-  /// Stands before the first place.
-  explicit Winder(const On& effects) noexcept : effects_(effects) {}
+  /// Before the first sample.
+  explicit PathSolver(const Effects& effects) noexcept : effects_(effects) {}
 
-  [[nodiscard]] Stand stand() const noexcept { return {follower(effects_).history.state, from_.twist}; }
+  [[nodiscard]] State state() const noexcept { return {of_torsion(effects_).history.state, here_.torsion}; }
 
-  /// Goes on to place k with the twist that the path says. Of the equilibria before it then knows nothing.
+  /// The equilibrium of the sample that was solved last, if it has one.
+  [[nodiscard]] std::optional<TipGuess<N>> equilibrium() const noexcept {
+    return ws_.warm ? std::optional(ws_.guess) : std::nullopt;
+  }
+
+  /// Goes on to sample k with the torsion of the path, and forgets the equilibria before it.
   void pass(const Path<N, double>& path, std::size_t k) noexcept {
-    effects_ = remembered(effects_at(path, k), path, k, path.q[k].twist);
-    from_ = path.q[k];
-    wound_.setZero();
-    balance_ = {};
+    begin(path, k);
+    here_.torsion = path.q[k].torsion;
+    effects_ = effects_at(here_.torsion);
+    difference_.setZero();
+    torsion_solver_ = {};
     ws_.reset();
   }
 
-  /// Goes on to place k, and finds the twist there. A place without an equilibrium keeps the one that is given, with
-  /// what the place before was wound up.
-  /// @param here    what stands at the place, by on_the_way()
-  /// @param given   the twist of a robot without effects there, or that of other values
-  /// @param path    of other places its joints alone are looked at: others may be winding them up
-  /// @param equilibrium  in: where to look for that of this place, or nothing: near the place before; out: where it is
-  /// @param variables  as twist_slopes() takes them; or null, and so is
-  /// @param slopes     out: those of the twist there by what is rubbed on the way to here, and by these variables; nothing
-  ///                   without an equilibrium
-  void wind(const System<N, Fx>& system, const RecordedRow<N>& here, const Twist<N>& given, const Path<N, double>& path,
-            std::size_t k, std::optional<TipGuess<N>>& equilibrium, const Variables<N, Fx>* variables,
-            std::optional<Slopes>* slopes) noexcept {
-    constexpr int most = 40;  // equilibria of a place
-    if (equilibrium) ws_.begin_at(*equilibrium);
-    const On others = effects_at(path, k);
-    Twist<N> found = given;
-    Vec::Map(found.data()) += wound_;
-    const auto in_equilibrium = [&](const On& with) {
-      return has_equilibrium(predict(system, here, with.history(), ws_, prediction_)) ? &prediction_.model : nullptr;
-    };
-    const int steps = system.settings.steps;
-    effects_ = balance_.solve(
-        in_equilibrium, [&](const Twist<N>& twist) { return remembered(others, path, k, twist); }, ws_, steps, found,
-        most);
-    wound_ = Vec::Map(found.data()) - Vec::Map(given.data());
-    Row to = path.q[k];
-    to.twist = found;
-    if (slopes) {
-      slopes->reset();
-      if (balance_.left_there() || in_equilibrium(effects_)) {
-        *slopes = twist_slopes(system, here, prediction_, ws_, *variables);
-        balance_.take((*slopes)->by_rubbing);
-        close((*slopes).value(), law(others, to, path.radius, k));
-      }
-    }
-    equilibrium = ws_.warm ? std::optional(ws_.guess) : std::nullopt;
-    from_ = to;
+  /// Goes on to sample k and solves it. A sample without an equilibrium keeps the torsion `given`, plus the difference that
+  /// the solution of the sample before makes.
+  /// @param sample  as RecordedPath::sample() gives it
+  /// @param given   torsion of a robot without effects there, or that of other values
+  /// @param path    the torsion of its samples is not read: other threads may be solving them
+  /// @param start   where to look for the equilibrium; nothing: near that of the sample before
+  void solve(const System<N, Fx>& system, const RecordedRow<N>& sample, const RelativeTorsion<N>& given,
+             const Path<N, double>& path, std::size_t k, const std::optional<TipGuess<N>>& start) noexcept {
+    constexpr int most = 40;  // equilibria of a sample
+    if (start) ws_.begin_at(*start);
+    begin(path, k);
+    RelativeTorsion<N> torsion = given;
+    Vec::Map(torsion.data()) += difference_;
+    effects_ = torsion_solver_.solve([&](const Effects& with) { return predicted(system, sample, with); },
+                                     [&](const RelativeTorsion<N>& with) { return effects_at(with); }, ws_,
+                                     system.settings.steps, torsion, most);
+    difference_ = Vec::Map(torsion.data()) - Vec::Map(given.data());
+    here_.torsion = torsion;
+  }
+
+  /// Derivatives of the torsion at the sample just solved, by the friction that the history up to there leaves, and by
+  /// variables; nothing without an equilibrium.
+  /// @param variables  as torsion_derivatives() takes them
+  std::optional<TorsionDerivatives<N>> linearise(const System<N, Fx>& system, const RecordedRow<N>& sample,
+                                                 const Variables<N, Fx>& variables) noexcept {
+    if (!torsion_solver_.equilibrium_is_current() && !predicted(system, sample, effects_)) return {};
+    TorsionDerivatives<N> d = torsion_derivatives(system, sample, prediction_, ws_, variables);
+    torsion_solver_.set_derivative(d.by_friction);
+    // Friction responds to the torsion it causes.
+    using ByFriction = typename TorsionDerivatives<N>::ByFriction;
+    const auto lu = (ByFriction::Identity() - d.by_friction * friction_by_torsion().asDiagonal()).eval().partialPivLu();
+    d.by_friction = lu.solve(d.by_friction).eval();
+    d.by_variables = lu.solve(d.by_variables).eval();
+    return d;
   }
 
 private:
-  /// Slope of what is rubbed at each contact on the way to here by the twist of that contact.
-  Vec law(const On& before, const Row& to, const ContactRadii<N>& radius, std::size_t k) const noexcept {
-    using S = Dual<1>;
-    Vec slopes = Vec::Zero();
-    if (k == 0) return slopes;
-    const auto dual = [](const Row& plain) {
-      typename Path<N, S>::Row row;
-      std::ranges::copy(plain.beta, row.beta.begin());
-      std::ranges::copy(plain.alpha, row.alpha.begin());
-      std::ranges::copy(plain.twist, row.twist.begin());
-      row.jumps = plain.jumps;
-      return row;
-    };
-    std::array way{dual(from_), dual(to)};
-    for (S& twist : way[1].twist) twist.d[0] = unit_lane(0);
-    auto effects = before.template seeded<S>(Constant<S>{});
-    follower(effects).update_history({way, {}, {}, radius}, 1);
-    for (int c = 0; c < Contacts<N>::count; ++c) slopes[c] = follower(effects).history.state[std::size_t(c)].d[0][0];
-    return slopes;
-  }
+  static auto& of_torsion(auto& effects) noexcept { return std::get<TorsionEffect<Fx, N>>(effects.list); }
 
-  /// Makes slopes of the equilibrium's twist those of the twist that this rubbing leaves.
-  static void close(Slopes& slopes, const Vec& law) noexcept {
-    using ByContact = typename Slopes::ByContact;
-    const auto lu = (ByContact::Identity() - slopes.by_rubbing * law.asDiagonal()).eval().partialPivLu();
-    slopes.by_rubbing = lu.solve(slopes.by_rubbing).eval();
-    slopes.by_variables = lu.solve(slopes.by_variables).eval();
-  }
-
-  static auto& follower(auto& effects) noexcept { return std::get<On::follower>(effects.list); }
-
-  /// The effects at place k, but for what follows the twist, which remembers what it did.
-  On effects_at(const Path<N, double>& path, std::size_t k) const noexcept {
-    On now = effects_;
-    now.for_each([&](auto& effect, int) {
-      if constexpr (!FollowsTwist<std::remove_cvref_t<decltype(effect)>> &&
+  /// Moves to sample k, its torsion still that of the path, and updates the history of all effects but that of torsion.
+  void begin(const Path<N, double>& path, std::size_t k) noexcept {
+    from_ = here_;
+    here_ = path.q[k];
+    radius_ = path.radius;
+    is_first_ = k == 0;
+    before_ = effects_;
+    before_.for_each([&](auto& effect, int) {
+      if constexpr (!DependsOnTorsion<std::remove_cvref_t<decltype(effect)>> &&
                     requires { effect.update_history(path, k); })
         effect.update_history(path, k);
     });
+  }
+
+  /// The effects after the motion to the current sample, if this is the torsion there.
+  Effects effects_at(const RelativeTorsion<N>& torsion) const noexcept {
+    Effects now = before_;
+    if (is_first_) return now;
+    std::array way{from_, here_};
+    way[1].torsion = torsion;
+    of_torsion(now).update_history({way, {}, {}, radius_}, 1);
     return now;
   }
 
-  /// The effects with all that they remember of the motion to place k, if the twist there is this.
-  On remembered(On now, const Path<N, double>& path, std::size_t k, const Twist<N>& twist) const noexcept {
-    if (k == 0) return now;
-    std::array<Row, 2> way{from_, path.q[k]};
-    way[1].twist = twist;
-    follower(now).update_history({way, {}, {}, path.radius}, 1);
-    return now;
+  /// Derivative of the friction at each contact by the torsion of that contact.
+  Vec friction_by_torsion() const noexcept {
+    using S = Dual<1>;
+    Vec derivative = Vec::Zero();
+    if (is_first_) return derivative;
+    const auto dual = [](const Sample& plain) {
+      typename Path<N, S>::Row row;
+      std::ranges::copy(plain.beta, row.beta.begin());
+      std::ranges::copy(plain.alpha, row.alpha.begin());
+      std::ranges::copy(plain.torsion, row.torsion.begin());
+      row.jumps = plain.jumps;
+      return row;
+    };
+    std::array way{dual(from_), dual(here_)};
+    for (S& torsion : way[1].torsion) torsion.d[0] = unit_lane(0);
+    auto effect = std::get<0>(before_.template seeded<S, typename Fx::OnTorsion>(Constant<S>{}).list);
+    effect.update_history({way, {}, {}, radius_}, 1);
+    for (int c = 0; c < Contacts<N>::count; ++c) derivative[c] = effect.history.state[std::size_t(c)].d[0][0];
+    return derivative;
   }
 
-  On effects_;
-  Row from_{};
-  Vec wound_ = Vec::Zero();  ///< by how much more than was given the tubes are wound up
-  TwistBalance<N, Fx> balance_;
+  /// The model with these effects, its equilibrium left in ws_, or null.
+  const Model<N, Fx>* predicted(const System<N, Fx>& system, const RecordedRow<N>& sample,
+                                const Effects& with) noexcept {
+    return has_equilibrium(predict(system, sample, with.history(), ws_, prediction_)) ? &prediction_.model : nullptr;
+  }
+
+  Effects effects_, before_{};  ///< after the motion to the current sample; those of torsion before it
+  Sample from_{}, here_{};      ///< the sample before, the current one
+  ContactRadii<N> radius_;
+  bool is_first_ = true;
+  Vec difference_ = Vec::Zero();  ///< of the solved torsion from the given one
+  TorsionSolver<N, Fx> torsion_solver_;
   Workspace<N> ws_;
   RecordedPrediction<N, Fx> prediction_;
 };

@@ -1,5 +1,6 @@
 #pragma once
-// How tubes are turned against one another in equilibrium where they touch, and what friction there does to that.
+// Relative torsion of the tubes at their contacts in equilibrium, the moment jumps there, and the derivatives of the torsion
+// by the friction at the contacts.
 #include <Eigen/LU>
 
 #include "ctcr/math/functions.hpp"
@@ -39,24 +40,31 @@ private:
   std::array<bool, std::size_t(Contacts<N>::breakpoints)> passed{};
 };
 
+/// Integrates the rod in the equilibrium of ws once more. @param met  as EffectRod::run() takes it
+template <int N, class Fx>
+void visit_breakpoints(const Model<N, Fx>& model, const Workspace<N>& ws, int steps, const auto& met) noexcept {
+  using Rod = RodInEquilibrium<N, Fx>;
+  const Rod rod(model, ws.q, ws.load);
+  auto y = rod.at_tip(ws.guess);
+  Frame<double> frame;
+  rod.rod.run(rod.events, steps, y, frame, met, typename Rod::NoNode{});
+}
+
 }  // namespace detail
 
-/// The twist in equilibrium.
-/// @param ws     the model's equilibrium, as solve() left it, else `last` is returned
+/// Relative torsion in equilibrium.
+/// @param ws     the model's equilibrium, as solve() left it; else `last` is returned
 /// @param steps  per segment, with which it was solved
 /// @param last   of the configuration before; this one differs from it by less than half a turn
 /// Real time: yes; one integration.
 template <int N, class Fx>
-[[nodiscard]] Twist<N> twist_of(const Model<N, Fx>& model, const Workspace<N>& ws, int steps, Twist<N> last) noexcept {
+[[nodiscard]] RelativeTorsion<N> relative_torsion(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+                                                  RelativeTorsion<N> last) noexcept {
   if (!ws.warm) return last;
-  const detail::RodInEquilibrium<N, Fx> rod(model, ws.q, ws.load);
-  auto y = rod.at_tip(ws.guess);
-  Frame<double> frame;
   detail::ContactAngles<N, double> angles;
-  rod.rod.run(
-      rod.events, steps, y, frame,
-      [&](int breakpoint, const auto&, const auto& state, const auto&) { angles(breakpoint, state); },
-      typename decltype(rod)::NoNode{});
+  detail::visit_breakpoints(model, ws, steps, [&](int breakpoint, const auto&, const auto& state, const auto&) {
+    angles(breakpoint, state);
+  });
   for (int i = 0; i + 1 < N; ++i) {
     const double at_base = ws.q.alpha[i] - ws.q.alpha[i + 1];
     for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
@@ -67,18 +75,15 @@ template <int N, class Fx>
   return last;
 }
 
-/// The jumps of the moments in equilibrium; arguments as above, but `last` is what is returned without one.
+/// Jumps of the bending moments in equilibrium; arguments as above, but without an equilibrium `last` is returned.
 /// Real time: yes; one integration.
 template <int N, class Fx>
 [[nodiscard]] MomentJumps<N> moment_jumps(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
                                           const MomentJumps<N>& last) noexcept {
   if (!ws.warm) return last;
-  const detail::RodInEquilibrium<N, Fx> rod(model, ws.q, ws.load);
-  auto y = rod.at_tip(ws.guess);
-  Frame<double> frame;
   MomentJumps<N> jumps;
   jumps.fill(0);
-  const auto gather = [&](int breakpoint, const auto&, const auto&, const auto& moments) {
+  detail::visit_breakpoints(model, ws, steps, [&](int breakpoint, const auto&, const auto&, const auto& moments) {
     const auto [far, near] = moments();
     double dx = 0, dy = 0;
     for (std::size_t i = 0; i < N; ++i) {
@@ -88,31 +93,31 @@ template <int N, class Fx>
       if (is_outermost && breakpoint != Contacts<N>::plate) continue;
       jumps[is_outermost ? Contacts<N>::count : Contacts<N>::index(int(i), breakpoint)] = std::hypot(dx, dy);
     }
-  };
-  rod.rod.run(rod.events, steps, y, frame, gather, typename decltype(rod)::NoNode{});
+  });
   return jumps;
 }
 
-/// Slopes of the twist. Rows are contacts whose twist changes.
+/// Derivatives of the relative torsion. Rows are the contacts at which it is.
 template <int N>
-struct TwistSlopes {
-  using ByContact = Eigen::Matrix<double, Contacts<N>::count, Contacts<N>::count>;
-  ByContact by_rubbing;  ///< by what is rubbed at each contact: the first states of what follows it
-  Eigen::Matrix<double, Contacts<N>::count, Eigen::Dynamic> by_variables;  ///< those states held
+struct TorsionDerivatives {
+  using ByFriction = Eigen::Matrix<double, Contacts<N>::count, Contacts<N>::count>;
+  ByFriction by_friction;  ///< by the friction at each contact: the first states of the effect that depends on torsion
+  Eigen::Matrix<double, Contacts<N>::count, Eigen::Dynamic> by_variables;  ///< friction held
 };
 
+/// Lane of the first variable by which the torsion is differentiated: the unknowns and the contacts stand before it.
 template <int N>
 inline constexpr int first_variable = N + 2 + Contacts<N>::count;
 
-/// Arguments as twist_of().
+/// Arguments as relative_torsion().
 /// @tparam Most      variables at most
-/// @param variables  how many there are besides what is rubbed
+/// @param variables  how many there are besides the friction at the contacts
 /// @param inputs     inputs(window): RodInputs of the equilibrium, with derivatives by them, in lanes from
 ///                   first_variable<N> on
 /// Real time: yes without variables, else it allocates; an integration for each 16 of unknowns, contacts and variables.
 template <int Most, int N, class Fx>
-[[nodiscard]] TwistSlopes<N> twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps, int variables,
-                                          const auto& inputs) noexcept {
+[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+                                                        int variables, const auto& inputs) noexcept {
   using Window = detail::Window<4>;
   using Pass = detail::EffectPass<N, Fx, Window::groups>;
   using S = typename Window::S;
@@ -120,9 +125,9 @@ template <int Most, int N, class Fx>
   static_assert(first_variable<N> == unknowns + contacts);
   const int known = contacts + variables;
   Eigen::Matrix<double, unknowns, unknowns> by_unknown;
-  Eigen::Matrix<double, contacts, unknowns> turned_by_unknown;
+  Eigen::Matrix<double, contacts, unknowns> torsion_by_unknown;
   Eigen::Matrix<double, unknowns, Eigen::Dynamic, 0, unknowns, contacts + Most> by_known(unknowns, known);
-  Eigen::Matrix<double, contacts, Eigen::Dynamic, 0, contacts, contacts + Most> turned(contacts, known);
+  Eigen::Matrix<double, contacts, Eigen::Dynamic, 0, contacts, contacts + Most> torsion_by_known(contacts, known);
   const auto put = [&](int lane, auto& unknown_part, auto& known_part, int row, double x) {
     if (lane < unknowns)
       unknown_part(row, lane) = x;
@@ -132,7 +137,7 @@ template <int Most, int N, class Fx>
   for (Window window; window.first < unknowns + known; window.first += window.size) {
     RodInputs<N, S, Fx> in = inputs(window);
     in.effects.for_each([&](auto& effect, int) {
-      if constexpr (FollowsTwist<std::remove_cvref_t<decltype(effect)>>)
+      if constexpr (DependsOnTorsion<std::remove_cvref_t<decltype(effect)>>)
         for (int k = 0; k < contacts; ++k) window.add(effect.history.state[std::size_t(k)], unknowns + k, 1);
     });
     detail::ContactAngles<N, S> angles;
@@ -143,20 +148,22 @@ template <int Most, int N, class Fx>
     for (int i = 0; i + 1 < N; ++i)
       for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {
         const std::size_t k = Contacts<N>::index(i, breakpoint);
-        const S twist = angles.angle[k] - (in.alpha[std::size_t(i)] - in.alpha[std::size_t(i) + 1]);
+        const S torsion = angles.angle[k] - (in.alpha[std::size_t(i)] - in.alpha[std::size_t(i) + 1]);
         for (int lane = 0; lane < window.size; ++lane)
-          put(window.first + lane, turned_by_unknown, turned, int(k), twist.d[lane / lane_count][lane % lane_count]);
+          put(window.first + lane, torsion_by_unknown, torsion_by_known, int(k),
+              torsion.d[lane / lane_count][lane % lane_count]);
       }
     for (int i = 0; i < unknowns; ++i)
       for (int lane = 0; lane < window.size; ++lane) put(window.first + lane, by_unknown, by_known, i, row[i][lane]);
   }
-  turned.noalias() -= turned_by_unknown * by_unknown.partialPivLu().solve(by_known).eval();
-  return {turned.template leftCols<contacts>(), turned.rightCols(variables)};
+  torsion_by_known.noalias() -= torsion_by_unknown * by_unknown.partialPivLu().solve(by_known).eval();
+  return {torsion_by_known.template leftCols<contacts>(), torsion_by_known.rightCols(variables)};
 }
 
-/// By what is rubbed alone. Real time: yes.
+/// By friction alone. Real time: yes.
 template <int N, class Fx>
-[[nodiscard]] TwistSlopes<N> twist_slopes(const Model<N, Fx>& model, const Workspace<N>& ws, int steps) noexcept {
+[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws,
+                                                        int steps) noexcept {
   using S = typename detail::Window<4>::S;
   const auto& c = model.coefficients();
   RodInputs<N, S, Fx> in;
@@ -173,7 +180,7 @@ template <int N, class Fx>
     in.gravity[k] = c.gravity[i];
   }
   in.effects = c.effects.template seeded<S>(Constant<S>{});
-  return twist_slopes<0>(model, ws, steps, 0, [&](const auto&) { return in; });
+  return torsion_derivatives<0>(model, ws, steps, 0, [&](const auto&) { return in; });
 }
 
 }  // namespace ctcr

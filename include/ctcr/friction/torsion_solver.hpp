@@ -1,124 +1,125 @@
 #pragma once
-// Tubes that rub wind each other up: what they rub depends on how they turn where they touch, and that on what they rub.
+// Friction and torsion at one sample: friction depends on how the tubes turn at their contacts, and that on friction.
 #include <Eigen/LU>
-#include <utility>
 
 #include "ctcr/friction/relative_torsion.hpp"
 
 namespace ctcr {
 
-/// Finds the twist_of() the robot with what is rubbed on the way to it, by Newton's method. The law of rubbing may be
-/// stiff: its slope is taken where it is. What the equilibrium makes of the rubbing is smooth: its slope is that of a place
-/// before, corrected by what is seen of it (Broyden), and taken anew where that does not lead on. Rubbing by the twist of
-/// the place before instead would overshoot by more than it corrects, and change sides at every place.
+/// Finds the relative torsion at which the equilibrium with the friction of this torsion has this torsion, by Newton's method.
+/// The constitutive law of friction may be stiff: its derivative is taken at the iterate. The torsion of the equilibrium is a
+/// smooth function of friction: its derivative is that of a sample before, corrected by what the iterates show (Broyden), and
+/// computed anew where that does not lead on. Friction by the torsion of the sample before instead would overshoot by more
+/// than it corrects, and change sides at every sample.
 template <int N, class Fx>
-class TwistBalance {
+class TorsionSolver {
   using Effects = typename Fx::template On<N>;
   static constexpr int contacts = Contacts<N>::count;
   using Vec = VecN<contacts>;
+  using ByFriction = typename TorsionDerivatives<N>::ByFriction;
 
 public:
   /// @param equilibrium  equilibrium(effects): the model with these effects, its equilibrium left in ws; or null if none
-  /// @param remembered   remembered(twist): the effects after the motion to this place, if the twist there is that
+  /// @param effects_at   effects_at(torsion): the effects after the motion to this sample, if this is the torsion there
   /// @param steps        of integration, per segment
-  /// @param twist        in: a guess; out: the solution [rad], unchanged without an equilibrium
+  /// @param torsion      in: a guess; out: the solution [rad], unchanged without an equilibrium
   /// @param most         equilibria that are tried
-  /// @return the effects at the solution. Real time: as equilibrium and remembered.
-  Effects solve(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, int steps, Twist<N>& twist,
-                int most) noexcept {
+  /// @return the effects at the solution. Real time: as equilibrium and effects_at.
+  Effects solve(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, int steps,
+                RelativeTorsion<N>& torsion, int most) noexcept {
     if constexpr (contacts == 0)
-      return remembered(twist);
+      return effects_at(torsion);
     else
-      return balanced(equilibrium, remembered, ws, steps, twist, most);
+      return iterate(equilibrium, effects_at, ws, steps, torsion, most);
   }
 
-  /// Takes slopes of the twist by what is rubbed, at a place like the next one.
-  void take(const Eigen::Matrix<double, contacts, contacts>& by_rubbing) noexcept {
-    by_rubbing_ = by_rubbing;
-    weight_ = by_rubbing_.colwise().squaredNorm().transpose();
+  /// Takes the derivative of the torsion by friction, computed at a sample close to the next one.
+  void set_derivative(const ByFriction& by_friction) noexcept {
+    by_friction_ = by_friction;
+    weight_ = by_friction_.colwise().squaredNorm().transpose();
   }
 
-  /// Whether the equilibrium that was asked for last is that of the solution, so that ws holds it.
-  [[nodiscard]] bool left_there() const noexcept { return left_there_; }
+  /// Whether the last equilibrium that was asked for is that of the solution, so that ws holds it.
+  [[nodiscard]] bool equilibrium_is_current() const noexcept { return equilibrium_is_current_; }
 
 private:
-  Effects balanced(const auto& equilibrium, const auto& remembered, const Workspace<N>& ws, int steps, Twist<N>& twist,
-                   int most) noexcept {
+  struct Iterate {
+    RelativeTorsion<N> torsion{};
+    Effects effects;             ///< with the friction of this torsion
+    Vec residual = Vec::Zero();  ///< torsion of the equilibrium with these effects, minus this torsion
+  };
+
+  Effects iterate(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, int steps,
+                  RelativeTorsion<N>& torsion, int most) noexcept {
     constexpr double tolerance = 1e-4;  // [rad]
-    const auto find = [&](Point& at) {
+    const auto evaluate = [&](Iterate& at) {
       const Model<N, Fx>* model = equilibrium(at.effects);
       if (model == nullptr) return false;
-      at.left = as_vector(twist_of(*model, ws, steps, at.twist)) - as_vector(at.twist);
+      at.residual = as_vector(relative_torsion(*model, ws, steps, at.torsion)) - as_vector(at.torsion);
       return true;
     };
-    Point best;
+    Iterate best;
     Vec step = Vec::Zero();
-    double part = 1;       // of the step
-    bool renewed = false;  // the slopes
+    double fraction = 1;  // of the step
+    bool derivative_is_new = false;
     for (int k = 0; k < most; ++k) {
-      Point here{twist, remembered(twist), Vec::Zero()};
-      const bool found = left_there_ = find(here);
+      Iterate here{torsion, effects_at(torsion), Vec::Zero()};
+      const bool found = equilibrium_is_current_ = evaluate(here);
       if (!found && k == 0) return here.effects;
-      if (found && k > 0) learn(best, here);
-      const bool worse = k > 0 && !(found && here.left.norm() <= best.left.norm());
+      if (found && k > 0) update_derivative(best, here);
+      const bool worse = k > 0 && !(found && here.residual.norm() <= best.residual.norm());
       if (worse)
-        left_there_ = false;
+        equilibrium_is_current_ = false;
       else
         best = here;
-      if (best.left.norm() < tolerance) break;
-      if (worse && renewed) {
-        part *= 0.5;
+      if (best.residual.norm() < tolerance) break;
+      if (worse && derivative_is_new) {
+        fraction *= 0.5;
       } else {
         if (worse) {
-          if (const Model<N, Fx>* model = equilibrium(best.effects)) take(twist_slopes(*model, ws, steps).by_rubbing);
-          renewed = true;
+          if (const Model<N, Fx>* model = equilibrium(best.effects))
+            set_derivative(torsion_derivatives(*model, ws, steps).by_friction);
+          derivative_is_new = true;
         }
-        step = newton_step(best, remembered);
-        part = 1;
+        step = newton_step(best, effects_at);
+        fraction = 1;
       }
-      as_vector(twist) = as_vector(best.twist) + part * step;
+      as_vector(torsion) = as_vector(best.torsion) + fraction * step;
     }
-    twist = best.twist;
+    torsion = best.torsion;
     return best.effects;
   }
 
-  struct Point {
-    Twist<N> twist{};        ///< with which rubbing is reckoned
-    Effects effects;         ///< so
-    Vec left = Vec::Zero();  ///< what the equilibrium's twist differs from it
-  };
+  static auto as_vector(RelativeTorsion<N>& torsion) noexcept { return Vec::Map(torsion.data()); }
+  static auto as_vector(const RelativeTorsion<N>& torsion) noexcept { return Vec::Map(torsion.data()); }
 
-  static Eigen::Map<Vec> as_vector(Twist<N>& twist) noexcept { return Eigen::Map<Vec>(twist.data()); }
-  static Eigen::Map<const Vec> as_vector(const Twist<N>& twist) noexcept { return Eigen::Map<const Vec>(twist.data()); }
-
-  /// What is rubbed.
-  static Vec rubbing(const Effects& effects) noexcept {
-    return Vec::Map(std::get<Effects::follower>(effects.list).history.state.data());
+  /// Friction at each contact.
+  static Vec friction(const Effects& effects) noexcept {
+    return Vec::Map(std::get<TorsionEffect<Fx, N>>(effects.list).history.state.data());
   }
 
-  /// What a change of the rubbing did to the equilibrium's twist, by the contacts that may have done it: where tubes hardly
-  /// press on each other, what is rubbed changes most, and does nothing.
-  void learn(const Point& from, const Point& to) noexcept {
-    const Vec change = rubbing(to.effects) - rubbing(from.effects);
-    const Vec blamed = weight_.cwiseProduct(change);
-    if (!(blamed.dot(change) > 1e-16)) return;
-    const Vec turned = as_vector(to.twist) + to.left - as_vector(from.twist) - from.left;
-    by_rubbing_ += (turned - by_rubbing_ * change) * blamed.transpose() / blamed.dot(change);
+  /// Broyden's update by what a change of friction did to the torsion. It is attributed to the contacts that can have done
+  /// it: where tubes hardly press on each other, friction changes most and has no effect.
+  void update_derivative(const Iterate& from, const Iterate& to) noexcept {
+    const Vec change = friction(to.effects) - friction(from.effects);
+    const Vec weighted = weight_.cwiseProduct(change);
+    if (!(weighted.dot(change) > 1e-16)) return;
+    const Vec turned = as_vector(to.torsion) + to.residual - as_vector(from.torsion) - from.residual;
+    by_friction_ += (turned - by_friction_ * change) * weighted.transpose() / weighted.dot(change);
   }
 
-  Vec newton_step(const Point& at, const auto& remembered) const noexcept {
+  Vec newton_step(const Iterate& at, const auto& effects_at) const noexcept {
     constexpr double small = 1e-6;  // [rad]
-    Twist<N> moved = at.twist;
-    as_vector(moved).array() += small;  // what is rubbed at a contact follows the twist there alone
-    const Vec law = (rubbing(remembered(moved)) - rubbing(at.effects)) / small;
-    const Eigen::Matrix<double, contacts, contacts> slope =
-        Eigen::Matrix<double, contacts, contacts>::Identity() - by_rubbing_ * law.asDiagonal();
-    return slope.partialPivLu().solve(at.left);
+    RelativeTorsion<N> moved = at.torsion;
+    as_vector(moved).array() += small;  // friction at a contact follows the torsion there alone
+    const Vec by_torsion = (friction(effects_at(moved)) - friction(at.effects)) / small;
+    const ByFriction jacobian = ByFriction::Identity() - by_friction_ * by_torsion.asDiagonal();
+    return jacobian.partialPivLu().solve(at.residual);
   }
 
-  bool left_there_ = false;
+  bool equilibrium_is_current_ = false;
   Vec weight_ = Vec::Ones();
-  Eigen::Matrix<double, contacts, contacts> by_rubbing_ = Eigen::Matrix<double, contacts, contacts>::Zero();
+  ByFriction by_friction_ = ByFriction::Zero();
 };
 
 }  // namespace ctcr

@@ -1,6 +1,5 @@
 #pragma once
-// Derivatives of what the tracker reads in a recorded row, along the way of recorded.hpp: exact ones of the discretised
-// model. (Where nothing loads the rod and no effect acts on it they are those of the unloaded equations, which differ
+// Derivatives of the reading in a recorded row, in the steps of predict.hpp: exact ones of the discretised model. (Where nothing loads the rod and no effect acts on it they are those of the unloaded equations, which differ
 // by their discretisation error.)
 #include "ctcr/recording/history_sensitivities.hpp"
 #include "ctcr/recording/predict.hpp"
@@ -12,7 +11,7 @@ namespace detail {
 /// The derivatives of one reading. In the lanes stand first the unknowns of the equations, then the parameters that move
 /// the tip, force and moment at the robot tip, and the parameters that change the reading alone, which need no integration.
 template <int N, class Fx>
-class RecordedSlopes {
+class RowDerivatives {
   using P = SystemParameters<N, Fx>;
   using V = ParameterVector<N>;
   using Window = detail::Window<4>;
@@ -23,10 +22,10 @@ class RecordedSlopes {
   static constexpr int groups = Window::groups_for(unknowns + P::count + loads);
 
 public:
-  RecordedSlopes(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
+  RowDerivatives(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                  const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                 const PastSlopesOfRow& past) noexcept
-    : system_(system), row_(row), ws_(ws), prediction_(prediction), past_(past), asked_(variables) {
+                 const RowHistorySensitivities& history) noexcept
+    : system_(system), row_(row), ws_(ws), prediction_(prediction), history_(history), asked_(variables) {
     equations_ = model().coefficients().on_rod;
     for (std::size_t j = 0; j < variables.size(); ++j) {
       const int v = variables[j];
@@ -68,8 +67,8 @@ private:
   [[nodiscard]] auto effects(const Window& window) const noexcept {
     return variables_.template effects<Some>(model().effects(), window, [&](double x, int state) {
       S seeded = x;
-      if (const double* slope = past_(state))
-        variables_.for_each_in(window, [&](int lane, int j) { window.add(seeded, lane, slope[j]); });
+      if (const double* derivative = history_(state))
+        variables_.for_each_in(window, [&](int lane, int j) { window.add(seeded, lane, derivative[j]); });
       return seeded;
     });
   }
@@ -79,7 +78,7 @@ private:
     };
   }
 
-  /// What the surroundings add, and its slopes by the parameters: it may be nothing and yet have some.
+  /// Force of the surroundings and its derivatives by the parameters, which may differ from 0 where the force does not.
   bool find_push() noexcept {
     bool pushed = false;
     if constexpr (On::has_environment) {
@@ -93,7 +92,8 @@ private:
     return pushed;
   }
 
-  /// The tip by everything, and by the first components of force and moment, from the equations with their effects.
+  /// Derivatives of the tip by everything, and by the first components of force and moment, from the equations with their
+  /// effects.
   void integrate(int components) noexcept {
     const Events<N> events = sort_events(with_all_curves(model().robot()), prediction_.q.beta);
     const int count = force_ + components;
@@ -111,7 +111,7 @@ private:
     (void)eliminate<unknowns>(rows_, lane);
   }
 
-  /// The tip by the joints that the tubes have and by the tubes, as the faster way of the standard model gives them.
+  /// Derivatives of the tip by the joints that the tubes have and by the tubes, by the faster path of the standard model.
   Status take_standard(Mat6* compliance) noexcept {
     TipDerivatives<N> tip;
     const Model<N> standard(model().robot());
@@ -134,22 +134,21 @@ private:
     return status;
   }
 
-  /// What the tip's own motion changes of the push: df = push dv + slope dp and dp = A dv + C df, p the robot tip.
+  /// Adds that the force of the surroundings f changes with the robot tip p, which it moves: df = f_v dv + f_p dp and
+  /// dp = A dv + C df, v a variable.
   void add_push(int end) noexcept {
     if constexpr (On::has_environment) {
-      using Slope = Dual<1>;
-      const Vec3& p = prediction_.solution.position;
-      std::array<Slope, 3> at{p[0], p[1], p[2]}, f{0.0, 0.0, 0.0};
-      for (int i = 0; i < 3; ++i) at[std::size_t(i)].d[0] = unit_lane(i);
-      model().effects().template seeded<Slope, typename Fx::OnTip>(Constant<Slope>{}).environment(at, f);
-      Mat3 slope, C;
+      const Mat3 by_position =
+          surrounding_force(model().effects().template seeded<Dual<1>, typename Fx::OnTip>(Constant<Dual<1>>{}),
+                            prediction_.solution.position)
+              .by_position;
+      Mat3 C;
       Eigen::Matrix<double, 6, 3> by_force;
       for (int j = 0; j < 3; ++j) {
         for (int i = 0; i < 6; ++i) by_force(i, j) = rows_[unknowns + i][force_ + j];
         for (int i = 0; i < 3; ++i) C(i, j) = rows_[Pass::rows + i][force_ + j];
-        for (int i = 0; i < 3; ++i) slope(i, j) = f[std::size_t(i)].d[0][std::size_t(j)];
       }
-      const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - slope * C);
+      const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - by_position * C);
       for (int j = unknowns; j < end; ++j) {
         Vec3 A, direct = Vec3::Zero();
         for (int i = 0; i < 3; ++i) {
@@ -158,13 +157,13 @@ private:
           const int l = j % Window::size;
           direct[i] = push_[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
         }
-        const Vec6 change = by_force * lu.solve(direct + slope * A);
+        const Vec6 change = by_force * lu.solve(direct + by_position * A);
         for (int i = 0; i < 6; ++i) rows_[unknowns + i].add(j, change[i]);
       }
     }
   }
 
-  /// From the tip to what the tracker makes of it.
+  /// From the tip to the reading.
   void read(Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) const noexcept {
     const Pose& T_base_tip = prediction_.solution.tube_tips[std::size_t(system_.sensor.tube)];
     const Pose& T_tracker_base = system_.sensor.T_tracker_base;
@@ -178,8 +177,8 @@ private:
           return Lanes3{rows_[first].x[at], rows_[first + 1].x[at], rows_[first + 2].x[at]};
         };
         const auto seeds = [&](Parameter kind) {
-          const auto slope = [&](int i) { return seed(0, V::index(kind, i)).d[g]; };
-          return Lanes3{slope(0), slope(1), slope(2)};
+          const auto of = [&](int i) { return seed(0, V::index(kind, i)).d[g]; };
+          return Lanes3{of(0), of(1), of(2)};
         };
         const Lanes3 v = R_tip_base * twist(unknowns), w = R_tip_base * twist(unknowns + 3);
         const Lanes3 shift = R_base_tracker * seeds(Parameter::tracker_position),
@@ -210,7 +209,7 @@ private:
   const RecordedRow<N>& row_;
   const Workspace<N>& ws_;
   const RecordedPrediction<N, Fx>& prediction_;
-  PastSlopesOfRow past_;
+  RowHistorySensitivities history_;
   std::span<const int> asked_;
   Variables<N, Fx> variables_;
   int force_ = unknowns, lanes_ = 0;  ///< lane of force and moment; end of all
@@ -223,9 +222,9 @@ private:
 
 /// Derivatives of the reading that predict() just left in `ws` and `prediction`, by some of the system's parameters.
 /// Rows: position [m], rotation [rad], tracker axes.
-/// @param variables  places in SystemParameters<N, Fx>, each once
+/// @param variables  indices in SystemParameters<N, Fx>, each once
 /// @param out        6 x variables.size()
-/// @param past       slopes of what the row's memory holds, by the variables; none: it is held
+/// @param history    derivatives of the history of this row, by the variables; none: it is held
 /// @param compliance derivatives of the tube's tip by force [N] and moment [N m] at the robot tip, base frame; or null
 /// @return as predict(); where that failed the derivatives are zero. Real time: yes, one integration for sixteen variables.
 template <int N, class Fx>
@@ -233,20 +232,21 @@ template <int N, class Fx>
 CTCR_NOINLINE Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                                    const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
                                    Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out,
-                                   const PastSlopesOfRow& past = {}, Mat6* compliance = nullptr) noexcept {
+                                   const RowHistorySensitivities& history = {}, Mat6* compliance = nullptr) noexcept {
   out.setZero();
   if (compliance) compliance->setZero();
   const Status status = prediction.solution.status;
   if (!has_equilibrium(status)) return status;
-  return detail::RecordedSlopes<N, Fx>(system, row, ws, prediction, variables, past).write(out, compliance);
+  return detail::RowDerivatives<N, Fx>(system, row, ws, prediction, variables, history).write(out, compliance);
 }
 
-/// As above without effects, by the faster way of predict.hpp.
+/// As above without effects, by the faster path of system/predict.hpp.
 template <int N, class Fx>
   requires(Fx::none)
 Status differentiate(const System<N, Fx>& system, const RecordedRow<N>& row, const Workspace<N>& ws,
                      const RecordedPrediction<N, Fx>& prediction, std::span<const int> variables,
-                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out, const PastSlopesOfRow& = {}) noexcept {
+                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out,
+                     const RowHistorySensitivities& = {}) noexcept {
   PredictionDerivatives<N> all;
   const Status status = differentiate(system, row.theta, ws, prediction, all);
   for (std::size_t j = 0; j < variables.size(); ++j) out.col(Eigen::Index(j)) = all.by_parameters.col(variables[j]);

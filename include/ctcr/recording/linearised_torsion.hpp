@@ -1,7 +1,7 @@
 #pragma once
-// How the twist of tubes that rub changes with the parameters of their system.
 #include <Eigen/Core>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "ctcr/mechanics/solution.hpp"
@@ -9,42 +9,41 @@
 
 namespace ctcr {
 
-/// The twist at each place of a recording, near the parameters with which the tubes were wound up: linear in some of them.
+/// Relative torsion at each sample of a recording as a linear function of some parameters, about the values with which
+/// solve_friction() found it.
 template <int N>
-struct Winding {
-  std::vector<std::optional<TipGuess<N>>> equilibria{};  ///< at each place; nothing: none was found
-  std::vector<int> variables{};                          ///< these, by their places in SystemParameters
-  Eigen::VectorXd values{};  ///< theirs, with which the tubes were wound up; empty: it is not known
-  Eigen::MatrixXd slopes{};  ///< (contacts, variables x places)
+struct LinearisedTorsion {
+  std::vector<std::optional<TipGuess<N>>> equilibria{};  ///< at each sample; nothing: none was found
+  std::vector<int> variables{};                          ///< the parameters, by their indices in SystemParameters
+  Eigen::VectorXd values{};                              ///< theirs at the solution; empty: there is none yet
+  Eigen::MatrixXd derivatives{};                         ///< (contacts, variables x samples)
 
-  /// Slopes of the twist at a place: (contacts, variables).
-  [[nodiscard]] auto at(std::size_t place) { return slopes.middleCols(first(place), Eigen::Index(variables.size())); }
-  [[nodiscard]] auto at(std::size_t place) const {
-    return slopes.middleCols(first(place), Eigen::Index(variables.size()));
+  /// Derivatives at a sample: (contacts, variables).
+  [[nodiscard]] auto at(std::size_t k) { return derivatives.middleCols(first(k), Eigen::Index(variables.size())); }
+  [[nodiscard]] auto at(std::size_t k) const {
+    return derivatives.middleCols(first(k), Eigen::Index(variables.size()));
   }
 
-  /// Adds to the twist along a path what other values of all parameters change.
-  void unwind(const Eigen::VectorXd& to, detail::RecordedPath<N, double>& path) const noexcept {
-    for (std::size_t place = 0; place < path.q.size(); ++place) extrapolate(to, place, path.q[place].twist);
-  }
-  /// The same of rows.
-  void unwind(const Eigen::VectorXd& to, std::span<RecordedRow<N>> rows) const noexcept {
-    std::size_t place = 0;
-    for (RecordedRow<N>& row : rows)
-      for (Twist<N>& twist : row.twist) extrapolate(to, place++, twist);
-  }
-  /// The same at a place.
-  void extrapolate(const Eigen::VectorXd& to, std::size_t place, Twist<N>& twist) const noexcept {
-    auto sum = VecN<Contacts<N>::count>::Map(twist.data());
-    const auto here = at(place);
+  /// Adds to the torsion at a sample what changes from the solution to other values of all parameters.
+  void extrapolate(const Eigen::VectorXd& to, std::size_t k, RelativeTorsion<N>& torsion) const noexcept {
+    auto sum = VecN<Contacts<N>::count>::Map(torsion.data());
+    const auto here = at(k);
     for (Eigen::Index j = 0; j < values.size(); ++j) {
       const double change = to[variables[std::size_t(j)]] - values[j];
       if (change != 0) sum += change * here.col(j);
     }
   }
+  void extrapolate(const Eigen::VectorXd& to, RecordedPath<N>& path) const noexcept {
+    for (std::size_t k = 0; k < path.q.size(); ++k) extrapolate(to, k, path.q[k].torsion);
+  }
+  void extrapolate(const Eigen::VectorXd& to, std::span<RecordedRow<N>> rows) const noexcept {
+    std::size_t k = 0;
+    for (RecordedRow<N>& row : rows)
+      for (RelativeTorsion<N>& torsion : row.torsion) extrapolate(to, k++, torsion);
+  }
 
 private:
-  [[nodiscard]] Eigen::Index first(std::size_t place) const noexcept { return Eigen::Index(place * variables.size()); }
+  [[nodiscard]] Eigen::Index first(std::size_t k) const noexcept { return Eigen::Index(k * variables.size()); }
 };
 
 }  // namespace ctcr

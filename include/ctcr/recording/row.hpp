@@ -9,38 +9,40 @@
 
 namespace ctcr {
 
-/// One row of a recording.
+/// One row of a recording. Between rows the joints move in a straight line, which is divided into samples.
 template <int N>
 struct RecordedRow {
   MotorAngles<N> theta;
   TipLoad load;
   Occasion at;
-  /// The twist_of() the tubes at evenly spaced places of the way from the row before, the last of them in this
-  /// row, as add_twist() and wind_up() give it; none: tubes count as stiff in torsion [rad].
-  std::vector<Twist<N>> twist{};
-  /// The moment_jumps() of a robot without effects at these places, as add_twist() gives them [N m].
+  /// relative_torsion() at evenly spaced samples of the way from the row before; the last sample is this row. Set by
+  /// set_frictionless_torsion() and solve_friction(); empty: tubes count as rigid in torsion [rad].
+  std::vector<RelativeTorsion<N>> torsion{};
+  /// moment_jumps() of a robot without effects at these samples, set by set_frictionless_torsion() [N m].
   std::vector<MomentJumps<N>> jumps{};
-  ContactRadii<N> radius{};  ///< as add_twist() gives them
-  /// Of a first row: whether the robot came straight from home, where all motors are at 0. Home is the first place then.
+  ContactRadii<N> radius{};  ///< set by set_frictionless_torsion()
+  /// Of a first row: whether the robot came straight from home, where all motors are at 0. Home is the first sample then.
   bool from_home = false;
 
-  [[nodiscard]] std::size_t places() const noexcept { return std::max<std::size_t>(twist.size(), from_home ? 2 : 1); }
+  [[nodiscard]] std::size_t samples() const noexcept {
+    return std::max<std::size_t>(torsion.size(), from_home ? 2 : 1);
+  }
 };
 
-/// What stands at a place on the way to a row, from 0 to places() - 1: joints and time on a straight line, the load of the
-/// row. A first row has no way, or one from home, all of it at its own time. Real time: no (allocates).
+/// A sample of the way to a row, from 0 to samples() - 1, as a row without torsion: joints and time on a straight line, load
+/// of the row. A first row has no way, or one from home, all of it at its own time. Real time: yes.
 template <int N>
-RecordedRow<N> on_the_way(std::span<const RecordedRow<N>> rows, std::size_t row, std::size_t place) {
+RecordedRow<N> sample_of(std::span<const RecordedRow<N>> rows, std::size_t row, std::size_t sample) noexcept {
   const RecordedRow<N>& end = rows[row];
   RecordedRow<N> here{end.theta, end.load, end.at};
-  if (place + 1 >= end.places()) return here;
+  if (sample + 1 >= end.samples()) return here;
   if (row == 0) {
-    const double done = double(place) / double(end.places() - 1);
+    const double done = double(sample) / double(end.samples() - 1);
     here.theta = {done * end.theta.translation, done * end.theta.rotation};
     return here;
   }
   const RecordedRow<N>& start = rows[row - 1];
-  const double left = 1 - double(place + 1) / double(end.places());
+  const double left = 1 - double(sample + 1) / double(end.samples());
   here.theta.translation += left * (start.theta.translation - end.theta.translation);
   here.theta.rotation += left * (start.theta.rotation - end.theta.rotation);
   here.at.time += left * (start.at.time - end.at.time);

@@ -1,5 +1,5 @@
 #pragma once
-// Parameters of a system by which something is differentiated: their lanes, and what they do to the rod.
+// Parameters of a system by which something is differentiated: their lanes, and the inputs of the rod with derivatives.
 #include <numbers>
 #include <span>
 
@@ -36,7 +36,7 @@ class Variables {
 public:
   Variables() noexcept { lane_.fill(-1), variable_.fill(-1); }
 
-  /// @param variable  its place among the variables   @param parameter  its place in SystemParameters<N, Fx>
+  /// @param variable  its index among the variables   @param parameter  its index in SystemParameters<N, Fx>
   void put(int lane, int variable, int parameter) noexcept {
     lane_[std::size_t(parameter)] = lane;
     variable_[std::size_t(lane)] = variable;
@@ -56,12 +56,12 @@ public:
   }
 
   /// Effects with their derivatives in a window; arguments as EffectList::On::seeded().
-  template <class Some = Fx, class Window, class Past = Constant<typename Window::S>>
+  template <class Some = Fx, class Window, class OfHistory = Constant<typename Window::S>>
   [[nodiscard]] auto effects(const typename Fx::template On<N>& plain, const Window& window,
-                             const Past& past = {}) const noexcept {
+                             const OfHistory& history = {}) const noexcept {
     const auto seed = seeding(window);
     return plain.template seeded<typename Window::S, Some>(
-        [&](double x, int k) { return seed(x, ParameterVector<N>::count + k); }, past);
+        [&](double x, int k) { return seed(x, ParameterVector<N>::count + k); }, history);
   }
 
   /// Calls f(lane, variable) for those of a window.

@@ -21,7 +21,7 @@ struct Contacts {
 /// bases [rad]. Where one of them has ended, or the breakpoint is behind the plate, it is that of the nearest arc length at
 /// which both are in front of it.
 template <int N, class P = double>
-using Twist = std::array<P, std::size_t(Contacts<N>::count)>;
+using RelativeTorsion = std::array<P, std::size_t(Contacts<N>::count)>;
 
 /// Jump of the bending moment of all tubes inside each contact, and last that of all tubes in the plate [N m]: a measure of
 /// the contact force. 0 where there is no contact; `usual` where it is not known.

@@ -38,8 +38,8 @@ public:
   [[nodiscard]] virtual Eigen::VectorXd nominal() const = 0;
   [[nodiscard]] virtual const std::vector<int>& unsolved() const = 0;
   [[nodiscard]] virtual const std::vector<bool>& active() const = 0;
-  virtual double wind_up(const Eigen::VectorXd& x) = 0;
-  [[nodiscard]] virtual bool is_wound() const = 0;
+  virtual double solve_friction(const Eigen::VectorXd& x) = 0;
+  [[nodiscard]] virtual bool friction_is_solved() const = 0;
   virtual void begin_at(const AnyRecording& other) = 0;
   virtual void activate(const std::vector<bool>& rows) = 0;
   /// T_tracker_sensor as predicted at the last call: (rows, 3) [m], (rows, 4) w first; NaN where not solved.

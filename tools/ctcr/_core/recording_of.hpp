@@ -35,8 +35,8 @@ std::vector<RecordedRow<N>> rows_of(const Table& table) {
     rows[i].at = {table.time[k], table.part[k], table.run[k], table.centre};
   }
   if (!rows.empty()) rows.front().from_home = table.from_home;
-  if (any_effect<N>(table, [](const auto& effect) { return requires { effect.follows_twist; }; }))
-    add_twist<N>(plain, rows);
+  if (any_effect<N>(table, [](const auto& effect) { return requires { effect.depends_on_torsion; }; }))
+    set_frictionless_torsion<N>(plain, rows);
   return rows;
 }
 
@@ -72,14 +72,14 @@ public:
     : pool_(table.threads),
       profiles_(profiles_of<N>(table)),
       recording_(system(table, profiles_), rows_of<N>(table), measured_of(table), table.free, pool_) {
-    recording_.wind_up(recording_.nominal());
+    recording_.solve_friction(recording_.nominal());
   }
 
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) override {
     return recording_(x, residual, jacobian);
   }
-  double wind_up(const Eigen::VectorXd& x) override { return recording_.wind_up(x); }
-  bool is_wound() const override { return recording_.is_wound(); }
+  double solve_friction(const Eigen::VectorXd& x) override { return recording_.solve_friction(x); }
+  bool friction_is_solved() const override { return recording_.friction_is_solved(); }
   void begin_at(const AnyRecording& other) override {
     if (const auto* like = dynamic_cast<const RecordingOf*>(&other)) recording_.begin_at(like->recording_);
   }

@@ -59,8 +59,9 @@ public:
   /// @return whether every row that is not left out could be solved; those that could not are in unsolved(), and NaN
   bool operator()(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) {
     const System<N, Fx> system = this->system(x);
-    const std::vector<HistoryOfRow> memory = histories<N, Fx>(system, rows_, *winding_);
-    const std::optional<PastSlopes<N, Fx>> past = jacobian ? std::optional(past_slopes(system)) : std::nullopt;
+    const RecordedPath<N> path = recorded_path<N, Fx>(system, rows_, *torsion_);
+    const std::vector<HistoryOfRow> history = histories<N, Fx>(system, rows_, path);
+    const auto sensitivities = jacobian ? std::optional(history_sensitivities(system, path)) : std::nullopt;
     const Mat3 turning = left_jacobian(turn_of(x));
     residual.resize(6 * size());
     if (jacobian) jacobian->resize(6 * size(), x.size());
@@ -73,8 +74,8 @@ public:
       w.workspace.reset();
       for (std::size_t i = first; i < end; ++i) {
         const auto at = Eigen::Index(6 * i);
-        bool solved = active_[i] && solve_row(system, memory[i], i, w);
-        if (solved && jacobian) solved = differentiate_row(system, i, past->at(i), turning, w, *jacobian);
+        bool solved = active_[i] && solve_row(system, history[i], i, w);
+        if (solved && jacobian) solved = differentiate_row(system, i, sensitivities->at(i), turning, w, *jacobian);
         if (active_[i]) failed[i] = !solved;
         if (solved) {
           residual.segment<6>(at) = ctcr::residual(measured_[i], w.prediction.reading);
@@ -91,40 +92,39 @@ public:
     return unsolved_.empty();
   }
 
-  /// Lets the tubes wind each other up in all rows by what they rub at x (see ctcr::wind_up). Until the next call the twist
-  /// changes with the parameters by its slopes there. @return how far it was from where it ends [rad], 1e-4 at least; 0
-  /// where nothing rubs
-  double wind_up(const Eigen::VectorXd& x) {
-    if constexpr (Fx::template On<N>::follows_twist && N > 1) {
-      constexpr double settled = 1e-4;  // [rad]: what is left of no account
-      const System<N, Fx> rubbing = system(x);
-      if (!rubbing.model.effects().act_by_twist()) return 0;
-      const Eigen::VectorXd at = P::values(rubbing);
-      auto winding = std::make_shared<Winding<N>>();
+  /// Solves friction along the recording at x (see ctcr::solve_friction). Until the next call the torsion is extrapolated
+  /// from there. @return the largest change of the torsion [rad], at least 1e-4; 0 without friction
+  double solve_friction(const Eigen::VectorXd& x) {
+    if constexpr (Fx::template On<N>::depends_on_torsion && N > 1) {
+      constexpr double settled = 1e-4;  // [rad], less than matters
+      const System<N, Fx> system = this->system(x);
+      if (!system.model.effects().act_by_torsion()) return 0;
+      const Eigen::VectorXd at = P::values(system);
+      auto torsion = std::make_shared<LinearisedTorsion<N>>();
       for (const int v : columns_)
-        if (detail::reaches<N, Fx>[std::size_t(v)] != detail::Reach::reading) winding->variables.push_back(v);
-      const bool is_there = at.size() == wound_at_.size() && at == wound_at_;
-      if (is_there && std::ranges::includes(sorted(winding_->variables), sorted(winding->variables))) return settled;
-      winding->equilibria = winding_->equilibria;
-      winding_->unwind(at, rows_);
-      wound_at_ = at;
-      const double moved = ctcr::wind_up<N, Fx>(rubbing, rows_, *pool_, winding.get());
-      winding_ = std::move(winding);
+        if (detail::reaches<N, Fx>[std::size_t(v)] != detail::Reach::reading) torsion->variables.push_back(v);
+      const bool is_there = at.size() == solved_at_.size() && at == solved_at_;
+      if (is_there && std::ranges::includes(sorted(torsion_->variables), sorted(torsion->variables))) return settled;
+      torsion->equilibria = torsion_->equilibria;
+      torsion_->extrapolate(at, rows_);
+      solved_at_ = at;
+      const double moved = ctcr::solve_friction<N, Fx>(system, rows_, *pool_, torsion.get());
+      torsion_ = std::move(torsion);
       return std::max(settled, moved);
     }
     return 0;
   }
 
-  /// Whether they are wound up.
-  [[nodiscard]] bool is_wound() const { return wound_at_.size() > 0; }
+  /// Whether friction was solved.
+  [[nodiscard]] bool friction_is_solved() const { return solved_at_.size() > 0; }
 
-  /// Takes over how another recording of the same table is wound up: with like values little is left to do.
+  /// Takes over the friction of another recording of the same table: with similar values little is left to solve.
   void begin_at(const Recording& other) {
-    const auto like = [](const RecordedRow<N>& a, const RecordedRow<N>& b) { return a.places() == b.places(); };
+    const auto like = [](const RecordedRow<N>& a, const RecordedRow<N>& b) { return a.samples() == b.samples(); };
     if (!std::ranges::equal(rows_, other.rows_, like)) return;
-    for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].twist = other.rows_[i].twist;
-    winding_ = other.winding_;
-    wound_at_ = other.wound_at_;
+    for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].torsion = other.rows_[i].torsion;
+    torsion_ = other.torsion_;
+    solved_at_ = other.solved_at_;
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
@@ -143,42 +143,42 @@ private:
   struct alignas(64) Worker {
     Workspace<N> workspace;
     RecordedPrediction<N, Fx> prediction;
-    Eigen::Matrix<double, 6, Eigen::Dynamic> slopes;
+    Eigen::Matrix<double, 6, Eigen::Dynamic> derivatives;
   };
 
-  bool solve_row(const System<N, Fx>& system, const HistoryOfRow& memory, std::size_t i, Worker& w) noexcept {
+  bool solve_row(const System<N, Fx>& system, const HistoryOfRow& history, std::size_t i, Worker& w) noexcept {
     Workspace<N>& ws = w.workspace;
     if (start_[i].known)
       ws.begin_at(start_[i].guess);
     else if (ws.warm &&
              !detail::nearby(ws, Configuration<N>{joints(system.transmission, rows_[i].theta), rows_[i].load}))
       ws.reset();
-    const bool solved = predict(system, rows_[i], memory, ws, w.prediction) == Status::ok;
+    const bool solved = predict(system, rows_[i], history, ws, w.prediction) == Status::ok;
     if (!solved) ws.reset();
     start_[i] = {ws.guess, solved};
     return solved;
   }
 
-  PastSlopes<N, Fx> past_slopes(const System<N, Fx>& system) {
-    PastSlopes<N, Fx> slopes(system, rows_, columns_, *winding_, active_);
-    pool_->parallel_for(slopes.windows(), [&](int window, int) noexcept { slopes.fill(window); });
-    return slopes;
+  HistorySensitivities<N, Fx> history_sensitivities(const System<N, Fx>& system, const RecordedPath<N>& path) {
+    HistorySensitivities<N, Fx> sensitivities(system, rows_, path, *torsion_, columns_, active_);
+    pool_->parallel_for(sensitivities.windows(), [&](int window, int) noexcept { sensitivities.fill(window); });
+    return sensitivities;
   }
 
-  bool differentiate_row(const System<N, Fx>& system, std::size_t i, const PastSlopesOfRow& past, const Mat3& turning,
-                         Worker& w, Eigen::MatrixXd& jacobian) noexcept {
-    w.slopes.resize(6, Eigen::Index(columns_.size()));
-    if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.slopes, past) != Status::ok)
+  bool differentiate_row(const System<N, Fx>& system, std::size_t i, const RowHistorySensitivities& history,
+                         const Mat3& turning, Worker& w, Eigen::MatrixXd& jacobian) noexcept {
+    w.derivatives.resize(6, Eigen::Index(columns_.size()));
+    if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.derivatives, history) != Status::ok)
       return false;
     const Mat6 by_reading = residual_by_prediction(ctcr::residual(measured_[i], w.prediction.reading));
     constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
     Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();
     for (std::size_t k = 0; k < columns_.size(); ++k)
-      if (const int j = columns_[k] - rotation; j >= 0 && j < 3) turned.col(j) = w.slopes.col(Eigen::Index(k));
+      if (const int j = columns_[k] - rotation; j >= 0 && j < 3) turned.col(j) = w.derivatives.col(Eigen::Index(k));
     turned = (turned * turning).eval();
     for (std::size_t k = 0; k < parameters_.size(); ++k) {
       const int j = parameters_[k] - rotation;
-      const Vec6 slope = j >= 0 && j < 3 ? Vec6(turned.col(j)) : Vec6(w.slopes.col(Eigen::Index(k)));
+      const Vec6 slope = j >= 0 && j < 3 ? Vec6(turned.col(j)) : Vec6(w.derivatives.col(Eigen::Index(k)));
       jacobian.col(Eigen::Index(k)).template segment<6>(Eigen::Index(6 * i)) = by_reading * slope;
     }
     return true;
@@ -209,8 +209,8 @@ private:
 
   System<N, Fx> nominal_;
   std::vector<RecordedRow<N>> rows_;
-  std::shared_ptr<const Winding<N>> winding_ = std::make_shared<const Winding<N>>();
-  Eigen::VectorXd wound_at_;  ///< all parameters of the system with which the tubes were wound up; or empty
+  std::shared_ptr<const LinearisedTorsion<N>> torsion_ = std::make_shared<const LinearisedTorsion<N>>();
+  Eigen::VectorXd solved_at_;  ///< all parameters of the system with which friction was solved; or empty
   std::vector<Pose> measured_;
   std::vector<int> parameters_, columns_;
   ThreadPool* pool_;
