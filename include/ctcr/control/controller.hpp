@@ -103,8 +103,8 @@ public:
     ControlState<N, Fx> state{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
     JointVelocity<N> v;
     Status found = minimum(state, motors, v, report.limits);
-    if constexpr (Fx::template On<N>::follows_twist) {
-      if (found == Status::ok && now_.model.effects().act_by_twist()) {
+    if constexpr (Fx::template On<N>::depends_on_torsion) {
+      if (found == Status::ok && now_.model.effects().act_by_torsion()) {
         state.reference.velocity.template head<3>() += missing(motors, v, acting);
         found = minimum(state, motors, v, report.limits);
       }

@@ -165,21 +165,7 @@ template <int N, class Fx>
 [[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws,
                                                         int steps) noexcept {
   using S = typename detail::Window<4>::S;
-  const auto& c = model.coefficients();
-  RodInputs<N, S, Fx> in;
-  for (std::size_t i = 0; i < N; ++i) {
-    const TubeParameters<double>& t = c.tubes[i];
-    in.tubes[i] = {t.k, t.kz, t.kappa, t.length, t.curved_length, t.mass};
-    in.beta[i] = ws.q.beta[Eigen::Index(i)];
-    in.alpha[i] = ws.q.alpha[Eigen::Index(i)];
-  }
-  for (int i = 0; i < 3; ++i) {
-    const auto k = std::size_t(i);
-    in.force[k] = ws.load.force[i];
-    in.moment[k] = ws.load.moment[i];
-    in.gravity[k] = c.gravity[i];
-  }
-  in.effects = c.effects.template seeded<S>(Constant<S>{});
+  const RodInputs<N, S, Fx> in = detail::constant_inputs<S>(model.coefficients(), ws.q, ws.load);
   return torsion_derivatives<0>(model, ws, steps, 0, [&](const auto&) { return in; });
 }
 

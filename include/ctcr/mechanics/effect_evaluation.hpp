@@ -165,6 +165,27 @@ private:
   S tip_psi_;
 };
 
+/// Inputs of the rod, without derivatives.
+template <class S, int N, class Fx>
+CTCR_INLINE RodInputs<N, S, Fx> constant_inputs(const EffectCoefficients<N, Fx>& c, const Joints<N>& q,
+                                           const TipLoad& load) noexcept {
+  RodInputs<N, S, Fx> in;
+  for (std::size_t i = 0; i < N; ++i) {
+    const TubeParameters<double>& t = c.tubes[i];
+    in.tubes[i] = {t.k, t.kz, t.kappa, t.length, t.curved_length, t.mass};
+    in.beta[i] = q.beta[Eigen::Index(i)];
+    in.alpha[i] = q.alpha[Eigen::Index(i)];
+  }
+  for (int i = 0; i < 3; ++i) {
+    const auto k = std::size_t(i);
+    in.force[k] = load.force[i];
+    in.moment[k] = load.moment[i];
+    in.gravity[k] = c.gravity[i];
+  }
+  in.effects = c.effects.template seeded<S>(Constant<S>{});
+  return in;
+}
+
 }  // namespace detail
 
 /// As evaluate() of the standard model (evaluation.hpp). The general path has one integration scheme; where no effect
@@ -186,21 +207,12 @@ CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joi
 
   const Events<N> events = sort_events(c.plain, q.beta);
   for (Window window; window.first < count; window.first += window.size) {
-    const auto variable = [&](bool varied, double value, int lane) { return varied ? window(value, lane) : S(value); };
-    RodInputs<N, S, Fx> in;
-    for (std::size_t i = 0; i < N; ++i) {
-      const TubeParameters<double>& t = c.tubes[i];
-      in.tubes[i] = {t.k, t.kz, t.kappa, t.length, t.curved_length, t.mass};
-      in.beta[i] = variable(Col::jacobian, q.beta[Eigen::Index(i)], beta + int(i));
-      in.alpha[i] = q.alpha[Eigen::Index(i)];
+    RodInputs<N, S, Fx> in = detail::constant_inputs<S>(c, q, load);
+    for (int i = 0; Col::jacobian && i < N; ++i) window.add(in.beta[std::size_t(i)], beta + i, 1);
+    for (int i = 0; Col::compliance && i < 3; ++i) {
+      window.add(in.force[std::size_t(i)], force + i, 1);
+      window.add(in.moment[std::size_t(i)], moment + i, 1);
     }
-    for (int i = 0; i < 3; ++i) {
-      const auto k = std::size_t(i);
-      in.force[k] = variable(Col::compliance, load.force[i], force + i);
-      in.moment[k] = variable(Col::compliance, load.moment[i], moment + i);
-      in.gravity[k] = c.gravity[i];
-    }
-    in.effects = c.effects.template seeded<S>(Constant<S>{});
     const Pass pass(in, events, guess, 0, steps, window);
     pass.write(row, window.first / lane_count);
     if (window.first > 0) continue;

@@ -270,15 +270,14 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
-/// @param evaluate_at  evaluate_at(guess, evaluation): evaluate() or an equal of it
-template <Derivatives D, Loading L, class Stepper, int N, class Fx, class Evaluate>
+template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
-                      Solution<N>& out, const Settings& settings, const Evaluate& evaluate_at) noexcept {
+                      Solution<N>& out, const Settings& settings) noexcept {
   if (!ws.warm) return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   using Ev = Evaluation<N, L, D>;
   Ev ev;
   const TipGuess<N> guess = predicted_guess(ws, q, load);
-  evaluate_at(guess, ev);
+  evaluate<D, L, Stepper>(model.coefficients(), q, load, guess, settings.steps, ev);
   out.iterations = 1;
   const VecN<N + 2> dx = newton_step<Ev, N>(ev);
   if (!(ev.residual < one_step_residual && dx.squaredNorm() < one_step_change * one_step_change))
@@ -356,11 +355,7 @@ template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int 
 CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                           Solution<N>& out, const Settings& settings = {}) noexcept {
   return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
-    constexpr Loading L = decltype(loading)::value;
-    const auto evaluate_at = [&](const TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
-      evaluate<D, L, Stepper>(model.coefficients(), q, load, guess, settings.steps, ev);
-    };
-    return detail::step_as<D, L, Stepper>(model, q, load, ws, out, settings, evaluate_at);
+    return detail::step_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
 }
 
