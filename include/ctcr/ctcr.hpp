@@ -1,5 +1,7 @@
 #pragma once
-// Everything that runs in real time. Needs Eigen alone.
+// The standard model, from motor angles to the predicted reading, with all its derivatives. All of it runs in real time and
+// needs Eigen alone. Not included, for the sake of compile time: shape and stability of the robot (mechanics/), effects and
+// their history (effects/, recording/, friction/), controllers (control/), threads (parallel/), simulation/, calibration/.
 #include "ctcr/actuation/transmission.hpp"
 #include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
