@@ -56,7 +56,8 @@ std::vector<Answer> solved(const Model<3>& model, const std::vector<Configuratio
   return answers;
 }
 
-TEST(Batch, IsBitForBitTheSameForAnyNumberOfThreads) {
+/// Bit for bit the same answers for any number of threads.
+TEST(Batch, Threads) {
   const Model<3> model(test::paper_robot());
   const auto cases = path_and_random(model.robot(), 700);
   const auto serial = solved(model, cases, 1);
@@ -67,7 +68,8 @@ TEST(Batch, IsBitForBitTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Batch, AgreesWithSolvesFromColdStarts) {
+/// Warm starts lead to the answers of cold ones.
+TEST(Batch, ColdStarts) {
   const Model<3> model(test::paper_robot());
   const auto cases = path_and_random(model.robot(), 700);
   const auto answers = solved(model, cases, 2);
@@ -84,7 +86,8 @@ TEST(Batch, AgreesWithSolvesFromColdStarts) {
   EXPECT_EQ(cold, 0);    // elsewhere it must not be tried
 }
 
-TEST(Batch, ReportsBadConfigurationsAndGoesOn) {
+/// They are reported, and the others are solved.
+TEST(Batch, BadConfigurations) {
   const Model<3> model(test::paper_robot());
   const auto cases = path_and_random(model.robot(), 200);
   const auto answers = solved(model, cases, 2);
@@ -99,7 +102,8 @@ TEST(Batch, ReportsBadConfigurationsAndGoesOn) {
   }
 }
 
-TEST(Batch, CallsEveryIndexOnceWhateverTheCount) {
+/// Each is called once, whatever the count.
+TEST(Batch, Indices) {
   test::Random random(1);
   const Model<1> model(test::random_robot<1>(random));
   ThreadPool pool(2);
@@ -114,7 +118,8 @@ TEST(Batch, CallsEveryIndexOnceWhateverTheCount) {
   }
 }
 
-TEST(Batch, MemoryDoesNotGrowWithTheCount) {
+/// It does not grow with the count.
+TEST(Batch, Memory) {
   const Model<3> model(test::paper_robot());
   ThreadPool pool(2);
   for (const std::ptrdiff_t count : {10, 1000}) {

@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 class ThreadPoolOf : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Threads, ThreadPoolOf, testing::Values(1, 2, 3, 8));
 
-TEST_P(ThreadPoolOf, CallsEachIndexOnce) {
+TEST_P(ThreadPoolOf, Indices) {
   ThreadPool pool(GetParam());
   EXPECT_EQ(pool.size(), GetParam());
   for (const int n : {0, 1, 2, 3, 7, 64, 1000}) {
@@ -32,7 +32,7 @@ TEST_P(ThreadPoolOf, CallsEachIndexOnce) {
   }
 }
 
-TEST_P(ThreadPoolOf, DoesNothingForNegativeCounts) {
+TEST_P(ThreadPoolOf, NegativeCounts) {
   ThreadPool pool(GetParam());
   bool called = false;
   pool.parallel_for(-5, [&](int, int) { called = true; });
@@ -40,7 +40,7 @@ TEST_P(ThreadPoolOf, DoesNothingForNegativeCounts) {
 }
 
 // Every loop must see its own function and count, whichever thread wakes late from the loop before.
-TEST_P(ThreadPoolOf, KeepsManyShortLoopsApart) {
+TEST_P(ThreadPoolOf, ShortLoops) {
   ThreadPool pool(GetParam(), 1us);
   std::vector<std::int64_t> seen(9);
   for (std::int64_t loop = 0; loop < 20000; ++loop) {
@@ -51,7 +51,7 @@ TEST_P(ThreadPoolOf, KeepsManyShortLoopsApart) {
   }
 }
 
-TEST_P(ThreadPoolOf, WorkersOwnTheirStorage) {
+TEST_P(ThreadPoolOf, Workers) {
   ThreadPool pool(GetParam());
   std::vector<long> sums(static_cast<std::size_t>(pool.size()));
   pool.parallel_for(5000, [&](int index, int worker) {
@@ -62,7 +62,7 @@ TEST_P(ThreadPoolOf, WorkersOwnTheirStorage) {
   EXPECT_EQ(std::accumulate(sums.begin(), sums.end(), 0L), 5000L * 4999L / 2);
 }
 
-TEST_P(ThreadPoolOf, RunsNestedLoopsOnTheSameWorker) {
+TEST_P(ThreadPoolOf, NestedLoops) {
   ThreadPool pool(GetParam());
   std::vector<std::atomic<int>> calls(100);
   pool.parallel_for(10, [&](int outer, int worker) {
@@ -76,7 +76,7 @@ TEST_P(ThreadPoolOf, RunsNestedLoopsOnTheSameWorker) {
   for (const auto& count : calls) EXPECT_EQ(count, 1);
 }
 
-TEST_P(ThreadPoolOf, ServesSeveralCallersAtOnce) {
+TEST_P(ThreadPoolOf, SeveralCallers) {
   ThreadPool pool(GetParam());
   std::atomic<long> sum{0};
   std::vector<std::thread> callers;
@@ -111,7 +111,7 @@ TEST(ThreadPool, UsesItsThreads) {
 }
 
 // A thread that does not get to run must not hold up the rest: it may keep one index at most.
-TEST(ThreadPool, GoesOnWithoutAThreadThatIsHeldUp) {
+TEST(ThreadPool, BlockedThread) {
   ThreadPool pool(2);
   std::atomic<int> done{0};
   std::atomic<bool> held{false};
@@ -125,7 +125,7 @@ TEST(ThreadPool, GoesOnWithoutAThreadThatIsHeldUp) {
 }
 
 // The caller gives up spinning and sleeps; the last thread must wake it.
-TEST(ThreadPool, WaitsForTheSlowestThread) {
+TEST(ThreadPool, SlowThread) {
   ThreadPool pool(2, 10us);
   for (int loop = 0; loop < 20; ++loop) {
     std::atomic<int> arrived{0};
@@ -140,11 +140,11 @@ TEST(ThreadPool, WaitsForTheSlowestThread) {
   }
 }
 
-TEST(ThreadPool, TakesOneThreadForEachCoreWhenNotTold) {
+TEST(ThreadPool, DefaultSize) {
   EXPECT_EQ(ThreadPool(0).size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
 }
 
-TEST(ThreadPool, AcceptsConstFunctions) {
+TEST(ThreadPool, ConstFunctions) {
   ThreadPool pool(2);
   std::atomic<int> sum{0};
   const auto add = [&](int index, int) { sum += index; };
@@ -152,14 +152,14 @@ TEST(ThreadPool, AcceptsConstFunctions) {
   EXPECT_EQ(sum, 6);
 }
 
-TEST(ThreadPool, LoopsOfTwoPoolsNest) {
+TEST(ThreadPool, TwoPools) {
   ThreadPool outer(2), inner(2);
   std::atomic<int> calls{0};
   outer.parallel_for(8, [&](int, int) { inner.parallel_for(8, [&](int, int) { ++calls; }); });
   EXPECT_EQ(calls, 64);
 }
 
-TEST(ThreadPool, DoesNotAllocateInTheLoop) {
+TEST(ThreadPool, NoAllocation) {
   ThreadPool pool(2, 0us);
   std::atomic<long> sum{0};
   const ctcr::test::HeapGuard guard;

@@ -33,10 +33,10 @@ struct Variation {
 };
 
 template <int N>
-Variation variation(const System<N, Catalogue>& system, int place) {
+Variation variation(const System<N, Catalogue>& system, int parameter) {
   Variation v{};
-  if (place < ParameterVector<N>::count) {
-    const ParameterKind& kind = ParameterVector<N>::info(ParameterVector<N>::entry(place).kind);
+  if (parameter < ParameterVector<N>::count) {
+    const ParameterKind& kind = ParameterVector<N>::info(ParameterVector<N>::entry(parameter).kind);
     if (kind.name.ends_with("diameter")) return {1e-3, 3e-7};
     if (kind.unit == "m/rad") return {1e-3, 1e-8};
     if (kind.unit == "m") return {0.1, 1e-5};
@@ -46,7 +46,7 @@ Variation variation(const System<N, Catalogue>& system, int place) {
   system.model.effects().for_each([&](const auto& effect, int first) {
     for (int k = 0; k < int(effect.parameters.size()); ++k)
       for (int i = 0; i < effect.size(k); ++i)
-        if (ParameterVector<N>::count + first + effect.index(k, i) == place) {
+        if (ParameterVector<N>::count + first + effect.index(k, i) == parameter) {
           const EffectParameter& p = effect.parameters[std::size_t(k)];
           const bool at_edge = effect.values[std::size_t(effect.index(k, i))] <= p.hard.low + 4e-3 * p.sigma;
           const bool plane = effect.info.id == "contact", shape = p.role == Role::shape;
@@ -110,14 +110,14 @@ void expect_derivatives(const test::Recorded<N>& recorded, const std::string& wh
   Columns exact(6, P<N>::count);
   ASSERT_EQ(derivatives_of_last(system, rows, ws, prediction, all_parameters<N>(), exact), Status::ok);
   const Eigen::VectorXd x = P<N>::values(system);
-  for (int place = 0; place < P<N>::count; ++place) {
-    if (ParameterVector<N>::index(Parameter::bending_stiffness) <= place &&
-        place < ParameterVector<N>::index(Parameter::gravity))
+  for (int parameter = 0; parameter < P<N>::count; ++parameter) {
+    if (ParameterVector<N>::index(Parameter::bending_stiffness) <= parameter &&
+        parameter < ParameterVector<N>::index(Parameter::gravity))
       continue;  // not given
-    const Variation v = variation(system, place);
+    const Variation v = variation(system, parameter);
     const auto change = [&](double by) {
       Eigen::VectorXd moved = x;
-      moved[place] += by;
+      moved[parameter] += by;
       Workspace<N> from = ws;
       RecordedPrediction<N, Catalogue> other;
       EXPECT_EQ(test::predict_last(P<N>::with_values(system, moved), rows, from, other), Status::ok);
@@ -125,12 +125,12 @@ void expect_derivatives(const test::Recorded<N>& recorded, const std::string& wh
     };
     Vec6 expected = slope(change, v);
     const auto agrees = [&] {
-      return (exact.col(place) - expected).norm() <= 2e-5 * (expected.norm() + 1e-2 / v.size);
+      return (exact.col(parameter) - expected).norm() <= 2e-5 * (expected.norm() + 1e-2 / v.size);
     };
     // Near an instability a reading changes so fast that the usual step is too long.
     if (!agrees()) expected = slope(change, {v.size, v.h / 16, v.forward});
-    EXPECT_TRUE(agrees()) << P<N>::name(place) << ", " << what << "\nexact      " << exact.col(place).transpose()
-                          << "\ndifference " << expected.transpose();
+    EXPECT_TRUE(agrees()) << P<N>::name(parameter) << ", " << what << "\nexact      "
+                          << exact.col(parameter).transpose() << "\ndifference " << expected.transpose();
   }
 }
 
@@ -185,8 +185,8 @@ void expect_those_of_the_standard_model(int cases) {
       using E = std::remove_cvref_t<decltype(effect)>;
       if (ActsOnRod<E, double, N> || HasEnvironment<E, double>) effect.values = E::neutral();
     });
-    for (const int place : all)
-      if (detail::reaches<N, Catalogue>[std::size_t(place)] != detail::Reach::equations) few.push_back(place);
+    for (const int parameter : all)
+      if (detail::reaches<N, Catalogue>[std::size_t(parameter)] != detail::Reach::equations) few.push_back(parameter);
     auto [system, rows] = test::random_recording<N>(effects, n % N, random);
     const bool loaded = n % 2 == 1;
     if (!loaded) {  // nor any weight
@@ -221,15 +221,15 @@ TEST(RecordedDerivatives, StandardModel) {
 TEST(Recorded, NotFinite) {
   test::Random random(4);
   const auto recorded = test::random_recording<2>({}, 0, random);
-  for (int place = 0; place < Catalogue::On<2>::count; ++place)
+  for (int parameter = 0; parameter < Catalogue::On<2>::count; ++parameter)
     for (const double absurd : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
       Eigen::VectorXd x = P<2>::values(recorded.system);
-      x[ParameterVector<2>::count + place] = absurd;
+      x[ParameterVector<2>::count + parameter] = absurd;
       const auto system = P<2>::with_values(recorded.system, x);
       Workspace<2> ws;
       RecordedPrediction<2, Catalogue> prediction;
       EXPECT_EQ(test::predict_last(system, recorded.rows, ws, prediction), Status::not_finite)
-          << P<2>::name(ParameterVector<2>::count + place);
+          << P<2>::name(ParameterVector<2>::count + parameter);
       EXPECT_TRUE(prediction.reading.position.allFinite() && prediction.reading.rotation.allFinite());
       EXPECT_TRUE(prediction.solution.position.isZero(0));
       Columns derivatives(6, 1);
