@@ -1,2 +1,3 @@
 include(${CMAKE_CURRENT_LIST_DIR}/../support/catalogue.cmake)
+include(${CMAKE_CURRENT_LIST_DIR}/../support/solver.cmake)
 include(${CMAKE_CURRENT_LIST_DIR}/../support/no_alloc.cmake)
