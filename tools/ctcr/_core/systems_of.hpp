@@ -5,8 +5,8 @@
 #include <ctcr/derivatives/parameters.hpp>
 #include <ctcr/effects/catalogue.hpp>
 #include <ctcr/effects/profile_table.hpp>
-#include <ctcr/system/parameters.hpp>
 #include <ctcr/recording/derivatives.hpp>
+#include <ctcr/system/parameters.hpp>
 
 namespace ctcr::python {
 
@@ -91,7 +91,7 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
                                                    const RecordedPrediction<N, python::AllEffects>&,                \
                                                    std::span<const int>,                                            \
                                                    Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,            \
-                                                   const PastSlopesOfRow&, Mat6*) noexcept;                         \
+                                                   const RowHistorySensitivities&, Mat6*) noexcept;                 \
   }
 #define CTCR_INSTANTIATE_SYSTEMS(N) CTCR_SOLVERS(template, N)
 
