@@ -88,7 +88,7 @@ TEST(FieldDistortion, IsPolynomialPlusMetal) {
     c["y_x"] = c["x_y"], c["z_x"] = c["x_z"], c["z_y"] = c["y_z"];
     const Vec3 coils(c["coils_x"], c["coils_y"], c["coils_z"]),
         p = pose.position - coils, metal = Vec3(c["metal_x"], c["metal_y"], c["metal_z"]) - coils;
-    const auto off = beside_metal<double>({p[0], p[1], p[2]}, {metal[0], metal[1], metal[2]}, c["metal_volume"]);
+    const auto off = metal_distortion<double>({p[0], p[1], p[2]}, {metal[0], metal[1], metal[2]}, c["metal_volume"]);
     by += Vec3(off.shift[0], off.shift[1], off.shift[2]);
     turn += Vec3(off.turn[0], off.turn[1], off.turn[2]);
     for (const auto& [name, value] : c) {
