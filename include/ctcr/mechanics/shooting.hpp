@@ -180,20 +180,21 @@ private:
     CTCR_INLINE S& operator()(S& x) const noexcept { return x; }
   };
   struct Value {
-    CTCR_INLINE double operator()(const S& x) const noexcept { return x.v; }
+    CTCR_INLINE const double& operator()(const S& x) const noexcept { return x.v; }
     CTCR_INLINE double& operator()(S& x) const noexcept { return x.v; }
   };
   template <int g>
   struct Tangents {
-    CTCR_INLINE Lanes operator()(const S& x) const noexcept { return x.d[g]; }
+    CTCR_INLINE const Lanes& operator()(const S& x) const noexcept { return x.d[g]; }
     CTCR_INLINE Lanes& operator()(S& x) const noexcept { return x.d[g]; }
   };
 
   template <int NC, class Part, class Rod>
   static CTCR_INLINE void gather(const SegmentTubes<N>& tubes, const State& y, Rod& z, const Part& part) noexcept {
     for (std::size_t i = 0; i < NC; ++i) {
-      z.psi[i] = part(y.psi[std::size_t(tubes.curved[i])]);
-      z.w[i] = part(y.w[std::size_t(tubes.curved[i])]);
+      const auto t = std::size_t(tubes.curved[i]);
+      z.psi[i] = part(y.psi[t]);
+      z.w[i] = part(y.w[t]);
     }
     if constexpr (Loaded)
       for (std::size_t i = 0; i < 3; ++i) {
@@ -206,8 +207,9 @@ private:
   template <int NC, class Part, class Rod>
   static CTCR_INLINE void scatter(const SegmentTubes<N>& tubes, const Rod& z, State& y, const Part& part) noexcept {
     for (std::size_t i = 0; i < NC; ++i) {
-      part(y.psi[std::size_t(tubes.curved[i])]) = z.psi[i];
-      part(y.w[std::size_t(tubes.curved[i])]) = z.w[i];
+      const auto t = std::size_t(tubes.curved[i]);
+      part(y.psi[t]) = z.psi[i];
+      part(y.w[t]) = z.w[i];
     }
     if constexpr (Loaded)
       for (std::size_t i = 0; i < 3; ++i) {
@@ -282,9 +284,9 @@ private:
   template <int NC>
   static CTCR_INLINE void tangent_step(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, State& y,
                                  Frame<S>& frame) noexcept {
-    const RodSection<double, double, NC> r = section<NC, double>(c, tubes, y, Value{});
     RodState<double, NC> z;
     gather<NC>(tubes, y, z, Value{});
+    const RodSection<double, double, NC> r = section<NC, double>(c, tubes, y, Value{});
     const double k = value(h);
     Stage<Loaded, Gravity, NC> stages[Loaded ? 4 : 3];
     Exponential step;

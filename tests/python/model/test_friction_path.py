@@ -55,7 +55,8 @@ def test_what_is_predicted_is_wound_up(robot, plan):
     np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
 
 
-def test_a_recording_begins_at_the_twist_of_another(robot, plan):
+def test_start(robot, plan):
+    """A recording may start at the friction path that another one has solved."""
     x, still = np.array(list(TRUE.values())), np.zeros(len(TRUE))
     first, like, unlike, fresh = (user_recording.recording_of(robot, plan, list(TRUE)) for _ in range(4))
     assert first.wind_up(x) > 10 * settings.FRICTION_PATH_CHANGE
@@ -67,7 +68,8 @@ def test_a_recording_begins_at_the_twist_of_another(robot, plan):
     np.testing.assert_array_equal(predicted(unlike, still), predicted(fresh, still))
 
 
-def test_candidates_are_screened_where_the_tubes_of_a_fit_are_wound_up(robot, plan):
+def test_screening(robot, plan):
+    """Candidates are screened at the friction path of the fit before."""
     made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
     noise = noise_of_readings(robot, made)
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
@@ -88,7 +90,8 @@ def predicted(table, x):
     return table.predicted()[0]
 
 
-def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
+def test_forms():
+    """Every constitutive law and every variant of an effect is tried."""
     effect = catalogue.get("friction", 3)
     coefficient = effect.names("coefficient")
     held = Candidate("friction", tuple(coefficient), (("effects.friction.insertion", 0.0),))
@@ -109,7 +112,8 @@ def test_every_law_and_all_that_an_effect_may_enter_by_are_tried():
     assert list(flat.names) == plane + effect.shapes and list(free.names) == plane + across + effect.shapes
 
 
-def test_friction_that_entered_by_the_wrong_strength_becomes_the_right_one(robot, plan):
+def test_other_variant(robot, plan):
+    """Friction that was accepted with the wrong amplitude changes to the right one."""
     made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=3)
     noise = noise_of_readings(robot, made)
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)

@@ -74,7 +74,8 @@ SIZES = {
 
 
 @pytest.mark.parametrize("name", SIZES)
-def test_size_one_moves_the_tip_as_much_as_is_plausible(name):
+def test_size(name):
+    """An effect of size one moves the tip by its plausible amount."""
     streamed = CAUSES[name].streamed
     thinned = 21, 64 if streamed else 13, "table2", streamed
     moved = tips(name, 1.0, *thinned) - tips(None, 0.0, *thinned)
@@ -85,7 +86,8 @@ def test_size_one_moves_the_tip_as_much_as_is_plausible(name):
 
 
 @pytest.mark.parametrize("noise", ["jitter", "realistic"])
-def test_calibration_swallows_its_own_and_leaves_what_it_cannot_do(noise):
+def test_detectability(noise):
+    """Calibration absorbs errors of its own parameters and leaves the others."""
     description = describe("two_tubes")
     bench, plan = draw_bench(description, np.random.default_rng(1)), plan_of(3, 17, "two_tubes")
 
@@ -110,7 +112,8 @@ def test_play_follows_late_and_by_its_own_gap():
     assert_allclose(outputs, [0.0, 0.0, 0.7, 0.7, 0.6])
 
 
-def test_beside_metal_a_tracker_reads_what_explains_the_field_best():
+def test_metal():
+    """Beside metal, a tracker reads the pose that explains the distorted field best."""
     place, volume = np.array([0.05, -0.1, -0.08]), 1e-9
     metal = np.array([0.1, -0.15, -0.02]) + np.outer([-0.02, 0.02], [0.0, 0.6, 0.8])
     shift, turn = misread(place, metal, volume)
@@ -159,7 +162,8 @@ def test_field_error_is_smooth():
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_plan_visits_every_stop_twice_and_keeps_order(robot):
+def test_plan(robot):
+    """A plan visits every stop twice and keeps the order of the tubes."""
     allowed = joint_range(describe(robot))
     plan, n = draw_plan(allowed, np.random.default_rng(5)), allowed.home.size
     assert len(plan.time) == 12 * 28 and np.all(np.diff(plan.time) > 0) and np.all(np.diff(plan.knot_time) > 0)
@@ -173,7 +177,8 @@ def test_plan_visits_every_stop_twice_and_keeps_order(robot):
         assert_allclose(plan.at(time), joints, atol=1e-12)
 
 
-def test_the_same_order_gives_the_same_set_and_another_seed_another(tmp_path, monkeypatch):
+def test_reproducible(tmp_path, monkeypatch):
+    """The same order gives the same set, another seed another one."""
     monkeypatch.setattr("session.RUNS", 1)
     order = Order((("backlash_rotation", 1.0), ("sensor_offset", 0.5)), 4, "realistic", "two_tubes")
     tables = []
@@ -184,7 +189,8 @@ def test_the_same_order_gives_the_same_set_and_another_seed_another(tmp_path, mo
     assert (tmp_path / "a" / "robot.yaml").read_text() == (tmp_path / "c" / "robot.yaml").read_text()
 
 
-def test_hiding_something_changes_neither_bench_nor_plan(monkeypatch):
+def test_hiding(monkeypatch):
+    """A hidden effect changes neither the bench nor the plan."""
     monkeypatch.setattr("session.RUNS", 1)
     plain, hidden = measure(Order((), 6)), measure(Order((("sensor_offset", 1.0),), 6))
     assert_array_equal(plain.plan.joints, hidden.plan.joints)
@@ -193,7 +199,8 @@ def test_hiding_something_changes_neither_bench_nor_plan(monkeypatch):
     assert_allclose(offset, np.tile(hidden.truths[0]["offset_m"], (len(offset), 1)), atol=1e-12)
 
 
-def test_true_bench_lies_within_what_calibration_may_move():
+def test_true_bench():
+    """The true bench lies within the stated uncertainties."""
     description = describe("table2")
     benches = [draw_bench(description, np.random.default_rng(seed)) for seed in range(300)]
     relative = [
@@ -204,7 +211,8 @@ def test_true_bench_lies_within_what_calibration_may_move():
     assert np.std(relative) == pytest.approx(0.7 * 0.15, rel=0.1)
 
 
-def test_suite_asks_every_question_often_enough_in_both_halves():
+def test_suite():
+    """Both halves of the suite hold enough sets for every question."""
     suite = make_suite.entries()
     other = make_suite.entries(shift=1)
     assert [e.order.seed % 2 for e in other] == [e.order.seed % 2 for e in suite]

@@ -47,18 +47,21 @@ def assert_poses(robot_file: Path, table: Path, *, metres: float, radians: float
 
 
 @pytest.mark.parametrize("table", STORED, ids=lambda path: path.parent.name)
-def test_fast_energy_agrees_with_the_stored_reference(table):
+def test_stored_reference(table):
+    """The fast energy agrees with the stored reference poses."""
     assert_poses(table.parent / "robot.yaml", table, metres=5e-6, radians=1e-4, every=5)
 
 
 @pytest.mark.parametrize("name", ["table2", "robot_b"])
-def test_fast_energy_agrees_with_the_shared_reference(name):
+def test_shared_reference(name):
+    """The fast energy agrees with the shared reference poses."""
     if not SHARED.is_dir():
         pytest.skip("the shared reference poses are not here")
     assert_poses(SHARED / f"{name}.yaml", SHARED / f"{name}_poses.csv", metres=5e-6, radians=1e-4, every=5)
 
 
-def test_fast_energy_of_the_standard_robot_is_the_slow_energy():
+def test_slow_energy():
+    """The fast energy of the standard robot equals the slow one."""
     robot = from_description(make_reference.describe("table2", [1.0, -9.0, 2.0]))
     beta, alpha, force = (np.array([-0.33, -0.235, -0.16]), np.array([0.3, -1.0, 2.0]), np.array([0.02, 0.1, -0.05]))
     grid = make_grid(robot, beta, 6e-3)
@@ -105,7 +108,8 @@ def everything(seed: int) -> tuple[Problem, np.ndarray]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_derivatives_of_every_term_agree_with_differences(seed):
+def test_derivatives(seed):
+    """Derivatives of every term agree with differences."""
     problem, x = everything(seed)
     _, gradient, hessian = problem.energy(x)
     steps = 1e-6 * np.eye(x.size)
@@ -116,7 +120,8 @@ def test_derivatives_of_every_term_agree_with_differences(seed):
     assert_allclose(hessian, curvature, rtol=0, atol=2e-3 * np.max(np.abs(hessian)))
 
 
-def test_minimum_has_no_gradient_and_a_positive_hessian():
+def test_minimum():
+    """At the minimum the gradient vanishes and the Hessian is positive definite."""
     problem, x = everything(7)
     _, gradient, hessian = problem.energy(problem.minimise(x))
     assert np.max(np.abs(gradient)) < 1e-9
@@ -148,7 +153,8 @@ def test_friction_is_that_of_the_slow_energy():
 
 
 @pytest.mark.parametrize("cause", ["friction", "yielding"])
-def test_what_dissipates_lags_and_vanishes_with_its_size(cause):
+def test_dissipation(cause):
+    """Dissipation causes a lag, which vanishes with its size."""
     robot = from_description(describe("two_tubes"))
     corners = [np.array([-0.25, -0.16, angle, 0.0]) for angle in (-0.4, 0.8, 1.8, 0.8)]
 

@@ -48,7 +48,8 @@ def assert_pose(pose, position, rotation, *, metres=1e-9, radians=1e-9):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_single_tube_is_a_line_and_an_arc_that_bends_about_its_x_axis(case):
+def test_single_tube(case):
+    """A single tube is a line and an arc that bends about its x axis."""
     robot, rng = design("one_tube"), np.random.default_rng(case)
     tube = robot.tubes[0]
     reach, alpha = rng.uniform(0.01, 0.2), rng.uniform(-3, 3)
@@ -60,7 +61,8 @@ def test_single_tube_is_a_line_and_an_arc_that_bends_about_its_x_axis(case):
     assert_pose(pose, base.apply(in_plane), (base * Rotation.from_rotvec(turn * E1)).as_matrix())
 
 
-def test_straight_tube_under_moments_is_an_arc_and_a_twist():
+def test_straight_tube():
+    """A straight tube under a moment is an arc with uniform twist."""
     robot, reach = straight_tube(), 0.12
     tube, beta = robot.tubes[0], np.array([reach - robot.tubes[0].length])
     bent = solve_pose(robot, beta, np.zeros(1), Load(NOTHING, 0.02 * E2))
@@ -83,7 +85,8 @@ def test_small_loads_deflect_like_a_cantilever():
 
 
 @pytest.mark.parametrize("name", make_reference.DESIGNS)
-def test_gradient_and_hessian_agree_with_differences(name):
+def test_derivatives(name):
+    """Gradient and Hessian of the energy agree with differences."""
     robot, beta, alpha, tip_load = random_case(name, 1)
     energy = Energy(robot, make_grid(robot, beta, 0.02), beta, alpha, tip_load.force)
     x = energy.initial_guess() + np.random.default_rng(2).normal(0, 0.5, energy.size)
@@ -94,7 +97,8 @@ def test_gradient_and_hessian_agree_with_differences(name):
     assert_allclose(energy.hessian(x), hessian, rtol=0, atol=1e-6 * np.max(np.abs(hessian)))
 
 
-def test_generalised_force_of_a_moment_is_its_work_on_the_tip_rotation():
+def test_moment():
+    """The generalised force of a moment is its work on the rotation of the tip."""
     robot, beta, alpha, tip_load = random_case("two_tubes", 3)
     energy = Energy(robot, make_grid(robot, beta, 0.02), beta, alpha, NOTHING)
     x = energy.initial_guess() + np.random.default_rng(4).normal(0, 0.5, energy.size)
@@ -115,7 +119,8 @@ def test_generalised_force_of_a_moment_is_its_work_on_the_tip_rotation():
 
 
 @pytest.mark.parametrize("name", make_reference.DESIGNS)
-def test_turning_everything_about_the_insertion_axis_turns_the_pose(name):
+def test_rotation(name):
+    """A rotation of everything about the insertion axis rotates the pose."""
     robot, beta, alpha, tip_load = random_case(name, 5)
     turn = Rotation.from_rotvec(0.7 * E3)
     turned_load = Load(turn.apply(tip_load.force), turn.apply(tip_load.moment))
@@ -158,7 +163,8 @@ def test_agrees_with_the_shared_reference(name):
         assert_stored_pose(robot, row, metres=1e-6, radians=1e-5)
 
 
-def test_grid_puts_every_breakpoint_on_a_node_and_rejects_unordered_joints():
+def test_grid():
+    """Every breakpoint is a node of the grid; joints out of order are refused."""
     robot = design("four_tubes")
     beta = np.array([-0.3, -0.25, -0.18, -0.11])
     nodes = np.concatenate([[0], np.cumsum(make_grid(robot, beta, 5e-3).h)])
@@ -170,7 +176,8 @@ def test_grid_puts_every_breakpoint_on_a_node_and_rejects_unordered_joints():
             make_grid(robot, wrong, 5e-3)
 
 
-def test_contact_forces_are_the_slope_of_the_incremental_energy():
+def test_contact_forces():
+    """Contact forces are the gradient of the incremental energy."""
     rng = np.random.default_rng(6)
     x, n = rng.normal(size=12), 40  # some joints stick, some slip
     contacts = Contacts(
@@ -196,7 +203,8 @@ def test_contact_forces_are_the_slope_of_the_incremental_energy():
     assert_allclose(hessian, slope, atol=1e-6)
 
 
-def test_friction_makes_the_tip_lag_behind_the_base_and_vanishes_with_its_coefficient():
+def test_friction():
+    """The tip lags behind the base, and the lag vanishes with the coefficient."""
     robot, beta = design("two_tubes"), np.array([-0.16, -0.1])
     start, middle, end = (np.array([angle, 0.0]) for angle in (0.2, 0.8, 1.4))
 
@@ -213,7 +221,8 @@ def test_friction_makes_the_tip_lag_behind_the_base_and_vanishes_with_its_coeffi
     assert back > 1e-3
 
 
-def test_the_demonstration_is_what_its_program_makes():
+def test_demonstration():
+    """The shipped demonstration is what its program makes."""
     folder = ROOT / "examples" / "data" / "demo"
     stored = read_poses(folder / "measurements.csv")
     for made, row in zip(islice(make_demo.measure(read_description(folder / "robot.yaml")), 1), stored, strict=False):

@@ -140,7 +140,8 @@ def test_benchmark_ratios_are_paired_by_round():
     assert added.endswith("only in one commit")
 
 
-def test_benchmark_report_gives_nanoseconds_and_no_failed_run():
+def test_benchmark_report():
+    """A benchmark report is read in nanoseconds, without runs that failed."""
     report = {
         "benchmarks": [
             {"name": "a", "run_type": "iteration", "cpu_time": 2.0, "time_unit": "us"},
@@ -155,7 +156,8 @@ def test_benchmark_report_gives_nanoseconds_and_no_failed_run():
     ("growth", "left_out", "compiler", "code"),
     [(1.029, None, "g++ 1", 0), (1.031, None, "g++ 1", 1), (1.0, "effects", "g++ 1", 1), (2.0, None, "g++ 2", 0)],
 )
-def test_more_instructions_than_recorded_are_refused(tmp_path, monkeypatch, capsys, growth, left_out, compiler, code):
+def test_instruction_limit(tmp_path, monkeypatch, capsys, growth, left_out, compiler, code):
+    """More instructions than recorded are refused, for the same compiler."""
     recorded = {case: 1000 for case in counting.CASES if case != left_out}
     baseline = tmp_path / "instructions.json"
     baseline.write_text(json.dumps({"compiler": "g++ 1", "instructions_per_step": recorded}))

@@ -32,13 +32,14 @@ def path(robot):
 
 
 @pytest.mark.parametrize("hidden", [None, "friction", "softening"])
-def test_open_loop_of_a_known_robot_stays_on_the_path(study, robot, path, hidden):
+def test_open_loop(study, robot, path, hidden):
     """The joints that the controller planned period by period are right when the whole motion is simulated at once."""
     known = study.hidden_robot(robot, hidden, np.random.default_rng(study.SEED)) if hidden else robot
     assert study.open_loop(path, known, known).mean() < 0.05
 
 
-def test_a_controller_that_knows_friction_keeps_nearer_to_the_path(study, robot, path):
+def test_known_friction(study, robot, path):
+    """A controller whose model has friction follows the path more closely."""
     plant = study.hidden_robot(robot, "friction", np.random.default_rng(study.SEED))
     without = plant.model_copy(update={"effects": {}})
     lacking, knowing = (np.concatenate(study.closed_loop(path, known, plant)) for known in (without, plant))
@@ -47,7 +48,8 @@ def test_a_controller_that_knows_friction_keeps_nearer_to_the_path(study, robot,
 
 
 @pytest.mark.slow
-def test_the_effect_found_brings_the_tip_nearer(study, robot, path):
+def test_found_effect(study, robot, path):
+    """With the effect that a diagnosis found, the tip comes nearer to the path."""
     plant = study.hidden_robot(robot, "softening", np.random.default_rng(study.SEED))
     joints = measurements.load(ROOT / "examples/data/plan.csv", robot.n_tubes)
     known, verdict = study.candidates(robot, simulation.simulate(plant, joints, "realistic", study.SEED))

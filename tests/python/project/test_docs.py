@@ -115,7 +115,8 @@ def is_quoted(block: str) -> bool:
     return False
 
 
-def test_quoted_lines_are_those_of_an_example_in_their_order():
+def test_quotation():
+    """A quotation holds the lines of an example in their order."""
     quotation = "#include <vector>\nint main() {"
     assert is_quoted(quotation)
     assert not is_quoted("\n".join(reversed(quotation.splitlines())))

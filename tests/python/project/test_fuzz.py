@@ -34,7 +34,7 @@ def test_a_check_that_is_left_out_is_found(fuzzer, monkeypatch):
         fuzzer.fuzz(fuzzer.read_table, fuzzer.TABLE, random.Random(1), ENOUGH_S)
 
 
-def test_a_planted_bug_of_the_robot_file_is_found(fuzzer, monkeypatch):
+def test_planted_bug(fuzzer, monkeypatch):
     """A relation that trusts its fields to be numbers."""
     monkeypatch.setattr(checks, "_number", lambda section, key: float(section.get(key, 0)))
     with pytest.raises(AssertionError, match="read_robot let out"):

@@ -25,7 +25,7 @@ def new_effect(tree: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_the_skeleton_compiles_in_the_catalogue(tree: Path) -> None:
+def test_compiles(tree: Path) -> None:
     done = new_effect(tree, "cable_pull")
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [

@@ -48,7 +48,8 @@ def scenario(path, **changes):
     return str(path)
 
 
-def test_tracking_is_as_that_of_the_simulated_robot(tmp_path, folder):
+def test_tracking(tmp_path, folder):
+    """Tracking on the bench is as good as that of the simulated robot."""
     path = scenario(tmp_path / "s.yaml")
     said = []
     runs, within = track(tmp_path / "out", str(ROBOT), path, str(BENCH), said=said.append)
@@ -98,7 +99,8 @@ FAULTS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_stops_the_run_and_the_same_command_goes_on(tmp_path, folder, fault):
+def test_fault(tmp_path, folder, fault):
+    """A fault stops the run, and the same command resumes it."""
     device, change, says = FAULTS[fault]
     path, target = scenario(tmp_path / "s.yaml", mass_g__="mass_g: [0] #"), tmp_path / "out"
     process = tracking(path, target, "--patience", 0.5)

@@ -6,18 +6,21 @@ Parameters are named as in the library: effects.softening.gamma.2 (tube 2), effe
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import _core
-from ctcr.effects import before_rebuild  # noqa: F401  facts of a stale compiled module
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 
 Array = NDArray[np.float64]
 NEEDS = ("order", "time", "orientation", "loads", "gravity")  # that data must have for some effects
+# What is taken from the library as it is.
+KEPT_OF_EFFECTS = ("id", "title", "physics", "signature", "measure", "reference")
+KEPT_OF_PARAMETERS = ("name", "unit", "meaning", "neutral", "sigma", "per_tube", "kind", "quantity")
 
 
 @dataclass(frozen=True)
@@ -94,27 +97,25 @@ def catalogue(n_tubes: int) -> dict[str, Effect]:
     """All effects of the library by id, in the order in which they act."""
     parameters: dict[str, list[EffectParameter]] = {}
     for p in _core.effect_parameters(n_tubes):
-        kept = {name: getattr(p, name) for name in ("name", "unit", "meaning", "neutral", "sigma", "per_tube")}
+        kept = {name: getattr(p, name) for name in KEPT_OF_PARAMETERS}
         described = EffectParameter(
             **kept,
             soft=(p.soft_low, p.soft_high),
             hard=(p.hard_low, p.hard_high),
-            kind="amplitude" if p.kind == "strength" else p.kind,  # a module built before the word changed
             full_names=full_names(p.effect, p.name, p.per_tube, n_tubes),
-            quantity=getattr(p, "quantity", "other"),
         )
         parameters.setdefault(p.effect, []).append(described)
     effects = {}
     for e in _core.effect_catalogue():
-        kept = {name: getattr(e, name) for name in ("id", "title", "physics", "signature", "measure", "reference")}
+        kept = {name: getattr(e, name) for name in KEPT_OF_EFFECTS}
         effects[e.id] = Effect(
             **kept,
             look_alikes=tuple(e.look_alikes.split()),
             needs=frozenset(need for need in NEEDS if getattr(e, need)),
-            acts_on=frozenset(getattr(e, "acts_on", ())),
+            acts_on=frozenset(e.acts_on),
             parameters=tuple(parameters[e.id]),
-            variants=tuple(map(tuple, getattr(e, "variants", ()))),
-            starts=tuple(getattr(e, "starts", ())),
+            variants=tuple(map(tuple, e.variants)),
+            starts=tuple(e.starts),
         )
     return effects
 
@@ -151,10 +152,12 @@ def get(name: str, n_tubes: int = 1) -> Effect:
 def neutral(robot: Robot) -> dict[str, float]:
     """The neutral value of every parameter; periods follow from the robot's transmission."""
     values = {name: p.neutral for name, p in parameter_of(robot.n_tubes).items()}
-    if robot.actuation.translation_mm_per_rev:
-        values["effects.periodic_translation.pitch"] = 1e-3 * abs(robot.actuation.translation_mm_per_rev)
-    if robot.actuation.rotation_rev_per_rev:
-        values["effects.periodic_rotation.turns"] = 1 / abs(robot.actuation.rotation_rev_per_rev)
+    periods = {
+        "screw_pitch": 1e-3 * abs(robot.actuation.translation_mm_per_rev or 0.0),
+        "gear_ratio": 1 / abs(robot.actuation.rotation_rev_per_rev or inf),
+    }
+    for quantity, period in periods.items():
+        values |= {name: period for name in names_with(quantity, robot.n_tubes) if period}
     return values
 
 
