@@ -1,4 +1,4 @@
-"""Tubes that rub wind each other up: in predictions, and in fits, which are repeated until they say so themselves."""
+"""Friction twists the tubes along their path: in predictions, and in fits, which are repeated until the path agrees."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,41 +30,43 @@ def robot():
 
 
 def test_stiff_friction_is_found(robot, plan):
+    """A fit that follows the friction path finds stiff friction."""
     made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=1)
     added = add.add(robot, made, ["friction"], fixed={LAW: 1.0}, free=FREE)
     found = added.parameters()
     for i in (1, 2):
         name = f"effects.friction.coefficient.{i}"
         assert abs(found[name]["value"] - 0.03) < 0.02 * 0.03, found[name]
-    # The fit begins at 0.105. Without what the tubes wind each other up it would end at 0.18.
+    # The fit begins at 0.105. Without the relative torsion that friction causes it would end at 0.18.
     assert abs(found["effects.friction.slip_angle"]["value"] - 0.03) < 0.003
     rms = added.rms("rms_mm")
     assert rms["friction"] < 2 * rms["noise_floor"] < 0.05 * rms["calibrated"]
 
 
-def test_what_is_predicted_is_wound_up(robot, plan):
-    rubbing = add.with_values(robot, ["friction"], TRUE)
-    table = user_recording.recording_of(rubbing, plan, list(TRUE))
-    assert table.wind_up(table.nominal()) < settings.FRICTION_PATH_CHANGE  # it was, when it was made
+def test_prediction(robot, plan):
+    """Predictions follow the friction path, which is solved when a recording is made."""
+    with_friction = add.with_values(robot, ["friction"], TRUE)
+    table = user_recording.recording_of(with_friction, plan, list(TRUE))
+    assert table.solve_friction(table.nominal()) < settings.FRICTION_PATH_CHANGE  # already solved when it was made
     table.residual(table.nominal())
-    wound = table.predicted()[0]
-    assert table.wind_up(0 * table.nominal()) == 0  # nothing rubs: nothing changes
+    solved = table.predicted()[0]
+    assert table.solve_friction(0 * table.nominal()) == 0  # no friction: nothing changes
     table.residual(table.nominal())
-    np.testing.assert_array_equal(table.predicted()[0], wound)
-    simulated = simulation.simulate(rubbing, plan, "none").position
-    np.testing.assert_allclose(simulated, wound, atol=2e-5)  # other integration steps
+    np.testing.assert_array_equal(table.predicted()[0], solved)
+    simulated = simulation.simulate(with_friction, plan, "none").position
+    np.testing.assert_allclose(simulated, solved, atol=2e-5)  # other integration steps
 
 
 def test_start(robot, plan):
     """A recording may start at the friction path that another one has solved."""
     x, still = np.array(list(TRUE.values())), np.zeros(len(TRUE))
     first, like, unlike, fresh = (user_recording.recording_of(robot, plan, list(TRUE)) for _ in range(4))
-    assert first.wind_up(x) > 10 * settings.FRICTION_PATH_CHANGE
+    assert first.solve_friction(x) > 10 * settings.FRICTION_PATH_CHANGE
     for table in (like, unlike):
         table.begin_at(first)
-    assert like.wind_up(x) < 1e-3
+    assert like.solve_friction(x) < 1e-3
     np.testing.assert_allclose(predicted(like, x), predicted(first, x), atol=1e-6)
-    assert unlike.wind_up(still) == 0  # where nothing rubs, tubes are not wound up
+    assert unlike.solve_friction(still) == 0  # without friction there is no relative torsion to solve
     np.testing.assert_array_equal(predicted(unlike, still), predicted(fresh, still))
 
 
@@ -73,16 +75,16 @@ def test_screening(robot, plan):
     made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
     noise = noise_of_readings(robot, made)
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
-    rubbing = [name for name in TRUE if name != LAW]
-    fit = engine.fit(rubbing, start=TRUE, fixed={LAW: 1.0})
-    assert fit.model.is_wound
+    with_friction = [name for name in TRUE if name != LAW]
+    fit = engine.fit(with_friction, start=TRUE, fixed={LAW: 1.0})
+    assert fit.model.friction_is_solved
     own = fit.jacobian_all.reshape(*fit.residual.shape, -1) * fit.prior_sd
     np.testing.assert_allclose(engine.derivatives(fit, fit.names, {LAW: 1.0}), own, atol=1e-9 * np.abs(own).max())
-    # A fit in which nothing rubs comes between: what was wound up is not forgotten.
-    assert not engine.fit().model.is_wound
+    # A fit without friction comes between: the solved path is not forgotten.
+    assert not engine.fit().model.friction_is_solved
     again = engine.recording(fit.names, {LAW: 1.0})
     again.begin_at(engine._friction_path)
-    assert again.wind_up(fit.values) < settings.FRICTION_PATH_CHANGE
+    assert again.solve_friction(fit.values) < settings.FRICTION_PATH_CHANGE
 
 
 def predicted(table, x):

@@ -79,9 +79,9 @@ void bind_recording(nb::module_& m) {
            "threads"_a = 0, "from_home"_a = true, "profiles"_a.none() = nb::none())
       .def("nominal", &AnyRecording::nominal, "Values of the free parameters.")
       .def("activate", &AnyRecording::activate, "rows"_a, "Rows to solve from now on, one flag a row.")
-      .def("wind_up", &AnyRecording::solve_friction, "x"_a,
+      .def("solve_friction", &AnyRecording::solve_friction, "x"_a,
            "Solves friction along the recording at x; returns the largest change of a relative torsion angle [rad].")
-      .def_prop_ro("is_wound", &AnyRecording::friction_is_solved, "Whether friction was solved.")
+      .def_prop_ro("friction_is_solved", &AnyRecording::friction_is_solved, "Whether friction was solved.")
       .def("begin_at", &AnyRecording::begin_at, "other"_a,
            "Takes over the friction of another recording of the same table.")
       .def("active", &AnyRecording::active, "Rows that are solved, one flag a row.")

@@ -95,7 +95,7 @@ class Engine:
             tolerance=tolerance or self.tolerance,
             few_first=not near,
         )
-        if table.is_wound:
+        if table.friction_is_solved:
             self._friction_path = table
         return fitted
 

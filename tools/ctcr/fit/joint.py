@@ -138,7 +138,7 @@ def _fit_active(
     began = perf_counter()
     start = np.asarray(priors.mean if start is None else start, dtype=float)
     try:
-        moved = model.wind_up(start)
+        moved = model.solve_friction(start)
         evidence, found = -np.inf, None
         alternates = moved > 0 and tolerance < settings.COARSE
         for left in reversed(range(settings.FRICTION_PATH_ROUNDS if alternates else 1)):
@@ -166,7 +166,7 @@ def _fit_active(
             gained, evidence = core.log_evidence - evidence, core.log_evidence
             if not left:
                 break
-            moved = model.wind_up(start)
+            moved = model.solve_friction(start)
             settled = abs(gained) < settings.COARSE
             if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break

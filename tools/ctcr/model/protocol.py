@@ -16,7 +16,7 @@ class ResidualModel(Protocol):
     Models in Python inherit from this class what holds of a model without distributed friction.
     """
 
-    is_wound = False  # whether distributed friction acts: then the friction path was solved at some parameters
+    friction_is_solved = False  # whether the friction path was solved at some parameters
 
     def nominal(self) -> Array:
         """Parameters (n,) of the robot file."""
@@ -40,7 +40,7 @@ class ResidualModel(Protocol):
         """Readings without noise at the last call: position (M, 3) [m], quaternion (M, 4); NaN where not solved."""
         raise NotImplementedError
 
-    def wind_up(self, x: Array) -> float:
+    def solve_friction(self, x: Array) -> float:
         """Solves the friction path at x; returns the largest change of a relative torsion angle [rad]."""
         return 0.0
 

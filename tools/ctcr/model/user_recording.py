@@ -96,9 +96,9 @@ class UserRecording(ResidualModel):
     def activate(self, rows: Sequence[bool]) -> None:
         self._active = np.array(rows, bool)
 
-    def wind_up(self, x: Array) -> float:
+    def solve_friction(self, x: Array) -> float:
         values = self._values(x)
-        return self._prepared(values).wind_up(self._inner_x(values))
+        return self._prepared(values).solve_friction(self._inner_x(values))
 
     def unsolved(self) -> list[int]:
         """Active rows that could not be solved at the last call, and those that never can."""
