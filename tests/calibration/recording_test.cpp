@@ -24,6 +24,13 @@ System<2> bench() {
   return {transmission, Model<2>(robot), {{rotation_matrix(Vec3(2, 0.3, -0.4)), Vec3(-0.05, 0.01, 0.02)}, 0}, {}};
 }
 
+/// The system with one parameter increased.
+System<2> changed(const System<2>& system, int index, double by) {
+  Eigen::VectorXd x = SystemParameters<2, EffectList<>>::values(system);
+  x[index] += by;
+  return SystemParameters<2, EffectList<>>::with_values(system, x);
+}
+
 struct Table {
   std::vector<RecordedRow<2>> rows;
   std::vector<Pose> measured;
