@@ -15,6 +15,7 @@ from ctcr.robot.yaml_document import FieldPath
 from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, figure, table
 from ctcr.show.output import atomic_writer
+from ctcr.show.wording import deviation, number
 
 
 @dataclass(frozen=True)
@@ -108,25 +109,6 @@ def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
         shown = [number(value, row.sd) for value in values]
         rows.append([row.name, row.unit, *shown, deviation(row.sd)])
     return columns, rows
-
-
-def number(value: float, deviation: float = nan) -> str:
-    """A value to a tenth of its standard deviation, or to four digits."""
-    if not isfinite(value):
-        return "-"
-    if not isfinite(deviation) or deviation <= 0:
-        return f"{value:.4g}"
-    return f"{value:.{digits(deviation)}f}"
-
-
-def deviation(value: float) -> str:
-    """A standard deviation to two digits."""
-    return f"{value:.{digits(value)}f}" if isfinite(value) and value > 0 else "-"
-
-
-def digits(deviation: float) -> int:
-    """Decimals that show a standard deviation to two digits."""
-    return max(0, 1 - int(f"{deviation:.1e}".partition("e")[2]))
 
 
 def write(outcome: Outcome, target: str | Path, source: str, command: str, robot=None) -> None:

@@ -3,10 +3,9 @@
 from math import isfinite
 
 from ctcr.calibrate.joint_fit import Calibration, Stage
-from ctcr.calibrate.outcome import deviation, number
 from ctcr.model.fields import doubts
 from ctcr.show.output import table
-from ctcr.show.wording import mm
+from ctcr.show.wording import deviation, mm, number
 
 ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
 PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]

@@ -9,11 +9,11 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from ctcr.calibrate.outcome import deviation, number
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import Round
 from ctcr.effects import catalogue
 from ctcr.show import output
+from ctcr.show.wording import deviation, number
 
 CANDIDATES = 8  # of a round
 ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest

@@ -1,12 +1,32 @@
 """Numbers and lists as messages and pages show them."""
 
 from collections.abc import Sequence
+from math import isfinite, nan
 from typing import Any
 
 
 def short(value: float) -> str:
     """An error in two or three digits: 1.36, 0.93, 0.10, 0.061."""
     return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
+
+
+def number(value: float, deviation: float = nan) -> str:
+    """A value to a tenth of its standard deviation, or to four digits."""
+    if not isfinite(value):
+        return "-"
+    if not isfinite(deviation) or deviation <= 0:
+        return f"{value:.4g}"
+    return f"{value:.{digits(deviation)}f}"
+
+
+def deviation(value: float) -> str:
+    """A standard deviation to two digits."""
+    return f"{value:.{digits(value)}f}" if isfinite(value) and value > 0 else "-"
+
+
+def digits(deviation: float) -> int:
+    """Decimals that show a standard deviation to two digits."""
+    return max(0, 1 - int(f"{deviation:.1e}".partition("e")[2]))
 
 
 def mm(value: float) -> str:
