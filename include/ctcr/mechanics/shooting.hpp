@@ -185,7 +185,7 @@ private:
   };
   template <int g>
   struct Tangents {
-    CTCR_INLINE const Lanes& operator()(const S& x) const noexcept { return x.d[g]; }
+    CTCR_INLINE Lanes operator()(const S& x) const noexcept { return x.d[g]; }
     CTCR_INLINE Lanes& operator()(S& x) const noexcept { return x.d[g]; }
   };
 
