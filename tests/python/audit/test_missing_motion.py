@@ -79,11 +79,14 @@ def test_completed(robot, left_out):
 
 
 def test_fit(robot, left_out):
-    """A fit comes near the noise; without the detours, readings at their end miss by millimetres."""
-    added = add.add(robot, left_out[0], ["friction"])
+    """A fit comes near the noise and near that of the whole table; without the detours, readings at their end miss by
+    millimetres."""
+    table, whole = left_out
+    added = add.add(robot, table, ["friction"])
     assert any("without a reading" in notice for notice in added.notices)
     rms = added.rms("rms_mm")
     assert rms["friction"] < 2 * rms["noise_floor"] < 0.1 * rms["calibrated"]
+    assert rms["friction"] < 1.15 * add.add(robot, whole, ["friction"]).rms("rms_mm")["friction"]
 
 
 def test_diagnosis(robot, left_out):

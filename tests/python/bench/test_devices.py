@@ -108,10 +108,10 @@ def test_braking_distance():
     """`rest` predicts where a velocity move ends."""
     move = VelocityMove(np.zeros(2), np.zeros(2), [0.5, -1.0], np.array([2.0, 1.0]), valid_s=1.0)
     while move._left > 0:
-        move.advance(5e-4)
+        move.advance(1e-4)
     rest = move.rest()
     while not move.is_finished:
-        place, _ = move.advance(5e-4)
+        place, _ = move.advance(1e-4)
     np.testing.assert_allclose(place, rest, atol=1e-3)
 
 
@@ -149,7 +149,7 @@ def test_axis_move(settings):
         control.move(HOME - 1)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(4))
 def test_velocities_keep_limits(settings, seed):
     """Random velocities never leave the limits."""
     rng = np.random.default_rng(seed)
@@ -236,6 +236,7 @@ def test_stop_and_release(tmp_path, capfd):
 def test_codes():
     """Every code has a meaning and a remedy."""
     assert ethercat.state_name(0x14) == "SAFEOP with an error" and ethercat.state_name(0) == "state 0x0"
+    assert "watchdog" in ethercat.STATUS_CODES[0x1B][0] and "manual" in ethercat.UNKNOWN_CODE[1]
     assert all(map(all, (*ethercat.STATUS_CODES.values(), *ethercat.DIAGNOSES.values())))
 
 

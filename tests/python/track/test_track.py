@@ -218,7 +218,6 @@ def test_other_robot(robot):
 def test_command(tmp_path):
     page, numbers = tmp_path / "page.html", tmp_path / "numbers.json"
     text = BASE.replace("repetitions: 10", "repetitions: 1").replace("mass_g: [0]", "mass_g: [0, 10]")
-    text = text.replace("side_mm: 30", "side_mm: 3")
     (tmp_path / "s.yaml").write_text(text)
     asked = ["track", str(ROBOT), str(tmp_path / "s.yaml"), "--report", str(page), "--json", str(numbers)]
     done = CliRunner().invoke(cli, asked)
