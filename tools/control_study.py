@@ -40,7 +40,7 @@ def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot
     strength, size = HIDDEN[identity]
     hidden = next(p for p in effect.parameters if p.name == strength)
     values = dict.fromkeys(hidden.full_names, hidden.neutral + size * hidden.sigma)
-    return add.with_values(simulation.as_built(robot, rng), [identity], values)
+    return catalogue.with_values(simulation.as_built(robot, rng), [identity], values)
 
 
 def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], str]:

@@ -26,20 +26,12 @@ TUBE = {
     "curved_length": ("curved_length_mm", 1e-3),
     "length": ("length_mm", 1e-3),
 }
-OUTSIDE = {
-    "backlash_rotation",
-    "backlash_translation",
-    "delay",
-    "tip_load",
-    "sensor_offset",
-    "field_distortion",
-    "frame_drift",
-    "frame_jump",
-    "periodic_rotation",
-    "periodic_translation",
-    "entry_compliance",
-    "contact",
-}
+OUTSIDE = set(
+    (
+        "backlash_rotation backlash_translation delay tip_load sensor_offset field_distortion frame_drift frame_jump "
+        "periodic_rotation periodic_translation entry_compliance contact"
+    ).split()
+)
 EFFECTS = {  # id -> parameters without the id, and their true values
     "delay": lambda v: {"delay": v["delay_s"]},
     "sensor_offset": lambda v: dict(zip("xyz", v["offset_m"], strict=True)),

@@ -41,12 +41,12 @@ def demonstration(runs: int, every: int):
 @pytest.fixture(scope="session")
 def hidden():
     """hidden(robot, friction__coefficient="0.01"): the robot with effects that a test hides in its readings."""
-    from ctcr.diagnose import add
+    from ctcr.effects import catalogue
     from ctcr.effects.settings import settings
 
     def with_them(robot, **given):
         values = settings([f"{name.replace('__', '.')}={value}" for name, value in given.items()], robot)
-        return add.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
+        return catalogue.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
 
     return with_them
 

@@ -164,7 +164,9 @@ VARYING_MOST = 4  # variations, one found after the other
 VARYING_EXPLAINED = 0.3  # that all variations must explain together
 VARYING_NEGLIGIBLE = 0.05  # for which no further variation is named
 VARYING_RIVAL = 0.15  # left by effects, below which no varying-coefficient model can outdo them
-VARYING_OUTDOES = 0.25  # left by a varying-coefficient model over what effects leave, below which it outdoes them
+VARYING_OUTDOES = (
+    0.25  # chi-square left by a varying-coefficient model over that of the effects: below, they are outdone
+)
 VARYING_AT_ONCE = 2_000_000  # numbers that are made at a time: memory
 MOST_TEETH = 24  # of a wheel whose errors are tried
 

@@ -27,28 +27,12 @@ from make_set import Order, write_set  # noqa: E402
 
 SUITE = Path(__file__).resolve().parents[2] / "build" / "suite"
 SIZES = (0.5, 1.0, 2.0)
-EFFECTS = (
-    "friction",
-    "backlash_rotation",
-    "backlash_translation",
-    "delay",
-    "tip_load",
-    "precurvature_profile",
-    "softening",
-    "anisotropy",
-    "straight_curvature",
-    "clearance",
-    "torsional_compliance",
-    "sensor_offset",
-    "field_distortion",
-    "frame_drift",
-    "frame_jump",
-    "periodic_rotation",
-    "periodic_translation",
-    "entry_compliance",
-    "entry_clearance",
-    "helical_precurvature",
-    "contact",
+EFFECTS = tuple(
+    (
+        "friction backlash_rotation backlash_translation delay tip_load precurvature_profile softening anisotropy "
+        "straight_curvature clearance torsional_compliance sensor_offset field_distortion frame_drift frame_jump "
+        "periodic_rotation periodic_translation entry_compliance entry_clearance helical_precurvature contact"
+    ).split()
 )
 # The realistic noise contains a distorted field, so that a further one is no question there.
 REALISTIC_EFFECTS = tuple(name for name in EFFECTS if name != "field_distortion")

@@ -115,7 +115,7 @@ template <class Effect, class P>
 concept HasMaterial =
     requires(const Effect& effect, const TubePoint<P>& at, Material<P>& m) { effect.material(at, m); };
 
-/// An effect whose history depends on how the tubes are turned against one another at their contacts.
+/// An effect whose history depends on the relative rotation of the tubes at their contacts.
 template <class Effect>
 concept DependsOnTorsion = requires { Effect::depends_on_torsion; };
 

@@ -13,7 +13,7 @@ namespace ctcr::detail {
 /// Samples of a recording that are solved by several threads. Friction depends on how the tubes came to a sample, but not for
 /// long: it forgets. So the path is cut into segments, which are solved at once, each from the state that the torsion known
 /// so far gives at its beginning. Where the segment before ends in another state, the next one is solved again from that,
-/// up to the sample where it makes no difference any more.
+/// up to the sample from which the difference is negligible.
 template <int N, class Fx>
 class SolvedSamples {
   using Solver = PathSolver<N, Fx>;

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from ctcr.audit import missing_motion
 from ctcr.diagnose import add, diagnose
+from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table.measurements import Measurements
@@ -49,7 +50,7 @@ def rows_of(table: Measurements, kept: np.ndarray) -> Measurements:
 
 @pytest.fixture(scope="module")
 def rubbing(robot):
-    return add.with_values(robot, ["friction"], FRICTION)
+    return catalogue.with_values(robot, ["friction"], FRICTION)
 
 
 @pytest.fixture(scope="module")

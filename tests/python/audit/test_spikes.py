@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from ctcr import cli
 from ctcr.audit import spikes
-from ctcr.diagnose import add, diagnose
+from ctcr.diagnose import diagnose
+from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table import measurements
@@ -54,7 +55,7 @@ def paths(plan):
 
 
 def measured(robot, paths, effect=None, seed=1):
-    hidden = add.with_values(robot, [effect], EFFECTS[effect]) if effect else robot
+    hidden = catalogue.with_values(robot, [effect], EFFECTS[effect]) if effect else robot
     return simulation.simulate(hidden, paths, "jitter", seed=seed)
 
 

@@ -17,7 +17,7 @@ from ctcr.bench.devices.motion import StraightMove, VelocityMove
 from ctcr.bench.shared import ethercat
 from ctcr.bench.shared.real_time import BUS, TRACKER, Lateness, real_time
 from ctcr.bench.shared.shared_record import SharedRecord
-from ctcr.diagnose import add
+from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.model import simulation
 from ctcr.model.moving import RECENT_S, MovingModel
@@ -321,7 +321,7 @@ def test_without_permission(monkeypatch):
 def test_moving_model(robot, effect, strength, shares, off):
     """Reading by reading it equals the simulation of the whole path, with effects that have a history."""
     effects = {f"effects.{effect}.{strength}.{i}": 0.02 for i in (1, 2, 3)}
-    true = add.with_values(robot, [effect], effects)
+    true = catalogue.with_values(robot, [effect], effects)
     plan = measurements.load(DATA / "plan.csv", 3)
     rows = np.arange(40)
     names = ("t", "run", "beta", "alpha", "force", "row")

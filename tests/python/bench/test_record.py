@@ -66,7 +66,7 @@ def test_kills(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 20, 70, 150])
 def test_power_cut(tmp_path, cut):
-    """It costs the group that was being written, no other."""
+    """A power cut loses the group of rows that was being written, and no other."""
     path = tmp_path / "measurements.csv"
     file = RowFile(path, column_names(2), 2)
     for number in range(5):

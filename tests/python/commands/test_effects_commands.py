@@ -7,7 +7,6 @@ from pathlib import Path
 import ctcr
 import numpy as np
 import pytest
-from ctcr.diagnose import add
 from ctcr.effects import catalogue
 from ctcr.effects.settings import settings
 from ctcr.errors import InputError
@@ -104,7 +103,7 @@ def test_faults_of_settings(text, message, robot):
 
 
 def test_neutral_effects_change_nothing(robot, plan):
-    everything = add.with_values(robot, list(catalogue.catalogue(3)), {})
+    everything = catalogue.with_values(robot, list(catalogue.catalogue(3)), {})
     assert set(everything.effects) == set(catalogue.catalogue(3))
     with_them, without = (recording.recording_of(r, plan, ()) for r in (everything, robot))
     np.testing.assert_allclose(with_them.residual(np.empty(0))[0], without.residual(np.empty(0))[0], atol=1e-12)

@@ -60,7 +60,7 @@ def effects_to_find(robot, plan) -> dict[str, dict[str, float]]:
 def test_search(robot, plan, identity):
     """The moment of a jump, the plane of a contact and the position of metal need not be given."""
     given = {f"effects.{identity}.{name}": x for name, x in effects_to_find(robot, plan)[identity].items()}
-    made = simulation.simulate(add.with_values(robot, [identity], given), plan, "jitter", seed=1)
+    made = simulation.simulate(catalogue.with_values(robot, [identity], given), plan, "jitter", seed=1)
     added = add.add(robot, made, [identity], free=CALIBRATION)
     rms = added.rms("rms_mm")
     assert rms["calibrated"] > 1.5 * rms["noise_floor"]

@@ -14,29 +14,13 @@ from ctcr.effects import catalogue
 from ctcr.fit.folds import groups
 from hidden_sessions import measured
 
-IDS = {
-    "friction",
-    "backlash_rotation",
-    "backlash_translation",
-    "delay",
-    "tip_load",
-    "precurvature_profile",
-    "softening",
-    "anisotropy",
-    "straight_curvature",
-    "clearance",
-    "torsional_compliance",
-    "sensor_offset",
-    "field_distortion",
-    "frame_drift",
-    "frame_jump",
-    "periodic_rotation",
-    "periodic_translation",
-    "entry_compliance",
-    "entry_clearance",
-    "helical_precurvature",
-    "contact",
-}
+IDS = set(
+    (
+        "friction backlash_rotation backlash_translation delay tip_load precurvature_profile softening anisotropy "
+        "straight_curvature clearance torsional_compliance sensor_offset field_distortion frame_drift frame_jump "
+        "periodic_rotation periodic_translation entry_compliance entry_clearance helical_precurvature contact"
+    ).split()
+)
 
 
 def test_stable_ids():

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr.diagnose import add
 from ctcr.diagnose.engine import Engine, values_of
+from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import robot_file
@@ -62,7 +62,7 @@ def test_released_memory(fit):
 def test_initial_history(engine, plan, from_home):
     """The readings say whether the robot came to its first row from home or was at rest there."""
     play = [f"effects.backlash_translation.play.{i}" for i in (1, 2, 3)]
-    made = add.with_values(engine.robot, ["backlash_translation"], dict.fromkeys(play, 2e-4))
+    made = catalogue.with_values(engine.robot, ["backlash_translation"], dict.fromkeys(play, 2e-4))
     readings = simulation.simulate(made, replace(plan, from_home=from_home), "jitter", seed=3)
     noise = noise_of_readings(engine.robot, readings)
     taken = Engine(engine.robot, replace(readings, from_home=True), noise, np.ones(len(readings), bool))

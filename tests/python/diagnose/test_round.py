@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.diagnose import add, held_out
+from ctcr.diagnose import held_out
 from ctcr.diagnose import round as rounds
 from ctcr.diagnose.candidates import Candidate, candidates, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain
 from ctcr.diagnose.round import CandidateFit, Round
+from ctcr.effects import catalogue
 from ctcr.effects.catalogue import get
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
@@ -23,7 +24,7 @@ NO_GAIN = Gain(0.0, *4 * [np.zeros(1)])
 def engine_for(robot, plan, hidden, seed=4):
     """An engine that fits all readings, with jitter, of a robot with hidden effects."""
     ids = list(dict.fromkeys(name.split(".")[1] for name in hidden))
-    made = simulation.simulate(add.with_values(robot, ids, hidden), plan, "jitter", seed=seed)
+    made = simulation.simulate(catalogue.with_values(robot, ids, hidden), plan, "jitter", seed=seed)
     return Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool))
 
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.diagnose import add, diagnose, figures, segment_delays
+from ctcr.diagnose import diagnose, figures, segment_delays
 from ctcr.diagnose import round as rounds
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine
+from ctcr.effects import catalogue
 from ctcr.fit.folds import groups
 from ctcr.model import simulation
 from ctcr.model.noise import noise_of_readings
@@ -21,7 +22,7 @@ DELAYS = (0.5, 0.75)  # s: rows of the demonstration follow each other slowly
 def late(robot, table, later):
     """Readings with jitter, late by the first of the two delays, or `later` (M,) by the second."""
     one, two = (
-        simulation.simulate(add.with_values(robot, ["delay"], {DELAY: delay}), table, "jitter", seed=1)
+        simulation.simulate(catalogue.with_values(robot, ["delay"], {DELAY: delay}), table, "jitter", seed=1)
         for delay in DELAYS
     )
     choose = later[:, None]
@@ -96,7 +97,7 @@ def test_uncertainty(by_chance, steady):
 
 
 def test_steady(steady):
-    """Of a constant delay nothing is said."""
+    """A constant delay gives no message about a delay that varies."""
     assert [accepted.ids for accepted in steady.accepted] == [["delay"]]
     assert steady.residual.messages == ["The residual is noise."]
 

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ctcr.diagnose import add, diagnose, smooth_field
+from ctcr.diagnose import diagnose, smooth_field
 from ctcr.diagnose.engine import Engine
+from ctcr.effects import catalogue
 from ctcr.effects.catalogue import get
 from ctcr.fit import joint
 from ctcr.model import simulation
@@ -25,7 +26,7 @@ def piece(robot, recorded):
 
 @pytest.fixture(scope="module")
 def by_metal(robot, recorded, piece):
-    metal = add.with_values(robot, ["field_distortion"], piece)
+    metal = catalogue.with_values(robot, ["field_distortion"], piece)
     return simulation.simulate(metal, recorded, "jitter", seed=3)
 
 

@@ -183,7 +183,7 @@ def test_fit(robot, readings, file):
     """A hidden effect of a user is fitted within its uncertainty."""
     (effect,) = user_effects.load(EXAMPLE)
     truth = {f"effects.rotation_pickup.gain.{i + 1}": value for i, value in enumerate((2.0, -1.0, 0.5))}
-    hidden = add.with_values(robot, [effect.id], truth)
+    hidden = catalogue.with_values(robot, [effect.id], truth)
     made = simulation.simulate(hidden, readings, "jitter", seed=3)
     added = add.add(robot, made, [effect.id], free=["tubes.*.curvature", "actuation.home_rotation.*"])
     for name, value in truth.items():

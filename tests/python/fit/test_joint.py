@@ -113,7 +113,7 @@ def test_expand():
 
 
 def test_standard():
-    """Standard leaves out what does not exist."""
+    """`standard` leaves out parameters that a robot does not have."""
     bench = robot()
     bench.tubes[1].curvature_per_m = 0.0
     bench.tubes[0].bending_stiffness_Nm2 = 0.01

@@ -31,7 +31,7 @@ def robot():
 
 def test_stiff_friction_is_found(robot, plan):
     """A fit that follows the friction path finds stiff friction."""
-    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=1)
+    made = simulation.simulate(catalogue.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=1)
     added = add.add(robot, made, ["friction"], fixed={LAW: 1.0}, free=FREE)
     found = added.parameters()
     for i in (1, 2):
@@ -45,7 +45,7 @@ def test_stiff_friction_is_found(robot, plan):
 
 def test_prediction(robot, plan):
     """Predictions follow the friction path, which is solved when a recording is made."""
-    with_friction = add.with_values(robot, ["friction"], TRUE)
+    with_friction = catalogue.with_values(robot, ["friction"], TRUE)
     table = user_recording.recording_of(with_friction, plan, list(TRUE))
     assert table.solve_friction(table.nominal()) < settings.FRICTION_PATH_CHANGE  # already solved when it was made
     table.residual(table.nominal())
@@ -72,7 +72,7 @@ def test_start(robot, plan):
 
 def test_screening(robot, plan):
     """Candidates are screened at the friction path of the fit before."""
-    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
+    made = simulation.simulate(catalogue.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=2)
     noise = noise_of_readings(robot, made)
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
     with_friction = [name for name in TRUE if name != LAW]
@@ -116,7 +116,7 @@ def test_forms():
 
 def test_other_variant(robot, plan):
     """Friction that was accepted with the wrong amplitude changes to the right one."""
-    made = simulation.simulate(add.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=3)
+    made = simulation.simulate(catalogue.with_values(robot, ["friction"], TRUE), plan, "jitter", seed=3)
     noise = noise_of_readings(robot, made)
     engine = Engine(robot, made, noise, np.ones(len(made), bool), free=FREE)
     names = {

@@ -124,7 +124,7 @@ def test_nothing_written(robot, tmp_path):
 
 
 def test_effects(robot, tmp_path):
-    """Effects are added and removed; they stand before the ledger."""
+    """Effects are added to a file and removed; their section stands before the ledger."""
     effects = {"friction": {"coefficient": [0.1, 0.2], "slip": 0.35}}
     first = ledger.write(robot, tmp_path / "a.yaml", [], Entry("ctcr add"))
     second = ledger.write(first, tmp_path / "b.yaml", [], Entry("ctcr add"), effects=effects)

@@ -87,7 +87,7 @@ void check(const Configurations& rows, const PredictOptions& options, int parame
             "by_parameters holds the places of parameters of tubes, gravity and effects");
 }
 
-/// The shape of a model at a configuration that is known to it: actuated joints, and all of the load.
+/// The shape of a model at joints after actuation, under the whole load.
 template <int N, class Fx>
 ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points, int steps) {
   std::vector<double> s(std::size_t(points + 2 * N));

@@ -17,8 +17,6 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-SHOWN = 6
-
 
 def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
     """The table with rows without a pose for motion that it leaves out, and a notice if there are any.
@@ -43,7 +41,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     notice = (
-        f"{len(here)} readings return to joints after a long step (rows {listed(measurements.row[here], SHOWN)}). They "
+        f"{len(here)} readings return to joints after a long step (rows {listed(measurements.row[here])}). They "
         f"agree with the earlier visit from the other side than that of the recorded motion ({apart[0]:.2f} mm apart, "
         f"the visit from this side {apart[1]:.2f} mm): the robot moved in between without a reading. The path of that "
         "visit is taken for them"

@@ -13,8 +13,6 @@ from ctcr.table.measurements import Measurements
 
 Array = NDArray[np.float64]
 
-SHOWN = 6
-
 
 def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
     """The table without the poses of spikes, and a notice if there are any.
@@ -28,7 +26,7 @@ def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, li
         return measurements, []
     count = "1 reading leaps" if spikes.sum() == 1 else f"{spikes.sum()} readings leap"
     notice = (
-        f"{count} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {listed(measurements.row[spikes], SHOWN)}), "
+        f"{count} up to {1e3 * np.nanmax(leap):.1f} mm away and back (rows {listed(measurements.row[spikes])}), "
         f"at least {settings.SPIKE_LEAP:g} times as far as the joints and the load move the tip: spikes of the "
         "tracker, left out of all fits and errors"
     )

@@ -14,7 +14,7 @@ from ctcr.robot.ledger import Change, Entry
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.show.wording import deviation, number
 
 
@@ -121,5 +121,4 @@ def write(outcome: Outcome, target: str | Path, source: str, command: str, robot
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))
     sections.append(table("Found, with one standard deviation", *cells(outcome), 2))
-    with atomic_writer(target) as file:
-        file.write(html_page.page(title, sections, source, command))
+    write_text(html_page.page(title, sections, source, command), target)

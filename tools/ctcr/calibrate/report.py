@@ -11,7 +11,7 @@ from ctcr.calibrate.view import view
 from ctcr.model.fields import doubts
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.show.wording import mm
 
 WIDE = 10.4  # [in] of a figure as wide as the page
@@ -19,8 +19,7 @@ WIDE = 10.4  # [in] of a figure as wide as the page
 
 def write(c: Calibration, target: str | Path, source: str) -> None:
     """Writes the report; source says what was fitted. Raises InputError when the file cannot be written."""
-    with atomic_writer(target) as file:
-        file.write(page(c, source))
+    write_text(page(c, source), target)
 
 
 def page(c: Calibration, source: str) -> str:

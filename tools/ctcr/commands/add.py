@@ -48,7 +48,7 @@ def command(robot, names, diagnosis, measurements, given, free, target, in_place
         raise InputError(Problem(text, diagnosis))
     fixed = held | settings(given, loaded, ids)
     if not measurements:
-        after = add.with_values(loaded, ids, fixed)
+        after = catalogue.with_values(loaded, ids, fixed)
         add.write_values(loaded, after, ids, target, in_place)
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")

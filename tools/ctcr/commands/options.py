@@ -80,11 +80,11 @@ def load(robot: str, table: str):
 
 def with_effects(robot, given):
     """The robot with the effects of texts such as friction.coefficient=0.02."""
-    from ctcr.diagnose import add
+    from ctcr.effects import catalogue
     from ctcr.effects.settings import settings
 
     values = settings(given, robot)
-    return add.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
+    return catalogue.with_values(robot, list(dict.fromkeys(name.split(".")[1] for name in values)), values)
 
 
 class Output:

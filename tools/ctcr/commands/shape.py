@@ -52,7 +52,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     force = _finite("force", force, 3)
     with_history = effect_model.of_the_path(loaded) if loaded.effects else []
     kept = {name: given for name, given in loaded.effects.items() if name not in with_history}
-    used = loaded.model_copy(update={"effects": kept})
+    used = loaded.with_effects(kept)
     model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:

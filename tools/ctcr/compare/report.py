@@ -12,13 +12,12 @@ from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
 from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 
 
 def write(c: Comparison, target: str | Path, source: str) -> None:
     """Write the report; source says what was compared. Raises InputError when the file cannot be written."""
-    with atomic_writer(target) as file:
-        file.write(page(c, source))
+    write_text(page(c, source), target)
 
 
 def page(c: Comparison, source: str) -> str:

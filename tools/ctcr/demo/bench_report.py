@@ -23,7 +23,7 @@ from ctcr.robot import history, robot_file
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.table import measurements
 from ctcr.track import scenario
 from ctcr.track.recording import runs_of
@@ -37,8 +37,7 @@ SHOWN = ("actuation.home_rotation_deg", "tracker.position_mm")  # of the calibra
 def write(story: Story, hidden: Robot, target) -> str:
     """The end of the story in words. `hidden` is the robot on the bench. Raises InputError where it cannot write."""
     drives = _drives(story.folder)
-    with atomic_writer(target) as file:
-        file.write(page(story, hidden, drives))
+    write_text(page(story, hidden, drives), target)
     rms = story.answers["added"]["rms_mm"]
     text = (
         f"The error of the model fell from {rms['nominal']:.2f} to {rms['calibrated']:.2f} mm by calibration, and to "

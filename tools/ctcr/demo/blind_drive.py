@@ -49,7 +49,7 @@ def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:
 def _step(robot: Robot, table: Measurements, error: Array) -> Array:
     """Joints (2N,) by which the tip moves by `error` [m], base frame, with the least motion."""
     beta, alpha = robot.joints_of_table(table.beta[-1:], table.alpha[-1:])
-    plain = robot.model_copy(update={"effects": {}})  # an effect with history has no Jacobian of a single pose
+    plain = robot.standard  # an effect with history has no Jacobian of a single pose
     jacobian = Model(plain).predict(beta, alpha, table.force[-1:], derivatives=True).jacobian[0, :3]
     scale = np.repeat([1.0, 1 / RADIAN], robot.n_tubes)
     scaled = jacobian * scale

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ctcr.diagnose import add
+from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.robot.description import Robot
 
@@ -18,4 +18,4 @@ def hidden_robot(known: Robot, misplaced: bool) -> Robot:
         built.tracker.position_mm = list(np.add(built.tracker.position_mm, SHIFT_MM))
         built.actuation.home_rotation_deg = list(np.add(built.actuation.home_rotation_deg, TURN_DEG))
     values = {f"effects.{EFFECT}.coefficient.{i + 1}": VALUE for i in range(known.n_tubes)}
-    return add.with_values(built, [EFFECT], values)
+    return catalogue.with_values(built, [EFFECT], values)

@@ -66,14 +66,6 @@ class Added:
         return {stage.name: getattr(stage, unit) for stage in self.stages}
 
 
-def with_values(robot: Robot, ids: Sequence[str], given: Mapping[str, float]) -> Robot:
-    """The robot with these effects at their neutral values, but for those `given` by full name."""
-    for identity in ids:
-        catalogue.get(identity, robot.n_tubes)
-    holder = _copy(robot, robot.effects | {identity: robot.effects.get(identity, {}) for identity in ids})
-    return _copy(robot, catalogue.as_section(given.keys(), given.values(), holder))
-
-
 def add(
     robot: Robot,
     readings: Measurements,
@@ -92,7 +84,7 @@ def add(
     """
     readings, said = prepared(robot, readings)
     fixed = dict(fixed or {})
-    robot = with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
+    robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     before = robot_before(robot, ids)
     held_out, everything = folds.held_out_rows(before, readings), np.ones(len(readings), bool)
     fitted = [*before.effects]
@@ -138,7 +130,7 @@ def add(
 
 def robot_before(robot: Robot, ids: Sequence[str]) -> Robot:
     """The robot without these effects."""
-    return _copy(robot, {name: given for name, given in robot.effects.items() if name not in ids})
+    return robot.with_effects({name: given for name, given in robot.effects.items() if name not in ids})
 
 
 def write_added(
@@ -246,7 +238,7 @@ class _Fitter:
         return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
 
     def _with(self, ids: Sequence[str]) -> Robot:
-        return _copy(self.robot, {identity: self.robot.effects[identity] for identity in ids})
+        return self.robot.with_effects({identity: self.robot.effects[identity] for identity in ids})
 
     def __call__(
         self, ids: Sequence[str], shaped: Sequence[str], rows: Mask, starts: Sequence[Mapping[str, float]]
@@ -282,7 +274,7 @@ class _Fitter:
         if found:
             choices = catalogue.get(identity, self.robot.n_tubes).choices
             chosen = {name: x for name, x in found[0][0].candidate.shape if name in choices}
-            self.robot = with_values(self.robot, [identity], chosen)
+            self.robot = catalogue.with_values(self.robot, [identity], chosen)
         return [start for _, start in found]
 
     def _best(self, own: Sequence[str], starts: Sequence[Mapping[str, float]]) -> dict[str, float]:
@@ -303,12 +295,6 @@ def _name_of(readings: Measurements, held_out: Mask) -> str:
     if np.isin(readings.run[~held_out], runs).any():
         return "one of every four blocks of time"
     return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
-
-
-def _copy(robot: Robot, section: Mapping[str, Any]) -> Robot:
-    made = robot.model_copy(update={"effects": dict(section)})
-    made._source = robot._source
-    return made
 
 
 def _stage(name: str, residual: Array, rows: Mask) -> Stage:

@@ -13,7 +13,7 @@ from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.show.wording import short
 
 MOST_ARROWS = 800
@@ -21,8 +21,7 @@ MOST_ARROWS = 800
 
 def write(d: Diagnosis, target: str | Path, source: str) -> None:
     """Write the report; source says what was diagnosed. Raises InputError when the file cannot be written."""
-    with atomic_writer(target) as file:
-        file.write(page(d, source))
+    write_text(page(d, source), target)
 
 
 def page(d: Diagnosis, source: str) -> str:

@@ -13,8 +13,6 @@ from ctcr.fit import joint
 from ctcr.model import effect_model
 from ctcr.show.wording import listed
 
-SHOWN = 6
-
 
 @dataclass(frozen=True)
 class Residual:
@@ -38,7 +36,7 @@ class Residual:
         if not self.clusters:
             return []
         return [
-            f"{len(self.clusters)} readings (rows {listed(self.clusters, SHOWN)}) are outliers in the same direction "
+            f"{len(self.clusters)} readings (rows {listed(self.clusters)}) are outliers in the same direction "
             "as their neighbours in joints and load: something acts at these joints."
         ]
 

@@ -150,10 +150,8 @@ class Selection:
             self.progress(f"without {a.id}")
             names, fixed = parameters_of(rest)
             start = values_of(self.fit)
-            for iterations in (
-                settings.FIRST_ITERATIONS,
-                settings.ITERATIONS,
-            ):  # a fit that is far behind need not converge
+            # A fit that is far behind need not converge.
+            for iterations in (settings.FIRST_ITERATIONS, settings.ITERATIONS):
                 without = self.engine.fit_like(
                     self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=settings.COARSE
                 )

@@ -11,8 +11,6 @@ from ctcr.diagnose.selection import Accepted
 from ctcr.fit import joint
 from ctcr.show.wording import listed
 
-SHOWN = 6  # runs that are named
-
 
 @dataclass
 class Verdict:
@@ -65,7 +63,7 @@ def judge(
     verb = "explains" if len(accepted) == 1 else "explain"
     odd = [run for run, fraction in explained.items() if fraction < settings.NOT_SPURIOUS]
     if residual.rejected and (typical < settings.MOSTLY or odd):
-        stays = [f"Much of the error in {listed(odd, SHOWN)} stays."] if odd else []
+        stays = [f"Much of the error in {listed(odd)} stays."] if odd else []
         most = (
             f"In the median held-out run {names} {verb} {typical:.0%} of the chi-square that noise leaves unexplained."
         )

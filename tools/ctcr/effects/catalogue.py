@@ -3,7 +3,7 @@
 Parameters are named as in the library: effects.softening.gamma.2 (tube 2), effects.delay.delay. SI units.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import inf
@@ -203,6 +203,14 @@ def as_section(
         numbers = {p.name: [float(now[name]) for name in p.full_names] for p in parameters}
         section[identity] = {p.name: numbers[p.name] if p.per_tube else numbers[p.name][0] for p in parameters}
     return section
+
+
+def with_values(robot: Robot, ids: Iterable[str], given: Mapping[str, float]) -> Robot:
+    """The robot with these effects too: neutral, but for the values `given` by full name (SI); errors as `get`."""
+    added = {identity: robot.effects.get(identity, {}) for identity in ids}
+    for identity in added:
+        get(identity, robot.n_tubes)
+    return robot.with_effects(as_section(given.keys(), given.values(), robot.with_effects(robot.effects | added)))
 
 
 def priors(robot: Robot, names: Iterable[str]) -> tuple[Array, Array, Array, Array]:

@@ -1,7 +1,7 @@
 """Which rows of a table are fitted and which are held out to judge the fit.
 
-Rows are never split singly: neighbours on a path share their error. What is kept together are runs, or where there are
-too few of them, blocks of time, or regions of joint space with every pass through them.
+Rows are never split singly, because neighbours on a path share their error. Runs stay together; where there are too few
+runs, blocks of time do, or regions of joint space with every pass through them.
 """
 
 from collections.abc import Collection

@@ -46,7 +46,7 @@ def of_the_poses(robot: Robot) -> dict[str, Any]:
 
 
 def of_the_path(robot: Robot) -> list[str]:
-    """Those of a robot's effects that depend on how a configuration was reached, and those of the user's own."""
+    """The robot's effects that depend on the path to a configuration, and all effects of users' files."""
     known = catalogue.catalogue(robot.n_tubes)
     return [
         identity

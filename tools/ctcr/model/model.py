@@ -95,7 +95,7 @@ class Model:
         self._core = _core.Model(
             robot.n_tubes,
             free_parameters.values(robot, own),
-            catalogue.values(robot.model_copy(update={"effects": acting})) if acting else None,
+            catalogue.values(robot.with_effects(acting)) if acting else None,
         )
 
     def predict(

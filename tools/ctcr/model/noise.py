@@ -39,7 +39,7 @@ def noise_of(
 
 
 def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = True) -> Noise:
-    """noise_of() what the table holds: who measured no orientations need not state their jitter."""
+    """As noise_of(), for the kinds of readings in the table: without orientations their jitter need not be stated."""
     kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
     return noise_of(robot, field=field, kinds=kinds)
 

@@ -20,7 +20,7 @@ def names_of(n_tubes: int) -> tuple[str, ...]:
 
 
 def values(robot: Robot) -> Array:
-    """Their values, those of the robot's effects included; the turn of the tracker frame counts from the file's: 0."""
+    """Values of all these parameters. The rotation of the tracker frame counts from the file's frame, so it is 0."""
     own = parameters.values(robot)
     for i, name in enumerate(parameters.names_of(robot.n_tubes)):
         if name.startswith("tracker.rotation."):
@@ -65,8 +65,8 @@ def recording_of(
 ) -> _core.Recording:
     """The compiled residuals of all rows as functions of the named parameters.
 
-    `fixed` gives parameters of effects other values than the robot's. `profiles` (K, 3N): at K places along each tube,
-    equally spaced from its grasped point to its tip, the curvature about its x and y axes to add [1/m], and the
+    `fixed` gives parameters of effects other values than the robot's. `profiles` (K, 3N): at K arc lengths along each
+    tube, equally spaced from its grasped point to its tip, the curvature about its x and y axes to add [1/m], and the
     relative change of its bending stiffness.
     """
     known = names_of(robot.n_tubes)
@@ -97,7 +97,7 @@ def recording_of(
 
 
 def _residual(robot: Robot, measurements: Measurements, steps: int, rows: NDArray[np.bool_]) -> Array:
-    """Of some rows (M,), as (M, 6); NaN elsewhere."""
+    """Residual (M, 6) at the robot file's values in some rows (M,); NaN in the others."""
     table = recording_of(robot, measurements, steps=steps)
     table.activate(rows.tolist())
     return table.residual(np.empty(0))[0].reshape(-1, 6)

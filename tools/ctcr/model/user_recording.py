@@ -58,8 +58,7 @@ class UserRecording(ResidualModel):
         self._hooks = hooks = Hooks(robot, Rows.of(measurements), own_effects)
         own = {effect.id for effect in own_effects}
         rest = {identity: given for identity, given in robot.effects.items() if identity not in own}
-        self._library_robot = robot.model_copy(update={"effects": rest})
-        self._library_robot._source = robot._source
+        self._library_robot = robot.with_effects(rest)
         library, known = recording.names_of(robot.n_tubes), catalogue.names_of(robot.n_tubes)
         self._nominal = dict(zip(library, recording.values(self._library_robot).tolist(), strict=True))
         self._own_sigma: dict[str, float] = {}

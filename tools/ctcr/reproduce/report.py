@@ -11,7 +11,7 @@ from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
 from ctcr.sensitivity import figures as sensitivity
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.show.style import AXES, ERROR
 from ctcr.track import figures as track
 from ctcr.track.result import errors_mm
@@ -47,8 +47,7 @@ def write(
         *(figure(*picture, wide=True) for picture in pictures),
     ]
     view = track.scene(list(runs.values()), wanted, list(runs))
-    with atomic_writer(target) as file:
-        file.write(html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view))
+    write_text(html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view), target)
 
 
 def _robot() -> str:

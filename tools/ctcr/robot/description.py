@@ -3,6 +3,7 @@
 Tubes go from the innermost outwards. Base frame: origin where the tubes leave the front plate, z along insertion.
 """
 
+from collections.abc import Mapping
 from math import pi
 from typing import Annotated, Any, Literal, get_args
 
@@ -211,7 +212,11 @@ class Robot(Section):
     @property
     def standard(self) -> "Robot":
         """The same without its effects beyond the standard model."""
-        return self.model_copy(update={"effects": {}})
+        return self.with_effects({})
+
+    def with_effects(self, effects: Mapping[str, Any]) -> "Robot":
+        """A copy with this section of effects instead of its own."""
+        return self.model_copy(update={"effects": dict(effects)})
 
     @property
     def gravity_vector(self) -> Array:

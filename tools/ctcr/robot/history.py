@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.output import atomic_writer, table
+from ctcr.show.output import table, write_text
 from ctcr.show.style import ERROR, NOISE, OUT
 
 COLUMNS = ["date", "command", "from", "changes", "error"]
@@ -81,8 +81,7 @@ def write_report(robot: Robot, target: str | Path, file: str) -> None:
     if stages:
         sections.append(html_page.figure(draw_waterfall, stages, 10.4, 4.4, "RMS error after each step."))
     sections.append("<h2>Ledger</h2>" + html_page.table("Oldest first", COLUMNS, lines, len(COLUMNS)))
-    with atomic_writer(target) as page:
-        page.write(html_page.page(title, sections, file, "ctcr history"))
+    write_text(html_page.page(title, sections, file, "ctcr history"), target)
 
 
 def _lead(stages: list[Stage]) -> str:

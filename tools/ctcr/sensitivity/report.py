@@ -6,7 +6,7 @@ from typing import Any
 from ctcr.sensitivity import figures, terminal
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 
 
 def write(found: dict[str, Any], target: str | Path, source: str, accuracy: float) -> None:
@@ -30,5 +30,4 @@ def write(found: dict[str, Any], target: str | Path, source: str, accuracy: floa
         title = "Increase of the error, worst of the range"
         rows = table(title, terminal.CLOSED_COLUMNS, terminal.closed_rows(study), 2)
         sections.append(f"<h2>Closed loop</h2>{drawn}{rows}")
-    with atomic_writer(target) as file:
-        file.write(html_page.page("Which parameters matter", sections, source, "ctcr sensitivity"))
+    write_text(html_page.page("Which parameters matter", sections, source, "ctcr sensitivity"), target)

@@ -51,14 +51,19 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
             Path(temporary).unlink(missing_ok=True)
 
 
+def write_text(text: str, target: str | Path) -> None:
+    """Writes a file whole or not at all; errors as `atomic_writer`."""
+    with atomic_writer(target) as file:
+        file.write(text)
+
+
 def write_json(data: Any, target: str) -> None:
     """Writes `data` as JSON to a file, or to standard output for "-"; see `plain` for the types it may hold."""
     text = json.dumps(plain(data), indent=2, allow_nan=False) + "\n"
     if target == "-":
         sys.stdout.write(text)
         return
-    with atomic_writer(target) as file:
-        file.write(text)
+    write_text(text, target)
 
 
 def plain(data: Any) -> Any:

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any
 
+NAMED = 6  # rows, runs and the like that a sentence names: more are not read
+
 
 def short(value: float) -> str:
     """An error in two or three digits: 1.36, 0.93, 0.10, 0.061."""
@@ -51,6 +53,6 @@ def join(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
-def listed(items: Sequence[Any], most: int) -> str:
+def listed(items: Sequence[Any], most: int = NAMED) -> str:
     """At most `most` items, and dots where there are more."""
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")

@@ -6,7 +6,7 @@ from pathlib import Path
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
@@ -30,8 +30,7 @@ def write(
         *(_one(run, scenario, robot) for run in _shown(drawn)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
-    with atomic_writer(target) as file:
-        file.write(html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario)))
+    write_text(html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario)), target)
 
 
 def _shown(runs: list[Run]) -> list[Run]:

@@ -6,7 +6,8 @@ from typing import Self
 
 from ctcr.bench.devices.fault import DeviceFault
 
-END_S = 20.0  # until the process has ended
+CONNECT_S = 20.0  # patience with a process that starts and looks for its device
+END_S = 20.0  # patience with a process that ends: it stops its device first
 
 
 class ProcessClient:

@@ -7,11 +7,10 @@ from pathlib import Path
 from ctcr.bench.devices import tracker_process
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.process_client import ProcessClient
+from ctcr.bench.devices.process_client import CONNECT_S, ProcessClient
 from ctcr.bench.devices.tracker_process import RATE_HZ, TrackedFrame
 from ctcr.bench.shared.real_time import Lateness
 
-CONNECT_S = 20.0
 RETRY_S = 3.0  # with faults during the connection, while the reader tries again
 STALE_S = 0.25  # without a new frame: the last pose is no longer the present one
 

@@ -57,7 +57,7 @@ class Folder:
             with real_time(CONTROLLER):
                 yield
         except BaseException as error:
-            with suppress(InputError):  # a full disk must not hide what ended it
+            with suppress(InputError):  # a full disk must not hide the first error
                 self._note(motors, tracker, str(error) or "interrupted")
             raise
         self._note(motors, tracker, "finished")

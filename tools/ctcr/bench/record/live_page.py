@@ -8,7 +8,7 @@ from typing import Self
 
 from ctcr.bench.record.session import Progress
 from ctcr.show import html_page
-from ctcr.show.output import atomic_writer
+from ctcr.show.output import write_text
 
 EVERY_S = 2
 SHOWN = 400  # newest readings
@@ -36,8 +36,7 @@ class LivePage:
             self._write(EVERY_S)
 
     def _write(self, reload_s: int) -> None:
-        with atomic_writer(self._path) as file:
-            file.write(page(self._last, self._title, reload_s))
+        write_text(page(self._last, self._title, reload_s), self._path)
 
 
 def page(progress: Progress, title: str, reload_s: int) -> str:
