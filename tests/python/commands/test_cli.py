@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import shlex
 import subprocess
 import sys
 import types
@@ -250,3 +251,14 @@ def test_options_meet_the_function(command):
         given = given - {"json_target", "report"} | {"out"}
         function = function.__wrapped__
     inspect.signature(function).bind(**dict.fromkeys(given))
+
+
+@pytest.mark.parametrize(
+    ("path", "command"), [pytest.param(path, found, id=" ".join(path)) for path, found in commands()]
+)
+def test_help_has_an_example(path, command):
+    """The help of every command ends with an example that the command accepts."""
+    _, found, example = " ".join(command.help.split()).partition("Example: ctcr ")
+    words = shlex.split(example)
+    assert found and tuple(words[: len(path)]) == path
+    command.make_context(" ".join(path), words[len(path) :]).close()

@@ -26,7 +26,9 @@ def bench(target, short, folder) -> int:
     """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.
 
     Each step is a command, shown as you would type it, which meets the robot through the protocols of tracker and
-    motors. Some minutes; writes report.html.
+    motors. It takes some minutes and writes report.html.
+
+    Example: ctcr demo bench
     """
     from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated

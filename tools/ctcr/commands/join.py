@@ -12,9 +12,11 @@ from ctcr.commands import options
 def command(robot, tables, target) -> None:
     """Join the tables of one session.
 
-    MEASUREMENTS of ROBOT, in the order in which they were recorded, become one table. For recordings between which
-    the joints stayed where they were, such as a first one and the one that `ctcr next` proposed. Runs are numbered
-    on; times follow from the recordings' session.json.
+    MEASUREMENTS of ROBOT, in the order in which they were recorded, become one table. The joints must not have moved
+    between these recordings, such as a first one and the one that `ctcr next` proposed. The numbers of the runs
+    continue; times follow from the recordings' session.json.
+
+    Example: ctcr join robot.yaml first/measurements.csv second/measurements.csv -o both.csv
     """
     from ctcr.bench.record.joined import joined, start_of
     from ctcr.model import simulation

@@ -17,8 +17,10 @@ from ctcr.commands import options
 def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> None:
     """Move the joints of a robot.
 
-    They move in a straight line of joint space; those not given stay. Limits and the order of the tubes are checked
-    before and during every move. Ctrl+C stops it.
+    They move along a straight line of joint space; joints that are not given stay. Limits and the order of the tubes
+    are checked before and during every move. Ctrl+C stops it.
+
+    Example: ctcr move robot.yaml --bench bench.yaml --beta -80,-60,-40 --alpha 0,90,0
     """
     import numpy as np
 

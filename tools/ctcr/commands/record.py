@@ -34,6 +34,8 @@ def command(robot, plan, target, bench_path, dwell, readings, speed, patience, p
     ROBOT moves through PLAN in its order, and FOLDER/measurements.csv holds the readings. Every row is on the disk
     as soon as it is measured; the same command resumes an interrupted recording. Where the force changes from one
     row to the next, you are asked to hang the weight. Home the joints first: `ctcr move --home`.
+
+    Example: ctcr record robot.yaml plan.csv --bench bench.yaml -o recordings/first
     """
     from contextlib import nullcontext
     from dataclasses import asdict

@@ -34,6 +34,8 @@ def aurora(robot, folder, scenario, seed, **physics) -> None:
     """Simulate an NDI Aurora tracker on a pseudo-terminal, looking at the tip of ROBOT.
 
     The robot stands at home, or where the motors of `ctcr sim ethercat` in the same folder put it.
+
+    Example: ctcr sim aurora robot.yaml --noise realistic
     """
     from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators.aurora import AuroraSimulator
@@ -55,6 +57,8 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     """Simulate a coupler EK1100 and stepper terminals, which answer EtherCAT frames on a network interface.
 
     Needs the rights of docs/hardware.md; `ctcr sim bench` needs none.
+
+    Example: ctcr sim ethercat --interface eth1 --motors 6
     """
     from ctcr.bench.shared.folder import BUS, MASTER, private_folder
     from ctcr.bench.simulators import network
@@ -80,6 +84,8 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
     """Simulate a whole bench around ROBOT while COMMAND runs (default: a shell); its motors move the tracked tip.
 
     Needs no rights: bus and COMMAND get a network of their own.
+
+    Example: ctcr sim bench robot.yaml --hide friction.coefficient=0.02 -- ctcr devices
     """
     from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated
@@ -96,7 +102,10 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
 @click.option("--break", "line_break", is_flag=True, help="A break on the serial line: resets the tracker.")
 @options.folder
 def set_(device, settings, force, line_break, folder) -> None:
-    """Switch faults of a running simulator on and off; without any, show them."""
+    """Switch faults of a running simulator on and off; without any, show them.
+
+    Example: ctcr sim set aurora missing=0.3
+    """
     from ctcr.bench.shared.control import request
     from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import yaml_document

@@ -13,6 +13,8 @@ def command(release: bool, folder: str | None) -> None:
 
     They stay stopped until `ctcr stop --release`. This stops by software. The switch that cuts the motors' power is
     the emergency stop of the bench.
+
+    Example: ctcr stop
     """
     from ctcr.bench.devices import emergency_stop
     from ctcr.bench.shared.folder import private_folder
