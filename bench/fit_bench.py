@@ -24,7 +24,7 @@ LONG = [("diagnose", 20_000)]
 
 def session(kind: str, rows: int):
     """The robot as described, and the readings of the true one."""
-    from ctcr.diagnose import add
+    from ctcr.effects import catalogue
     from ctcr.model import parameters, simulation
     from ctcr.robot import robot_file
     from ctcr.table import measurements
@@ -37,7 +37,7 @@ def session(kind: str, rows: int):
     plan = measurements.load(EXAMPLES / "data" / "plan.csv", robot.n_tubes)
     stream = "stream" in kind
     if stream:
-        true = add.with_values(true, ["delay"], {"effects.delay.delay": 0.06})
+        true = catalogue.with_values(true, ["delay"], {"effects.delay.delay": 0.06})
     runs = [np.flatnonzero(plan.run == run) for run in np.unique(plan.run)]
     made: list[dict] = []
     while sum(len(run["t"]) for run in made) < rows:

@@ -26,6 +26,7 @@ class RotationPickup(Effect):
 
 def main() -> None:
     from ctcr.diagnose import add
+    from ctcr.effects import catalogue
     from ctcr.model import simulation
     from ctcr.robot import robot_file
     from ctcr.table import measurements
@@ -35,7 +36,7 @@ def main() -> None:
     robot = robot_file.load(examples / "robots" / "table2.yaml")
     plan = measurements.load(examples / "data" / "plan.csv", robot.n_tubes)
 
-    truth = add.with_values(robot, ["rotation_pickup"], {"effects.rotation_pickup.gain.1": 2.0})
+    truth = catalogue.with_values(robot, ["rotation_pickup"], {"effects.rotation_pickup.gain.1": 2.0})
     readings = simulation.simulate(truth, plan, noise="jitter", seed=5)
     added = add.add(robot, readings, ["rotation_pickup"])
     for stage in added.stages:
