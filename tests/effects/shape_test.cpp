@@ -13,7 +13,7 @@ constexpr int N = 2;
 template <class Model>
 std::vector<ShapePoint<N>> shape_of(const Model& model, const test::Case<N>& c, Solution<N>& tip) {
   std::array<double, 30> s;
-  const std::size_t count = shape_places(model, c.q, 20, s);
+  const std::size_t count = shape_arc_lengths(model, c.q, 20, s);
   std::vector<double> at{c.q.beta[0], c.q.beta[1] / 2};
   at.insert(at.end(), s.begin(), s.begin() + std::ptrdiff_t(count));
   std::vector<ShapePoint<N>> points(at.size());

@@ -48,7 +48,7 @@ Solved<N> solve_shape(const Case<N>& c, const std::vector<double>& s, const Sett
 template <int N>
 std::vector<double> places(const Case<N>& c, std::size_t points) {
   std::vector<double> s(points + 2 * N);
-  s.resize(shape_places(Model<N>(c.robot), c.q, points, s));
+  s.resize(shape_arc_lengths(Model<N>(c.robot), c.q, points, s));
   return s;
 }
 

@@ -277,8 +277,8 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
 /// @param s       out: ascending, each once [m]; room for points + 2N
 /// @return how many were written   Real time: yes.
 template <int N, class Fx>
-std::size_t shape_places(const Model<N, Fx>& model, const Joints<N>& q, std::size_t points,
-                         std::span<double> s) noexcept {
+std::size_t shape_arc_lengths(const Model<N, Fx>& model, const Joints<N>& q, std::size_t points,
+                              std::span<double> s) noexcept {
   const auto& c = model.coefficients();
   Events<N> events;
   if constexpr (Fx::none)

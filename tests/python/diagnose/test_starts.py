@@ -119,7 +119,7 @@ def test_source_search(engine, seed):
     reach = 0.06 + np.max((engine.positions - np.median(engine.positions, axis=0)) @ side) / np.linalg.norm(side)
     place = np.median(engine.positions, axis=0) + reach * side / np.linalg.norm(side)
     coils = rng.normal(0, 0.02, 3)
-    signal = -3e-6 * _core.beside_metal(engine.positions - coils, place - coils)
+    signal = -3e-6 * _core.metal_distortion(engine.positions - coils, place - coils)
     signal[~engine.rows] = 0
     found, columns = found_from(engine, signal, jitter)
     assert np.linalg.norm(found[:3] - place) < 0.015

@@ -24,7 +24,7 @@ struct Table {
   Eigen::VectorXd part;     ///< (rows) of the session's duration, 0 to 1
   Eigen::VectorXi run;      ///< (rows)
   Eigen::Vector3d centre;   ///< of all measured positions, tracker frame [m]
-  std::vector<int> free;    ///< places in SystemParameters<N, Catalogue>
+  std::vector<int> free;    ///< indices in SystemParameters<N, Catalogue>
   int steps, threads;
   bool from_home;     ///< whether the robot came to the first row straight from home
   RowMajor profiles;  ///< (nodes, 3 N) of each tube: curvature x, y added [1/m], relative change of EI; or empty

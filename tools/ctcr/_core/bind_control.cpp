@@ -66,9 +66,9 @@ LoopResult closed_loop_on(const nb::object& device, LoopRequest& r) {
 }
 
 SensitivityResult any_sensitivity(Eigen::Index tubes, const SensitivityRequest& r) {
-  const Eigen::Index places = r.nominal.parameters.size();
-  const bool fits = r.varied.cols() == places && r.varied.rows() % 2 == 0 && r.low.size() == places &&
-                    r.high.size() == places && r.blocks >= 1 && r.configurations >= 1;
+  const Eigen::Index parameters = r.nominal.parameters.size();
+  const bool fits = r.varied.cols() == parameters && r.varied.rows() % 2 == 0 && r.low.size() == parameters &&
+                    r.high.size() == parameters && r.blocks >= 1 && r.configurations >= 1;
   if (!fits) throw std::invalid_argument("the arrays of a sensitivity study do not fit together");
   const nb::gil_scoped_release released;
   return with_tubes(tubes, [&](auto n) { return sensitivity<n>(r); });

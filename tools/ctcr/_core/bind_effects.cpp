@@ -72,11 +72,11 @@ std::vector<CatalogueEntry> catalogue() {
   return out;
 }
 
-RowMajor beside_metal(const RowMajor& places, const Eigen::Vector3d& metal) {
-  RowMajor off(places.rows(), 6);
-  for (Eigen::Index i = 0; i < places.rows(); ++i) {
-    const auto at =
-        ctcr::metal_distortion<double>({places(i, 0), places(i, 1), places(i, 2)}, {metal[0], metal[1], metal[2]}, 1.0);
+RowMajor metal_distortion(const RowMajor& positions, const Eigen::Vector3d& metal) {
+  RowMajor off(positions.rows(), 6);
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    const auto at = ctcr::metal_distortion<double>({positions(i, 0), positions(i, 1), positions(i, 2)},
+                                                   {metal[0], metal[1], metal[2]}, 1.0);
     off.row(i) << at.shift[0], at.shift[1], at.shift[2], at.turn[0], at.turn[1], at.turn[2];
   }
   return off;
@@ -123,11 +123,10 @@ void bind_effects(nb::module_& m) {
   m.def(
       "effect_parameters",
       [](int tubes) { return with_tubes(tubes, [](auto n) { return catalogue_parameters<n>(); }); }, "tubes"_a,
-      "Parameters of all effects; `first` is the place of a parameter's value among those of the catalogue.");
-  m.def("beside_metal", &beside_metal, "places"_a, "metal"_a,
-        "(M, 6) position [m] and rotation vector [rad] by which readings at places (M, 3) [m] are off for each m^3 of "
-        "metal "
-        "at a place (3,) [m]; tracker frame.");
+      "Parameters of all effects; `first` is the index of a parameter's value among those of the catalogue.");
+  m.def("metal_distortion", &metal_distortion, "positions"_a, "metal"_a,
+        "(M, 6) error of readings [m], [rad] at positions (M, 3) [m], for each m^3 of metal at the position (3,) [m]; "
+        "tracker frame.");
 }
 
 }  // namespace ctcr::python

@@ -1,4 +1,4 @@
-// Joint identification: parameters fitted to a recording. Use ctcr.identify, which converts and names.
+// Joint identification: parameters fitted to a recording. Use ctcr.fit.joint, which converts and names.
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -49,14 +49,12 @@ using Within = std::vector<std::tuple<std::string, Eigen::VectorXd, double>>;
 std::pair<Identification, std::vector<int>> identify_any(
     const nb::object& predict, const std::vector<std::string>& names, const Eigen::VectorXd& mean,
     const Eigen::VectorXd& sd, const Eigen::VectorXd& low, const Eigen::VectorXd& high, const Noise& noise,
-    const Eigen::MatrixX3d& places, bool robust, bool admit_model_error, const std::optional<Eigen::MatrixX2d>& weights,
+    const Eigen::MatrixX3d& positions, const std::optional<Eigen::MatrixX2d>& weights,
     const std::optional<Eigen::Vector2d>& inflation, const std::optional<Eigen::VectorXd>& start,
     const std::optional<Eigen::MatrixX2d>& first_weights, int starts, int max_iterations, double tolerance,
     const Known& known, const Within& within) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
-  options.robust = robust;
-  options.admit_model_error = admit_model_error;
   options.weights = weights;
   if (inflation) options.inflation = inflation->array();
   options.start = start;
@@ -73,10 +71,10 @@ std::pair<Identification, std::vector<int>> identify_any(
     AnyRecording& recording = nb::cast<AnyRecording&>(predict);
     const nb::gil_scoped_release released;
     std::vector<int> excluded;
-    Identification fit = identify_with_exclusions(recording, parameters, noise, places, options, excluded);
+    Identification fit = identify_with_exclusions(recording, parameters, noise, positions, options, excluded);
     return {std::move(fit), std::move(excluded)};
   }
-  return {identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, places, options), {}};
+  return {identify(predictor_of(nb::cast<nb::callable>(predict)), parameters, noise, positions, options), {}};
 }
 
 RowReport report_any(const Identification& fit, const nb::object& predict) {
@@ -171,9 +169,9 @@ void bind_identify(nb::module_& m) {
 
   m.def(
       "identify", &identify_any, nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a,
-      "places"_a, "robust"_a = true, "admit_model_error"_a = true, "weights"_a.none() = nb::none(),
-      "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(), "first_weights"_a.none() = nb::none(),
-      "starts"_a = 3, "max_iterations"_a = 50, "tolerance"_a = 0.02, "known"_a = Known{}, "within"_a = Within{},
+      "positions"_a, "weights"_a.none() = nb::none(), "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(),
+      "first_weights"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50, "tolerance"_a = 0.02,
+      "known"_a = Known{}, "within"_a = Within{},
       "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and the rows "
       "left out because they could not be solved. Raises ValueError where no fit is possible.");
 }

@@ -84,19 +84,19 @@ void check(const Configurations& rows, const PredictOptions& options, int parame
           "derivatives need the default integrator");
   for (const int p : options.by_parameters)
     require(p >= 0 && p < parameters && (p < ParameterVector<N>::robot_count || p >= ParameterVector<N>::count),
-            "by_parameters holds the places of parameters of tubes, gravity and effects");
+            "by_parameters holds the indices of parameters of tubes, gravity and effects");
 }
 
 /// The shape of a model at joints after actuation, under the whole load.
 template <int N, class Fx>
 ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points, int steps) {
   std::vector<double> s(std::size_t(points + 2 * N));
-  s.resize(shape_places(model, q, std::size_t(points), std::span(s)));
-  std::vector<ShapePoint<N>> places(s.size());
+  s.resize(shape_arc_lengths(model, q, std::size_t(points), std::span(s)));
+  std::vector<ShapePoint<N>> shape_at(s.size());
   Workspace<N> ws;
   Solution<N> solution;
   const auto count = Eigen::Index(s.size());
-  ShapeArrays out{.status = shape<N>(model, q, load, s, places, ws, solution, Settings{.steps = steps}),
+  ShapeArrays out{.status = shape<N>(model, q, load, s, shape_at, ws, solution, Settings{.steps = steps}),
                   .arc_length = Eigen::Map<const Eigen::VectorXd>(s.data(), count),
                   .position = RowMajor(count, 3),
                   .quaternion = RowMajor(count, 4),
@@ -106,13 +106,13 @@ ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoa
                   .tube_curvature = RowMajor(N, 3 * count),
                   .tube_moment = RowMajor(N, 3 * count)};
   for (Eigen::Index k = 0; k < count; ++k) {
-    const ShapePoint<N>& place = places[std::size_t(k)];
-    out.position.row(k) = place.bishop.position.transpose();
-    out.quaternion.row(k) = quaternion(place.bishop.rotation);
-    out.force.row(k) = place.force.transpose();
-    out.moment.row(k) = place.moment.transpose();
+    const ShapePoint<N>& point = shape_at[std::size_t(k)];
+    out.position.row(k) = point.bishop.position.transpose();
+    out.quaternion.row(k) = quaternion(point.bishop.rotation);
+    out.force.row(k) = point.force.transpose();
+    out.moment.row(k) = point.moment.transpose();
     for (Eigen::Index i = 0; i < N; ++i) {
-      const TubeShape& tube = place.tube[std::size_t(i)];
+      const TubeShape& tube = point.tube[std::size_t(i)];
       const double scale = tube.present ? 1.0 : std::numeric_limits<double>::quiet_NaN();
       out.tube_angle(i, k) = scale * tube.angle;
       out.tube_curvature.row(i).template segment<3>(3 * k) = scale * tube.curvature.transpose();

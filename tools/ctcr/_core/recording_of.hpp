@@ -120,7 +120,7 @@ private:
 
 template <int N>
 void check(const Table& table) {
-  constexpr int places = SystemParameters<N, Catalogue>::count;
+  constexpr int parameters = SystemParameters<N, Catalogue>::count;
   const Eigen::Index rows = table.beta.rows();
   const auto is = [](const auto& matrix, Eigen::Index height, Eigen::Index width) {
     return matrix.rows() == height && matrix.cols() == width;
@@ -131,7 +131,7 @@ void check(const Table& table) {
       table.run.size() == rows && table.parameters.size() == ParameterVector<N>::count &&
       table.effects.size() == Catalogue::On<N>::count && table.sensor_tube >= 0 && table.sensor_tube < N &&
       table.steps >= 1 && (table.profiles.size() == 0 || table.profiles.cols() == 3 * N);
-  const bool known = std::ranges::all_of(table.free, [](int place) { return place >= 0 && place < places; });
+  const bool known = std::ranges::all_of(table.free, [](int index) { return index >= 0 && index < parameters; });
   if (!fits || !known) throw std::invalid_argument("the arrays of a recording do not fit together");
 }
 

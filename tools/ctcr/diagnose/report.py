@@ -49,8 +49,8 @@ def _opening(d: Diagnosis, title: str) -> str:
     return (
         f"<h1>{escape(title)}</h1>"
         f'<p class="lead"><b>{escape(verdict)}.</b> {escape(" ".join(d.verdict.sentences))}</p>{cards(numbers)}'
-        f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. Noise and uncertain parameters of '
-        f"a right model give {short(d.expected_mm)} mm there.</p>"
+        f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. A right model would leave '
+        f"{short(d.expected_mm)} mm there: noise, and the uncertainty of its parameters.</p>"
     )
 
 

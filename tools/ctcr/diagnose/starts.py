@@ -110,7 +110,7 @@ def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:
     radius = np.quantile(np.linalg.norm(engine.positions - centre, axis=1), 0.95)
 
     def derivative(at: Array) -> Array:  # by the volume, with metal and coils at[:3] and at[3:]
-        column = -sd[0] * _core.beside_metal(engine.positions - at[3:], at[:3] - at[3:])
+        column = -sd[0] * _core.metal_distortion(engine.positions - at[3:], at[:3] - at[3:])
         column[~engine.fitted] = 0.0
         return column[:, :, None]
 

@@ -153,7 +153,7 @@ def _fit_active(
                 known=list(priors.gauges),
                 within=list(priors.limits),
                 noise=noise,
-                places=np.asarray(positions, dtype=float),
+                positions=np.asarray(positions, dtype=float),
                 weights=weights,
                 inflation=None if inflation is None else np.asarray(inflation, dtype=float),
                 start=start,

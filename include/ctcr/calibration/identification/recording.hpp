@@ -27,7 +27,7 @@ class Recording {
 
 public:
   /// @param measured    T_tracker_sensor of each row, NaN where not measured
-  /// @param parameters  places of x in SystemParameters<N, Fx>
+  /// @param parameters  indices of x in SystemParameters<N, Fx>
   /// @param pool        must outlive this
   Recording(const System<N, Fx>& nominal, std::vector<RecordedRow<N>> rows, std::vector<Pose> measured,
             std::vector<int> parameters, ThreadPool& pool)
