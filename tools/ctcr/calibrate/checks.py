@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Integers, Mask
 from ctcr.compare.offsets import find_run_offsets
 from ctcr.compare.sample import take_sample
 from ctcr.compare.visits import find_revisits, find_stops
@@ -19,7 +19,6 @@ from ctcr.show import wording
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
-Array = NDArray[np.float64]
 LISTED = 12
 
 
@@ -48,7 +47,7 @@ def start(robot: Robot, readings: Measurements) -> float:
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)
 
 
-def usable_rows(readings: Measurements) -> tuple[NDArray[np.bool_], list[str]]:
+def usable_rows(readings: Measurements) -> tuple[Mask, list[str]]:
     """Rows that say something new, and what to say about the others."""
     columns = [readings.t[:, None], readings.run[:, None], readings.beta, readings.alpha, readings.force]
     columns += [part for part in (readings.position, readings.quaternion) if part is not None]
@@ -130,6 +129,6 @@ def _errors_if_framed(robot: Robot, readings: Measurements, fit: Fit) -> tuple[s
     return None
 
 
-def _rows(rows: NDArray[np.int64]) -> str:
+def _rows(rows: Integers) -> str:
     text = listed(rows, LISTED)
     return f"{len(rows)} rows ({text})" if len(rows) > 1 else f"Row {text}"

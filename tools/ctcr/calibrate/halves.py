@@ -6,10 +6,10 @@ A difference beyond noise means that the model fits one part of the workspace at
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model import effect_model
@@ -17,15 +17,13 @@ from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Halves:
     """The difference of the two models' tips at K visited joints, tracker frame, and the one that noise alone gives."""
 
     kind: str  # what the halves kept together, runs or places
-    row: NDArray[np.int64]  # (K,) of the file
+    row: Integers  # (K,) of the file
     tip: Array  # (K, 3) of the first model, base frame [m]
     difference: Array  # (K, 3) second minus first, tracker frame [m]
     noise: Array  # (K,) RMS length that noise alone gives [m]
@@ -68,7 +66,7 @@ def compare_halves(robot: Robot, readings: Measurements, first: Fit, second: Fit
     return Halves(kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(square[solved]))
 
 
-def _tips(robot: Robot, readings: Measurements, rows: NDArray[np.int64]) -> Array:
+def _tips(robot: Robot, readings: Measurements, rows: Integers) -> Array:
     """Predicted tips (K, 3), tracker frame; NaN where not solved."""
     if robot.effects:  # they may depend on the whole path
         seen = effect_model.readings(robot, readings)

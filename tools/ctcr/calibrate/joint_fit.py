@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_roll
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
@@ -23,8 +23,6 @@ from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -224,7 +222,7 @@ def _stage(name: str, residual: Array) -> Stage:
     return Stage(name, *errors, *((float(size.mean()), float(size.max())) if len(size) else ()))
 
 
-def _held_out(judged: list[tuple[Fit, NDArray[np.bool_]]], kind: str) -> HeldOut:
+def _held_out(judged: list[tuple[Fit, Mask]], kind: str) -> HeldOut:
     """All held-out readings together: fits, each with the rows (M,) that it judges."""
     residual = np.concatenate([fit.residual[rows] for fit, rows in judged])
     expected = np.concatenate([fit.expected_square[rows] for fit, rows in judged])

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.motors import Motors
@@ -20,8 +20,6 @@ from ctcr.bench.shared.transmission import turns_of_joints
 from ctcr.calibrate.tables import Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 PATIENCE_S = 30.0
 STILL_M = 0.5e-3  # motion of a probe that a hand holds still, with the tracker's noise
@@ -108,7 +106,7 @@ def point_table(path: str | Path, points: Table, desk: Desk, frames: int, rounds
 class StillReading:
     """The mean of some frames of a sensor at rest; `scatter`: standard deviation of one frame, per axis [m]."""
 
-    position: NDArray[np.float64]  # (3,) [m], tracker frame
+    position: Array  # (3,) [m], tracker frame
     scatter: float
     frames: int
 

@@ -4,11 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Mask
 from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
-
-Array = NDArray[np.float64]
 
 WIDTH, ROW_HEIGHT = 10.4, 3.6
 LONGEST_ARROW = 0.15  # of the size of the picture
@@ -21,8 +19,8 @@ class Circle:
     name: str
     position: Array  # (K, 3) [m], in the frame of the circle
     angle: Array  # (K,) of the tube, without its offset [rad]
-    forward: NDArray[np.bool_]  # (K,)
-    used: NDArray[np.bool_]  # (K,)
+    forward: Mask  # (K,)
+    used: Mask  # (K,)
     centre: Array  # (3,) [m]
     normal: Array  # (3,)
     radius: float  # [m]
@@ -42,7 +40,7 @@ class Circle:
         return np.degrees(np.angle(np.exp(1j * off) / np.mean(np.exp(1j * off[self.used]))))
 
 
-def circle_of(name: str, position: Array, angle: Array, forward: NDArray[np.bool_], fit, robot) -> Circle:
+def circle_of(name: str, position: Array, angle: Array, forward: Mask, fit, robot) -> Circle:
     """The circle of a fit to readings (K, 3) [m], tracker frame, at the tube's angles (K,) [rad]."""
     if fit.in_base_frame:
         position = (position - robot.tracker.position) @ robot.tracker.rotation

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from math import degrees, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
 from ctcr.calibrate.tables import Column, Table
@@ -18,8 +18,6 @@ from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change
 from ctcr.show.wording import listed
-
-Array = NDArray[np.float64]
 
 SIGMAS_AT_95 = 2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
 AXES = "xyz"

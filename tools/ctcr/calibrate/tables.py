@@ -10,12 +10,11 @@ from math import pi
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Integers
 from ctcr.errors import InputError, Problem, did_you_mean, file_fault, shown
 from ctcr.table.csv_table import Faults, header_names
 
-Array = NDArray[np.float64]
 MAX_BYTES = 16 << 20
 
 UNITS = {
@@ -54,8 +53,8 @@ class Table:
     """The columns that are there, by name, in SI units; empty fields are NaN. `unit` is as written in the file."""
 
     file: str
-    row: NDArray[np.int64]  # (M,) of the file; the header is row 1
-    columns: dict[str, Array | NDArray[np.int64] | list[str]]
+    row: Integers  # (M,) of the file; the header is row 1
+    columns: dict[str, Array | Integers | list[str]]
     unit: dict[str, str]
 
     def __len__(self) -> int:

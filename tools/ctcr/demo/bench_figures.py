@@ -5,16 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.diagnose.figures import GOOD
 from ctcr.model import simulation
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
 from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 OURS, SIMULATED = "#e2eef4", "#f6ead9"
 BOXES = {  # name: x, y, width, colour, text

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices import bench_file
 from ctcr.bench.record.folder import ABOUT, TABLE
 from ctcr.demo import bench_figures
@@ -27,8 +27,6 @@ from ctcr.show.output import write_text
 from ctcr.table import measurements
 from ctcr.track import scenario
 from ctcr.track.recording import runs_of
-
-Array = NDArray[np.float64]
 
 TITLE = "A hidden effect, found on the bench"
 SHOWN = ("actuation.home_rotation_deg", "tracker.position_mm")  # of the calibrated parameters

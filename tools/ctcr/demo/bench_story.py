@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.record.folder import TABLE
 from ctcr.demo import blind_drive
 from ctcr.demo.story import Story
@@ -14,8 +14,6 @@ from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table import measurements
 from ctcr.track import scenario
-
-Array = NDArray[np.float64]
 
 FILES = Path(__file__).parent / "bench"
 BENCH = "--bench bench.yaml"

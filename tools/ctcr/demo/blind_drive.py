@@ -1,16 +1,14 @@
 """Joints that bring the tip to points by the model alone, without a look at the tracker: as good as the model is."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ctcr.arrays import Array, ArrayLike
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.model import simulation
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 TURN = np.deg2rad(60.0)  # in one direction: longer than the memory of friction
 CLOSE = 2e-5  # [m] from a point, by the model

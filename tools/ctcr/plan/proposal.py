@@ -10,17 +10,15 @@ from itertools import permutations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
 from ctcr.plan.runs import Run, random_runs, table
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -105,7 +103,7 @@ class Contest:
     covariance (n, n) of the other's parameters before these runs.
     """
 
-    def __init__(self, residual: Array, jacobian: Array, run: NDArray[np.int64], covariance: Array) -> None:
+    def __init__(self, residual: Array, jacobian: Array, run: Integers, covariance: Array) -> None:
         parts = [run == k for k in range(int(run.max()) + 1)]
         self.square = np.array([residual[part] @ residual[part] for part in parts])
         self.cross = np.array([jacobian[part].T @ residual[part] for part in parts])
@@ -113,7 +111,7 @@ class Contest:
         self.known = np.linalg.inv(covariance)
 
     @property
-    def solved(self) -> NDArray[np.bool_]:
+    def solved(self) -> Mask:
         """Runs (count,) that both explanations predict."""
         return np.isfinite(self.square)
 

@@ -6,13 +6,11 @@ Joints stay within the measured range, tube tips in their measured order, loads 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.model.model import Model
 from ctcr.reproduce.paper import Claim, paper_robot, random_design, random_rows
-
-Array = NDArray[np.float64]
 
 SCHEMES = {"RK3": "ssprk3", "RK4": "rk4", "RK8": "rk8", "ours": "default"}
 # Of RK8 a segment: the paper takes 100, which differ from these by less than 1e-12 of the length.

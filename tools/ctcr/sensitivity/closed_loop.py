@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.model import parameters
@@ -16,8 +16,6 @@ from ctcr.sensitivity.work import ProgressFile, workers
 from ctcr.track.result import errors_mm
 from ctcr.track.runs import check, run_once
 from ctcr.track.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

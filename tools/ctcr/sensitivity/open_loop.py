@@ -6,15 +6,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.sensitivity.ranges import Varied, together
 from ctcr.sensitivity.work import ProgressFile, workers
-
-Array = NDArray[np.float64]
 
 BLOCK = 1024  # configurations that share a seed
 CHUNK = 16  # blocks a job

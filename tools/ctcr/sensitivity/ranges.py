@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from ctcr.arrays import Array
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

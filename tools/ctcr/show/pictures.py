@@ -9,11 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.show.output import atomic_writer
-
-Array = NDArray[np.float64]
 
 TUBE_COLOURS = ("#e8871e", "#3f8fc4", "#6b7a8f", "#3d4757")  # innermost first; apart for colour-blind eyes too
 AXIS_COLOURS = ("#c0392b", "#27934b", "#2255aa")

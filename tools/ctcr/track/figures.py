@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
 from ctcr.show.style import AXES, ERROR, FAINT, INK, OUT
 from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
-
-Array = NDArray[np.float64]
 
 MOST_POINTS = 3000  # of a line of the 3-D view
 COLOURS = (OUT, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")

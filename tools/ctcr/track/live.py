@@ -8,8 +8,8 @@ from math import tau
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.fault import DeviceFault
@@ -30,8 +30,6 @@ from ctcr.track.recording import COLUMNS, CONTROL, control_row, finished, runs_o
 from ctcr.track.result import Run
 from ctcr.track.runs import check, run_once, system_values
 from ctcr.track.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 PATIENCE_S = 2.0
 MOST_ERROR_MM = 20.0

@@ -3,9 +3,7 @@
 import json
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ctcr.arrays import Array
 from ctcr.bench.devices.fault import needed
 from ctcr.bench.record.folder import ABOUT, COPIES, TABLE
 from ctcr.errors import InputError, Problem, file_fault
@@ -48,7 +46,7 @@ def write_mcap(folder: str | Path, target: str | Path) -> dict[str, int]:
     return counts
 
 
-def _channels(folder: Path) -> dict[str, tuple[list[str], NDArray[np.float64]]]:
+def _channels(folder: Path) -> dict[str, tuple[list[str], Array]]:
     """Columns and rows of each channel; the first column is t_s."""
     n = robot_file.load(folder / COPIES["robot"]).n_tubes
     names, groups = column_names(n), group_columns(n)
@@ -63,7 +61,7 @@ def _channels(folder: Path) -> dict[str, tuple[list[str], NDArray[np.float64]]]:
     return found
 
 
-def _write(writer, topic: str, columns: list[str], rows: NDArray[np.float64], start: float) -> int:
+def _write(writer, topic: str, columns: list[str], rows: Array, start: float) -> int:
     schema = {
         "type": "object",
         "required": columns,

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, LinearConstraint, minimize
 
+from ctcr.arrays import Array
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.track.scenario import Limits, Scenario
-
-Array = NDArray[np.float64]
 
 REACHED = 1e-6  # [m]
 

@@ -1,8 +1,8 @@
 """Runs on the bench as files: the measurements, and beside them reference and results of the controller, row by row."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.record.folder import TABLE, Folder
 from ctcr.frames import tracker_to_base
 from ctcr.robot.description import Robot
@@ -10,8 +10,6 @@ from ctcr.table import measurements
 from ctcr.table.csv_table import read_columns
 from ctcr.track.result import Run, beside_obstacle
 from ctcr.track.scenario import TASKS, Scenario
-
-Array = NDArray[np.float64]
 
 CONTROL = "control.csv"
 _GROUPS = (

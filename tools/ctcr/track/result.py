@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Mask
 from ctcr.track.scenario import TASKS, Scenario
-
-Array = NDArray[np.float64]
 
 FAR = 10e-3  # [m] from the obstacle's surface; errors nearer to it do not count, as the tip must deviate there
 FAILED = 1e-3  # [m] error above which a run has failed
@@ -32,7 +31,7 @@ class Run:
     held: NDArray[np.int32]  # (R, 4) bits of the tubes held at base gaps, tip gaps, travel; speed
     force: Array  # (R, 3) [N] tip force in the controller's model
     stability: Array  # (R,) det B_u
-    far: NDArray[np.bool_]  # (R,) whether the reference is far from the obstacle
+    far: Mask  # (R,) whether the reference is far from the obstacle
     clearance: float  # least distance between tip and obstacle [m]; infinite without one
 
     @property
@@ -50,7 +49,7 @@ class Run:
         return self.error[self.far]
 
     @property
-    def at_limit(self) -> NDArray[np.bool_]:
+    def at_limit(self) -> Mask:
         """(R,) whether a position limit held the step."""
         return (self.held[:, :3] > 0).any(axis=1)
 
@@ -98,7 +97,7 @@ def limit_in_words(kind: int, tube: int, n: int) -> str:
     return f"{('base', 'tip')[kind]} of tube {tube + 1} against {beside}"
 
 
-def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[NDArray[np.bool_], float]:
+def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[Mask, float]:
     """Run.far and Run.clearance."""
     if not scenario.obstacle:
         return np.ones(len(wanted), bool), np.inf

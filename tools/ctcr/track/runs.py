@@ -6,17 +6,15 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.track.result import FAR, UNSETTLED, Run, beside_obstacle, limit_in_words
 from ctcr.track.scenario import Scenario
-
-Array = NDArray[np.float64]
 
 
 class Device(Protocol):

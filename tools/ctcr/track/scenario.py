@@ -11,16 +11,14 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Len
-from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationError
 
+from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.robot import yaml_document
 from ctcr.robot.checks import problems
 from ctcr.robot.description import Section, Three
 from ctcr.robot.units import Quantity
-
-Array = NDArray[np.float64]
 
 # All twelve edges of a cube: three are travelled twice, as each of its eight corners has three edges. Bit k of a
 # corner's number says at which end of axis k it lies.

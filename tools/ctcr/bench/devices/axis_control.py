@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ctcr.arrays import Array, ArrayLike, Mask
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motion import StraightMove, VelocityMove
-
-Array = NDArray[np.float64]
 
 GAIN = 20.0  # [1/s] of the position loop, closed on the encoders
 STOP_RAMPS = 4.0  # a stop brakes so much harder than a move
@@ -153,7 +151,7 @@ class AxisControl:
             raise _fault("the joints are not known since power on", "home first: `ctcr move --home`")
 
 
-def _axis_fault(which: NDArray[np.bool_], what: str, remedy: str) -> DeviceFault:
+def _axis_fault(which: Mask, what: str, remedy: str) -> DeviceFault:
     """Of the first axis of a mask (2N,)."""
     tube, n = int(np.flatnonzero(which)[0]), len(which) // 2
     kind = "translation" if tube < n else "rotation"

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from ctcr.arrays import Array, ArrayLike
 
 
 @dataclass(frozen=True)

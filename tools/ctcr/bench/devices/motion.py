@@ -1,9 +1,8 @@
 """Motion profiles of the joints: straight moves and velocities, with ramps."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from ctcr.arrays import Array, ArrayLike
 
 
 class StraightMove:

@@ -6,15 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ctcr.arrays import Array, ArrayLike
 from ctcr.bench.devices import bus_process, emergency_stop
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.process_client import CONNECT_S, ProcessClient
 from ctcr.bench.shared.transmission import home_joints, transmission, turns_of_joints
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 ANSWER_S = 2.0  # patience with the bus process, which answers within some bus cycles of 4 ms
 POLL_S = 0.005  # about one bus cycle

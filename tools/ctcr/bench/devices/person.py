@@ -4,13 +4,12 @@ from pathlib import Path
 
 import click
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices.bench_file import SIMULATED, Bench
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import AURORA
 
-Array = NDArray[np.float64]
 GRAVITY = 9.80665  # [m/s^2]
 
 

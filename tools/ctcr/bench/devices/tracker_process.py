@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices.aurora import Aurora
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.shared.ndi import RATE_HZ, SYSTEM_STATUS, ToolReading
@@ -51,7 +51,7 @@ class TrackedFrame:
         return cls(t, ToolReading(handle, position, quaternion, error, status, frame), missed, late)
 
     @property
-    def pose(self) -> NDArray[np.float64]:
+    def pose(self) -> Array:
         """Position [m] and unit quaternion, w >= 0, of a sensor that is seen (7,), tracker frame."""
         quaternion = np.array(self.reading.quaternion)
         quaternion *= (1 if quaternion[0] >= 0 else -1) / np.linalg.norm(quaternion)

@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.errors import InputError, Problem
 from ctcr.table.csv_table import SHOWN
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = {"planned": 0.0, "forward": -1.0, "backward": 1.0}  # sign of the way point minus the target
 

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.devices.tracker_process import TrackedFrame
@@ -14,8 +14,6 @@ from ctcr.bench.record.plan import Step
 from ctcr.bench.record.row_file import RowFile
 from ctcr.model.moving import MovingModel
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

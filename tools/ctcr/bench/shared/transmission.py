@@ -3,12 +3,10 @@
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ctcr.arrays import Array, ArrayLike
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 
 def transmission(robot: Robot) -> Array:

@@ -5,14 +5,12 @@ import subprocess
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from ctcr.arrays import Array, ArrayLike
 from ctcr.errors import InputError, Problem
 from ctcr.frames import base_to_tracker
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 
 class Oracle:

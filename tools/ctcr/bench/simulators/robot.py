@@ -1,16 +1,14 @@
 """The robot on the simulated bench: motors turn, its tip moves, a tracker sees it."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
+from ctcr.arrays import Array, ArrayLike
 from ctcr.bench.shared.transmission import joints_of_turns
 from ctcr.bench.simulators.oracle import Oracle
 from ctcr.effects.one_tube import one_tube
 from ctcr.model.moving import MovingModel
 from ctcr.model.simulation import ReadingNoise
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 INSIDE_M = 2e-4  # a tip that stands out no farther than this counts as behind the plate
 
