@@ -4,7 +4,6 @@ import html
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite, nan
-from pathlib import Path
 from typing import Any
 
 from ctcr.calibrate.procedure_figures import WIDTH
@@ -14,7 +13,6 @@ from ctcr.robot.ledger import Change, Entry
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.output import write_text
 from ctcr.show.wording import deviation, number
 
 
@@ -111,8 +109,8 @@ def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
     return columns, rows
 
 
-def write(outcome: Outcome, target: str | Path, source: str, command: str, robot=None) -> None:
-    """Writes the report; `source` names the table. Raises InputError where the file cannot be written."""
+def page(outcome: Outcome, source: str, command: str, robot=None) -> str:
+    """The whole HTML text; `source` names the table."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
     sections = [f"<h1>{html.escape(title)}</h1>"]
     if outcome.notices:
@@ -121,4 +119,4 @@ def write(outcome: Outcome, target: str | Path, source: str, command: str, robot
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))
     sections.append(table("Found, with one standard deviation", *cells(outcome), 2))
-    write_text(html_page.page(title, sections, source, command), target)
+    return html_page.page(title, sections, source, command)

@@ -1,7 +1,6 @@
 """The calibration as one HTML page that needs nothing else: no network, no other file."""
 
 import html
-from pathlib import Path
 
 import numpy as np
 
@@ -11,19 +10,13 @@ from ctcr.calibrate.view import view
 from ctcr.model.fields import doubts
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import write_text
 from ctcr.show.wording import mm
 
 WIDE = 10.4  # [in] of a figure as wide as the page
 
 
-def write(c: Calibration, target: str | Path, source: str) -> None:
-    """Writes the report; source says what was fitted. Raises InputError when the file cannot be written."""
-    write_text(page(c, source), target)
-
-
 def page(c: Calibration, source: str) -> str:
-    """The whole HTML text."""
+    """The whole HTML text; `source` says what was fitted."""
     title = f"Calibration: {c.before.name}"
     sections = [_opening(c, title), _doubts(c), *_fit(c), _halves(c), _residuals(c), _numbers(c)]
     return html_page.page(title, sections, source, "ctcr calibrate fit", view(c))

@@ -121,7 +121,10 @@ class Output:
     def write_report(self, module: str, result, source: str, **details) -> None:
         """Where --report asks for it: the page of the module, below ctcr; `source` says what it is made from."""
         if self.report:
-            import_module(f"ctcr.{module}").write(result, self.report, source, **details)
+            from ctcr.show import output
+
+            page = import_module(f"ctcr.{module}").page(result, source, **details)
+            output.write_text(page, self.report)
 
 
 def _gives_output(*options):

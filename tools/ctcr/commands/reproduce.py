@@ -21,10 +21,9 @@ def command(quick: bool, target: str, out) -> None:
     """
     import time
 
-    from ctcr.reproduce import control, influence, model
-    from ctcr.reproduce import report as page
+    from ctcr.reproduce import control, influence, model, report
     from ctcr.reproduce.paper import COLUMNS
-    from ctcr.show.output import Progress
+    from ctcr.show.output import Progress, write_text
 
     designs, configurations, repetitions = (20, 50, 1) if quick else (1000, 1000, 10)
     samples, points = (2000, 3) if quick else (1_000_000, 11)
@@ -42,7 +41,7 @@ def command(quick: bool, target: str, out) -> None:
         *influence.claims(found),
     ]
     made = f"{time.process_time() - start:.0f} s of processor time in {time.monotonic() - clock:.0f} s"
-    page.write(target, claims, errors, runs, found, made, quick)
+    write_text(report.page(claims, errors, runs, found, made, quick), target)
     out.write_json([{**vars(claim), "ratio": claim.ratio} for claim in claims])
     shown = (0, 1, 3, 4, 5)  # the reasons are on the page
     rows = [[claim.row()[k] for k in shown] for claim in claims]

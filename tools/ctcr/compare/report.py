@@ -2,7 +2,6 @@
 
 import html
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -12,16 +11,10 @@ from ctcr.compare.scene import MOST_ARROWS, arrow_factor, scene
 from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import write_text
-
-
-def write(c: Comparison, target: str | Path, source: str) -> None:
-    """Write the report; source says what was compared. Raises InputError when the file cannot be written."""
-    write_text(page(c, source), target)
 
 
 def page(c: Comparison, source: str) -> str:
-    """The whole HTML text."""
+    """The whole HTML text; `source` says what was compared."""
     title = f"Model and measurement: {c.robot}"
     sections = [_opening(c, title), _findings(c), _view(c), _figures(c), _tables(c)]
     return html_page.page(title, sections, source, "ctcr compare", scene(c))

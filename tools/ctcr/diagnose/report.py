@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from html import escape
-from pathlib import Path
 
 import numpy as np
 
@@ -13,19 +12,13 @@ from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import cards, figure, table
-from ctcr.show.output import write_text
 from ctcr.show.wording import short
 
 MOST_ARROWS = 800
 
 
-def write(d: Diagnosis, target: str | Path, source: str) -> None:
-    """Write the report; source says what was diagnosed. Raises InputError when the file cannot be written."""
-    write_text(page(d, source), target)
-
-
 def page(d: Diagnosis, source: str) -> str:
-    """The whole HTML text."""
+    """The whole HTML text; `source` says what was diagnosed."""
     title = f"Diagnosis: {d.robot.name}"
     parts = [_found, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d, title), *(part(d) for part in parts)]

@@ -1,27 +1,22 @@
 """The page: the paper's values, ours, their ratio, why they differ, and the figures."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from ctcr.reproduce.control import Scenarios
 from ctcr.reproduce.influence import SLOW_FEEDBACK, Influence
 from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
-from ctcr.sensitivity import figures as sensitivity
+from ctcr.sensitivity import report as sensitivity
 from ctcr.show import html_page
 from ctcr.show.html_page import cards, figure, table
-from ctcr.show.output import write_text
 from ctcr.show.style import AXES, ERROR
 from ctcr.track import figures as track
 from ctcr.track.result import errors_mm
 from ctcr.track.scenario import shipped
 
 
-def write(
-    target: str | Path, claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made: str, quick: bool
-) -> None:
-    """Writes the page; `made` says how long it took. Raises InputError where the file cannot be written."""
+def page(claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made: str, quick: bool) -> str:
+    """The whole HTML text; `made` says how long it took."""
     title, wanted = "The paper and this library", shipped("S2")
     runs = {f"{name}, {mass:g} g": s.runs[name, mass][0] for name, mass in (("S2", 0.0), ("S3", 20.0), ("S4", 20.0))}
     shown = "fewer designs, configurations and repetitions than the paper" if quick else "as many as the paper"
@@ -47,7 +42,7 @@ def write(
         *(figure(*picture, wide=True) for picture in pictures),
     ]
     view = track.scene(list(runs.values()), wanted, list(runs))
-    write_text(html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view), target)
+    return html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view)
 
 
 def _robot() -> str:

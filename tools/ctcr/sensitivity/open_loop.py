@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ctcr import _core
-from ctcr.arrays import Array
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.sensitivity.ranges import Varied, together
@@ -17,43 +16,8 @@ from ctcr.sensitivity.work import ProgressFile, workers
 BLOCK = 1024  # configurations that share a seed
 CHUNK = 16  # blocks a job
 EDGES_MM = 1e3 * np.geomspace(1e-7, 1.0, 241)  # of the histogram's bins
-
-
-@dataclass
-class Totals:
-    """Sums over the configurations so far: a column for each end of each parameter, the last for all together."""
-
-    count: Array
-    unsolved: Array
-    sum: Array
-    sum_of_squares: Array
-    maximum: Array
-    histogram: Array
-    evaluations: float = 0.0
-    seconds: float = 0.0  # of processors
-    jobs: int = 0
-
-    @classmethod
-    def empty(cls, columns: int) -> "Totals":
-        return cls(*(np.zeros(columns) for _ in range(5)), np.zeros((columns, len(EDGES_MM) - 1)))
-
-    def add(self, part: dict[str, Any]) -> None:
-        """Adds the result of the next job, in their order: the sums then do not depend on the worker."""
-        for name in ("count", "unsolved", "sum", "sum_of_squares"):
-            for row in part[name]:
-                setattr(self, name, getattr(self, name) + row)
-        self.maximum = np.maximum(self.maximum, np.max(part["maximum"], axis=0))
-        self.histogram = self.histogram + part["histogram"]
-        self.evaluations += part["evaluations"]
-        self.seconds += part["seconds"]
-        self.jobs += 1
-
-    def as_state(self) -> dict[str, Any]:
-        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(self).items()}
-
-    @classmethod
-    def from_state(cls, state: dict[str, Any]) -> "Totals":
-        return cls(**{name: np.array(v) if isinstance(v, list) else v for name, v in state.items()})
+BY_BLOCK = ("count", "unsolved", "sum", "sum_of_squares")  # results of a job that hold a row a block
+Totals = dict[str, Any]  # sums over configurations: a column for each end of each parameter, the last for all together
 
 
 @dataclass(frozen=True)
@@ -84,7 +48,7 @@ def work(job: dict[str, Any]) -> dict[str, Any]:
     clock = time.thread_time if job["threads"] == 1 else time.process_time
     start, nominal = clock(), _core.SystemValues(parameters=job["nominal"], effects=np.empty(0))
     result = _core.sensitivity(**job | {"nominal": nominal})
-    names = ("count", "unsolved", "sum", "sum_of_squares", "maximum", "histogram", "evaluations")
+    names = (*BY_BLOCK, "maximum", "histogram", "evaluations")
     return {name: getattr(result, name) for name in names} | {"seconds": clock() - start}
 
 
@@ -112,15 +76,33 @@ def study(
     settings = {"nominal": nominal.tolist(), "ends": ends.tolist(), "configurations": configurations, **options}
     kept = ProgressFile(keep, {"study": "open loop", **settings})
     state = kept.load()
-    totals = Totals.from_state(state) if state else Totals.empty(len(ends) + 1)
-    done = totals.jobs
+    totals = {name: np.array(value) for name, value in state.items()} if state else no_totals(len(ends) + 1)
+    done = int(totals["jobs"])
     advance(sum(job["blocks"] * job["configurations"] for job in jobs[:done]))
     with workers(dask) as in_order:
         for job, part in zip(jobs[done:], in_order(work, jobs[done:]), strict=True):
-            totals.add(part)
-            kept.save(totals.as_state())
+            _add(totals, part)
+            kept.save({name: value.tolist() for name, value in totals.items()})
             advance(job["blocks"] * job["configurations"])
     return _summary(varied, configurations, totals)
+
+
+def no_totals(columns: int) -> Totals:
+    """The totals before the first job."""
+    totals = {name: np.zeros(columns) for name in (*BY_BLOCK, "maximum")}
+    totals |= {"histogram": np.zeros((columns, len(EDGES_MM) - 1))}
+    return totals | {"evaluations": np.array(0.0), "seconds": np.array(0.0), "jobs": np.array(0)}
+
+
+def _add(totals: Totals, part: dict[str, Any]) -> None:
+    """Adds the result of the next job, in their order: the sums then do not depend on the worker."""
+    for name in BY_BLOCK:
+        for row in part[name]:
+            totals[name] = totals[name] + row
+    for name in ("histogram", "evaluations", "seconds"):
+        totals[name] = totals[name] + part[name]
+    totals["maximum"] = np.maximum(totals["maximum"], np.max(part["maximum"], axis=0))
+    totals["jobs"] = totals["jobs"] + 1
 
 
 def _pieces(configurations: int) -> Iterator[dict[str, int]]:
@@ -134,13 +116,14 @@ def _pieces(configurations: int) -> Iterator[dict[str, int]]:
 
 def _summary(varied: list[Varied], configurations: int, t: Totals) -> OpenLoop:
     def influence(name: str, columns: slice) -> Influence:
-        count, unsolved = t.count[columns].sum(), int(t.unsolved[columns].sum())
+        count, unsolved = t["count"][columns].sum(), int(t["unsolved"][columns].sum())
         if not count:
             return Influence(name, np.nan, np.nan, np.nan, unsolved)
-        mean, largest = 1e3 * t.sum[columns].sum() / count, 1e3 * t.maximum[columns].max()
-        upper_bin = int(np.searchsorted(np.cumsum(t.histogram[columns].sum(axis=0)), 0.95 * count))
+        mean, largest = 1e3 * t["sum"][columns].sum() / count, 1e3 * t["maximum"][columns].max()
+        upper_bin = int(np.searchsorted(np.cumsum(t["histogram"][columns].sum(axis=0)), 0.95 * count))
         return Influence(name, mean, min(EDGES_MM[upper_bin + 1], largest), largest, unsolved)
 
     each = [influence(one.name, slice(2 * k, 2 * k + 2)) for k, one in enumerate(varied)]
     all_at_once = influence("all together", slice(2 * len(varied), None))
-    return OpenLoop(configurations, each, all_at_once, float(t.count.sum()), t.evaluations, t.seconds)
+    solved, evaluations, seconds = (float(t[name].sum()) for name in ("count", "evaluations", "seconds"))
+    return OpenLoop(configurations, each, all_at_once, solved, evaluations, seconds)

@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -15,33 +16,25 @@ from typing import Any
 from ctcr.errors import InputError, Problem, file_fault
 from ctcr.show.output import atomic_writer
 
-Map = Callable[[Callable, Iterable], Iterator]
-
 
 @contextmanager
-def workers(address: str | None, threads: int | None = None) -> Iterator[Map]:
+def workers(address: str | None, threads: int | None = None) -> Iterator[Callable[[Callable, Iterable], Iterator]]:
     """Gives map(function, jobs), which yields results in the order of the jobs; few are held at a time.
 
     `address` is that of a dask.distributed scheduler; None: `threads` of this machine (None: all cores).
     """
     if address is None:
         count = threads or os.cpu_count() or 1
-        with ThreadPoolExecutor(count) as pool:
-            try:
-                yield lambda function, jobs: _in_order(pool.submit, function, jobs, 2 * count)
-            finally:
-                pool.shutdown(cancel_futures=True)  # an interruption does not wait for jobs that have not begun
-        return
-    client = _client(address)
-
-    def submit(function: Callable, job: Any):
-        return client.submit(function, job, pure=False)
-
+        pool = ThreadPoolExecutor(count)
+        submit, close = pool.submit, partial(pool.shutdown, cancel_futures=True)  # waits only for jobs that have begun
+    else:
+        client = _client(address)
+        count = max(sum(client.nthreads().values()), 1)
+        submit, close = partial(client.submit, pure=False), client.close
     try:
-        width = 2 * max(sum(client.nthreads().values()), 1)
-        yield lambda function, jobs: _in_order(submit, function, jobs, width)
+        yield lambda function, jobs: _in_order(submit, function, jobs, 2 * count)
     finally:
-        client.close()
+        close()
 
 
 def _client(address: str) -> Any:

@@ -1,24 +1,17 @@
 """A scenario as one HTML page that needs nothing else: no network, no other file."""
 
 import html
-from pathlib import Path
 
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.output import write_text
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
 
 
-def write(
-    runs: list[Run], target: str | Path, source: str, scenario: Scenario, robot: Robot, measured: bool = False
-) -> None:
-    """Writes the page; `source` says what was run. Raises InputError where the file cannot be written.
-
-    `measured`: tips are tracker readings.
-    """
+def page(runs: list[Run], source: str, scenario: Scenario, robot: Robot, measured: bool = False) -> str:
+    """The whole HTML text; `source` says what was run; `measured`: tips are tracker readings."""
     numbers = summary(runs)
     drawn = [worst([run for run in group if run.started] or group) for group in by_mass(runs).values()]
     sections = [
@@ -30,7 +23,7 @@ def write(
         *(_one(run, scenario, robot) for run in _shown(drawn)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
-    write_text(html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario)), target)
+    return html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario))
 
 
 def _shown(runs: list[Run]) -> list[Run]:
