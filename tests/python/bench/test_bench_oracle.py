@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 from ctcr import cli
-from ctcr.bench.simulators.oracle import Oracle
-from ctcr.bench.simulators.robot import SimulatedRobot
+from ctcr.bench.simulators.robot import Oracle, SimulatedRobot
 from ctcr.errors import InputError
 from ctcr.robot import robot_file
 from simulated_bench import ROBOT, ROOT, ctcr, running

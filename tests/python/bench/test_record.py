@@ -15,9 +15,8 @@ from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.person import Person
 from ctcr.bench.record.display import picture
 from ctcr.bench.record.live_page import LivePage
-from ctcr.bench.record.plan import Approach, steps_of
 from ctcr.bench.record.row_file import RowFile
-from ctcr.bench.record.session import Progress
+from ctcr.bench.record.session import Approach, Progress, steps_of
 from ctcr.errors import InputError
 from ctcr.robot import robot_file
 from ctcr.table import measurements

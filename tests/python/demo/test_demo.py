@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr.bench.record.joined import PAUSE_S, joined, start_of
-from ctcr.demo.hidden_robot import VALUE
+from ctcr.demo.bench_story import VALUE
 from ctcr.demo.story import LOG, Story, new_folder
 from ctcr.errors import InputError
 from ctcr.table import measurements

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from ctcr import cli
 from ctcr.model import simulation
-from ctcr.plan.proposal import Contest
-from ctcr.plan.runs import random_runs, table
+from ctcr.plan.proposal import Contest, random_runs, table
 from ctcr.robot import robot_file
 from ctcr.table import measurements
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from ctcr.calibrate import figures, terminal
 from ctcr.calibrate.joint_fit import Calibration
-from ctcr.calibrate.view import view
 from ctcr.model.fields import doubts
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, cards, figure, table
@@ -19,7 +18,7 @@ def page(c: Calibration, source: str) -> str:
     """The whole HTML text; `source` says what was fitted."""
     title = f"Calibration: {c.before.name}"
     sections = [_opening(c, title), _doubts(c), *_fit(c), _halves(c), _residuals(c), _numbers(c)]
-    return html_page.page(title, sections, source, "ctcr calibrate fit", view(c))
+    return html_page.page(title, sections, source, "ctcr calibrate fit", figures.view(c))
 
 
 def _opening(c: Calibration, title: str) -> str:

@@ -34,10 +34,9 @@ def bench(target, short, folder) -> int:
     from ctcr.bench.simulators import bench as simulated
     from ctcr.bench.simulators.robot import SimulatedRobot
     from ctcr.demo import bench_story
-    from ctcr.demo.hidden_robot import hidden_robot
     from ctcr.robot import robot_file
 
-    hidden = hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
+    hidden = bench_story.hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
     return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), private_folder(folder))
 
 

@@ -49,8 +49,7 @@ def command(robot, plan, target, bench_path, dwell, readings, speed, patience, p
     from ctcr.bench.record.display import Display
     from ctcr.bench.record.folder import TABLE, Folder
     from ctcr.bench.record.live_page import LivePage
-    from ctcr.bench.record.plan import Approach, steps_of
-    from ctcr.bench.record.session import Options, Session
+    from ctcr.bench.record.session import Approach, Options, Session, steps_of
     from ctcr.bench.shared.folder import private_folder
 
     loaded, table = options.load(robot, plan)

@@ -136,8 +136,7 @@ def _run(program) -> int:
 def _robot(robot, seed, hidden, oracle, noise):
     import shlex
 
-    from ctcr.bench.simulators.oracle import Oracle
-    from ctcr.bench.simulators.robot import SimulatedRobot
+    from ctcr.bench.simulators.robot import Oracle, SimulatedRobot
     from ctcr.robot import robot_file
 
     if oracle and hidden:

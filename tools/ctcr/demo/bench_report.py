@@ -14,8 +14,7 @@ from ctcr.bench.devices import bench_file
 from ctcr.bench.record.folder import ABOUT, TABLE
 from ctcr.demo import bench_figures
 from ctcr.demo.bench_figures import Driven
-from ctcr.demo.bench_story import ROBOTS, cube
-from ctcr.demo.hidden_robot import EFFECT, VALUE
+from ctcr.demo.bench_story import EFFECT, ROBOTS, VALUE, cube
 from ctcr.demo.story import Story
 from ctcr.frames import tracker_to_base
 from ctcr.model import parameters as free_parameters

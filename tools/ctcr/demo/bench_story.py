@@ -10,8 +10,10 @@ from ctcr.arrays import Array
 from ctcr.bench.record.folder import TABLE
 from ctcr.demo import blind_drive
 from ctcr.demo.story import Story
+from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.robot import robot_file
+from ctcr.robot.description import Robot
 from ctcr.table import measurements
 from ctcr.track import scenario
 
@@ -19,6 +21,19 @@ FILES = Path(__file__).parent / "bench"
 BENCH = "--bench bench.yaml"
 KNOWN = "known.yaml"  # the robot file after the procedures
 ROBOTS = {"calibrated": "without friction", "with_effect": "with friction"}  # in the model
+EFFECT, VALUE = "friction", 0.02  # coefficient of every tube
+SEED = 4
+SHIFT_MM, TURN_DEG = ((9.0, -6.0, 7.0), (3.0, -2.5, 2.0))  # of the tracker, and of the tubes at home, if misplaced
+
+
+def hidden_robot(known: Robot, misplaced: bool) -> Robot:
+    """The robot on the bench: off its file `known` in all calibrated parameters, with an effect that the file lacks."""
+    built = simulation.as_built(known, np.random.default_rng(SEED))
+    if misplaced:
+        built.tracker.position_mm = list(np.add(built.tracker.position_mm, SHIFT_MM))
+        built.actuation.home_rotation_deg = list(np.add(built.actuation.home_rotation_deg, TURN_DEG))
+    values = {f"effects.{EFFECT}.coefficient.{i + 1}": VALUE for i in range(known.n_tubes)}
+    return catalogue.with_values(built, [EFFECT], values)
 
 
 def tell(story: Story, short: bool = False) -> None:

@@ -17,7 +17,7 @@ from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
-from ctcr.plan.runs import Run, random_runs, table
+from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
@@ -28,6 +28,15 @@ class Rival:
     id: str
     fit: joint.Fit
     fixed: dict[str, float]  # values of parameters of effects that are not fitted
+
+
+@dataclass(frozen=True)
+class Run:
+    """Stops between two configurations and back again, under one load."""
+
+    beta: Array  # (2 stops, N) [m]
+    alpha: Array  # (2 stops, N) [rad]
+    mass: float  # hung at the tip [kg]
 
 
 @dataclass(frozen=True)
@@ -142,3 +151,51 @@ def _readings(diagnosis: Diagnosis, rival: Rival, plan: Measurements) -> tuple[A
     recorded: Any = user_recording.recording_of(diagnosis.robot, plan, rival.fit.names, fixed=rival.fixed)
     recorded.residual(rival.fit.values)
     return recorded.predicted()
+
+
+# ---- random runs
+
+
+def random_runs(
+    robot: Robot, measurements: Measurements, count: int, masses: Array, random: np.random.Generator
+) -> list[Run]:
+    """`count` runs that the robot can do; `masses` [kg] are those that can be hung at the tip.
+
+    Joints stay within the measured range, tube tips in their measured order.
+    """
+    joints = np.hstack([measurements.beta, measurements.alpha])
+    low, high = joints.min(axis=0), joints.max(axis=0)
+    slack = _orders(measurements.beta, robot).min(axis=0)
+    runs = []
+    for _ in range(settings.PLAN_TRIES * count):
+        ends = random.uniform(low, high, size=(2, len(low)))
+        way = np.linspace(ends[0], ends[1], settings.PLAN_STOPS)
+        beta, alpha = np.hsplit(np.vstack([way, way[::-1]]), 2)
+        if (_orders(beta, robot) >= slack).all():
+            runs.append(Run(beta, alpha, float(random.choice(masses))))
+        if len(runs) == count:
+            break
+    return runs
+
+
+def _orders(beta: Array, robot: Robot) -> Array:
+    """How far each grasped point is behind the next tube's, and each tip beyond it (rows, 2 N - 2) [m]."""
+    tips = beta + np.array([tube.length for tube in robot.tubes])
+    return np.hstack([np.diff(beta, axis=1), -np.diff(tips, axis=1)])
+
+
+def table(robot: Robot, runs: list[Run], first_run: int = 0) -> Measurements:
+    """The runs one after the other as a table without poses."""
+    rows = sum(len(run.beta) for run in runs)
+    down = np.array(robot.gravity if robot.gravity is not None else (0.0, 0.0, 0.0))
+    mass = np.concatenate([np.full(len(run.beta), run.mass) for run in runs])
+    return Measurements(
+        t=settings.PLAN_STOP_S * np.arange(rows),
+        run=np.repeat(np.arange(first_run, first_run + len(runs)), [len(run.beta) for run in runs]),
+        beta=np.vstack([run.beta for run in runs]),
+        alpha=np.vstack([run.alpha for run in runs]),
+        force=mass[:, None] * down,
+        position=None,
+        quaternion=None,
+        row=np.arange(rows) + 2,
+    )

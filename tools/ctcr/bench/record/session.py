@@ -1,4 +1,4 @@
-"""One recording: the plan is run on the devices, row by row, and every row is kept."""
+"""One recording: the rows of a plan, checked against the limits, are run on the devices and kept one by one."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -7,13 +7,64 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ctcr.arrays import Array
+from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.devices.tracker_process import TrackedFrame
-from ctcr.bench.record.plan import Step
 from ctcr.bench.record.row_file import RowFile
+from ctcr.errors import InputError, Problem
 from ctcr.model.moving import MovingModel
 from ctcr.robot.description import Robot
+from ctcr.table.csv_table import SHOWN
+from ctcr.table.measurements import Measurements
+
+DIRECTIONS = {"planned": 0.0, "forward": -1.0, "backward": 1.0}  # sign of the way point minus the target
+
+
+@dataclass(frozen=True)
+class Approach:
+    """How the joints come to a row: as planned, or always from below (forward) or above (backward)."""
+
+    direction: str = "planned"
+    translation: float = 2e-3  # [m] between way point and target
+    rotation: float = np.deg2rad(5.0)  # [rad]
+
+    @property
+    def has_way_point(self) -> bool:
+        return self.direction != "planned"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One row of the plan."""
+
+    row: int  # of the plan's file
+    run: int
+    joints: Array  # (2N,) [m], [rad]
+    way_point: Array | None  # (2N,)
+    force: Array  # (3,) [N]
+
+    def problem(self, limits: JointLimits) -> str | None:
+        """Which limit it violates; None where it is allowed."""
+        if text := limits.problem(self.joints):
+            return text
+        text = None if self.way_point is None else limits.problem(self.way_point)
+        return text and f"on its approach {text}"
+
+
+def steps_of(plan: Measurements, approach: Approach, limits: JointLimits, file: str) -> list[Step]:
+    """Raises InputError with every row that the limits forbid."""
+    n = plan.beta.shape[1]
+    shift = DIRECTIONS[approach.direction] * np.repeat([approach.translation, approach.rotation], n)
+    steps = []
+    for row, run, *parts, force in zip(plan.row, plan.run, plan.beta, plan.alpha, plan.force, strict=True):
+        joints = np.concatenate(parts)
+        steps.append(Step(int(row), int(run), joints, joints + shift if approach.has_way_point else None, force))
+    texts = [(step.row, text) for step in steps if (text := step.problem(limits))]
+    if texts:
+        problems = [Problem(text, file, row, line_name="row") for row, text in texts[:SHOWN]]
+        raise InputError(problems, omitted=len(texts) - len(problems))
+    return steps
 
 
 @dataclass(frozen=True)
