@@ -51,20 +51,13 @@ def bench(figure: Figure, _) -> None:
         axes.text(x + width / 2, y + HEIGHT / 2 - 0.38, below, ha="center", fontsize=8.5)
 
 
-@dataclass(frozen=True)
-class Loop:
-    """Readings of runs that go out and come back through the same joints, and the models that predict them."""
+def out_and_return(figure: Figure, loop: tuple[Measurements, dict[str, Robot]]) -> None:
+    """The error of each model along the runs, both ways, in the direction in which the first model errs most.
 
-    table: Measurements
-    models: dict[str, Robot]
-
-
-def out_and_return(figure: Figure, loop: Loop) -> None:
-    """The error of each model along the runs, both ways, in the direction in which the first model errs most."""
-    table, predict = loop.table, simulation.simulate
-    errors = {
-        name: 1e3 * (table.position - predict(robot, table, "none").position) for name, robot in loop.models.items()
-    }
+    `loop`: readings of runs that go out and come back through the same joints, and the models that predict them.
+    """
+    (table, models), predict = loop, simulation.simulate
+    errors = {name: 1e3 * (table.position - predict(robot, table, "none").position) for name, robot in models.items()}
     first = next(iter(errors.values()))
     axis = np.linalg.svd(first - first.mean(axis=0), full_matrices=False)[2][0]
     runs = [run for run in np.unique(table.run) if np.sum(table.run == run) > 2]

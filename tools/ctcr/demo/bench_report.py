@@ -54,12 +54,17 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
     """The whole HTML text; `drives` is empty where the story ended before the cube."""
     folder = story.folder
     known, found = robot_file.load(folder / "robot.yaml"), robot_file.load(folder / "with_effect.yaml")
+    processes = (
+        "Blue: the same processes as on a real bench. Brown: simulated; it answers in the bytes of the real devices, "
+        "so that one line of the bench file replaces each by the real one."
+    )
+    fall = figure(history.draw_waterfall, history.waterfall(found), 8.4, 3.8, "RMS error on held-out runs.")
     sections = [
         _opening(story, found, drives),
-        _bench(),
+        "<h2>The bench</h2>" + figure(bench_figures.bench, None, 10.4, 2.7, processes, wide=True),
         _steps(story),
         _first_look(story, known.n_tubes),
-        _model(found),
+        "<h2>The error of the model falls</h2>" + fall,
         _cube(drives) if drives else "",
         _truth(story, known, found, hidden),
         _loops(story),
@@ -118,14 +123,6 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
     )
 
 
-def _bench() -> str:
-    text = (
-        "Blue: the same processes as on a real bench. Brown: simulated; it answers in the bytes of the real devices, "
-        "so that one line of the bench file replaces each by the real one."
-    )
-    return "<h2>The bench</h2>" + figure(bench_figures.bench, None, 10.4, 2.7, text, wide=True)
-
-
 def _steps(story: Story) -> str:
     rows = "".join(
         f'<li><b>{html.escape(step.why)}</b> <span class="soft">{step.seconds:.0f} s</span><br>'
@@ -138,18 +135,13 @@ def _steps(story: Story) -> str:
 def _first_look(story: Story, n_tubes: int) -> str:
     names = {"calibrated": "calibrated", "with_effect": f"calibrated, with {EFFECT}"}
     models = {name: robot_file.load(story.folder / f"{file}.yaml") for file, name in names.items()}
-    loop = bench_figures.Loop(measurements.load(story.folder / "both.csv", n_tubes), models)
+    loop = measurements.load(story.folder / "both.csv", n_tubes), models
     text = (
         "The error of the model where the same joints were reached from both sides, in its main direction. Without "
         "friction no model can be right on both ways."
     )
     drawn = figure(bench_figures.out_and_return, loop, 10.4, 3.6, text, wide=True)
     return "<h2>The same joints, out and back</h2>" + drawn
-
-
-def _model(found: Robot) -> str:
-    text, stages = "RMS error on held-out runs.", history.waterfall(found)
-    return "<h2>The error of the model falls</h2>" + figure(history.draw_waterfall, stages, 8.4, 3.8, text)
 
 
 def _cube(drives: dict[str, Driven]) -> str:

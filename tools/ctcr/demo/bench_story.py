@@ -20,6 +20,7 @@ from ctcr.track import scenario
 FILES = Path(__file__).parent / "bench"
 BENCH = "--bench bench.yaml"
 KNOWN = "known.yaml"  # the robot file after the procedures
+RECORDED = "{rows} poses, {rms_mm:.2f} mm RMS off the model"
 ROBOTS = {"calibrated": "without friction", "with_effect": "with friction"}  # in the model
 EFFECT, VALUE = "friction", 0.02  # coefficient of every tube
 SEED = 4
@@ -68,14 +69,15 @@ def _find_the_joints(story: Story, short: bool) -> None:
 def _find_the_effect(story: Story, short: bool) -> None:
     dwell, first, second = 0.05 if short else 0.2, "first/measurements.csv", "second/measurements.csv"
     why = "Measure: all tubes turn by 40 degrees and back"
-    story.do(why, _record(KNOWN, "first", dwell), _recorded, "first")
+    story.do(why, _record(KNOWN, "first", dwell), RECORDED, "first")
     if not short:
-        story.do("How wrong is the model?", f"compare {KNOWN} {first}", _compared, "compared")
+        off = "by {position_mm[rms]:.2f} mm RMS, where noise alone would be {noise[rms_mm]:.2f} mm"
+        story.do("How wrong is the model?", f"compare {KNOWN} {first}", off, "compared")
         story.do("Which effect is missing?", f"diagnose {KNOWN} {first}", _diagnosed, "first_diagnosis")
     propose = f"next {KNOWN} {first} --runs 2 -o second.csv"
     story.do("Ask for the runs that decide", propose, _proposed, "proposal")
     if story.answers["proposal"]["runs"]:
-        story.do("Measure them", _record(KNOWN, "second", dwell), _recorded, "second")
+        story.do("Measure them", _record(KNOWN, "second", dwell), RECORDED, "second")
         story.do("Put both recordings together", f"join {KNOWN} {first} {second} -o both.csv", "both.csv")
     else:  # the first recording has decided
         shutil.copy(story.folder / first, story.folder / "both.csv")
@@ -87,10 +89,10 @@ def _add_the_effect(story: Story, short: bool) -> None:
     if not short:
         table = "all.csv"
         why = "Measure all over the workspace"
-        story.do(why, _record(KNOWN, "workspace"), _recorded, "workspace")
+        story.do(why, _record(KNOWN, "workspace"), RECORDED, "workspace")
         story.do("Join it", f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", table)
     fit = f"calibrate fit {KNOWN} {table} -o calibrated.yaml"
-    story.do("Calibrate alone, to compare", fit, _calibrated, "calibrated")
+    story.do("Calibrate alone, to compare", fit, "{rms_mm[held_out]:.2f} mm RMS on held-out runs", "calibrated")
     add = f"add {KNOWN} --diagnosis diagnosis.json --fit {table} -o with_effect.yaml"
     story.do("Add the effect that was found", add, _added, "added")
 
@@ -98,10 +100,12 @@ def _add_the_effect(story: Story, short: bool) -> None:
 def _track(story: Story) -> None:
     """Along the edges of a cube, first by the model alone, then with the tracker's help."""
     corners = cube(story.folder)
+    start = scenario.load(story.folder / "cube.yaml", robot_file.load(story.folder / "robot.yaml").n_tubes).start
+    joints = np.concatenate([1e-3 * np.array(start.beta_mm), np.deg2rad(start.alpha_deg)])
     for robot, name in ROBOTS.items():
         blind = f"blind_{robot}"
         loaded = robot_file.load(story.folder / f"{robot}.yaml")
-        plan = blind_drive.drive(loaded, _start(story.folder), corners)
+        plan = blind_drive.drive(loaded, joints, corners)
         simulation.write(plan, story.folder / f"{blind}.csv", loaded.n_tubes)
 
         off = partial(_off_the_cube, story.folder / blind / TABLE, corners, loaded.n_tubes)
@@ -123,21 +127,11 @@ def cube(folder: Path) -> Array:
     return blind_drive.in_tracker(robot, path.points)
 
 
-def _start(folder: Path) -> Array:
-    """Joints (2N,) [m], [rad] where tracking begins."""
-    start = scenario.load(folder / "cube.yaml", robot_file.load(folder / "robot.yaml").n_tubes).start
-    return np.concatenate([1e-3 * np.array(start.beta_mm), np.deg2rad(start.alpha_deg)])
-
-
 # ---- results of the commands, in words
 
 
 def _devices(told) -> str:
     return f"{len(told['devices'])} devices and tools answer"
-
-
-def _recorded(told) -> str:
-    return f"{told['rows']} poses, {told['rms_mm']:.2f} mm RMS off the model"
 
 
 def _registered(told) -> str:
@@ -149,11 +143,6 @@ def _registered(told) -> str:
 def _turned(told) -> str:
     offsets = [value for value in told["values"] if value["name"].endswith("rotation offset")]
     return ", ".join(f"{value['value']:.1f} ± {value['sd']:.1f}" for value in offsets) + " deg from their marks"
-
-
-def _compared(told) -> str:
-    noise = told["noise"]["rms_mm"]
-    return f"by {told['position_mm']['rms']:.2f} mm RMS, where noise alone would be {noise:.2f} mm"
 
 
 def _off_the_cube(recording: Path, corners: Array, n_tubes: int, _) -> str:
@@ -170,10 +159,6 @@ def _proposed(told) -> str:
     masses = ", ".join(f"{1e3 * run['mass_kg']:g} g" for run in told["runs"])
     rivals = " and ".join(told["rivals"]).replace("_", " ")
     return f"{len(told['runs'])} runs tell {rivals} apart (weights at the tip: {masses})"
-
-
-def _calibrated(told) -> str:
-    return f"{told['rms_mm']['held_out']:.2f} mm RMS on held-out runs"
 
 
 def _tracked(told) -> str:

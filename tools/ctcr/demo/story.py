@@ -51,7 +51,8 @@ class Story:
         self._console = console
 
     def do(self, why: str, command: str, found: str | Callable[[Any], str], answer: str = "") -> None:
-        """Runs one command line. With `answer` its JSON is kept under that name; `found` puts it into words.
+        """Runs one command line. With `answer` its JSON is kept under that name; `found` puts it into words: a function
+        of it, or a format with its keys.
 
         Raises InputError with the message of the command where it fails.
         """
@@ -61,7 +62,7 @@ class Story:
         self._run(shlex.split(command) + (["--json", f"{answer}.json"] if answer else []), command)
         if answer:
             told = self.answers[answer] = json.loads((self.folder / f"{answer}.json").read_text(encoding="utf-8"))
-        words = found(told) if callable(found) else found
+        words = found(told) if callable(found) else found.format_map(told or {})
         step = Step(why, f"ctcr {command}", words, time.monotonic() - start)
         self.steps.append(step)
         self._console.print(f"    {step.found} ({step.seconds:.0f} s)", style="green", markup=False)

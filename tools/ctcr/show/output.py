@@ -6,7 +6,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -105,15 +105,12 @@ def table(title: str, columns: list[str], rows: list[list[str]], text_columns: i
     return made
 
 
-class Progress:
+class Progress(AbstractContextManager):
     """A progress bar on standard error, shown only on a terminal and only once the work has taken a second."""
 
     def __init__(self, task: str, total: float):
         self.task, self.total, self.done = task, total, 0.0
         self._start, self._bar = time.monotonic(), None
-
-    def __enter__(self) -> "Progress":
-        return self
 
     def __exit__(self, *_) -> None:
         if self._bar:

@@ -27,58 +27,37 @@ def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int 
 
 @dataclass(frozen=True)
 class Room:
-    """The positions that limits allow [m]: intervals of beta_i - beta_i+1 (of the last tube: beta) and of beta_i."""
+    """The joints (beta, alpha) (2N,) [m], [rad] that limits allow, as scipy takes them."""
 
-    gap_low: Array
-    gap_high: Array
-    low: Array
-    high: Array
+    gaps: LinearConstraint  # of beta_i - beta_i+1; of the last tube: beta
+    travel: Bounds
 
     @classmethod
     def of(cls, robot: Robot, limits: Limits) -> "Room":
-        n, lengths = robot.n_tubes, np.array([tube.length for tube in robot.tubes])
-        return cls(
-            1e-3 * limits.tip_gap_mm - (lengths - np.append(lengths[1:], 0)),
-            np.full(n, -1e-3 * limits.base_gap_mm),
-            np.full(n, -np.inf) if limits.beta_low_mm is None else 1e-3 * np.array(limits.beta_low_mm),
-            np.full(n, np.inf) if limits.beta_high_mm is None else 1e-3 * np.array(limits.beta_high_mm),
-        )
-
-    @property
-    def _gaps(self) -> Array:
-        """(N, 2N) takes (beta, alpha) to beta_i - beta_i+1."""
-        n = len(self.low)
-        return np.hstack([np.eye(n) - np.eye(n, k=1), np.zeros((n, n))])
-
-    @property
-    def constraint(self) -> LinearConstraint:
-        return LinearConstraint(self._gaps, self.gap_low, self.gap_high)
-
-    @property
-    def bounds(self) -> Bounds:
-        free = np.full(len(self.low), np.inf)
-        return Bounds(np.append(self.low, -free), np.append(self.high, free))
+        n, lengths, free = robot.n_tubes, [tube.length for tube in robot.tubes], np.full(robot.n_tubes, np.inf)
+        low = -free if limits.beta_low_mm is None else 1e-3 * np.array(limits.beta_low_mm)
+        high = free if limits.beta_high_mm is None else 1e-3 * np.array(limits.beta_high_mm)
+        gaps = np.hstack([np.eye(n) - np.eye(n, k=1), np.zeros((n, n))])
+        tips, bases = 1e-3 * limits.tip_gap_mm + np.diff(lengths, append=0), np.full(n, -1e-3 * limits.base_gap_mm)
+        return cls(LinearConstraint(gaps, tips, bases), Bounds(np.append(low, -free), np.append(high, free)))
 
     def drawn(self, random: np.random.Generator) -> Array:
         """Random positions within it (N,); drawn from the outermost tube inwards."""
-        beta, after = np.empty(len(self.low)), 0.0
+        beta, after = np.empty(len(self.gaps.lb)), 0.0
         for i in reversed(range(len(beta))):
-            low, high = max(self.gap_low[i] + after, self.low[i]), min(self.gap_high[i] + after, self.high[i])
+            low = max(self.gaps.lb[i] + after, self.travel.lb[i])
+            high = min(self.gaps.ub[i] + after, self.travel.ub[i])
             beta[i] = after = random.uniform(low, max(low, high))
         return beta
 
     def holds(self, x: Array) -> bool:
         """Whether (beta, alpha) lies within it, up to rounding."""
-        gaps, beta, slack = self._gaps @ x, x[: len(self.low)], 1e-6
-        return bool(
-            ((gaps > self.gap_low - slack) & (gaps < self.gap_high + slack)).all()
-            and ((beta > self.low - slack) & (beta < self.high + slack)).all()
-        )
+        return all((left > -1e-6).all() for limit in (self.gaps, self.travel) for left in limit.residual(x))
 
 
 def _nearest(model: Model, force: Array, room: Room, target: Array, starts: int, random: np.random.Generator) -> float:
     """The least distance [m] of the tip from the target (3,), of searches from `starts` random postures."""
-    n, best = len(room.low), np.inf
+    n, best = len(room.gaps.lb), np.inf
 
     def squared_mm(x: Array) -> tuple[float, Array]:
         tips = model.predict(x[None, :n], x[None, n:], force, derivatives=True)
@@ -90,7 +69,7 @@ def _nearest(model: Model, force: Array, room: Room, target: Array, starts: int,
     search = {"method": "SLSQP", "jac": True, "options": {"maxiter": 200, "ftol": 1e-9}}
     for _ in range(starts):
         start = np.append(room.drawn(random), random.uniform(-np.pi, np.pi, n))
-        found = minimize(squared_mm, start, bounds=room.bounds, constraints=room.constraint, **search)
+        found = minimize(squared_mm, start, bounds=room.travel, constraints=room.gaps, **search)
         if room.holds(found.x):
             best = min(best, 1e-3 * np.sqrt(found.fun))
         if best < REACHED:

@@ -4,9 +4,9 @@ import os
 import struct
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from typing import Self, TypeVar
+from typing import TypeVar
 
 from ctcr.bench.devices.fault import DeviceFault, needed
 from ctcr.bench.shared import ndi
@@ -36,7 +36,7 @@ class Frame:
     system_status: int
 
 
-class Aurora:
+class Aurora(AbstractContextManager):
     """One tracker. `connect` before `read`; every method raises DeviceFault. Not real-time safe: it waits.
 
     After a fault, `connect` starts anew, also where the cable was pulled in between.
@@ -76,9 +76,6 @@ class Aurora:
         if self._line:
             self._line.close()
         self._line = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_) -> None:
         self.close()

@@ -2,7 +2,7 @@
 
 import multiprocessing
 from collections.abc import Callable
-from typing import Self
+from contextlib import AbstractContextManager
 
 from ctcr.bench.devices.fault import DeviceFault
 
@@ -10,7 +10,7 @@ CONNECT_S = 20.0  # patience with a process that starts and looks for its device
 END_S = 20.0  # patience with a process that ends: it stops its device first
 
 
-class ProcessClient:
+class ProcessClient(AbstractContextManager):
     """Base of Motors and Tracker: `connect` starts the process, `close` ends it."""
 
     def __init__(self, device: str):
@@ -30,9 +30,6 @@ class ProcessClient:
             self._pipe.close()
             self._process.join(END_S)
         self._process = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_) -> None:
         self.close()

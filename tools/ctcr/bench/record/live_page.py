@@ -1,10 +1,10 @@
 """A recording in progress as a page that the browser reloads: a file, so nothing listens on the network."""
 
 import time
+from contextlib import AbstractContextManager
 from html import escape
 from math import isnan
 from pathlib import Path
-from typing import Self
 
 from ctcr.bench.record.session import Progress
 from ctcr.show import html_page
@@ -15,15 +15,12 @@ SHOWN = 400  # newest readings
 WIDTH, HEIGHT, LEFT, BOTTOM = 860, 300, 60, 30  # of the picture and its margins [px]
 
 
-class LivePage:
+class LivePage(AbstractContextManager):
     """Shows the newest progress every EVERY_S; in a `with` block, whose end stops the reloading."""
 
     def __init__(self, path: str | Path, title: str):
         self._path, self._title = path, title
         self._next, self._last = 0.0, Progress(0)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_) -> None:
         self._write(reload_s=0)
