@@ -18,13 +18,17 @@ from ctcr.show.wording import deviation, number
 
 @dataclass(frozen=True)
 class Row:
-    """A value with its unit and standard deviation (NaN: not known); `old`: in the robot file (NaN: no file)."""
+    """A value with its unit and standard deviation (NaN: not known); `old`: in the robot file (NaN: no file).
+
+    `path`: the field of the robot file that holds it, where it is to be updated.
+    """
 
     name: str
     unit: str
     value: float
     sd: float = nan
     old: float = nan
+    path: FieldPath | None = None
 
 
 @dataclass(frozen=True)
@@ -39,23 +43,24 @@ class Picture:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The rows to show, notices about them, and the changes of the robot file."""
+    """The rows to show and notices about them."""
 
     title: str
     rows: list[Row]
     notices: list[str] = field(default_factory=list)
-    changes: list[Change] = field(default_factory=list)
     figures: dict[str, Any] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     picture: Picture | None = None
 
+    @property
+    def changes(self) -> list[Change]:
+        """Those of the robot file; the ledger holds no deviations of the components of a rotation vector."""
+        updating = [row for row in self.rows if row.path]
+        return [Change(row.path, row.unit, row.value, None if row.unit == "rad" else row.sd) for row in updating]
+
     def as_dict(self) -> dict[str, Any]:
-        return {
-            "values": [vars(row) for row in self.rows],
-            "figures": self.figures,
-            "notices": self.notices,
-            **self.details,
-        }
+        values = [{name: value for name, value in vars(row).items() if name != "path"} for row in self.rows]
+        return {"values": values, "figures": self.figures, "notices": self.notices, **self.details}
 
 
 def computed(procedure: Callable, file: str, **arguments):

@@ -16,7 +16,6 @@ from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-from ctcr.robot.ledger import Change
 from ctcr.show.wording import listed
 
 SIGMAS_AT_95 = 2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
@@ -64,8 +63,14 @@ def tracker_noise(robot: Robot | None, table: Table | None = None) -> dict[str, 
 def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> Outcome:
     """Home rotations from circles of the tip, one tube alone at a time. Ref: Boyer et al., eq. (5)."""
     tubes = table["tube"] if "tube" in table else np.ones(len(table), np.int64)
-    ratio = _rotation_ratio(robot, ratio)
-    rows, notices, changes, details, circles = [], [], [], {}, []
+    if ratio is None and robot is not None:
+        ratio = robot.actuation.rotation_rev_per_rev
+    if ratio is None:
+        raise InputError(Problem("give --ratio, turns of a tube in one turn of its motor, or --robot"))
+    pose = np.eye(4)
+    if robot:
+        pose[:3, :3], pose[:3, 3] = robot.tracker.rotation, robot.tracker.position
+    rows, notices, details, circles = [], [], {}, []
     for tube in np.unique(tubes).tolist():
         mine, name = np.flatnonzero(tubes == tube), f"tube {tube}"
         check_tube(tube, robot, table.file, int(table.row[mine[0]]))
@@ -78,7 +83,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
             position=position,
             direction=direction,
             ratio=ratio,
-            T_ref=_tracker_pose(robot) if robot else None,
+            T_ref=pose if robot else None,
             bend_angle=-np.pi / 2 if robot is None or robot.tubes[tube - 1].curvature >= 0 else np.pi / 2,
             **tracker_noise(robot, table),
         )
@@ -86,8 +91,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         offset, old = degrees(fit.offset), in_file(robot, path)
         if robot:
             offset = _nearest_turn(offset, old)
-            changes.append(Change(path, "deg", offset, degrees(fit.offset_sd)))
-        rows.append(Row(f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), old))
+        rows.append(Row(f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), old, path))
         for way in ("forward", "backward"):
             value, sd = getattr(fit, f"offset_{way}"), getattr(fit, f"offset_{way}_sd")
             if isfinite(value):
@@ -115,7 +119,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         "the two directions differ, friction or backlash holds the tip back."
     )
     picture = Picture(figures_of.circles, circles, caption, figures_of.ROW_HEIGHT * len(circles))
-    return Outcome("Rotation offsets", rows, notices, changes, figures, {"tubes": details}, picture)
+    return Outcome("Rotation offsets", rows, notices, figures, {"tubes": details}, picture)
 
 
 def _nearest_turn(angle: float, other: float) -> float:
@@ -145,15 +149,14 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
         **tracker_noise(robot, table),
     )
     position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
-    rows, changes = [], []
+    rows = []
     for field, text, unit, values, sds in (
         ("position_mm", "origin of the base frame", "mm", position, 1e3 * np.asarray(fit.position_sd)),
         ("rotation_vector_rad", "rotation vector", "rad", turn, fit.rotation_sd),
     ):
         for i, axis in enumerate(AXES):
             path = ("tracker", field, i)
-            rows.append(Row(f"{text}, {axis}", unit, values[i], sds[i], in_file(robot, path)))
-            changes.append(Change(path, unit, values[i], sds[i] if unit == "mm" else None))
+            rows.append(Row(f"{text}, {axis}", unit, values[i], sds[i], in_file(robot, path), path))
     rows.append(Row("error at the points, RMS", "mm", 1e3 * fit.fre))
     expected = zip(targets, fit.tre, strict=True)
     rows += [Row(f"expected error at {names[i]}, RMS", "mm", 1e3 * tre) for i, tre in expected]
@@ -170,7 +173,7 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
     where = 1e3 * point[[names.index(name) for name in fit.names]]
     caption = "Left: displacement of the readings from the CAD points. Right: its size."
     picture = Picture(figures_of.points, (where, fit), caption, 4.4)
-    return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], changes, figures, details, picture)
+    return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], figures, details, picture)
 
 
 def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict[str, float]) -> Outcome:
@@ -199,7 +202,7 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
         1e3 * np.asarray(getattr(fit, name))
         for name in ("offset", "offset_sd", "length", "length_sd", "deployed", "deployed_sd")
     )
-    rows, changes, old = [], [], []
+    rows, old = [], []
     for i, tube in enumerate(tubes):
         before = []
         for name, path, value, sd in (
@@ -207,29 +210,14 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
             ("length", ("tubes", i, "length_mm"), length[i], length_sd[i]),
         ):
             before.append(in_file(robot, path))
-            rows.append(Row(f"tube {tube}: {name}", "mm", value, sd, before[-1]))
-            changes.append(Change(path, "mm", value, sd))
+            rows.append(Row(f"tube {tube}: {name}", "mm", value, sd, before[-1], path))
         rows.append(Row("    deployed at home", "mm", deployed[i], deployed_sd[i]))
         old.append(np.cumsum(before))  # grasped point and tip
     sd = np.column_stack([offset_sd, deployed_sd])
     caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
     picture = Picture(figures_of.homes, (tubes, offset, deployed, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
     notices, details = [notice.text for notice in fit.notices], {"correlation": fit.correlation}
-    return Outcome("Home", rows, notices, changes, {}, details, picture)
-
-
-def _tracker_pose(robot: Robot) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = robot.tracker.rotation, robot.tracker.position
-    return pose
-
-
-def _rotation_ratio(robot: Robot | None, ratio: float | None) -> float:
-    if ratio is None and robot is not None:
-        ratio = robot.actuation.rotation_rev_per_rev
-    if ratio is None:
-        raise InputError(Problem("give --ratio, turns of a tube in one turn of its motor, or --robot"))
-    return ratio
+    return Outcome("Home", rows, notices, {}, details, picture)
 
 
 def check_tube(tube: int, robot: Robot | None, file: str, row: int | None = None) -> None:

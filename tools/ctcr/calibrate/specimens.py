@@ -11,7 +11,7 @@ from ctcr.calibrate.procedures import check_tube, outliers
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-from ctcr.robot.ledger import Change
+from ctcr.robot.yaml_document import FieldPath
 
 CANTILEVER = (
     Column("load", "load"),
@@ -51,14 +51,15 @@ def cantilever(
     )
     given_EI = described is not None and described.bending_stiffness_Nm2 is not None
     gpa = [1e-9 * x for x in (fit.youngs_modulus, fit.youngs_modulus_sd)]
-    old = nan if given_EI else _old(described, "youngs_modulus_GPa")
-    modulus = Row("Young's modulus", "GPa", *gpa, old)
-    ei = (fit.bending_stiffness, fit.bending_stiffness_sd, _old(described, "bending_stiffness"))
-    stiffness = Row("bending stiffness EI", "N m^2", *ei)
-    rows = [modulus, stiffness, Row("distance from the readings, RMS", "mm", 1e3 * fit.rms)]
+    modulus = (nan, None) if given_EI else (_old(described, "youngs_modulus_GPa"), _path(tube, "youngs_modulus_GPa"))
+    ei, old_ei = (fit.bending_stiffness, fit.bending_stiffness_sd), _old(described, "bending_stiffness")
+    rows = [
+        Row("Young's modulus", "GPa", *gpa, *modulus),
+        Row("bending stiffness EI", "N m^2", *ei, old_ei, _path(tube, "bending_stiffness_Nm2") if given_EI else None),
+        Row("distance from the readings, RMS", "mm", 1e3 * fit.rms),
+    ]
     if fit_zero:
         rows.append(Row("zero of the readings", "mm", 1e3 * fit.zero, 1e3 * fit.zero_sd))
-    written = {"bending_stiffness_Nm2": stiffness} if given_EI else {"youngs_modulus_GPa": modulus}
     details = {
         "rows": [
             {"row": row, "modulus_GPa": 1e-9 * modulus, "residual_mm": 1e3 * residual}
@@ -69,8 +70,8 @@ def cantilever(
     read = 1e3 * table["deflection"]
     caption = "What was read and what the fitted modulus gives; right, the difference."
     picture = Picture(figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption)
-    notices, changes = [notice.text for notice in fit.notices], _changes(described, tube, written)
-    return Outcome("Cantilever", rows, notices, changes, {"deflection_rms_mm": 1e3 * fit.rms}, details, picture)
+    notices, figures = [notice.text for notice in fit.notices], {"deflection_rms_mm": 1e3 * fit.rms}
+    return Outcome("Cantilever", rows, notices, figures, details, picture)
 
 
 def curvature(
@@ -107,12 +108,9 @@ def curvature(
     sign = -1.0 if described is not None and described.curvature < 0 else 1.0  # a picture does not tell it
     curve = (sign * fit.curvature, fit.curvature_sd, _old(described, "curvature"))
     bent = (1e3 * fit.curved_length, 1e3 * fit.curved_length_sd, _old(described, "curved_length_mm"))
-    written = {
-        "curvature_per_m": Row("curvature", "1/m", *curve),
-        "curved_length_mm": Row("curved length", "mm", *bent),
-    }
     rows = [
-        *written.values(),
+        Row("curvature", "1/m", *curve, _path(tube, "curvature_per_m")),
+        Row("curved length", "mm", *bent, _path(tube, "curved_length_mm")),
         Row("radius", "mm", 1e3 * fit.radius),
         Row("straight length seen", "mm", 1e3 * fit.straight_length),
         Row("distance from the points, RMS", "mm", 1e3 * fit.rms),
@@ -122,8 +120,7 @@ def curvature(
     ends, bend = (np.asarray(fit.junction), np.asarray(fit.tip)), fit.curved_length / abs(fit.radius)
     caption = "The points on the fitted tube; the mark is where its curve starts."
     picture = Picture(figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)), caption, 5.0)
-    changes, figures = _changes(described, tube, written), {"shape_rms_mm": 1e3 * fit.rms}
-    return Outcome("Shape of the tube", rows, notices, changes, figures, details, picture)
+    return Outcome("Shape of the tube", rows, notices, {"shape_rms_mm": 1e3 * fit.rms}, details, picture)
 
 
 def _old(described, name: str) -> float:
@@ -132,11 +129,9 @@ def _old(described, name: str) -> float:
     return nan if value is None else value
 
 
-def _changes(described, tube: int | None, written: dict[str, Row]) -> list[Change]:
-    """Changes of the tube's fields, where it is one of a robot file."""
-    if described is None:
-        return []
-    return [Change(("tubes", tube - 1, name), row.unit, row.value, row.sd) for name, row in written.items()]
+def _path(tube: int | None, field: str) -> FieldPath | None:
+    """The field of a tube in the robot file."""
+    return None if tube is None else ("tubes", tube - 1, field)
 
 
 def _described_tube(robot: Robot | None, tube: int | None):
