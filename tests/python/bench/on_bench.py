@@ -53,7 +53,7 @@ SMALL = [-2e-3, -1e-3, -1e-3, 0.2, -0.1, 0.1]
 
 def test_settings(bench, folder):
     """Motor current, feedback and encoder are written before a motor is enabled."""
-    bus = Bus(MASTER, [1, 2], bench.drive_settings)
+    bus = Bus(MASTER, [1, 2], bench.motors)
     bus.connect()
     try:
         for drive in bus.drives:
@@ -98,12 +98,12 @@ def test_bus_lock(robot, bench, folder, monkeypatch):
 def test_wrong_terminal(bench, folder):
     """Wrong positions and interfaces are named."""
     for positions, text in (([0, 1], "no stepper terminal"), ([1, 9], "none at position 9")):
-        bus = Bus(MASTER, positions, bench.drive_settings)
+        bus = Bus(MASTER, positions, bench.motors)
         with pytest.raises(DeviceFault, match=text):
             bus.connect()
         bus.close()
     with pytest.raises(DeviceFault, match="cannot be opened"):
-        Bus("nothing0", [1], bench.drive_settings).connect()
+        Bus("nothing0", [1], bench.motors).connect()
 
 
 class TestMotors:
@@ -252,7 +252,7 @@ def test_more_faults(robot, bench, folder, fault):
 def test_bring_ups(bench, folder):
     """Forty in a row, under load."""
     for _ in range(40):
-        bus = Bus(MASTER, [1, 2, 3, 4, 5, 6], bench.drive_settings)
+        bus = Bus(MASTER, [1, 2, 3, 4, 5, 6], bench.motors)
         bus.connect()
         bus.close()
 

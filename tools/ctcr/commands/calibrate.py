@@ -25,7 +25,7 @@ def _procedure(function):
 def _live(function):
     """The options of procedures that the bench can carry out."""
     for option in (
-        options.folder,
+        options.folder_name,
         options.setting("--readings", click.IntRange(2), 20, "With --live: readings per row."),
         click.option("--bench", metavar="BENCH.yaml", help="With --live: the devices and their limits."),
         click.option("--live", is_flag=True, help="Measure now: write the table row by row, or resume the one there."),

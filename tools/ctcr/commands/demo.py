@@ -30,14 +30,13 @@ def bench(target, short, folder) -> int:
 
     Example: ctcr demo bench
     """
-    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated
     from ctcr.bench.simulators.robot import SimulatedRobot
     from ctcr.demo import bench_story
     from ctcr.robot import robot_file
 
     hidden = bench_story.hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
-    return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), private_folder(folder))
+    return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), folder)
 
 
 def _tell(target, hidden, short) -> int:

@@ -9,7 +9,7 @@ from ctcr.commands import options
 @click.option("--bench", "bench_path", required=True, metavar="BENCH.yaml", help="Where the devices are connected.")
 @options.folder
 @options.json
-def command(bench_path: str, folder: str | None, out) -> int:
+def command(bench_path: str, folder, out) -> int:
     """Show the devices of a bench.
 
     Which of them answer, their versions and their faults. Nothing moves.
@@ -18,11 +18,9 @@ def command(bench_path: str, folder: str | None, out) -> int:
     """
     from ctcr.bench.devices import bench_file, emergency_stop
     from ctcr.bench.devices.health import health_of
-    from ctcr.bench.shared.folder import private_folder
 
-    place = private_folder(folder)
-    found = health_of(bench_file.load(bench_path), place)
-    reason = emergency_stop.reason(place)
+    found = health_of(bench_file.load(bench_path), folder)
+    reason = emergency_stop.reason(folder)
     out.write_json({"devices": [vars(device) for device in found], "stopped": reason})
     rows = [[d.name, d.place, "ok" if d.is_well else "FAULT", d.about] for d in found]
     out.table("Devices", ["", "where", "", "report"], rows, text_columns=4)

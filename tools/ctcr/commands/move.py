@@ -27,16 +27,15 @@ def command(robot, bench_path, beta, alpha, home, at_home, speed, folder) -> Non
     from ctcr.bench.devices import bench_file, homing
     from ctcr.bench.devices.motors import Motors
     from ctcr.bench.devices.person import person_of
-    from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import robot_file
 
-    loaded, place = robot_file.load(robot), private_folder(folder)
-    bench, out, n = bench_file.load(bench_path), options.Output(), loaded.n_tubes
+    loaded, bench, out = robot_file.load(robot), bench_file.load(bench_path), options.Output()
+    n = loaded.n_tubes
     wanted = [_numbers("--beta", beta, n, 1e-3), _numbers("--alpha", alpha, n, np.pi / 180)]
-    with Motors(bench, loaded, place) as motors:
+    with Motors(bench, loaded, folder) as motors:
         motors.connect()
         if home:
-            homing.home(motors, loaded, person_of(bench, place), out.say)
+            homing.home(motors, loaded, person_of(bench, folder), out.say)
         if at_home:
             motors.set_joints(motors.settings.home)
         if beta or alpha:

@@ -16,7 +16,7 @@ def setting(name: str, kind, default, text: str, **more):
 
 robot = click.argument("robot")
 measurements = click.argument("measurements")
-folder = click.option(
+folder_name = click.option(
     "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
 )
 steps = setting("--steps", click.IntRange(1, 1000), 4, "Integration steps per segment; more are slower, more accurate.")
@@ -42,6 +42,18 @@ free = setting(
     "Parameters to fit, separated by commas, such as tubes.*.youngs_modulus,tracker.frame; standard: the paper's.",
     metavar="NAMES",
 )
+
+
+def folder(function):
+    """--folder, as `folder`: the private folder of a bench, made where it does not exist."""
+
+    @wraps(function)
+    def command(*args, folder, **others):
+        from ctcr.bench.shared.folder import private_folder
+
+        return function(*args, folder=private_folder(folder), **others)
+
+    return folder_name(command)
 
 
 def new_robot(function):

@@ -50,16 +50,15 @@ def command(robot, plan, target, bench_path, dwell, readings, speed, patience, p
     from ctcr.bench.record.folder import TABLE, Folder
     from ctcr.bench.record.live_page import LivePage
     from ctcr.bench.record.session import Approach, Options, Session, steps_of
-    from ctcr.bench.shared.folder import private_folder
 
     loaded, table = options.load(robot, plan)
-    place, bench = private_folder(folder), bench_file.load(bench_path)
+    bench = bench_file.load(bench_path)
     way = Approach(approach["approach"], 1e-3 * approach["approach_mm"], float(np.deg2rad(approach["approach_deg"])))
     steps = steps_of(table, way, bench.axis_settings(loaded).limits, plan)
     how, sources = Options(dwell, readings, speed), {"robot": robot, "plan": plan, "bench": bench_path}
     settings, group = asdict(how) | {"approach": asdict(way)}, readings + way.has_way_point
-    recording, person = Folder(target, sources, settings, loaded.n_tubes, group), person_of(bench, place)
-    with Tracker(bench, place, patience) as tracker, Motors(bench, loaded, place) as motors:
+    recording, person = Folder(target, sources, settings, loaded.n_tubes, group), person_of(bench, folder)
+    with Tracker(bench, folder, patience) as tracker, Motors(bench, loaded, folder) as motors:
         motors.connect()
         tracker.connect()
         before = recording.rows.groups

@@ -37,11 +37,10 @@ def aurora(robot, folder, scenario, seed, **physics) -> None:
 
     Example: ctcr sim aurora robot.yaml --noise realistic
     """
-    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators.aurora import AuroraSimulator
     from ctcr.bench.simulators.bench import serve
 
-    simulator = AuroraSimulator(_robot(robot, seed, **physics), private_folder(folder), scenario, seed)
+    simulator = AuroraSimulator(_robot(robot, seed, **physics), folder, scenario, seed)
     click.echo(f"tracker: {simulator.line.link}")
     serve(simulator)
 
@@ -60,15 +59,14 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
     Example: ctcr sim ethercat --interface eth1 --motors 6
     """
-    from ctcr.bench.shared.folder import BUS, MASTER, private_folder
+    from ctcr.bench.shared.folder import BUS, MASTER
     from ctcr.bench.simulators import network
     from ctcr.bench.simulators.bench import serve
     from ctcr.bench.simulators.ethercat import EthercatSimulator
 
-    place = private_folder(folder)
     if not interface:
         network.make_cable()
-    simulator = EthercatSimulator(interface or BUS, place, motors, variant, scenario, seed)
+    simulator = EthercatSimulator(interface or BUS, folder, motors, variant, scenario, seed)
     click.echo(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
     serve(simulator)
 
@@ -87,12 +85,11 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
 
     Example: ctcr sim bench robot.yaml --hide friction.coefficient=0.02 -- ctcr devices
     """
-    from ctcr.bench.shared.folder import private_folder
     from ctcr.bench.simulators import bench as simulated
 
     scenarios = tracker_scenario, bus_scenario
     made = _robot(robot, seed, **physics)
-    return simulated.run(lambda: _run(program), made, private_folder(folder), scenarios, seed)
+    return simulated.run(lambda: _run(program), made, folder, scenarios, seed)
 
 
 @command.command(name="set")
@@ -107,14 +104,13 @@ def set_(device, settings, force, line_break, folder) -> None:
     Example: ctcr sim set aurora missing=0.3
     """
     from ctcr.bench.shared.control import request
-    from ctcr.bench.shared.folder import private_folder
     from ctcr.robot import yaml_document
 
     pairs = [text.partition("=")[::2] for text in settings]
     message = {"faults": {name: yaml_document.parse(value, name).data for name, value in pairs}}
     message |= {"force": list(force)} if force else {}
     message |= {"break": True} if line_break else {}
-    state = request(private_folder(folder), device, message)
+    state = request(folder, device, message)
     rows = [[name, str(value).lower()] for name, value in state.pop("faults").items()]
     rows += [[name, str(value)] for name, value in state.items()]
     options.Output().table(f"Simulator: {device}", ["", "value"], rows)

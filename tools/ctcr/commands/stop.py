@@ -8,7 +8,7 @@ from ctcr.commands import options
 @click.command(name="stop")
 @click.option("--release", is_flag=True, help="Release the stop, after its cause has been mended.")
 @options.folder
-def command(release: bool, folder: str | None) -> None:
+def command(release: bool, folder) -> None:
     """Stop all motors of the bench at once.
 
     They stay stopped until `ctcr stop --release`. This stops by software. The switch that cuts the motors' power is
@@ -17,13 +17,11 @@ def command(release: bool, folder: str | None) -> None:
     Example: ctcr stop
     """
     from ctcr.bench.devices import emergency_stop
-    from ctcr.bench.shared.folder import private_folder
 
-    place = private_folder(folder)
     if not release:
-        emergency_stop.stop(place, "ctcr stop was called")
+        emergency_stop.stop(folder, "ctcr stop was called")
         click.echo("stopped; release with `ctcr stop --release`")
         return
-    reason = emergency_stop.reason(place)
-    emergency_stop.release(place)
+    reason = emergency_stop.reason(folder)
+    emergency_stop.release(folder)
     click.echo(f"released; the reason of the stop was: {reason}" if reason else "nothing was stopped")

@@ -14,7 +14,7 @@ from ctcr.commands import options
 @click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; one that is there is resumed.")
 @options.setting("--patience", click.FloatRange(0.1), 2.0, "How long the tracker may lose the sensor [s].")
 @options.setting("--most-error-mm", click.FloatRange(1), 20.0, "Stop where the tip is farther from its reference [mm].")
-@options.folder
+@options.folder_name
 @options.outputs
 def command(robot, scenario, plant, live, bench_path, target, patience, most_error_mm, folder, out) -> None:
     """Follow a path in closed loop.

@@ -9,7 +9,6 @@ from pydantic import Field, ValidationError
 
 from ctcr.bench.devices.axis_control import AxisSettings
 from ctcr.bench.devices.joint_limits import JointLimits
-from ctcr.bench.devices.stepper_drive import DriveSettings
 from ctcr.bench.shared.folder import AURORA, MASTER
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot import yaml_document
@@ -42,8 +41,8 @@ class Motors(Section):
     translation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
     rotation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
     current_mA: Annotated[int, Quantity("mA", usual=(50, 5000), above=0)] = 1000
-    full_steps: Annotated[int, Quantity("", usual=(20, 1000), above=0)] = 200
-    encoder_counts: Annotated[int, Quantity("", usual=(100, 100000), above=0)] = 4096
+    full_steps: Annotated[int, Quantity("", usual=(20, 1000), above=0)] = 200  # a turn
+    encoder_counts: Annotated[int, Quantity("", usual=(100, 100000), above=0)] = 4096  # a turn, four a line
     period_ms: Annotated[float, Quantity("ms", usual=(1, 20), above=0)] = 4.0
     speed_mm_s: Annotated[float, Quantity("mm/s", usual=(0.1, 100), above=0)] = 10.0
     speed_deg_s: Annotated[float, Quantity("deg/s", usual=(1, 720), above=0)] = 60.0
@@ -81,11 +80,6 @@ class Bench(Section):
     def positions(self) -> list[int]:
         """Positions on the bus of the terminals, in the order of the joints."""
         return [*self.motors.translation_terminals, *self.motors.rotation_terminals]
-
-    @property
-    def drive_settings(self) -> DriveSettings:
-        motors = self.motors
-        return DriveSettings(motors.current_mA, motors.full_steps, motors.encoder_counts)
 
     def axis_settings(self, robot: Robot) -> AxisSettings:
         """Of this robot's joints. Raises InputError where the file is for another number of tubes."""

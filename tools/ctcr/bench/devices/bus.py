@@ -2,8 +2,9 @@
 
 import time
 
+from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.fault import DeviceFault, needed
-from ctcr.bench.devices.stepper_drive import DriveInputs, DriveSettings, StepperDrive
+from ctcr.bench.devices.stepper_drive import DriveInputs, StepperDrive
 from ctcr.bench.shared.ethercat import State
 
 BRING_UP_US = 20000  # timeout of a frame during the bring-up; pysoem's own loses one in twenty under load
@@ -15,7 +16,7 @@ OP_S = 2.0  # longest way to OP
 class Bus:
     """One master on a network interface. Every method raises DeviceFault. For one process alone, see `bus_process`."""
 
-    def __init__(self, interface: str, positions: list[int], settings: DriveSettings):
+    def __init__(self, interface: str, positions: list[int], settings: Motors):
         """`positions` of the motors' terminals on the bus, in the order of the axes; the coupler is 0."""
         self.interface, self._positions, self._settings = interface, positions, settings
         self.drives: list[StepperDrive] = []

@@ -20,9 +20,10 @@ import numpy as np
 
 from ctcr.bench.devices import emergency_stop
 from ctcr.bench.devices.axis_control import AxisControl, AxisSettings
+from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.bus import Bus
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.devices.stepper_drive import DriveInputs, DriveSettings
+from ctcr.bench.devices.stepper_drive import DriveInputs
 from ctcr.bench.shared.real_time import BUS, Lateness, real_time
 from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
 
@@ -47,7 +48,7 @@ class BusSettings:
 
     interface: str
     positions: list[int]
-    drive: DriveSettings
+    drive: Motors
     axes: AxisSettings
     ratios: np.ndarray  # (2N,) [m] or [rad] per turn
     home: np.ndarray  # (2N,)

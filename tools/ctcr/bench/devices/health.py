@@ -45,7 +45,7 @@ def _tracker(bench: Bench, port: str) -> Iterator[Health]:
 
 
 def _bus(bench: Bench, folder: Path) -> Iterator[Health]:
-    bus = Bus(bench.interface, bench.positions, bench.drive_settings)
+    bus = Bus(bench.interface, bench.positions, bench.motors)
     with bus_lock(folder):
         try:
             bus.connect()

@@ -29,7 +29,7 @@ class Motors(ProcessClient):
         self.settings = bus_process.BusSettings(
             interface=bench.interface,
             positions=bench.positions,
-            drive=bench.drive_settings,
+            drive=bench.motors,
             axes=replace(axes, limits=replace(axes.limits, one_by_one=one_by_one)),
             ratios=transmission(robot),
             home=home_joints(robot),

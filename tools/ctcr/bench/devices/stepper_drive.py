@@ -3,6 +3,7 @@
 import struct
 from dataclasses import dataclass
 
+from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.shared.ethercat import (
     DIAGNOSES,
@@ -25,15 +26,6 @@ _PDO_RANGES = {_RX: range(0x1600, 0x1610), _TX: range(0x1A00, 0x1A10)}
 _FULL = 32767  # velocity at the full speed
 
 
-@dataclass(frozen=True)
-class DriveSettings:
-    """What a terminal must know of its motor before it may enable it."""
-
-    current_mA: int = 1000
-    full_steps: int = 200  # a turn
-    encoder_counts: int = 4096  # a turn, four edges a line
-
-
 @dataclass
 class DriveInputs:
     """Inputs of one cycle."""
@@ -47,7 +39,7 @@ class DriveInputs:
 class StepperDrive:
     """A terminal on the bus in PREOP, with the process data layout that it reports itself."""
 
-    def __init__(self, slave, position: int, settings: DriveSettings, errors: tuple[type[Exception], ...]):
+    def __init__(self, slave, position: int, settings: Motors, errors: tuple[type[Exception], ...]):
         """`slave` is that of pysoem; `errors`: its exceptions for a mailbox without a usable answer."""
         self.slave, self.position, self.settings, self._errors = slave, position, settings, errors
         self.name = f"terminal {position} ({slave.name})"
