@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ctcr import cli, frames
-from ctcr.calibrate import joint_fit, report, terminal
+from ctcr.calibrate import joint_fit, report
 from ctcr.errors import InputError
 from ctcr.fit import folds
 from ctcr.model import effect_model, fields
@@ -139,7 +139,7 @@ def some(readings, keep):
 
 
 def said(calibration) -> str:
-    return " ".join([*calibration.notices, *terminal.undetermined(calibration), *fields.doubts(calibration.fitted)])
+    return " ".join([*calibration.notices, *report.undetermined(calibration), *fields.doubts(calibration.fitted)])
 
 
 def test_one_run(robot, readings):

@@ -10,7 +10,7 @@ import pytest
 from ctcr.bench.devices import emergency_stop
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import private_folder
-from ctcr.bench.simulators import aurora, ethercat, network
+from ctcr.bench.simulators import aurora, bench, ethercat
 
 ROOT = Path(__file__).parents[3]
 HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
@@ -25,7 +25,7 @@ def ctcr(*arguments) -> list[str]:
 
 def skip_without_bench() -> None:
     """Skips the test that asks, where no bench can be simulated."""
-    if not network.is_permitted():
+    if not bench.is_permitted():
         pytest.skip("this system does not permit networks of one's own (unshare -Urn), or iproute2 is missing")
     for package in ("pysoem", "serial"):
         pytest.importorskip(package, reason=f"{package} is not installed")

@@ -12,8 +12,7 @@ from ctcr.cli import cli
 from ctcr.errors import InputError
 from ctcr.table.csv_table import read_columns
 from ctcr.table.measurements import column_names
-from ctcr.track.mcap_file import write_mcap
-from ctcr.track.recording import COLUMNS, CONTROL
+from ctcr.track.recording import COLUMNS, CONTROL, write_mcap
 from simulated_bench import ROBOT
 
 reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")

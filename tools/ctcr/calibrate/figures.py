@@ -50,7 +50,8 @@ def waterfall(figure, c: Calibration) -> None:
 def histogram(figure, c: Calibration) -> None:
     """Error sizes before and after, against what noise would give."""
     axes = figure.subplots()
-    before, after = (_known(1e3 * np.linalg.norm(r[:, :3], axis=1)) for r in (c.fit.nominal_residual, c.fit.residual))
+    sizes = (1e3 * np.linalg.norm(r[:, :3], axis=1) for r in (c.fit.nominal_residual, c.fit.residual))
+    before, after = (size[np.isfinite(size)] for size in sizes)
     axis_sd = c.floor.rms_mm / np.sqrt(3)
     low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
     edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
@@ -112,7 +113,8 @@ def correlations(figure, c: Calibration) -> None:
     left.set_xticks(range(count), names, rotation=90, fontsize=7)
     left.set_yticks(range(count), names, fontsize=7.5)
     left.grid(visible=False)
-    for edge in _group_edges(names):
+    kinds = [name.split(".")[0] + name.split(".")[-1 if name.startswith("tubes") else 1] for name in names]
+    for edge in (i - 0.5 for i in range(1, count) if kinds[i] != kinds[i - 1]):
         left.axhline(edge, color="white", lw=1.5)
         left.axvline(edge, color="white", lw=1.5)
         right.axhline(edge, color="#e7ebef", lw=1.5)
@@ -123,11 +125,6 @@ def correlations(figure, c: Calibration) -> None:
     right.axvline(100 * settings.SAYS_NOTHING, color=NOISE, ls="--", lw=1)
     right.set(xlim=(0, 105), xlabel="sd left, %")
     right.set_title("sd after / before", fontsize=9)
-
-
-def _group_edges(names: list[str]) -> list[float]:
-    kinds = [name.split(".")[0] + name.split(".")[-1 if name.startswith("tubes") else 1] for name in names]
-    return [i - 0.5 for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
 
 
 def half_difference(figure, c: Calibration) -> bool | None:
@@ -209,10 +206,6 @@ def view(c: Calibration) -> str:
     menu = {"type": "buttons", "direction": "right", "buttons": buttons, "active": 1, "bgcolor": "#f6f8fa"}
     menu |= {"x": 0.01, "y": 0.99, "xanchor": "left", "yanchor": "top"}
     return scene.view(data, eye=(1.3, 1.3, 0.7), updatemenus=[menu])
-
-
-def _known(values):
-    return values[np.isfinite(values)]
 
 
 def _plain_ticks(axis) -> None:

@@ -1,23 +1,108 @@
-"""The calibration as one HTML page that needs nothing else: no network, no other file."""
+"""A joint fit on a terminal, and as one HTML page that needs nothing else: no network, no other file."""
 
 import html
+from math import isfinite
 
 import numpy as np
 
-from ctcr.calibrate import figures, terminal
-from ctcr.calibrate.joint_fit import Calibration
+from ctcr.calibrate import figures
+from ctcr.calibrate.joint_fit import Calibration, Stage
 from ctcr.model.fields import doubts
-from ctcr.show import html_page
+from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, cards, figure, table
-from ctcr.show.wording import mm
+from ctcr.show.wording import deviation, mm, number
 
 WIDE = 10.4  # [in] of a figure as wide as the page
+ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
+PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]
+SHOWN = 12
+NEEDED_WIDTH = 108  # of the table of parameters; a narrower terminal wraps its lines
+
+
+def show(console, c: Calibration) -> None:
+    """Prints a calibration on a rich console."""
+    console.print(f"[bold]{c.before.name}[/bold]", highlight=False)
+    console.print(headline(c), markup=False)
+    console.print(output.table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c)))
+    made = output.table("Parameters", PARAMETER_COLUMNS, parameter_rows(c), text_columns=2)
+    for column in made.columns:
+        column.no_wrap = True
+    made.columns[-1].justify = "left"
+    console.width = max(console.width, NEEDED_WIDTH)
+    console.print(made)
+    lists = ("Doubts", doubts(c.fitted)), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
+    for title, lines in lists:
+        if lines:
+            console.print(f"[bold]{title}[/bold]")
+        for line in lines:
+            console.print(f"  • {line}", markup=False)
+
+
+def headline(c: Calibration) -> str:
+    """The result in one or two sentences."""
+    before, after = c.stages[0].rms_mm, c.stages[-1].rms_mm
+    text = f"{len(c.fitted)} parameters fitted: the error falls from {mm(before)} to {mm(after)} RMS"
+    if c.held_out:
+        error, floor = mm(c.held_out.error.rms_mm), mm(c.held_out.floor.rms_mm)
+        text += f", {error} on held-out {c.held_out.kind}, where a right model would leave {floor}."
+    else:
+        text += f". A right model would leave {mm(c.floor.rms_mm)}."
+    return text + f" Reduced chi-square {c.fit.reduced_chi_square:.3g}."
+
+
+def error_rows(c: Calibration) -> list[list[str]]:
+    """The errors by stage, ending at the error to be expected of a right model."""
+    rows = [[stage.name, *_sizes(stage), str(c.n_readings)] for stage in c.stages]
+    if c.held_out:
+        name = f"held out ({c.held_out.kind}, {c.held_out.fits} fits)"
+        rows.append([name, *_sizes(c.held_out.error), str(c.held_out.readings)])
+        rows.append(["expected there", *_sizes(c.held_out.floor), ""])
+    smooth = " and field" if c.fit.noise.position_field > 0 else ""
+    return [*rows, [f"expected (jitter{smooth})", *_sizes(c.floor), ""]]
+
+
+def parameter_rows(c: Calibration) -> list[list[str]]:
+    """Each parameter before and after, in the unit of the robot file."""
+    return [
+        [
+            item.name,
+            item.unit,
+            _with_deviation(item.nominal, item.prior_sd),
+            _with_deviation(item.value, item.sd),
+            f"{item.shift:+.1f} sd" if isfinite(item.shift) else "-",
+            f"{100 * item.ratio:.0f} %" if isfinite(item.ratio) else "-",
+            item.flag,
+        ]
+        for item in c.fitted
+    ]
+
+
+def undetermined(c: Calibration) -> list[str]:
+    """Undetermined directions and correlated pairs, in words."""
+    lines = [f"{d.text}: sd {100 * d.ratio:.0f} % of the prior's" for d in c.fit.directions]
+    lines += [
+        f"{first} and {second} are correlated ({r:+.2f})"
+        for first, second, r in c.fit.correlations
+        if not any(first in d.text and second in d.text for d in c.fit.directions)
+    ]
+    return lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else [])
+
+
+def _with_deviation(value: float, sd: float) -> str:
+    return f"{number(value, sd)} ± {deviation(sd)}" if isfinite(sd) else number(value)
+
+
+def _sizes(stage: Stage) -> list[str]:
+    values = (stage.rms_mm, stage.mean_mm, stage.max_mm, stage.rms_deg)
+    return [f"{value:.3f}" if isfinite(value) else "-" for value in values]
 
 
 def page(c: Calibration, source: str) -> str:
     """The whole HTML text; `source` says what was fitted."""
     title = f"Calibration: {c.before.name}"
-    sections = [_opening(c, title), _doubts(c), *_fit(c), _halves(c), _residuals(c), _numbers(c)]
+    lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
+    known = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
+    sections = [_opening(c, title), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
     return html_page.page(title, sections, source, "ctcr calibrate fit", figures.view(c))
 
 
@@ -34,17 +119,12 @@ def _opening(c: Calibration, title: str) -> str:
         ("noise", expected, f"noise floor: expected error of a right model (jitter{smooth}, parameters)"),
         ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"),
     ]
-    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(terminal.headline(c))}</p>{cards(numbers)}'
-
-
-def _doubts(c: Calibration) -> str:
-    lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
-    return "".join(f"<h2>{title}</h2>" + bullets(lines) for title, lines in lists if lines)
+    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
 
 
 def _fit(c: Calibration) -> list[str]:
     """What the fit gains, the parameters, and how far the data determine them."""
-    shown, lines = min(len(c.fitted), figures.MOST_NAMES), terminal.undetermined(c)
+    shown, lines = min(len(c.fitted), figures.MOST_NAMES), undetermined(c)
     gain = "From the robot file's values to the expected error. The error that counts is the one of held-out readings."
     values = (
         "Fitted values and their standard deviations, in standard deviations of the robot file's values (grey: one and "
@@ -54,7 +134,7 @@ def _fit(c: Calibration) -> list[str]:
     return [
         "<h2>What calibration brings</h2>" + figure(figures.waterfall, c, WIDE, 4.2, gain, wide=True),
         "<h2>The parameters</h2>" + figure(figures.shifts, c, WIDE, 1.0 + 0.24 * shown, values, wide=True),
-        table("Values ± one standard deviation", terminal.PARAMETER_COLUMNS, terminal.parameter_rows(c), 2),
+        table("Values ± one standard deviation", PARAMETER_COLUMNS, parameter_rows(c), 2),
         "<h2>What the data cannot tell apart</h2>" + (bullets(lines) if lines else ""),
         figure(figures.correlations, c, WIDE, 2.8 + 0.2 * shown, together, wide=True),
     ]
@@ -101,7 +181,7 @@ def _numbers(c: Calibration) -> str:
         ["seconds of the last fit", f"{fit.seconds:.2g}"],
     ]
     tables = [
-        table("Error, measured minus predicted", terminal.ERROR_COLUMNS, terminal.error_rows(c), 1),
+        table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c), 1),
         table("The fit", ["", ""], rows, 1),
     ]
     if fit.frames:

@@ -236,7 +236,7 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, targe
 
     Example: ctcr calibrate fit robot.yaml measurements.csv --free standard -o calibrated.yaml --report fit.html
     """
-    from ctcr.calibrate import joint_fit, outcome, terminal
+    from ctcr.calibrate import joint_fit, outcome, report
 
     loaded, readings = options.load(robot, measurements)
     target = outcome.check_target(loaded, target, in_place)
@@ -247,7 +247,7 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, targe
         joint_fit.write_robot(calibration, target, measurements, in_place=in_place)
     out.write_report("calibrate.report", calibration, f"{measurements} fitted with {robot}")
     out.write_json(calibration.as_dict())
-    terminal.show(out.console, calibration)
+    report.show(out.console, calibration)
     out.say(*readings.warnings)
     if target:
         out.say(f"Robot file: {target}")

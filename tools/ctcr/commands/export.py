@@ -17,7 +17,7 @@ def command(folder, target) -> None:
 
     Example: ctcr export recording -o recording.mcap
     """
-    from ctcr.track.mcap_file import write_mcap
+    from ctcr.track.recording import write_mcap
 
     counts = write_mcap(folder, target)
     rows = [[channel, str(count)] for channel, count in counts.items()]

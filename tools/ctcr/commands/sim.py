@@ -60,12 +60,11 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     Example: ctcr sim ethercat --interface eth1 --motors 6
     """
     from ctcr.bench.shared.folder import BUS, MASTER
-    from ctcr.bench.simulators import network
-    from ctcr.bench.simulators.bench import serve
+    from ctcr.bench.simulators.bench import make_cable, serve
     from ctcr.bench.simulators.ethercat import EthercatSimulator
 
     if not interface:
-        network.make_cable()
+        make_cable()
     simulator = EthercatSimulator(interface or BUS, folder, motors, variant, scenario, seed)
     click.echo(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
     serve(simulator)

@@ -1,8 +1,10 @@
-"""Both simulators around one robot, while some work is done beside them."""
+"""Both simulators around one robot, while some work is done beside them, in a network that needs no rights."""
 
 import multiprocessing
 import os
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -10,15 +12,16 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from ctcr.bench.shared.folder import BUS, VARIABLE
-from ctcr.bench.simulators import network
+from ctcr.bench.shared.folder import BUS, MASTER, VARIABLE
 from ctcr.bench.simulators.aurora import AuroraSimulator
 from ctcr.bench.simulators.ethercat import EthercatSimulator
 from ctcr.bench.simulators.robot import SimulatedRobot
 from ctcr.bench.simulators.simulator import Simulator
-from ctcr.errors import InputError
+from ctcr.errors import InputError, Problem
 
 READY_S = 20.0
+_INSIDE = "CTCR_OWN_NETWORK"
+_PAIR = ["ip", "link", "add", MASTER, "type", "veth", "peer", "name", BUS]
 
 
 def run(
@@ -33,8 +36,8 @@ def run(
     Where permitted, the command line starts again in a network of its own: call this before anything else.
     """
     os.environ[VARIABLE] = str(folder.resolve())
-    network.enter_own_network(sys.argv[1:])
-    network.make_cable()
+    enter_own_network(sys.argv[1:])
+    make_cable()
     motors = 2 * robot.robot.n_tubes
     served = [
         _start(lambda: AuroraSimulator(robot, folder, scenarios[0], seed)),
@@ -77,3 +80,37 @@ def _serve(make: Callable[[], Simulator], ready: Connection) -> None:
         return
     ready.send(None)
     serve(simulator)
+
+
+# ---- network: a pair of virtual interfaces, joined like by a cable
+
+
+def make_cable() -> None:
+    """Makes the pair, or finds it there. Raises InputError where this is not permitted."""
+    if not shutil.which("ip"):
+        raise InputError(Problem("the command `ip` is missing: install iproute2"))
+    if subprocess.run(["ip", "link", "show", MASTER], capture_output=True).returncode == 0:
+        return
+    settings = (["addrgenmode", "none"], ["up"])  # the first: no IPv6 traffic
+    for command in (_PAIR, *(["ip", "link", "set", name, *to] for to in settings for name in (MASTER, BUS))):
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode and "File exists" not in done.stderr:
+            reason = done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "refused"
+            raise InputError(Problem(f"cannot make virtual network interfaces: {reason}", MASTER))
+
+
+def enter_own_network(arguments: list[str]) -> None:
+    """Starts this program again in a network namespace of its own, where that is permitted and not done yet."""
+    if not os.environ.get(_INSIDE) and is_permitted():
+        os.environ[_INSIDE] = "1"
+        os.execvp("unshare", [*_unshare(), sys.executable, "-m", "ctcr", *arguments])
+
+
+def is_permitted() -> bool:
+    """Whether the user may make a network namespace with the pair in it."""
+    return bool(shutil.which("unshare")) and subprocess.run([*_unshare(), *_PAIR], capture_output=True).returncode == 0
+
+
+def _unshare() -> list[str]:
+    """Root needs no user namespace, and without one keeps the right to real-time priority."""
+    return ["unshare", "-n"] if os.geteuid() == 0 else ["unshare", "-Urn"]

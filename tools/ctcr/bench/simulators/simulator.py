@@ -2,14 +2,14 @@
 
 import select
 import time
-from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from ctcr.bench.shared.control import ControlSocket
 from ctcr.bench.shared.real_time import Duty, real_time
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import yaml_document
 
 Settings = dict[str, Any]
@@ -74,8 +74,7 @@ def checked(changes: Settings, none: Settings) -> Settings:
     problems, values = [], {}
     for name, value in changes.items():
         if name not in none:
-            meant = did_you_mean(name, none)
-            hint = f"did you mean {meant}?" if meant else f"there are {', '.join(none)}"
+            hint = suggestion(name, none, f"there are {', '.join(none)}")
             problems.append(Problem(f"unknown fault: {hint}", field=name))
             continue
         values[name] = none[name] if value is None else value
@@ -100,12 +99,8 @@ def load_scenario(path: str | Path, none: Settings) -> list[tuple[float, Setting
         try:
             checked(changes, none)
         except InputError as error:
-            problems += _placed(error.problems, str(path), document, i)
+            problems += [replace(p, file=str(path), line=document.line((i, p.field))) for p in error.problems]
         steps.append((float(entry["at_s"]), changes))
     if problems:
         raise InputError(problems)
     return sorted(steps, key=lambda step: step[0])
-
-
-def _placed(problems: Iterable[Problem], file: str, document, entry: int) -> list[Problem]:
-    return [Problem(p.message, file, document.line((entry, p.field)), p.field) for p in problems]

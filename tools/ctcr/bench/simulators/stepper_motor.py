@@ -72,10 +72,6 @@ class StepperMotor:
     def stalled(self) -> bool:
         return self.enabled and self.jammed and self.speed != 0
 
-    @property
-    def is_too_hot(self) -> bool:
-        return self.heat >= HEATING_S
-
     def advance(self, now: float, overload: bool) -> None:
         """Moves on to the time `now` [s]."""
         step = 0.0 if self._time is None else min(0.05, now - self._time)

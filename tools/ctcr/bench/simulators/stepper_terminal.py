@@ -4,7 +4,7 @@ from ctcr.bench.shared.ethercat import DIAGNOSIS, ProcessImage, State, Values, s
 from ctcr.bench.simulators.object_dictionary import OUT_OF_RANGE, Abort, Entry, ObjectDictionary, ServiceDataServer
 from ctcr.bench.simulators.sii import Identity, SyncManager
 from ctcr.bench.simulators.slave_controller import Application
-from ctcr.bench.simulators.stepper_motor import StepperMotor
+from ctcr.bench.simulators.stepper_motor import HEATING_S, StepperMotor
 
 MAILBOX = 128  # bytes
 ENCODER, STEPPER, POSITIONING = 0x7000, 0x7010, 0x7020  # outputs; inputs are 0x1000 lower
@@ -166,7 +166,11 @@ class StepperTerminal(Application):
 
     def _diagnose(self) -> None:
         motor = self.motor
-        faults = {OVER_TEMPERATURE: motor.is_too_hot, SHORT_CIRCUIT: motor.shorted, UNDER_VOLTAGE: motor.unpowered}
+        faults = {
+            OVER_TEMPERATURE: motor.heat >= HEATING_S,
+            SHORT_CIRCUIT: motor.shorted,
+            UNDER_VOLTAGE: motor.unpowered,
+        }
         self._error |= any(faults.values())
         for subindex, value in (faults | {STALL: motor.stalled, SATURATED: motor.stalled}).items():
             self.objects.set(DIAGNOSIS, subindex, int(value))
