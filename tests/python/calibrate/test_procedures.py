@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -207,7 +208,6 @@ def test_circle(sign):
     forward = np.arange(80) < 40
     seen = sign * (angle + 0.7 + np.where(forward, 0.02, -0.02))
     position = np.column_stack([3 + 0.5 * np.cos(seen), 0.5 * np.sin(seen), np.full(80, 2.0)])
-    circle = Circle(
-        "tube 1", position, angle, forward, np.ones(80, bool), np.array([3.0, 0, 2]), np.array([0.0, 0, 1]), 0.5
-    )
+    fit = SimpleNamespace(centre=np.array([3.0, 0, 2]), normal=np.array([0.0, 0, 1]), radius=0.5, outliers=[])
+    circle = Circle("tube 1", position, angle, forward, fit)
     assert np.degrees(0.02) * np.where(forward, 1, -1) == pytest.approx(circle.behind(), abs=1e-9)

@@ -1,6 +1,6 @@
 """The joint fit as `ctcr calibrate fit` runs it: the fit, its error on held-out readings, how far two halves agree."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import nan
@@ -147,7 +147,7 @@ def calibrate(
         def refitted(like: Fit, rows: Array) -> Fit:
             return fitted(names, rows=rows, noise=like.noise, inflation=like.inflation, starts=1)
 
-        tried = _explaining([partial(fitted, names, noise=one) for one in _noises(robot, readings, noise)])
+        tried = _explaining(fitted(names, noise=one) for one in _noises(robot, readings, noise))
         fit, held_out = tried[-1], None
         if judged:
             errors = [
@@ -202,16 +202,15 @@ def _noises(robot: Robot, readings: Measurements, noise: str) -> list[Noise]:
     return {"jitter": [jitter], "field": [field], "auto": [jitter, field] if smooth else [jitter]}[noise]
 
 
-def _explaining(fits: Sequence) -> list[Fit]:
-    """The first of some fits, made in their order, whose noise explains the residual; all of them where none does."""
+def _explaining(fits: Iterable[Fit]) -> list[Fit]:
+    """The first of some fits whose noise explains the residual, or the last that nearly does; else all of them."""
     tried: list[Fit] = []
-    for make in fits:
-        tried.append(make())
-        fit, is_last = tried[-1], len(tried) == len(fits)
-        nearly = fit.noise.position_field > 0 and fit.reduced_chi_square < settings.NEARLY_EXPLAINED
-        if fit.p_value > settings.SIGNIFICANCE or (is_last and nearly):
+    for fit in fits:  # later ones are made only where earlier ones do not explain it
+        if fit.p_value > settings.SIGNIFICANCE:
             return [fit]
-    return tried
+        tried.append(fit)
+    nearly = tried[-1].noise.position_field > 0 and tried[-1].reduced_chi_square < settings.NEARLY_EXPLAINED
+    return tried[-1:] if nearly else tried
 
 
 def _stage(name: str, residual: Array) -> Stage:

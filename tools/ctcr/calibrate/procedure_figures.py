@@ -20,16 +20,18 @@ class Circle:
     position: Array  # (K, 3) [m], in the frame of the circle
     angle: Array  # (K,) of the tube, without its offset [rad]
     forward: Mask  # (K,)
-    used: Mask  # (K,)
-    centre: Array  # (3,) [m]
-    normal: Array  # (3,)
-    radius: float  # [m]
+    fit: Any  # of the core: its centre (3,) [m], normal (3,), radius [m] and outliers
+
+    @property
+    def used(self) -> Mask:
+        return ~np.isin(np.arange(len(self.angle)), self.fit.outliers)
 
     def in_plane(self) -> Array:
         """The readings from the centre (K, 2) [mm]."""
-        first = np.cross(self.normal, [1.0, 0.0, 0.0] if abs(self.normal[0]) < 0.9 else [0.0, 1.0, 0.0])
+        normal = self.fit.normal
+        first = np.cross(normal, [1.0, 0.0, 0.0] if abs(normal[0]) < 0.9 else [0.0, 1.0, 0.0])
         first /= np.linalg.norm(first)
-        return 1e3 * (self.position - self.centre) @ np.column_stack([first, np.cross(self.normal, first)])
+        return 1e3 * (self.position - self.fit.centre) @ np.column_stack([first, np.cross(normal, first)])
 
     def behind(self) -> Array:
         """Angle of the tip less a constant offset from its motor (K,) [deg]."""
@@ -40,21 +42,13 @@ class Circle:
         return np.degrees(np.angle(np.exp(1j * off) / np.mean(np.exp(1j * off[self.used]))))
 
 
-def circle_of(name: str, position: Array, angle: Array, forward: Mask, fit, robot) -> Circle:
-    """The circle of a fit to readings (K, 3) [m], tracker frame, at the tube's angles (K,) [rad]."""
-    if fit.in_base_frame:
-        position = (position - robot.tracker.position) @ robot.tracker.rotation
-    used = ~np.isin(np.arange(len(angle)), fit.outliers)
-    return Circle(name, position, angle, forward, used, np.array(fit.centre), np.array(fit.normal), fit.radius)
-
-
 def circles(figure, found: list[Circle]) -> None:
     """The readings of each tube on its circle, and the lag of its tip behind its motor."""
     panels = figure.subplots(len(found), 2, width_ratios=(1, 1.6), squeeze=False)
     turn = np.linspace(0, 2 * np.pi, 200)
     for (left, right), circle in zip(panels, found, strict=True):
         around, off = circle.in_plane(), circle.behind()
-        radius = 1e3 * circle.radius
+        radius = 1e3 * circle.fit.radius
         left.plot(radius * np.cos(turn), radius * np.sin(turn), color=NOISE, lw=1)
         left.plot(0, 0, "+", color=NOISE)
         for way, colour, label in ((True, OUT, "forward"), (False, BACK, "backward")):

@@ -102,7 +102,9 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         notices += outliers(name, table.row[mine[list(fit.outliers)]])
         turned = np.diff(angle)
         forward = (np.append(turned[:1], turned) if direction is None else direction) > 0
-        circles.append(figures_of.circle_of(name, position, ratio * angle, forward, fit, robot))
+        if fit.in_base_frame:
+            position = (position - robot.tracker.position) @ robot.tracker.rotation
+        circles.append(figures_of.Circle(name, position, ratio * angle, forward, fit))
         details[f"tube_{tube}"] = {
             "centre_mm": 1e3 * np.asarray(fit.centre),
             "normal": fit.normal,

@@ -64,7 +64,7 @@ def _masses(text: str) -> tuple[float, ...]:
 
 
 def _show(out, n_tubes: int, verdict: str, proposal) -> None:
-    from ctcr.plan.proposal import instead
+    from ctcr.effects import catalogue
 
     if len(proposal.rivals) < 2:
         out.say(f"Nothing is open between effects: the verdict on these measurements is {verdict}.")
@@ -78,4 +78,4 @@ def _show(out, n_tubes: int, verdict: str, proposal) -> None:
     out.table(title, ["run", "mass at the tip, g", "expected log evidence with it"], rows)
     if not proposal.decides:
         out.say("No run within the measured joints and these loads can decide. Measure instead:")
-        out.say(*(f"  {identity}: {advice}" for identity, advice in instead(proposal, n_tubes).items()))
+        out.say(*(f"  {rival.id}: {catalogue.get(rival.id, n_tubes).measure}" for rival in proposal.rivals))

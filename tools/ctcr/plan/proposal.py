@@ -14,7 +14,6 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.diagnose.pipeline import Diagnosis
-from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import user_recording
 from ctcr.robot.description import Robot
@@ -98,11 +97,6 @@ def propose(
 def _margin(rivals: list[Rival]) -> float:
     best, second = sorted((rival.fit.log_evidence for rival in rivals), reverse=True)[:2]
     return float(best - second)
-
-
-def instead(proposal: Proposal, n_tubes: int) -> dict[str, str]:
-    """By effect: other measurements that show it."""
-    return {rival.id: catalogue.get(rival.id, n_tubes).measure for rival in proposal.rivals}
 
 
 class Contest:

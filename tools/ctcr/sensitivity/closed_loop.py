@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -58,20 +59,13 @@ class ClosedLoop:
         return sum(curve.worst_maximum for curve in self.curves)
 
 
-@dataclass(frozen=True)
-class Job:
-    """One controller with all weights of the scenario, one run each with the same noise."""
+def work(text: str, nominal: Array, effects: Array, wrong: Array) -> tuple[float, float]:
+    """Mean and largest error [mm] of a controller with the parameters `wrong`; NaN where a run failed.
 
-    scenario: str  # as JSON
-    controller: Array
-    plant: Array
-    effects: Array
-
-
-def work(job: Job) -> tuple[float, float]:
-    """Mean and largest error [mm]; NaN where a run failed."""
-    scenario = Scenario.model_validate_json(job.scenario)
-    controller, plant = (_core.SystemValues(parameters=x, effects=job.effects) for x in (job.controller, job.plant))
+    All weights of the scenario, which is JSON, one run each with the same noise: plain data that a worker needs.
+    """
+    scenario = Scenario.model_validate_json(text)
+    controller, plant = (_core.SystemValues(parameters=values, effects=effects) for values in (wrong, nominal))
     runs = [run_once(scenario, controller, plant, mass) for mass in scenario.load.mass_g]
     if any(not run.started or run.status != "ok" for run in runs):
         return np.nan, np.nan
@@ -96,14 +90,14 @@ def study(
     check(scenario, robot, robot)
     fractions, nominal = np.linspace(-1, 1, points), parameters.values(robot)
     cases = [nominal] + [one.at(fraction) for one in varied for fraction in fractions]
-    text, effects = scenario.model_dump_json(), catalogue.values(robot)
-    jobs = [Job(text, case, nominal, effects) for case in cases]
+    text = scenario.model_dump_json()
+    errors_of = partial(work, text, nominal, catalogue.values(robot))
     settings = {"study": "closed loop", "scenario": text, "cases": [case.tolist() for case in cases]}
     kept = ProgressFile(keep, settings)
     found = kept.load() or []
     advance(len(found))
     with workers(dask) as in_order:
-        for outcome in in_order(work, jobs[len(found) :]):
+        for outcome in in_order(errors_of, cases[len(found) :]):
             found.append(outcome)
             if len(found) % points == 1:
                 kept.save(found)
