@@ -83,8 +83,7 @@ def random_joints(robot, rows: int, random):
     inner_end = np.zeros(rows)
     for i in reversed(range(robot.n_tubes)):
         least = inner_end
-        outer_beta = ends[:, i + 1] - lengths[i + 1] if i + 1 < robot.n_tubes else 0.0
-        most = lengths[i] + outer_beta
+        most = lengths[i] + (ends[:, i + 1] - lengths[i + 1] if i + 1 < robot.n_tubes else 0.0)
         ends[:, i] = random.uniform(least, np.minimum(most, least + 0.1))
         inner_end = ends[:, i]
     return ends - lengths, random.uniform(-np.pi, np.pi, (rows, robot.n_tubes))

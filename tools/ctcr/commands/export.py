@@ -19,6 +19,5 @@ def command(folder, target) -> None:
     """
     from ctcr.track.recording import write_mcap
 
-    counts = write_mcap(folder, target)
-    rows = [[channel, str(count)] for channel, count in counts.items()]
+    rows = [[channel, str(count)] for channel, count in write_mcap(folder, target).items()]
     options.Output().table(target, ["channel", "messages"], rows)

@@ -87,8 +87,7 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
     from ctcr.bench.simulators import bench as simulated
 
     scenarios = tracker_scenario, bus_scenario
-    made = _robot(robot, seed, **physics)
-    return simulated.run(lambda: _run(program), made, folder, scenarios, seed)
+    return simulated.run(lambda: _run(program), _robot(robot, seed, **physics), folder, scenarios, seed)
 
 
 @command.command(name="set")

@@ -68,14 +68,12 @@ def _find_the_joints(story: Story, short: bool) -> None:
 
 def _find_the_effect(story: Story, short: bool) -> None:
     dwell, first, second = 0.05 if short else 0.2, "first/measurements.csv", "second/measurements.csv"
-    why = "Measure: all tubes turn by 40 degrees and back"
-    story.do(why, _record(KNOWN, "first", dwell), RECORDED, "first")
+    story.do("Measure: all tubes turn by 40 degrees and back", _record(KNOWN, "first", dwell), RECORDED, "first")
     if not short:
         off = "by {position_mm[rms]:.2f} mm RMS, where noise alone would be {noise[rms_mm]:.2f} mm"
         story.do("How wrong is the model?", f"compare {KNOWN} {first}", off, "compared")
         story.do("Which effect is missing?", f"diagnose {KNOWN} {first}", _diagnosed, "first_diagnosis")
-    propose = f"next {KNOWN} {first} --runs 2 -o second.csv"
-    story.do("Ask for the runs that decide", propose, _proposed, "proposal")
+    story.do("Ask for the runs that decide", f"next {KNOWN} {first} --runs 2 -o second.csv", _proposed, "proposal")
     if story.answers["proposal"]["runs"]:
         story.do("Measure them", _record(KNOWN, "second", dwell), RECORDED, "second")
         story.do("Put both recordings together", f"join {KNOWN} {first} {second} -o both.csv", "both.csv")
@@ -88,8 +86,7 @@ def _add_the_effect(story: Story, short: bool) -> None:
     table = "both.csv"
     if not short:
         table = "all.csv"
-        why = "Measure all over the workspace"
-        story.do(why, _record(KNOWN, "workspace"), RECORDED, "workspace")
+        story.do("Measure all over the workspace", _record(KNOWN, "workspace"), RECORDED, "workspace")
         story.do("Join it", f"join {KNOWN} both.csv workspace/measurements.csv -o {table}", table)
     fit = f"calibrate fit {KNOWN} {table} -o calibrated.yaml"
     story.do("Calibrate alone, to compare", fit, "{rms_mm[held_out]:.2f} mm RMS on held-out runs", "calibrated")
@@ -105,12 +102,10 @@ def _track(story: Story) -> None:
     for robot, name in ROBOTS.items():
         blind = f"blind_{robot}"
         loaded = robot_file.load(story.folder / f"{robot}.yaml")
-        plan = blind_drive.drive(loaded, joints, corners)
-        simulation.write(plan, story.folder / f"{blind}.csv", loaded.n_tubes)
+        simulation.write(blind_drive.drive(loaded, joints, corners), story.folder / f"{blind}.csv", loaded.n_tubes)
 
         off = partial(_off_the_cube, story.folder / blind / TABLE, corners, loaded.n_tubes)
-        why = f"Drive along a cube blindly, by the model {name}"
-        story.do(why, _record(f"{robot}.yaml", blind), off, blind)
+        story.do(f"Drive along a cube blindly, by the model {name}", _record(f"{robot}.yaml", blind), off, blind)
     for robot, name in ROBOTS.items():
         track = f"track {robot}.yaml cube.yaml --live {BENCH} -o track_{robot}"
         story.do(f"Track the cube at 40 Hz, by the model {name}", track, _tracked, f"track_{robot}")

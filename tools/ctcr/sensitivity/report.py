@@ -115,8 +115,7 @@ def page(found: dict[str, Any], source: str, accuracy: float) -> str:
             f"error over {1e3 * study.nominal_maximum:.0f} µm with true parameters."
         )
         drawn = figure(curves, study, 10.4, 5.4, text, wide=True)
-        title = "Increase of the error, worst of the range"
-        rows = table(title, CLOSED_COLUMNS, closed_rows(study), 2)
+        rows = table("Increase of the error, worst of the range", CLOSED_COLUMNS, closed_rows(study), 2)
         sections.append(f"<h2>Closed loop</h2>{drawn}{rows}")
     return html_page.page("Which parameters matter", sections, source, "ctcr sensitivity")
 

@@ -41,8 +41,7 @@ def _client(address: str) -> Any:
     try:
         from distributed import Client  # late: an optional package
     except ModuleNotFoundError:
-        text = "--dask needs the package distributed: pip install distributed"
-        raise InputError(Problem(text)) from None
+        raise InputError(Problem("--dask needs the package distributed: pip install distributed")) from None
     try:
         return Client(address, timeout=10)
     except (OSError, ValueError) as error:
