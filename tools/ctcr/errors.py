@@ -1,6 +1,7 @@
 """Faults of an input, with messages that help its author to correct it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -53,7 +54,11 @@ def shown(value: object) -> str:
     return text if len(text) <= 40 else text[:36] + " ..."
 
 
-def file_fault(error: OSError, path: object, doing: str) -> InputError:
-    """The operating system's refusal as one sentence: `doing` is read or write."""
-    reason = (error.strerror or str(error)).lower()
-    return InputError(Problem(f"cannot {doing} it: {reason}", file=str(path)))
+@contextmanager
+def file_faults(path: object, doing: str) -> Iterator[None]:
+    """Raises the operating system's refusal of a file as an InputError of one sentence: `doing` is read or write."""
+    try:
+        yield
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(Problem(f"cannot {doing} it: {reason}", file=str(path))) from None

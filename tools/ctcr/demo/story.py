@@ -13,7 +13,7 @@ from typing import Any
 
 from rich.console import Console
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 
 LOG = "log.txt"
 
@@ -33,12 +33,10 @@ def new_folder(path: str | Path) -> Path:
     folder = Path(path)
     if folder.is_dir() and any(folder.iterdir()) and not (folder / LOG).exists():
         raise InputError(Problem("is not empty and holds no demonstration: choose another folder", str(folder)))
-    try:
+    with file_faults(folder, "write"):
         if folder.exists():
             shutil.rmtree(folder)
         folder.mkdir(parents=True)
-    except OSError as error:
-        raise file_fault(error, folder, "write") from None
     (folder / LOG).touch()
     return folder
 

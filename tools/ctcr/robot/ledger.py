@@ -16,7 +16,7 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
@@ -84,11 +84,8 @@ def write(
 
 def sha256(path: str | Path) -> str:
     """The fingerprint of a file, in hexadecimal."""
-    try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
+    with file_faults(path, "read"), open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _apply(document: CommentedMap, change: Change) -> CommentedMap:

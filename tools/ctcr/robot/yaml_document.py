@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 
 FieldPath = tuple[str | int, ...]
 MAX_BYTES = 1 << 20  # a description is a few kB: a larger file is something else, often a table
@@ -36,11 +36,8 @@ class YamlDocument:
 
 def load(path: str | Path) -> YamlDocument:
     """The document of a file. Raises InputError where it cannot be read or is no YAML."""
-    try:
-        with open(path, "rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
+    with file_faults(path, "read"), open(path, "rb") as file:
+        content = file.read(MAX_BYTES + 1)
     return parse(content, str(path))
 
 

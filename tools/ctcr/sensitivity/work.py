@@ -13,7 +13,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 from ctcr.show.output import atomic_writer
 
 
@@ -67,11 +67,11 @@ class ProgressFile:
         """The state, or None where there is none yet. Raises InputError where it belongs to another study."""
         if self.path is None or not Path(self.path).exists():
             return None
+        with file_faults(self.path, "read"):
+            text = Path(self.path).read_text(encoding="utf-8")
         try:
-            kept = json.loads(Path(self.path).read_text(encoding="utf-8"))
+            kept = json.loads(text)
             settings, state = kept["settings"], kept["state"]
-        except OSError as error:
-            raise file_fault(error, self.path, "read") from None
         except (ValueError, KeyError, TypeError):
             raise InputError(Problem("is not the progress of a sensitivity study", str(self.path))) from None
         if settings != self.settings:

@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import Progress as Bar
 from rich.table import Table
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 
 PROGRESS_AFTER_S = 1.0
 
@@ -34,18 +34,17 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
     special = target.exists() and not target.is_file()  # /dev/null and the like are written, never replaced
     temporary = None
     try:
-        if special:
-            with open(target, **mode) as file:
+        with file_faults(path, "write"):
+            if special:
+                with open(target, **mode) as file:
+                    yield file
+                return
+            handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+            with open(handle, **mode) as file:
                 yield file
-            return
-        handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-        with open(handle, **mode) as file:
-            yield file
-        os.chmod(temporary, _usual_permissions())
-        os.replace(temporary, target)
-        temporary = None
-    except OSError as error:
-        raise file_fault(error, path, "write") from None
+            os.chmod(temporary, _usual_permissions())
+            os.replace(temporary, target)
+            temporary = None
     finally:
         if temporary:
             Path(temporary).unlink(missing_ok=True)

@@ -12,7 +12,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.errors import InputError, Problem, file_fault, shown
+from ctcr.errors import InputError, Problem, file_faults, shown
 
 BLOCK_BYTES = 4 << 20
 MAX_HEADER_BYTES = 1 << 16
@@ -104,15 +104,12 @@ def read_columns(path: str | Path, columns: Sequence[str]) -> NDArray[np.float64
 
 def open_table(path: str | Path) -> NumberTable:
     """Reads the header and counts the rows. Raises InputError where the file is no table of text."""
-    try:
-        with open(path, "rb") as file:
-            header = file.readline(MAX_HEADER_BYTES)
-            columns = header_names(header, str(path))
-            start = file.tell()
-            end = _end_of_content(file, start)
-            n_rows = _count_lines(file, start, end)
-    except OSError as error:
-        raise file_fault(error, path, "read") from None
+    with file_faults(path, "read"), open(path, "rb") as file:
+        header = file.readline(MAX_HEADER_BYTES)
+        columns = header_names(header, str(path))
+        start = file.tell()
+        end = _end_of_content(file, start)
+        n_rows = _count_lines(file, start, end)
     if n_rows == 0:
         raise InputError(Problem("has no rows below the header", str(path)))
     return NumberTable(Path(path), columns, n_rows, start, end)

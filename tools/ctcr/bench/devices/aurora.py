@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 from ctcr.bench.devices.fault import DeviceFault, needed
@@ -47,6 +48,7 @@ class Aurora(AbstractContextManager):
         a reply [s]; `tries`: of a command whose reply came damaged."""
         self.port, self.baud, self.replies = port, baud, replies
         self._answer_s, self._tries = answer_s, tries
+        self._fault = partial(DeviceFault, f"tracker {port}")
         self.version, self.tools = "", []
         self.damaged_answers = 0
         self._line = None
@@ -261,6 +263,3 @@ class Aurora(AbstractContextManager):
     def _silence(self) -> DeviceFault:
         remedy = "wait, or switch it off and on; after a change of its baud rate connect again"
         return self._fault(f"no answer within {self._answer_s:g} s", remedy)
-
-    def _fault(self, what: str, remedy: str, code: int | None = None) -> DeviceFault:
-        return DeviceFault(f"tracker {self.port}", what, remedy, code)

@@ -1,6 +1,7 @@
 """Control of the joints in each cycle: follows moves, watches limits and following errors, latches faults."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ JOG_M, JOG_RAD = 25e-3, 0.6  # longest move without limits, before homing
 # An encoder has jumped where it moves so many times faster than its motor can, and also further than this fraction of
 # the following error allowed: readings come at uneven times.
 JUMP_FACTOR, JUMP_ERROR = 4.0, 0.5
+_fault = partial(DeviceFault, "joints")
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,3 @@ def _axis_fault(which: Mask, what: str, remedy: str) -> DeviceFault:
     tube, n = int(np.flatnonzero(which)[0]), len(which) // 2
     kind = "translation" if tube < n else "rotation"
     return DeviceFault(f"{kind} of tube {tube % n + 1}", what, remedy)
-
-
-def _fault(what: str, remedy: str) -> DeviceFault:
-    return DeviceFault("joints", what, remedy)

@@ -1,6 +1,7 @@
 """The EtherCAT bus with its stepper terminals: brought up, exchanged every cycle, its faults explained."""
 
 import time
+from functools import partial
 
 from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.fault import DeviceFault, needed
@@ -19,6 +20,7 @@ class Bus:
     def __init__(self, interface: str, positions: list[int], settings: Motors):
         """`positions` of the motors' terminals on the bus, in the order of the axes; the coupler is 0."""
         self.interface, self._positions, self._settings = interface, positions, settings
+        self._fault = partial(DeviceFault, f"bus {interface}")
         self.drives: list[StepperDrive] = []
         self.names: list[str] = []
         self._master = None
@@ -117,6 +119,3 @@ class Bus:
             if drive.slave.state != State.OP:
                 return drive.state_fault()
         return self._fault("frames come back damaged or not at all", "check the cable, then connect again")
-
-    def _fault(self, what: str, remedy: str) -> DeviceFault:
-        return DeviceFault(f"bus {self.interface}", what, remedy)

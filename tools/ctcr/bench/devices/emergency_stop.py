@@ -1,5 +1,6 @@
 """The latch of the emergency stop: a file in the bench's folder. While it exists, nothing moves."""
 
+from contextlib import suppress
 from pathlib import Path
 
 from ctcr.bench.devices.fault import DeviceFault
@@ -9,11 +10,8 @@ REMEDY = "look at the robot, mend the cause, then release it with `ctcr stop --r
 
 def stop(folder: Path, reason: str) -> None:
     """Stops all motion; the first reason stays."""
-    try:
-        with open(folder / "stop", "x", encoding="utf-8") as file:
-            file.write(reason)
-    except FileExistsError:
-        pass
+    with suppress(FileExistsError), open(folder / "stop", "x", encoding="utf-8") as file:
+        file.write(reason)
 
 
 def is_stopped(folder: Path) -> bool:

@@ -2,6 +2,7 @@
 
 import struct
 from dataclasses import dataclass
+from functools import partial
 
 from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.fault import DeviceFault
@@ -42,7 +43,7 @@ class StepperDrive:
     def __init__(self, slave, position: int, settings: Motors, errors: tuple[type[Exception], ...]):
         """`slave` is that of pysoem; `errors`: its exceptions for a mailbox without a usable answer."""
         self.slave, self.position, self.settings, self._errors = slave, position, settings, errors
-        self.name = f"terminal {position} ({slave.name})"
+        self.fault = partial(DeviceFault, f"terminal {position} ({slave.name})")  # what, remedy, its own code
         self.full_speed = 0.0  # [turns/s]
         self._images: dict[int, ProcessImage] = {}
 
@@ -123,9 +124,6 @@ class StepperDrive:
     def _not_a_drive(self) -> DeviceFault:
         remedy = "compare the terminals in the bench file with `ctcr devices`"
         return self.fault("is no stepper terminal with an encoder, or does not answer", remedy)
-
-    def fault(self, what: str, remedy: str, code: int | None = None) -> DeviceFault:
-        return DeviceFault(self.name, what, remedy, code)
 
     # ---- object dictionary
 

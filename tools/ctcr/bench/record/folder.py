@@ -13,7 +13,7 @@ from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.record.row_file import RowFile
 from ctcr.bench.shared.real_time import CONTROLLER, real_time
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 from ctcr.show.output import atomic_writer, write_json
 from ctcr.table.measurements import column_names
 
@@ -93,10 +93,8 @@ class Folder:
         write_json(self.about, str(self.path / ABOUT))
 
     def _create(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
-        try:
+        with file_faults(self.path, "write"):
             self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise file_fault(error, self.path, "write") from None
         if any(self.path.iterdir()):
             raise InputError(Problem("is not empty and holds no recording: choose another folder", str(self.path)))
         for name, content in contents.items():
@@ -121,7 +119,5 @@ class Folder:
 
 
 def _read(path: str | Path) -> bytes:
-    try:
+    with file_faults(path, "read"):
         return Path(path).read_bytes()
-    except OSError as error:
-        raise file_fault(error, path, "read") from None

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ctcr.errors import InputError, Problem, file_fault
+from ctcr.errors import InputError, Problem, file_faults
 
 Row = Iterable[float | str]
 
@@ -22,7 +22,7 @@ class RowFile:
         """
         self.path, self._synced = path, synced
         header = (",".join(columns) + "\n").encode()
-        try:
+        with file_faults(path, "write"):
             self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
             content = path.read_bytes()
             if not content.startswith(header[: len(content)]):
@@ -38,32 +38,29 @@ class RowFile:
             self._end = len(kept)
             self.last: list[str] | None = next(csv.reader([whole[-1].decode()])) if whole else None
             os.fsync(self._file)
-        except OSError as error:
-            raise file_fault(error, path, "write") from None
 
     def append(self, rows: list[Row]) -> None:
         """One group, in the order of the columns; NaN is an empty field. Raises InputError where the disk is full."""
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows([map(_field, row) for row in rows])
         data = text.getvalue().encode()
-        try:
-            written = os.pwrite(self._file, data, self._end)
-            if written < len(data):
-                os.pwrite(self._file, data[written:], self._end + written)
-            if self._synced:
-                os.fsync(self._file)
-        except OSError as error:
-            os.ftruncate(self._file, self._end)  # no half of a group
-            raise file_fault(error, self.path, "write") from None
+        with file_faults(self.path, "write"):
+            try:
+                written = os.pwrite(self._file, data, self._end)
+                if written < len(data):
+                    os.pwrite(self._file, data[written:], self._end + written)
+                if self._synced:
+                    os.fsync(self._file)
+            except OSError:
+                os.ftruncate(self._file, self._end)  # no half of a group
+                raise
         self._end += len(data)
         self.groups += 1
 
     def sync(self) -> None:
         """What was appended is on the disk when it returns. Raises InputError."""
-        try:
+        with file_faults(self.path, "write"):
             os.fsync(self._file)
-        except OSError as error:
-            raise file_fault(error, self.path, "write") from None
 
     def close(self) -> None:
         os.close(self._file)

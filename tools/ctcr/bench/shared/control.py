@@ -3,6 +3,7 @@
 import json
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,10 +42,8 @@ class ControlSocket:
                 reply = {"error": str(error)}
             except (ValueError, OSError) as error:
                 reply = {"error": f"not a request: {error}"}
-            try:
+            with suppress(OSError):  # the client has gone
                 connection.send(json.dumps(reply).encode())
-            except OSError:
-                pass  # the client has gone
 
     def close(self) -> None:
         self._socket.close()

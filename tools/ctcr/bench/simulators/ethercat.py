@@ -4,6 +4,7 @@ import errno
 import random
 import socket
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from ctcr.bench.shared.folder import ETHERCAT
@@ -101,10 +102,8 @@ class EthercatSimulator(Simulator):
                 self._send(frame)
 
     def _send(self, frame: bytearray) -> None:
-        try:
+        with suppress(OSError):  # the interface is down: the frame is lost, as on a wire
             self._socket.send(frame)
-        except OSError:
-            pass  # the interface is down: the frame is lost, as on a wire
 
     # ---- control
 

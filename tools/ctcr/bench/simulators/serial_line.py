@@ -6,6 +6,7 @@ import termios
 import time
 import tty
 from collections import deque
+from contextlib import suppress
 from pathlib import Path
 
 CHUNK_S = 0.004  # bytes leave together in chunks this long
@@ -73,10 +74,8 @@ class SerialLine:
             _, chunk = self._leaving.popleft()
             if self.host_baud() != self.baud:
                 chunk = bytes(byte ^ 0x55 for byte in chunk)  # garbled by the wrong rate
-            try:
+            with suppress(BlockingIOError):  # nobody reads: as on a wire, they are lost
                 os.write(self._master, chunk)
-            except BlockingIOError:
-                pass  # nobody reads: as on a wire, they are lost
         return max(0.0, self._leaving[0][0] - time.monotonic()) if self._leaving else None
 
     def host_baud(self) -> int | None:
