@@ -5,8 +5,7 @@ import re
 import numpy as np
 import pytest
 from ctcr.calibrate import tables
-from ctcr.calibrate.procedures import HOME, REGISTRATION, ROTATION_OFFSETS
-from ctcr.calibrate.specimens import CANTILEVER
+from ctcr.calibrate.procedures import CANTILEVER, HOME, REGISTRATION, ROTATION_OFFSETS
 from ctcr.errors import InputError
 
 

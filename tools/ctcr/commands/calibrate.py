@@ -53,18 +53,15 @@ def _length(name: str, default: float | None, text: str, least: float = 0):
 
 
 def _run(procedure: str, table: str, robot, target, in_place, out, **chosen) -> None:
-    """Runs a function of ctcr.calibrate, "room.name", whose columns are its name in capitals, and gives the result."""
-    from importlib import import_module
-
-    from ctcr.calibrate import outcome, tables
+    """Runs a function of ctcr.calibrate.procedures, whose columns are its name in capitals, and gives the result."""
+    from ctcr.calibrate import outcome, procedures, tables
     from ctcr.robot import robot_file
 
-    room, _, name = procedure.partition(".")
-    room, called = import_module(f"ctcr.calibrate.{room}"), f"ctcr calibrate {click.get_current_context().info_name}"
+    called = f"ctcr calibrate {click.get_current_context().info_name}"
     loaded = robot_file.load(robot) if robot else None
     target = outcome.check_target(loaded, target, in_place)
-    data = tables.read(table, getattr(room, name.upper()))
-    found = getattr(room, name)(data, loaded, **chosen)
+    data = tables.read(table, getattr(procedures, procedure.upper()))
+    found = getattr(procedures, procedure)(data, loaded, **chosen)
     if target:
         outcome.write_robot(found, loaded, target, called, table, in_place)
     out.write_report("calibrate.outcome", found, table, command=called, robot=loaded)
@@ -103,7 +100,7 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
         deployed = None if deployed_mm is None else 1e-3 * deployed_mm
         circles = Circles(math.radians(step_deg), readings, deployed)
         rotation_table(table, robot_file.load(robot), _desk(bench, folder, out), circles)
-    _run("procedures.rotation_offsets", table, robot, out=out, ratio=ratio, **target)
+    _run("rotation_offsets", table, robot, out=out, ratio=ratio, **target)
 
 
 @command.command(name="registration")
@@ -132,7 +129,7 @@ def registration(points, robot, placement_sd_mm, live, bench, readings, folder, 
         if not cad:
             raise click.UsageError("--live needs --cad")
         point_table(points, tables.read(cad, CAD_POINTS), _desk(bench, folder, out), readings, rounds)
-    _run("procedures.registration", points, robot, out=out, placement_sd_mm=placement_sd_mm, **target)
+    _run("registration", points, robot, out=out, placement_sd_mm=placement_sd_mm, **target)
 
 
 @command.command(name="home")
@@ -152,7 +149,7 @@ def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **others) -> Non
     Example: ctcr calibrate home home.csv --robot robot.yaml -o new.yaml
     """
     sds = {"distance_sd": distance_sd_mm, "flush_sd": flush_sd_mm, "length_sd": length_sd_mm}
-    _run("procedures.home", table, sds_mm=sds, **others)
+    _run("home", table, sds_mm=sds, **others)
 
 
 @command.command(name="cantilever")
@@ -174,7 +171,7 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
     Example: ctcr calibrate cantilever cantilever.csv --robot robot.yaml --tube 1 -o new.yaml
     """
     sds = {"deflection_sd": deflection_sd_mm, "free_length_sd": free_length_sd_mm, "diameter_sd": diameter_sd_mm}
-    _run("specimens.cantilever", table, sds_mm=sds, **others)
+    _run("cantilever", table, sds_mm=sds, **others)
 
 
 @command.command(name="curvature")
@@ -198,7 +195,7 @@ def curvature(table: str, **others) -> None:
 
     Example: ctcr calibrate curvature picture.csv --robot robot.yaml --tube 2 --mm-per-px 0.0833 -o new.yaml
     """
-    _run("specimens.curvature", table, **others)
+    _run("curvature", table, **others)
 
 
 @command.command(name="fit")
