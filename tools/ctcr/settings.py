@@ -1,4 +1,4 @@
-"""Every tuning value of fits and diagnosis: its unit, and why it has that value. Nothing here depends on the data.
+"""Every tuning value of comparisons, fits and diagnosis: its unit, and why it has that value. Nothing here depends on the data.
 
 Use it as `settings.NAME`. Limits of what is printed or drawn stand where they are used.
 """
@@ -8,6 +8,8 @@ Use it as `settings.NAME`. Limits of what is printed or drawn stand where they a
 SIGNIFICANCE = 0.01  # p-value below which the noise as stated does not explain a residual
 OUTLIER_WEIGHT = 0.3  # robust weight below which a reading counts as an outlier: 1 plain, 0 not fitted
 SAYS_NOTHING = 0.9  # posterior over prior standard deviation from which the data say nothing of a parameter
+JOINT_LEVER = 0.02  # [m] of insertion that moves the tip about as far as one radian of rotation
+LOAD_LEVER = 1e-3  # [N] that counts as much as a radian: readings under other loads are never near
 MOVED_FAR = 2.0  # prior standard deviations beyond which a fitted value contradicts the robot file
 
 # ---- Model: numerical errors that stay far below the tracker's noise
@@ -34,6 +36,44 @@ SAME_SIDE = 0.5  # cosine of two steps that arrive from the same side
 STRAIGHT_ON = 0.9  # cosine of two steps that continue straight on
 VISITS_DIFFER = 4.0  # distance of two visits over the noise of their difference, from which they differ
 DETOUR_SIGNIFICANCE = 0.01  # p-value below which missing motion is added to the table
+
+# ---- Comparison of readings with the model
+
+LEVEL = 0.05 / 4  # p-value of a finding: four tests (shift, runs, direction, dependence) on noise alone find one in 5 %
+STOP_AND_GO_S = 1.0  # [s] between readings, beyond which they are stops, whose speed is not in the table
+REVERSAL = 2e-4  # part of its whole range by which a joint that reverses comes back: less is encoder noise or dither
+CLEAR_DELAY = 0.2  # fraction of the squared hysteresis that a delay must explain to be mentioned
+
+REST = 20e-6  # [m] of scaled joint distance, within which rows are one stop
+PASS_APART = 0.25  # usual joint steps by which two passes through the same joints may miss each other,
+PASS_APART_BOUNDS = (0.1e-3, 0.5e-3)  # [m] ... within these bounds
+LONGEST_LINK = 3.0  # usual joint steps over which errors are interpolated at most,
+LONGEST_LINK_TURN = 0.2  # ... and part of the lever arm: about 0.2 rad of rotation
+MOST_NEIGHBOURS = 4_000_000  # pairs of visits that are looked up: memory
+FEWEST_PAIRS = 5  # of visits from the same direction, below which the noise floor is taken from elsewhere
+FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the noise floor
+NOTABLE = 1.5  # difference of visits over the stated jitter, below which it is not reported
+OUTLYING_PAIR = 1e-5  # probability by noise below which the difference of two visits is an outlier
+DENSE_STREAM = 20  # pairs of visits a segment, beyond which neighbours are not independent
+
+DEPENDENCE_ROWS = 6000  # that are examined, evenly spread: to save time
+DEPENDENCE_BLOCKS = 24  # of runs, at most: one held out leaves a typical part
+FEWEST_BLOCKS = 6  # runs that serve as blocks: of fewer, parts of the table take their place
+REGIONS = 16  # of joint space that are such parts, a power of two
+PATH_SEGMENTS = 12  # of time, as such parts of pairs of visits
+RIDGES = (0.01, 0.3)  # of which the better one counts, for chance as well; over the mean square of a column
+SIGN_TRIALS = 1999  # random signs of the blocks, which show what chance does: resolves p-values far below LEVEL
+HARMONICS = 3  # of an angle, in its richer curve
+WAVES = 4  # half waves over the range of another quantity, in its richer curve
+MOST_DEPENDENCES = 5  # one found after the other
+LEAST_DEPENDENCE = 0.01  # fraction of the squared error that a quantity must predict
+SAME_ERROR = 0.95  # correlation of two fitted errors, from which the data do not tell the quantities apart
+MAIN_AXIS = 0.7  # fraction of the squared fit, from which one axis is named
+
+GROSS_TURN_DEG = 10.0  # [deg] of a tracker frame that is fitted before anything else is examined,
+GROSS_TURN_EXPLAINED = 0.3  # ... if it explains this fraction of the squared error that the shift leaves
+OUTLYING_RUN = 5.0  # robust standard deviations beyond which the mean error of a run may be an outlier,
+BEYOND_MOTION = 2.0  # ... and is, where it differs from errors at near joints by this many times their distance
 
 # ---- Noise of the tracker
 
@@ -76,7 +116,6 @@ NEARLY_EXPLAINED = 1.5  # reduced chi-square up to which the smooth field error 
 CROSS_VALIDATION_ROWS = 5000  # rows beyond which one fold is held out instead of each in turn: to save time
 HALVES_ROWS = 400  # rows at which the models of two halves are compared
 HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives is then known to 15 %
-RUN_OFFSET_SIGNIFICANCE = 0.0125  # p-value below which runs have offsets of their own
 FRAMES_BEYOND = 4.0  # RMS error over the expected one, from which frames for each run may be the reason,
 FRAMES_LEAVE = 0.5  # ... if they leave less than this part of it
 
@@ -119,10 +158,14 @@ NOISE_MUCH_BETTER = 0.9  # ... and where the model explains the readings as it i
 
 MOMENTS_AT_A_TIME = 40  # moments that are tried at a time; then those between the neighbours of the best
 SURFACE_OUTSIDE = (0.6, 0.75, 0.9, 0.97)  # fractions of the tips that a surface leaves outside
+SURFACE_ELEVATIONS = (-60, -30, 0, 30, 60, 90)  # [deg] of normals of surfaces that are tried,
+SURFACE_AZIMUTHS = 12  # ... each in so many directions around the insertion axis: all 30 deg apart
 FEWEST_CONTACTS = 5  # tips that must touch a surface
 SOURCE_DISTANCES = (1.1, 1.5, 2.2, 3.5)  # of a source from the centre of the readings, over that of far readings
 SOURCE_DIRECTIONS = 48  # in which a source is tried: 30 deg apart
+SOURCE_FAR = 0.95  # quantile of the distances from that centre that far readings have
 SOURCE_STARTS, SOURCE_EVALUATIONS = 3, 150  # simplex searches for a source, and evaluations of each
+SOURCE_SIMPLEX = (0.2, 0.5)  # its edges: position over the distance of far readings, coils over their prior sd
 SOURCE_EVIDENCE = 3.0  # log evidence of the best position of the grid, below which no better one is searched for
 ADDED_STARTS = 2  # starts of an effect that `ctcr add` tries, with and without outliers
 
@@ -164,9 +207,7 @@ VARYING_MOST = 4  # variations, one found after the other
 VARYING_EXPLAINED = 0.3  # that all variations must explain together
 VARYING_NEGLIGIBLE = 0.05  # for which no further variation is named
 VARYING_RIVAL = 0.15  # left by effects, below which no varying-coefficient model can outdo them
-VARYING_OUTDOES = (
-    0.25  # chi-square left by a varying-coefficient model over that of the effects: below, they are outdone
-)
+VARYING_OUTDOES = 0.25  # chi-square left by a varying-coefficient model over that of effects: below, it outdoes them
 VARYING_AT_ONCE = 2_000_000  # numbers that are made at a time: memory
 MOST_TEETH = 24  # of a wheel whose errors are tried
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from compare_bench import JITTER_MM, bench, outward, stop_and_go, stream, tips
+from ctcr import settings
 from ctcr.compare import compare
-from ctcr.compare.analysis import LEVEL
 from ctcr.compare.summary import differs, findings, headline, is_noise, limits, quiet
 from ctcr.errors import InputError
 from ctcr.frames import product, quaternion_from_rotation_vector
@@ -22,7 +22,7 @@ def test_false_alarms(monkeypatch):
 
     7 or more of 40 come once in 300 times; in every other table the runs share joints.
     """
-    monkeypatch.setattr("ctcr.compare.dependence.TRIALS", 399)
+    monkeypatch.setattr("ctcr.settings.SIGN_TRIALS", 399)
     alarms = 0
     for seed in range(40):
         random = np.random.default_rng(seed)
@@ -47,7 +47,7 @@ def test_offset(seed):
     random = np.random.default_rng(seed)
     vector = random.normal(0, 0.5, 3)
     result = compare(*bench(random, stop_and_go(random), constant(vector), turn=(0, 0, 0)))
-    assert result.shift.p_value <= LEVEL
+    assert result.shift.p_value <= settings.LEVEL
     np.testing.assert_allclose(result.shift.vector_mm, vector, atol=4 * JITTER_MM / np.sqrt(180))
     assert result.shift.share == pytest.approx(1 - 3 * JITTER_MM**2 / (vector @ vector + 3 * JITTER_MM**2), abs=0.02)
     assert findings(result)[0].text.startswith("A constant offset")
@@ -73,7 +73,7 @@ def test_dependence(name, error):
     variance = np.mean(np.sum((planted - planted.mean(axis=0)) ** 2, axis=1))
     # The tip's position follows the joints: a quantity of it may predict as well and come first by a hair.
     assert best.share > first.share - 0.01
-    assert best.p_value <= LEVEL
+    assert best.p_value <= settings.LEVEL
     assert 0.8 < best.share <= 1
     assert best.size_mm == pytest.approx(np.sqrt(variance) * 1e3, rel=0.1)
     assert result.ranking.chosen[0].name == first.name
@@ -115,7 +115,7 @@ def test_hysteresis(seed):
     d = result.direction
     size = np.linalg.norm(vector)
     assert differs(d)
-    assert d.p_against_same <= LEVEL
+    assert d.p_against_same <= settings.LEVEL
     assert d.typical_rms_mm == pytest.approx(d.rms_mm, rel=0.4)
     assert d.floor_mm == pytest.approx(np.hypot(size, JITTER_MM * np.sqrt(1.5)), rel=0.05)
     assert any("There is hysteresis" in item.text for item in findings(result))
@@ -137,7 +137,7 @@ def test_poor_repeatability():
     """Every visit errs by itself, far beyond the jitter: that is not called noise."""
     random = np.random.default_rng(8)
     result = compare(*bench(random, stop_and_go(random), noise_mm=0.6))
-    assert result.direction.p_against_same > LEVEL
+    assert result.direction.p_against_same > settings.LEVEL
     assert differs(result.direction)
     assert "readings repeat only to" in headline(result)
     assert any("do not give the same pose again" in item.text for item in findings(result))
@@ -167,7 +167,7 @@ def test_run_offsets():
     offsets = random.normal(0, 2e-3, (10, 3))
     planted = bench(random, stop_and_go(random, shared=True), lambda q, t, run: offsets[run])
     result = compare(*planted)
-    assert result.run_offsets.p_value <= LEVEL
+    assert result.run_offsets.p_value <= settings.LEVEL
     assert result.run_offsets.found
     assert result.run_offsets.share > 0.98
     assert np.linalg.norm(result.ranking.error, axis=1).mean() * 1e3 < 2 * JITTER_MM

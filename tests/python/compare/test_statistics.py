@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from compare_bench import bench, stop_and_go, stream
+from ctcr import settings
 from ctcr.compare import crossvalidation as cv
-from ctcr.compare.blocks import PLACES, split
+from ctcr.compare.blocks import split
 from ctcr.compare.dependence import local_frames
 from ctcr.compare.offsets import rigid_motion
 from ctcr.compare.sample import take_sample
@@ -34,7 +35,7 @@ def test_held_out_sums(seed):
     assert len(sums) == 13
     for signs, value in zip(folds.signs, sums, strict=True):
         flipped = target * signs[folds.label][:, None]
-        expected = min(plain_held_out(design, flipped, label, ridge) for ridge in cv.RIDGES)
+        expected = min(plain_held_out(design, flipped, label, ridge) for ridge in settings.RIDGES)
         assert value == pytest.approx(expected, rel=1e-9)
     left = target - cv.held_out_prediction(design, target, folds)
     assert np.sum(left**2) == pytest.approx(sums[0], rel=1e-9)
@@ -74,7 +75,7 @@ def test_regions_are_blocks():
     sample = take_sample(*bench(random, stream(random)))
     rows, label, kind = split(sample)
     assert kind == "places"
-    assert np.bincount(label).min() > 0.8 * len(rows) / PLACES
+    assert np.bincount(label).min() > 0.8 * len(rows) / settings.REGIONS
     region = np.empty(len(rows), int)
     region[rows] = label
     half = len(rows) // 2  # the second half of the path is the first one backwards, between its readings

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from compare_bench import JITTER_MM, bench, stop_and_go, stream
+from ctcr import settings
 from ctcr.compare import compare
 from ctcr.compare.motion import follow
 from ctcr.compare.noise import noise_floor
 from ctcr.compare.sample import take_sample
-from ctcr.compare.visits import MIXED, OPPOSITE, SAME, STEP_SHARE, TOLERANCE, find_revisits, find_stops
+from ctcr.compare.visits import MIXED, OPPOSITE, SAME, find_revisits, find_stops
 
 
 @pytest.mark.parametrize("stops", [5, 9, 12])
@@ -98,12 +99,12 @@ def test_thinned_search(monkeypatch):
     random = np.random.default_rng(6)
     measured = bench(random, stream(random))
     complete = compare(*measured)
-    monkeypatch.setattr("ctcr.compare.visits.MOST_CANDIDATES", 2000)
+    monkeypatch.setattr("ctcr.settings.MOST_NEIGHBOURS", 2000)
     result = compare(*measured)
     assert 10 < result.direction.pairs < min(400, complete.direction.pairs)
     sample = result.headline
     step = np.linalg.norm(np.diff(sample.motion.scaled, axis=0), axis=1)[np.diff(sample.run) == 0]
-    assert result.revisits.miss.max() <= np.clip(STEP_SHARE * np.median(step), *TOLERANCE)
+    assert result.revisits.miss.max() <= np.clip(settings.PASS_APART * np.median(step), *settings.PASS_APART_BOUNDS)
 
 
 def test_directions():

@@ -109,7 +109,7 @@ def _run_frames(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     sample = take_sample(robot, readings, Model(robot.standard).predict(beta, alpha, readings.force))
     revisits = find_revisits(find_stops(sample), sample.lever)
-    offsets = find_run_offsets(sample, revisits, settings.RUN_OFFSET_SIGNIFICANCE)
+    offsets = find_run_offsets(sample, revisits)
     if not offsets.found:
         return []
     share = wording.percent(offsets.share)

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.compare.blocks import FEWEST_RUNS, group_means, split
+from ctcr import settings
+from ctcr.compare.blocks import group_means, split
 from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.crossvalidation import make_folds
-from ctcr.compare.dependence import TRIALS, Ranking, rank
+from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
 from ctcr.compare.sample import Sample, take_sample
@@ -18,8 +19,6 @@ from ctcr.errors import InputError, Problem
 
 Array = NDArray[np.float64]
 
-# Four tests (shift, runs, direction, dependence) together raise a false alarm in 5 % of the tables of noise alone.
-LEVEL = 0.05 / 4
 NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
 
 
@@ -85,7 +84,7 @@ class Comparison:
             "not_solved": self.sample.not_solved.tolist(),
         }
         data["dependence"] = {
-            "level": LEVEL,
+            "level": settings.LEVEL,
             "blocks": self.ranking.blocks,
             "block_kind": self.ranking.block_kind,
             "rows_used": len(self.ranking.rows),
@@ -120,11 +119,11 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
-    run_offsets = find_run_offsets(sample, revisits, LEVEL)
+    run_offsets = find_run_offsets(sample, revisits)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
     pitch = robot.actuation.translation_mm_per_rev
-    ranking = rank(sample, error, pitch * 1e-3 if pitch else None, LEVEL)
+    ranking = rank(sample, error, pitch * 1e-3 if pitch else None, settings.LEVEL)
     length = np.linalg.norm(headline.error, axis=1) * 1e3
     rotation = headline.rotation_error
     angle = np.full(len(length), np.nan) if rotation is None else np.degrees(np.linalg.norm(rotation, axis=1))
@@ -165,8 +164,8 @@ def _spread(values: Array) -> Spread | None:
 
 def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
     rows, label, _ = split(sample)
-    folds = make_folds(label, TRIALS)
-    if folds.count < FEWEST_RUNS:
+    folds = make_folds(label, settings.SIGN_TRIALS)
+    if folds.count < settings.FEWEST_BLOCKS:
         return None, None
     return find_shift(sample.error[rows], folds), find_turn(sample.predicted[rows], sample.measured[rows], folds)
 

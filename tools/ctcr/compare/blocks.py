@@ -3,14 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.compare.sample import Sample
 
 Array = NDArray[np.float64]
-MOST_ROWS = 6_000
-MOST_BLOCKS = 24
-FEWEST_RUNS = 6  # with fewer runs, parts of the table take their place
-PLACES = 16  # regions of joint space, a power of two
-SEGMENTS = 12  # time segments of a path
 
 
 def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
@@ -20,11 +16,11 @@ def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
     a pass to its return.
     """
     count = len(sample.row)
-    rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(np.int64))
+    rows = np.unique(np.linspace(0, count - 1, min(count, settings.DEPENDENCE_ROWS)).astype(np.int64))
     runs, label = np.unique(sample.run[rows], return_inverse=True)
-    kind = "runs" if len(runs) >= FEWEST_RUNS else "places"
+    kind = "runs" if len(runs) >= settings.FEWEST_BLOCKS else "places"
     if kind == "runs":
-        label = (label * min(len(runs), MOST_BLOCKS)) // len(runs)
+        label = (label * min(len(runs), settings.DEPENDENCE_BLOCKS)) // len(runs)
     else:
         label = _regions(sample.motion.scaled[rows])
     order = np.argsort(label, kind="stable")
@@ -32,9 +28,9 @@ def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
 
 
 def _regions(scaled: Array) -> NDArray[np.int64]:
-    """Region (K,) of each reading: halves along the widest joint, until there are PLACES regions of equal size."""
+    """Region (K,) of each reading: halves along the widest joint, until there are REGIONS regions of equal size."""
     label = np.zeros(len(scaled), np.int64)
-    for _ in range(int(np.log2(PLACES))):
+    for _ in range(int(np.log2(settings.REGIONS))):
         label *= 2
         for cell in np.unique(label):
             members = np.flatnonzero(label == cell)
@@ -47,7 +43,8 @@ def _regions(scaled: Array) -> NDArray[np.int64]:
 def segments(run: NDArray) -> NDArray:
     """Blocks (P,) of pairs of visits in measured order: runs if there are enough, else time segments of the path."""
     names, label = np.unique(run, return_inverse=True)
-    return label if len(names) >= FEWEST_RUNS else np.arange(len(run)) * SEGMENTS // max(len(run), 1)
+    in_time = np.arange(len(run)) * settings.PATH_SEGMENTS // max(len(run), 1)
+    return label if len(names) >= settings.FEWEST_BLOCKS else in_time
 
 
 def block_error(values: Array, blocks: NDArray) -> float:

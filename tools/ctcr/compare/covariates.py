@@ -7,12 +7,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.compare.sample import Sample
 
 Array = NDArray[np.float64]
-HARMONICS = 3
-WAVES = 4
-STOP_AND_GO_S = 1.0  # readings farther apart than this are stops, whose speed is not in the table
 UNITS = {"deg": 180 / np.pi, "deg/s": 180 / np.pi, "mm": 1e3, "mm/s": 1e3}  # value of an SI unit; others are 1
 
 
@@ -42,12 +40,12 @@ class Covariate:
         if self.kind == "direction":
             return [self.value[:, None]]
         if self.kind == "angle":
-            return [self._harmonics(1), self._harmonics(HARMONICS)]
+            return [self._harmonics(1), self._harmonics(settings.HARMONICS)]
         low, high = np.nanmin(self.value), np.nanmax(self.value)
         unit = np.nan_to_num((self.value - low) / (high - low), nan=0.5)[:, None]
         levels = len(np.unique(self.value[:: max(1, len(self.value) // 5000)]))
-        line = 2 * unit - 1
-        return [line, np.cos(np.pi * unit * np.arange(1, min(WAVES, levels - 1) + 1))][: 1 if levels < 3 else 2]
+        waves = np.cos(np.pi * unit * np.arange(1, min(settings.WAVES, levels - 1) + 1))
+        return [2 * unit - 1, waves][: 1 if levels < 3 else 2]
 
     def _harmonics(self, count: int) -> Array:
         turns = self.value[:, None] * np.arange(1, count + 1)
@@ -77,7 +75,7 @@ def has_speed(sample: Sample) -> bool:
     """Whether the readings are a stream with a time axis, so that speeds at the readings are known."""
     elapsed = np.diff(sample.t)[np.diff(sample.run) == 0]
     elapsed = elapsed[np.isfinite(elapsed) & (elapsed > 0)]
-    return len(elapsed) > 0 and bool(np.median(elapsed) <= STOP_AND_GO_S)
+    return len(elapsed) > 0 and bool(np.median(elapsed) <= settings.STOP_AND_GO_S)
 
 
 def _all(sample: Sample, pitch: float | None) -> Iterator[Covariate]:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
+
 Array = NDArray[np.float64]
-RIDGES = (0.01, 0.3)  # relative to the mean square of a column; the better one counts, for chance as well
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def unexplained(design: Array, target: Array, folds: Folds) -> Array:
     """
     gram, cross = block_products(design, target, folds)
     energy = float(np.sum(target**2))
-    forms = [_quadratic_form(gram, cross, ridge) for ridge in RIDGES]
+    forms = [_quadratic_form(gram, cross, ridge) for ridge in settings.RIDGES]
     return energy + np.min([np.sum((folds.signs @ form) * folds.signs, axis=1) for form in forms], axis=0)
 
 
@@ -85,7 +86,7 @@ def _inverses(gram: Array, ridge: float) -> Array:
 def held_out_prediction(design: Array, target: Array, folds: Folds) -> Array:
     """Prediction (K, C) of every row from the blocks it does not belong to."""
     gram, cross = block_products(design, target, folds)
-    ridge = RIDGES[int(np.argmin([_quadratic_form(gram, cross, ridge).sum() for ridge in RIDGES]))]
+    ridge = settings.RIDGES[int(np.argmin([_quadratic_form(gram, cross, ridge).sum() for ridge in settings.RIDGES]))]
     coefficients = _inverses(gram, ridge) @ (cross.sum(axis=0) - cross)
     return np.einsum("kp,kpc->kc", design, coefficients[folds.label])
 

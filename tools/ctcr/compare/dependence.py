@@ -11,17 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr.compare.blocks import FEWEST_RUNS, split
+from ctcr import settings
+from ctcr.compare.blocks import split
 from ctcr.compare.covariates import Covariate, covariates, has_speed
 from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, unexplained
 from ctcr.compare.sample import Sample
 
 Array = NDArray[np.float64]
-TRIALS = 1999
-MOST_FINDINGS = 5
-SMALLEST_SHARE = 0.01
-SAME_FIELD = 0.95  # correlation of two fitted errors above which the data do not distinguish them
-MAIN_SHARE = 0.7  # of the squared fit, for one axis to be named
 
 FRAME_NAMES = {
     "base": ("x", "y", "z"),
@@ -71,7 +67,7 @@ class Form:
         """RMS [mm] of the fit, and the axis that holds most of its square, "" if none does."""
         square = np.sum(self.fitted(error) ** 2, axis=0)
         main = int(np.argmax(square))
-        named = not self.coupled and square[main] > MAIN_SHARE * square.sum()
+        named = not self.coupled and square[main] > settings.MAIN_AXIS * square.sum()
         return float(np.sqrt(square.sum() / len(error))) * 1e3, FRAME_NAMES[self.frame][main] if named else ""
 
 
@@ -121,7 +117,7 @@ class Ranking:
         shown: list[Dependence] = []
         for item in self.alone:
             twins = [other for other in shown if item.label in other.indistinct]
-            if not any(abs(other.share - item.share) < SMALLEST_SHARE for other in twins):
+            if not any(abs(other.share - item.share) < settings.LEAST_DEPENDENCE for other in twins):
                 shown.append(item)
         return shown
 
@@ -133,15 +129,18 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
     """
     rows, label, kind = split(sample)
     error = base_error[rows]
-    folds = make_folds(label, TRIALS)
+    folds = make_folds(label, settings.SIGN_TRIALS)
     frames = local_frames(sample, rows)
-    total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if folds.count >= FEWEST_RUNS else 0.0
+    enough = folds.count >= settings.FEWEST_BLOCKS
+    total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if enough else 0.0
     if total == 0:
         return Ranking([], [], np.nan, 0.0, error, rows, folds.count, kind, frames)
     forms = all_forms(sample, rows, covariates(sample, pitch_m), frames)
     alone, by_chance = _judge(forms, error, folds, total)
     chosen, left, best = [], error, alone
-    while len(chosen) < MOST_FINDINGS and best and best[0].p_value <= alpha and best[0].share >= SMALLEST_SHARE:
+    while len(chosen) < settings.MOST_DEPENDENCES and best:
+        if best[0].p_value > alpha or best[0].share < settings.LEAST_DEPENDENCE:
+            break
         chosen += _with_rivals(best[:1], best, left)
         form = best[0].form
         target = form.local(left)
@@ -230,7 +229,7 @@ def _with_rivals(items: list[Dependence], others: list[Dependence], error: Array
         fields = np.stack([item.form.in_base(item.form.fitted(error)).ravel() for item in found])
         return fields / np.maximum(np.linalg.norm(fields, axis=1, keepdims=True), 1e-300)
 
-    alike = directions(items) @ directions(others).T >= SAME_FIELD
+    alike = directions(items) @ directions(others).T >= settings.SAME_ERROR
     names = [[other.label for other, same in zip(others, row, strict=True) if same] for row in alike]
     return [
         replace(item, indistinct=tuple(name for name in rivals if name != item.label))

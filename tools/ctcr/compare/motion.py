@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ctcr import settings
 
-# A joint that comes back by less than this part of its whole range has not reversed (encoder noise, dither).
-REVERSAL_SHARE = 2e-4
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ def follow(t: Array, run: NDArray, beta: Array, alpha: Array, lever: float) -> M
     linked = run[1:] == run[:-1]
     elapsed = np.where(linked & (np.diff(t) > 0), np.diff(t), np.nan)
     rate[1:] = np.diff(joints, axis=0) / elapsed[:, None]
-    band = REVERSAL_SHARE * np.ptp(joints, axis=0)
+    band = settings.REVERSAL * np.ptp(joints, axis=0)
     for rows in np.split(np.arange(len(run)), np.flatnonzero(~linked) + 1):
         for column in range(joints.shape[1]):
             direction[rows, column] = _directions(joints[rows, column].tolist(), band[column])

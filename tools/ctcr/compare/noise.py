@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from ctcr.compare.blocks import SEGMENTS, block_error, segments
+from ctcr import settings
+from ctcr.compare.blocks import block_error, segments
 from ctcr.compare.visits import OPPOSITE, SAME, Revisits, Stops
 
 Array = NDArray[np.float64]
-FEWEST_PAIRS = 5  # below this many same-direction revisits the floor is taken from elsewhere
-FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the floor
-NOTABLE = 1.5  # a difference of visits below this many times the stated jitter is not reported
 
 
 @dataclass(frozen=True)
@@ -59,11 +57,11 @@ def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloo
     freedom = stops.size[resting] - 1
     rest_square = np.sum(stops.dwell_variance[resting] * freedom)
     rest_axis = float(np.sqrt(rest_square / freedom.sum())) if resting.any() else np.nan
-    if len(pairs) >= FEWEST_PAIRS:
+    if len(pairs) >= settings.FEWEST_PAIRS:
         variance = pairs.square / pairs.noise_factor / 3
         source, axis = "revisits", float(np.sqrt(variance.mean()))
         error = block_error(variance, segments(stops.run[pairs.later])) / (2 * axis) if axis > 0 else np.nan
-    elif freedom.sum() >= FEWEST_FREEDOM:
+    elif freedom.sum() >= settings.FEWEST_FREEDOM:
         source, axis, error = "rest", rest_axis, rest_axis / np.sqrt(6 * freedom.sum())
     else:
         source, axis, error = "stated", stated_mm * 1e-3, np.nan
@@ -102,12 +100,12 @@ def direction_difference(
     )
     known = [axis for axis in (floor.axis_mm, floor.rest_axis_mm, floor.stated_axis_mm) if np.isfinite(axis)]
     quiet = min(known, default=np.nan) * 1e-3
-    p_quiet = _beyond(scaled, NOTABLE * quiet, blocks) if known else np.nan
-    outliers = int(np.sum(scaled > stats.chi2.isf(1e-5, 3) * quiet**2))
-    if len(opposite) > 20 * SEGMENTS:  # a dense stream, whose neighbours are not independent
+    p_quiet = _beyond(scaled, settings.NOTABLE * quiet, blocks) if known else np.nan
+    outliers = int(np.sum(scaled > stats.chi2.isf(settings.OUTLYING_PAIR, 3) * quiet**2))
+    if len(opposite) > settings.DENSE_STREAM * settings.PATH_SEGMENTS:  # neighbours are not independent
         scaled, reference = _block_quartiles(scaled, blocks), _block_quartiles(reference, same_blocks)
     p_same = np.nan
-    if len(same) >= FEWEST_PAIRS:
+    if len(same) >= settings.FEWEST_PAIRS:
         p_same = stats.mannwhitneyu(scaled, reference, alternative="greater").pvalue
     rms = float(np.sqrt(square.mean()))
     motion = tip_step[opposite.later]
@@ -148,7 +146,7 @@ def _delay(opposite: Revisits, blocks: NDArray, velocity: Array) -> tuple[float,
     known = np.isfinite(contrast).all(axis=1)
     contrast, difference = contrast[known], opposite.difference[known]
     energy = np.sum(contrast**2)
-    if known.sum() < FEWEST_PAIRS or energy == 0:
+    if known.sum() < settings.FEWEST_PAIRS or energy == 0:
         return np.nan, np.nan, np.empty(0)
     delay = -np.sum(contrast * difference) / energy
     left = difference + delay * contrast

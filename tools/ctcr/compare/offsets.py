@@ -8,17 +8,14 @@ from scipy import stats
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from ctcr.compare.blocks import FEWEST_RUNS, group_means
+from ctcr import settings
+from ctcr.compare.blocks import group_means
 from ctcr.compare.crossvalidation import Folds, chance, unexplained
-from ctcr.compare.noise import FEWEST_PAIRS, rms_mm
+from ctcr.compare.noise import rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import Revisits
 
 Array = NDArray[np.float64]
-GROSS_TURN_DEG = 10.0  # a frame turned by more is fitted before anything else is examined
-GROSS_SHARE = 0.3  # of the squared error left by the shift that such a turn must explain
-OUTLYING = 5.0  # robust standard deviations beyond which the mean error of a run may be an outlier ...
-BEYOND_MOTION = 2.0  # ... and is, if it differs from the error at near joints by this many times their distance
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class FrameTurn:
     @property
     def gross(self) -> bool:
         """Whether the frame is wrong by more than small corrections describe."""
-        return self.turn_deg > GROSS_TURN_DEG and self.share > GROSS_SHARE
+        return self.turn_deg > settings.GROSS_TURN_DEG and self.share > settings.GROSS_TURN_EXPLAINED
 
 
 @dataclass(frozen=True)
@@ -101,21 +98,21 @@ def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:
     return FrameTurn(float(np.degrees(angle)), tuple(axis), rms_mm(before), rms_mm(after))
 
 
-def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOffsets:
+def find_run_offsets(sample: Sample, revisits: Revisits) -> RunOffsets:
     """Compare visits of the same joints in different runs with visits inside one run.
 
-    Offsets count as found when these visits differ more at that level, or when some runs lie far from the others.
+    Offsets count as found when these visits differ more at LEVEL, or when some runs lie far from the others.
     """
     square, error = revisits.square, sample.error
     between, within = square[revisits.between_runs], square[~revisits.between_runs]
     p_value = np.nan
-    if min(len(between), len(within)) >= FEWEST_PAIRS:
+    if min(len(between), len(within)) >= settings.FEWEST_PAIRS:
         p_value = float(stats.mannwhitneyu(between, within, alternative="greater").pvalue)
     names, label = np.unique(sample.run, return_inverse=True)
     means = group_means(error, label)
     around = np.sum((error - error.mean(axis=0)) ** 2)
     distance = np.linalg.norm(means - np.median(means, axis=0), axis=1)
-    far = _far_runs(sample, label, distance) if len(names) >= FEWEST_RUNS else np.zeros(len(names), bool)
+    far = _far_runs(sample, label, distance) if len(names) >= settings.FEWEST_BLOCKS else np.zeros(len(names), bool)
     return RunOffsets(
         pairs_between=len(between),
         pairs_within=len(within),
@@ -125,7 +122,7 @@ def find_run_offsets(sample: Sample, revisits: Revisits, level: float) -> RunOff
         share=float(1 - np.sum((error - means[label]) ** 2) / max(around, 1e-300)),
         outlying=tuple(int(name) for name in names[far]),
         outlying_mm=float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
-        found=bool(p_value <= level or far.any()),
+        found=bool(p_value <= settings.LEVEL or far.any()),
     )
 
 
@@ -136,12 +133,12 @@ def _far_runs(sample: Sample, label: NDArray, distance: Array) -> NDArray[np.boo
     than the tip moves: a change far beyond the joint distance to the nearest reading of another run belongs to the run.
     """
     # the median length of a 3-D Gaussian vector is 1.54 standard deviations
-    far = distance > OUTLYING * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
+    far = distance > settings.OUTLYING_RUN * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
     near, error = ~far[label], sample.error
     tree = cKDTree(sample.motion.scaled[near])
     for run in np.flatnonzero(far):
         mine = np.flatnonzero(label == run)[:: max(1, int(np.sum(label == run)) // 500)]
         gap, index = tree.query(sample.motion.scaled[mine])
         change = np.linalg.norm(error[mine] - error[near][index], axis=1)
-        far[run] = np.median(change) > BEYOND_MOTION * np.median(gap)
+        far[run] = np.median(change) > settings.BEYOND_MOTION * np.median(gap)
     return far

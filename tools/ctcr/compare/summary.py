@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctcr.compare.analysis import LEVEL, Comparison
+from ctcr import settings
+from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import Dependence
-from ctcr.compare.noise import NOTABLE, DirectionDifference
+from ctcr.compare.noise import DirectionDifference
 from ctcr.show.wording import join, mm, most, percent, probability
 
 MOST = 6
-CLEAR_DELAY = 0.2  # share of the squared hysteresis that a delay must explain to be mentioned
 
 CAUSES = {  # by how the name of a dependence begins
     "frame_turn": "a small rotation error of the registered tracker frame",
@@ -57,7 +57,7 @@ def headline(c: Comparison) -> str:
     if noise.source == "revisits":
         source = f"{noise.pairs} revisits from the same direction, ± {noise.uncertainty_mm * np.sqrt(3):.2g} mm"
     size, left = f"{mm(noise.rms_mm)} RMS ({source})", most(1 - c.noise_share)
-    if noise.source == "revisits" and noise.axis_mm > NOTABLE * noise.stated_axis_mm:
+    if noise.source == "revisits" and noise.axis_mm > settings.NOTABLE * noise.stated_axis_mm:
         stated = mm(noise.stated_axis_mm * 3**0.5)
         return text + (
             f"The tracker's stated scatter is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
@@ -84,7 +84,7 @@ def held_out(c: Comparison) -> str:
 
 
 def _all(c: Comparison) -> Iterator[Finding]:
-    shifted = c.shift if c.shift and c.shift.p_value <= LEVEL else None
+    shifted = c.shift if c.shift and c.shift.p_value <= settings.LEVEL else None
     if c.turn and c.turn.gross:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
         yield Finding(
@@ -113,7 +113,7 @@ def _all(c: Comparison) -> Iterator[Finding]:
 def _run_text(c: Comparison) -> str:
     r = c.run_offsets
     text = "The runs do not share one frame or homing. "
-    if r.p_value <= LEVEL:
+    if r.p_value <= settings.LEVEL:
         text += (
             f"The same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs, but "
             f"{mm(r.rms_within_mm)} inside one run. "
@@ -128,7 +128,7 @@ def _run_text(c: Comparison) -> str:
 
 
 def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
-    if np.isfinite(d.p_against_same) and d.p_against_same > LEVEL:
+    if np.isfinite(d.p_against_same) and d.p_against_same > settings.LEVEL:
         return (
             f"The same joints do not give the same pose again: visits from opposite directions differ by "
             f"{mm(d.rms_mm)} RMS ({d.pairs} pairs), visits from the same direction by {mm(d.same_rms_mm)} "
@@ -142,7 +142,7 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
         f"{mm(d.floor_mm)} RMS there."
     )
     share = 1 - (d.rms_without_delay_mm / d.rms_mm) ** 2
-    if c.has_speed and abs(d.delay_s) > 3 * d.delay_uncertainty_s and share > CLEAR_DELAY:
+    if c.has_speed and abs(d.delay_s) > 3 * d.delay_uncertainty_s and share > settings.CLEAR_DELAY:
         return text + (
             f" A delay of {d.delay_s:.3f} ± {d.delay_uncertainty_s:.3f} s between joints and poses explains "
             f"{percent(share)} of this squared difference; without it {mm(d.rms_without_delay_mm)} RMS remain, a floor "
@@ -153,7 +153,7 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
 
 def differs(d: DirectionDifference) -> bool:
     """Whether the pose at the same joints depends on how they were reached."""
-    return bool(d.p_against_same <= LEVEL / 2 or d.p_against_quiet <= LEVEL / 2)
+    return any(p <= settings.LEVEL / 2 for p in (d.p_against_same, d.p_against_quiet))
 
 
 def _dependence_text(item: Dependence, c: Comparison) -> str:
@@ -188,7 +188,7 @@ def quiet(c: Comparison) -> list[str]:
         if d.outliers:
             text += f" Pairs far beyond that: {d.outliers}, at most {mm(d.maximum_mm)} apart. Possible cause: outliers."
         found.append(text)
-    if c.shift and c.shift.p_value > LEVEL:
+    if c.shift and c.shift.p_value > settings.LEVEL:
         size, p = mm(c.shift.size_mm), probability(c.shift.p_value)
         found.append(f"There is no significant constant offset (mean error {size}, p = {p}).")
     if c.ranking.alone and not c.ranking.chosen and not is_noise(c):

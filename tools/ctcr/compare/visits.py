@@ -13,17 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ctcr import settings
 from ctcr.compare.sample import Sample
 
 Array = NDArray[np.float64]
 SAME, OPPOSITE, MIXED = 1, -1, 0
-
-REST = 20e-6  # rows within this scaled joint distance [m] of one another are one stop
-STEP_SHARE = 0.25  # two passes may miss each other by this part of the usual joint step ...
-TOLERANCE = (0.1e-3, 0.5e-3)  # ... inside these bounds [m]
-LONGEST_LINK = 3.0  # errors are interpolated over steps of at most this many usual steps ...
-LONGEST_LINK_SHARE = 0.2  # ... and this part of the lever arm (about 0.2 rad of rotation)
-MOST_CANDIDATES = 4_000_000  # pairs of neighbours; beyond, only every so many visits are looked up
 
 
 @dataclass(frozen=True)
@@ -73,11 +67,11 @@ class Revisits:
 def find_stops(sample: Sample) -> Stops:
     """Join the rows of one run that stay within REST of the first of them."""
     scaled, run, error = sample.motion.scaled, sample.run, sample.error
-    moved = np.append(True, np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * REST)
+    moved = np.append(True, np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * settings.REST)
     first: list[int] = []
     for i in range(len(run)):
         same_run = first and run[i] == run[first[-1]]
-        if not (same_run and (not moved[i] or np.abs(scaled[i] - scaled[first[-1]]).max() <= REST)):
+        if not (same_run and (not moved[i] or np.abs(scaled[i] - scaled[first[-1]]).max() <= settings.REST)):
             first.append(i)
     start = np.array(first, dtype=np.int64)
     size = np.diff(np.append(start, len(run)))
@@ -101,8 +95,8 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
     link = np.where(linked[:, None], np.roll(stops.scaled, -1, axis=0) - stops.scaled, 0.0)
     length = np.linalg.norm(link, axis=1)
     usual = float(np.median(length[linked])) if linked.any() else 0.0
-    tolerance = float(np.clip(STEP_SHARE * usual, *TOLERANCE))
-    usable = linked & (length <= min(LONGEST_LINK * usual, LONGEST_LINK_SHARE * lever))
+    tolerance = float(np.clip(settings.PASS_APART * usual, *settings.PASS_APART_BOUNDS))
+    usable = linked & (length <= min(settings.LONGEST_LINK * usual, settings.LONGEST_LINK_TURN * lever))
     reach = float(np.hypot(tolerance, 0.5 * length[usable].max(initial=0.0)))
 
     later, vertex = _neighbours(stops.scaled, reach)
@@ -129,7 +123,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray]:
     tree = cKDTree(scaled)
     probe = np.linspace(0, len(scaled) - 1, min(len(scaled), 500)).astype(int)
     typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
-    stride = int(np.ceil(typical * len(scaled) / MOST_CANDIDATES))
+    stride = int(np.ceil(typical * len(scaled) / settings.MOST_NEIGHBOURS))
     queries = np.arange(0, len(scaled), stride)
     found = tree.query_ball_point(scaled[queries], reach)
     sizes = np.fromiter(map(len, found), np.int64, len(found))

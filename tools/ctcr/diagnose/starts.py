@@ -88,8 +88,9 @@ def _surfaces(engine: Engine, candidate: Candidate, surface: list[str], by_force
     sd = engine.priors(stiffness)[1][0]
     usual = dict(zip(shapes, map(float, engine.priors(shapes)[0]), strict=True))
     found = []
-    for elevation in np.deg2rad((-60, -30, 0, 30, 60, 90)):
-        for azimuth in np.deg2rad(np.arange(0, 360, 30) if elevation < 1.5 else [0]):
+    around = np.deg2rad(np.arange(0, 360, 360 / settings.SURFACE_AZIMUTHS))
+    for elevation in np.deg2rad(settings.SURFACE_ELEVATIONS):
+        for azimuth in around if elevation < 1.5 else [0.0]:
             across = np.cos(elevation)
             normal = np.array([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)])
             height = tips @ normal
@@ -107,7 +108,7 @@ def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:
     """The candidate with the best position of a local source of field: a grid around the readings, then a simplex."""
     _, sd, _, _ = engine.priors(candidate.names)
     centre = np.median(engine.positions, axis=0)
-    radius = np.quantile(np.linalg.norm(engine.positions - centre, axis=1), 0.95)
+    radius = np.quantile(np.linalg.norm(engine.positions - centre, axis=1), settings.SOURCE_FAR)
 
     def derivative(at: Array) -> Array:  # by the volume, with metal and coils at[:3] and at[3:]
         column = -sd[0] * _core.metal_distortion(engine.positions - at[3:], at[:3] - at[3:])
@@ -122,7 +123,8 @@ def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:
     costs = [cost(at) for at in tried]
     best = tried[int(np.argmin(costs))]
     if min(costs) < -settings.SOURCE_EVIDENCE:
-        steps = np.vstack([np.zeros(6), np.diag(np.repeat([0.2 * radius, 0.5 * float(sd[4])], 3))])
+        edges = np.multiply(settings.SOURCE_SIMPLEX, (radius, sd[4]))
+        steps = np.vstack([np.zeros(6), np.diag(np.repeat(edges, 3))])
         options = {"maxfev": settings.SOURCE_EVALUATIONS}
         found = [
             minimize(cost, at, method="Nelder-Mead", options=options | {"initial_simplex": at + steps})

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import settings
-from ctcr.compare.covariates import HARMONICS, Covariate, covariates
+from ctcr.compare.covariates import Covariate, covariates
 from ctcr.compare.sample import Sample
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.held_out import unexplained_of
@@ -227,7 +227,7 @@ def _bases(quantity: Covariate) -> Iterator[tuple[Covariate, Array, str]]:
     for basis in quantity.bases():
         yield quantity, basis, ""
     if quantity.kind == "angle" and quantity.tube:
-        for teeth in range(HARMONICS + 1, settings.MOST_TEETH + 1):
+        for teeth in range(settings.HARMONICS + 1, settings.MOST_TEETH + 1):
             label = f"{quantity.label}, {teeth} times a turn"
             angle = teeth * quantity.value[:, None]
             yield replace(quantity, label=label), np.hstack([np.cos(angle), np.sin(angle)]), "home_rotation"

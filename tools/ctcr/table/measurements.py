@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ctcr import settings
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
@@ -20,8 +21,6 @@ from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
 JOINT_ORDER_SLACK_M = 1e-6  # rounding of recorded joints
 UNIT_QUATERNION_SLACK = 1e-3
 _MAX_RUN = 1e15  # whole numbers that a float holds exactly
-LEVER = 0.02  # [m] of insertion that moves the tip about as far as one radian of rotation
-OTHER_LOAD = 1e-3  # [N] that counts as much as a radian: readings under other loads are never near
 
 Array = NDArray[np.float64]
 
@@ -60,12 +59,12 @@ class Measurements:
     @property
     def joint_space(self) -> Array:
         """Joints as one vector (M, 2 N) [rad], in which distances are comparable."""
-        return np.column_stack([self.beta / LEVER, self.alpha])
+        return np.column_stack([self.beta / settings.JOINT_LEVER, self.alpha])
 
     @property
     def load_space(self) -> Array:
         """Joints and load as one vector (M, 2 N + 3) [rad]."""
-        return np.column_stack([self.joint_space, self.force / OTHER_LOAD])
+        return np.column_stack([self.joint_space, self.force / settings.LOAD_LEVER])
 
 
 def load(path: str | Path, n_tubes: int) -> Measurements:
