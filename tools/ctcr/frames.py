@@ -1,9 +1,9 @@
 """Rotations as quaternions (w, x, y, z) and rotation vectors, and the tracker frame. Arrays of any leading shape."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from ctcr.arrays import Array
 
 
 def quaternion_from_rotation_vector(rotation_vector: ArrayLike) -> Array:

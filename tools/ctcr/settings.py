@@ -1,4 +1,4 @@
-"""Every tuning value of comparisons, fits and diagnosis: its unit, and why it has that value. Nothing here depends on the data.
+"""Every tuning value of comparisons, fits and diagnosis: its unit, and why it has that value. None depends on the data.
 
 Use it as `settings.NAME`. Limits of what is printed or drawn stand where they are used.
 """

@@ -7,15 +7,13 @@ before, and only the reading is recorded. By the table it came from the other si
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
@@ -82,7 +80,7 @@ def _turn(towards: Array, visit: int) -> int:
     return start
 
 
-def _with_detours(m: Measurements, rows: NDArray[np.int64], turn: NDArray[np.int64]) -> Measurements:
+def _with_detours(m: Measurements, rows: Integers, turn: Integers) -> Measurements:
     """The table with a row in front of each of `rows` that has the joints of the row `turn` and no pose."""
     columns = {
         "t": 0.5 * (m.t[rows - 1] + m.t[rows]),

@@ -3,15 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:

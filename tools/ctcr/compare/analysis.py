@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.compare.blocks import group_means, split
 from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.crossvalidation import make_folds
@@ -16,8 +16,6 @@ from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets,
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.errors import InputError, Problem
-
-Array = NDArray[np.float64]
 
 NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
 

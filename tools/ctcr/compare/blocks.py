@@ -1,15 +1,13 @@
 """Parts of a table that may be treated as independent: blocks of cross-validation, and standard errors by blocks."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.compare.sample import Sample
 
-Array = NDArray[np.float64]
 
-
-def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
+def split(sample: Sample) -> tuple[Integers, Integers, str]:
     """Rows used, their blocks in ascending order, and the kind of the blocks: "runs", or "places" in joint space.
 
     A place is a region of joint space. It holds every pass through it, in both directions, so that nothing leaks from
@@ -27,7 +25,7 @@ def split(sample: Sample) -> tuple[NDArray[np.int64], NDArray[np.int64], str]:
     return rows[order], label[order], kind
 
 
-def _regions(scaled: Array) -> NDArray[np.int64]:
+def _regions(scaled: Array) -> Integers:
     """Region (K,) of each reading: halves along the widest joint, until there are REGIONS regions of equal size."""
     label = np.zeros(len(scaled), np.int64)
     for _ in range(int(np.log2(settings.REGIONS))):
@@ -40,14 +38,14 @@ def _regions(scaled: Array) -> NDArray[np.int64]:
     return np.unique(label, return_inverse=True)[1]
 
 
-def segments(run: NDArray) -> NDArray:
+def segments(run: Integers) -> Integers:
     """Blocks (P,) of pairs of visits in measured order: runs if there are enough, else time segments of the path."""
     names, label = np.unique(run, return_inverse=True)
     in_time = np.arange(len(run)) * settings.PATH_SEGMENTS // max(len(run), 1)
     return label if len(names) >= settings.FEWEST_BLOCKS else in_time
 
 
-def block_error(values: Array, blocks: NDArray) -> float:
+def block_error(values: Array, blocks: Integers) -> float:
     """Standard error of the mean of (P,) values whose blocks are independent of one another; NaN with one block."""
     count = np.bincount(blocks)
     total = np.bincount(blocks, values)[count > 0]
@@ -58,6 +56,6 @@ def block_error(values: Array, blocks: NDArray) -> float:
     return float(np.sqrt(len(count) / (len(count) - 1) * np.sum(deviation**2)) / len(values))
 
 
-def group_means(values: Array, label: NDArray) -> Array:
+def group_means(values: Array, label: Integers) -> Array:
     """Mean vector (G, C) of each group of the rows (K, C); label (K,) 0..G-1."""
     return np.stack([np.bincount(label, column) / np.bincount(label) for column in values.T], axis=1)

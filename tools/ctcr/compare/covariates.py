@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.compare.sample import Sample
 
-Array = NDArray[np.float64]
 UNITS = {"deg": 180 / np.pi, "deg/s": 180 / np.pi, "mm": 1e3, "mm/s": 1e3}  # value of an SI unit; others are 1
 
 

@@ -8,18 +8,16 @@ block and destroys only the structure that repeats from block to block, which th
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
-
-Array = NDArray[np.float64]
+from ctcr.arrays import Array, Integers
 
 
 @dataclass(frozen=True)
 class Folds:
     """Assignment of rows to G blocks, held out in turn, and T random sign patterns for them."""
 
-    label: NDArray[np.int64]  # (K,) 0..G-1, ascending: a block is a slice of the rows
+    label: Integers  # (K,) 0..G-1, ascending: a block is a slice of the rows
     signs: Array  # (1 + T, G), first row all ones: the data as they are
 
     @property
@@ -32,7 +30,7 @@ class Folds:
         return Folds(np.repeat(self.label, len(target) // len(self.label)), self.signs)
 
 
-def make_folds(label: NDArray, trials: int, seed: int = 0) -> Folds:
+def make_folds(label: Integers, trials: int, seed: int = 0) -> Folds:
     """Folds for ascending labels 0..G-1 with a fixed seed, so that a report can be repeated."""
     count = int(label.max()) + 1
     random = np.random.default_rng(seed)

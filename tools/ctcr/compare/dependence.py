@@ -9,15 +9,13 @@ for the number of forms tried.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.compare.blocks import split
 from ctcr.compare.covariates import Covariate, covariates, has_speed
 from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, unexplained
 from ctcr.compare.sample import Sample
-
-Array = NDArray[np.float64]
 
 FRAME_NAMES = {
     "base": ("x", "y", "z"),
@@ -107,7 +105,7 @@ class Ranking:
     chance_share: float  # the best of all forms reaches this by chance with the probability of the level
     explained: float  # share of the squared error that the chosen ones predict together
     error: Array  # (K, 3) that was explained, base frame [m], the offset removed
-    rows: NDArray[np.int64]  # indices of the sample's rows that were used, block by block
+    rows: Integers  # indices of the sample's rows that were used, block by block
     blocks: int
     block_kind: str  # "runs" or "places"
     frames: dict[str, Array]  # frame -> axes (K, 3, 3) as columns, base frame
@@ -153,7 +151,7 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
     return Ranking(alone, chosen, chance_share, explained, error, rows, folds.count, kind, frames)
 
 
-def all_forms(sample: Sample, rows: NDArray, items: list[Covariate], frames: dict[str, Array]) -> list[Form]:
+def all_forms(sample: Sample, rows: Integers, items: list[Covariate], frames: dict[str, Array]) -> list[Form]:
     """Every form tried: each quantity in three frames, and the few that are not functions of one quantity."""
     position = sample.base_position[rows]
     lever = position - position.mean(axis=0)
@@ -176,7 +174,7 @@ def all_forms(sample: Sample, rows: NDArray, items: list[Covariate], frames: dic
     return forms
 
 
-def local_frames(sample: Sample, rows: NDArray) -> dict[str, Array]:
+def local_frames(sample: Sample, rows: Integers) -> dict[str, Array]:
     """Axes of each frame as columns (K, 3, 3) in the base frame; zero where a frame is not defined."""
     tip = sample.tip_rotation[rows]
     away = sample.base_position[rows] * [1.0, 1.0, 0.0]

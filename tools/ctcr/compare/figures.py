@@ -5,9 +5,9 @@ from collections.abc import Iterable
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 from scipy import stats
 
+from ctcr.arrays import Array
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
@@ -15,7 +15,6 @@ from ctcr.compare.visits import OPPOSITE, SAME
 from ctcr.show.scene import evenly
 from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
 
-Array = NDArray[np.float64]
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 
 MOST_POINTS = 4000

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import settings
-
-Array = NDArray[np.float64]
+from ctcr.arrays import Array, Integers, Mask
 
 
 @dataclass(frozen=True)
@@ -18,12 +17,12 @@ class Motion:
     direction: NDArray[np.int8]  # (M, 2N) sign of the last motion, kept at rest; 0 before a joint first moves
     rate: Array  # (M, 2N) joint speed since the previous row [m/s, rad/s]; NaN where unknown
 
-    def rows(self, keep: NDArray) -> "Motion":
+    def rows(self, keep: Mask) -> "Motion":
         """The same motion at some of the rows only."""
         return Motion(self.scaled[keep], self.direction[keep], self.rate[keep])
 
 
-def follow(t: Array, run: NDArray, beta: Array, alpha: Array, lever: float) -> Motion:
+def follow(t: Array, run: Integers, beta: Array, alpha: Array, lever: float) -> Motion:
     """Motion along a joint path of at least one row.
 
     t (M,) [s, NaN allowed], run (M,), beta (M, N) [m], alpha (M, N) [rad]; lever [m] turns a base rotation

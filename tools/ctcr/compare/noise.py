@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.compare.blocks import block_error, segments
 from ctcr.compare.visits import OPPOSITE, SAME, Revisits, Stops
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ def direction_difference(
     )
 
 
-def _delay(opposite: Revisits, blocks: NDArray, velocity: Array) -> tuple[float, float, Array]:
+def _delay(opposite: Revisits, blocks: Integers, velocity: Array) -> tuple[float, float, Array]:
     """Delay [s] of readings behind joints, its standard error, and the squared differences [m^2] that it leaves.
 
     A reading late by tau errs by -tau times the tip velocity, so two passes differ by -tau times the difference
@@ -159,11 +157,11 @@ def rms_mm(square: Array) -> float:
     return float(np.sqrt(square.mean())) * 1e3 if len(square) else float("nan")
 
 
-def _block_quartiles(values: Array, blocks: NDArray) -> Array:
+def _block_quartiles(values: Array, blocks: Integers) -> Array:
     return np.array([np.percentile(values[blocks == block], 75) for block in np.unique(blocks)])
 
 
-def _beyond(square: Array, axis: float, blocks: NDArray) -> float:
+def _beyond(square: Array, axis: float, blocks: Integers) -> float:
     """p-value that no more than a quarter of (P,) squared 3-D distances lie beyond the upper quartile of noise.
 
     axis: the noise of one reading per axis. The fraction beyond is judged by its scatter from block to block.

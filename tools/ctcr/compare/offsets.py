@@ -3,19 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.compare.blocks import group_means
 from ctcr.compare.crossvalidation import Folds, chance, unexplained
 from ctcr.compare.noise import rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import Revisits
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ def find_run_offsets(sample: Sample, revisits: Revisits) -> RunOffsets:
     )
 
 
-def _far_runs(sample: Sample, label: NDArray, distance: Array) -> NDArray[np.bool_]:
+def _far_runs(sample: Sample, label: Integers, distance: Array) -> Mask:
     """Runs whose mean error is an outlier that their joints cannot explain.
 
     Runs visit different joints, so their errors may differ. But between two readings the error hardly changes by more

@@ -6,21 +6,19 @@ The model predicts poses in the base frame; T_ref carries them over to the track
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Integers
 from ctcr.compare.motion import Motion, follow
 from ctcr.frames import base_to_tracker, conjugate, matrix_from_quaternion, product
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Sample:
     """K comparable readings in measured order; lengths in m, angles in rad, time in s (NaN when absent)."""
 
-    row: NDArray[np.int64]  # (K,) line in the measurement file
+    row: Integers  # (K,) line in the measurement file
     t: Array  # (K,)
-    run: NDArray[np.int64]  # (K,)
+    run: Integers  # (K,)
     beta: Array  # (K, N)
     alpha: Array  # (K, N)
     force: Array  # (K, 3) base frame [N]
@@ -37,8 +35,8 @@ class Sample:
     tube_lengths: Array  # (N,)
     lever: float  # typical distance of the tip from the insertion axis [m]
     motion: Motion
-    not_measured: NDArray[np.int64]  # file lines
-    not_solved: NDArray[np.int64]  # file lines
+    not_measured: Integers  # file lines
+    not_solved: Integers  # file lines
 
     @property
     def error(self) -> Array:

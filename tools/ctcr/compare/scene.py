@@ -1,8 +1,8 @@
 """The 3-D view: measured and predicted tips with error arrows."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Integers
 from ctcr.compare.analysis import Comparison
 from ctcr.show import scene as show
 from ctcr.show.style import INK, OUT
@@ -17,7 +17,7 @@ def arrow_factor(c: Comparison) -> float:
     return show.arrow_factor(1e3 * c.headline.measured, c.position_mm.p95, ARROW_SHARE)
 
 
-def shown_rows(c: Comparison) -> NDArray[np.int64]:
+def shown_rows(c: Comparison) -> Integers:
     """Rows of the sample that the view shows, evenly spread."""
     return show.evenly(len(c.headline.row), MOST_ARROWS)
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.compare.sample import Sample
 
-Array = NDArray[np.float64]
 SAME, OPPOSITE, MIXED = 1, -1, 0
 
 
@@ -24,9 +24,9 @@ SAME, OPPOSITE, MIXED = 1, -1, 0
 class Stops:
     """S visits: rows at rest are averaged into one visit, a moving row is a visit of its own."""
 
-    first: NDArray[np.int64]  # (S,) index of the first row
-    size: NDArray[np.int64]  # (S,) rows averaged
-    run: NDArray[np.int64]  # (S,)
+    first: Integers  # (S,) index of the first row
+    size: Integers  # (S,) rows averaged
+    run: Integers  # (S,)
     scaled: Array  # (S, 2N) [m]
     direction: NDArray[np.int8]  # (S, 2N)
     error: Array  # (S, 3) tracker frame [m]
@@ -37,11 +37,11 @@ class Stops:
 class Revisits:
     """P pairs of a later visit with an earlier pass through the same joints."""
 
-    later: NDArray[np.int64]  # (P,) visit index
-    earlier: NDArray[np.int64]  # (P,) visit index at the start of the earlier step
+    later: Integers  # (P,) visit index
+    earlier: Integers  # (P,) visit index at the start of the earlier step
     weight: Array  # (P,) position on the earlier step, 0 at its start, 1 at its end
     kind: NDArray[np.int8]  # (P,) SAME, OPPOSITE or MIXED directions of the joints
-    between_runs: NDArray[np.bool_]  # (P,)
+    between_runs: Mask  # (P,)
     difference: Array  # (P, 3) later error minus earlier error, tracker frame [m]
     miss: Array  # (P,) scaled joint distance between the two [m]
     noise_factor: Array  # (P,) variance of the difference in units of one reading's variance
@@ -52,11 +52,11 @@ class Revisits:
         return np.sum(self.difference**2, axis=1)
 
     @property
-    def end(self) -> NDArray[np.int64]:
+    def end(self) -> Integers:
         """Visit index (P,) at the end of the earlier step; the start where the visit itself was hit."""
         return self.earlier + (self.weight > 0)
 
-    def select(self, mask: NDArray) -> "Revisits":
+    def select(self, mask: Mask | Integers) -> "Revisits":
         """Some of the pairs."""
         return Revisits(*(getattr(self, field.name)[mask] for field in fields(self)))
 
@@ -118,7 +118,7 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
     return _pairs(stops, later[order], start[order], weight[order], miss[order])
 
 
-def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray]:
+def _neighbours(scaled: Array, reach: float) -> tuple[Integers, Integers]:
     """Index pairs (visit, neighbour) within reach, the visit itself included; thinned when there are too many."""
     tree = cKDTree(scaled)
     probe = np.linspace(0, len(scaled) - 1, min(len(scaled), 500)).astype(int)
@@ -131,7 +131,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[NDArray, NDArray]:
     return np.repeat(queries, sizes), flat
 
 
-def _nearest_point(scaled: Array, link: Array, length: Array, usable: NDArray, later: NDArray, vertex: NDArray):
+def _nearest_point(scaled: Array, link: Array, length: Array, usable: Mask, later: Integers, vertex: Integers):
     """Nearest point to each later visit on the steps that meet in the neighbouring vertex: miss, start, weight."""
     best_miss = np.linalg.norm(scaled[later] - scaled[vertex], axis=1)
     best_start, best_weight = vertex.copy(), np.zeros(len(vertex))

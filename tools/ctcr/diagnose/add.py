@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Mask
 from ctcr.audit.preparation import prepared
 from ctcr.calibrate.checks import sentence
 from ctcr.diagnose import outliers, segment_delays, smooth_field
@@ -28,9 +28,6 @@ from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core, settings
+from ctcr.arrays import Array, Mask
 from ctcr.diagnose.linearised import Linear
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
 from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass

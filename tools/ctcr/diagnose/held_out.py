@@ -5,15 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Mask
 from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.fit import folds, joint
 from ctcr.model.noise import with_field
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:

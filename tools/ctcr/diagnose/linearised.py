@@ -6,10 +6,9 @@ Residuals and derivatives are whitened, parameters counted in units of their pri
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 
-Array = NDArray[np.float64]
+from ctcr.arrays import Array
 
 
 @dataclass(frozen=True)

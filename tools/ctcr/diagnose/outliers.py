@@ -3,14 +3,12 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.stats import binom
 
 from ctcr import settings
+from ctcr.arrays import Integers, Mask
 from ctcr.table.measurements import Measurements
-
-Mask = NDArray[np.bool_]
 
 
 def outliers(fit: Any, admitted: float = 1.0) -> Mask:
@@ -73,7 +71,7 @@ def clustered(measurements: Measurements, fit: Any) -> Mask:
     return found
 
 
-def _nearest(measurements: Measurements, read: NDArray[np.int64]) -> NDArray[np.int64]:
+def _nearest(measurements: Measurements, read: Integers) -> Integers:
     """Index, among the rows `read`, of the one nearest to each in joints and load."""
     place = measurements.load_space[read]
     near = cKDTree(place).query(place, k=2)[1]

@@ -5,9 +5,9 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Mask
 from ctcr.audit.preparation import prepared
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
@@ -25,8 +25,6 @@ from ctcr.fit.result import rms
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass

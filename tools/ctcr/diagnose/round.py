@@ -4,9 +4,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.diagnose import segment_delays, starts
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine, effects_in, values_of
@@ -16,7 +16,6 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.fit import folds, joint
 
-Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 

@@ -8,18 +8,15 @@ between segments that are close in time; everything is linear in the lags at a f
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain, Linear, laplace
 from ctcr.effects import catalogue
 from ctcr.fit import folds
 from ctcr.fit.joint import Fit, likeliest_field
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
-
 
 CORRECTED = (
     "Errors with the effects found are corrected for that: readings of held-out runs count as late as the readings "
@@ -36,7 +33,7 @@ class SegmentLags:
     columns: Array  # (K, segments) whitened derivatives by independent lags, from which those of the segments follow
     gain: Gain  # of these
     lag: Array  # (M,) [s] of each row's segment, also in rows that were not fitted
-    segment: NDArray[np.int64]  # (M,) of each row
+    segment: Integers  # (M,) of each row
 
     @property
     def log_evidence(self) -> float:
@@ -140,7 +137,7 @@ def segment_lags(engine: Engine, fit: Fit) -> SegmentLags | None:
     return SegmentLags(delay, plain, columns, gain, (root @ gain.values)[segment], segment)
 
 
-def segments(measurements: Measurements) -> NDArray[np.int64]:
+def segments(measurements: Measurements) -> Integers:
     """The time segment of each row (M,), numbered from 0."""
     group = folds.groups(measurements)
     segment, count = np.zeros(len(group), np.int64), 0

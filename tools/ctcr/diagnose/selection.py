@@ -3,17 +3,15 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.diagnose import segment_delays
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.round import CandidateFit, Progress, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
-
-Array = NDArray[np.float64]
 
 
 @dataclass

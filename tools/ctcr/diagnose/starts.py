@@ -7,18 +7,16 @@ searched by the linearised gain of the amplitude alone. The quantities of its pa
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from ctcr import _core, settings
+from ctcr.arrays import Array, Mask
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine
 from ctcr.effects import catalogue
 from ctcr.model.recording import session_part
 from ctcr.table.measurements import Measurements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Worth = Callable[[Array], float]  # linearised gain in log evidence by derivatives (M, 6, k)
 Option = tuple[Candidate, Array]  # with its derivatives (M, 6, k)
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.compare.covariates import Covariate, covariates
 from ctcr.compare.sample import Sample
 from ctcr.diagnose.engine import Engine
@@ -22,8 +22,6 @@ from ctcr.diagnose.linearised import Linear, laplace
 from ctcr.diagnose.residual import screw_pitch
 from ctcr.fit.joint import Fit
 from ctcr.model import parameters
-
-Array = NDArray[np.float64]
 
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
@@ -107,7 +105,7 @@ class _Trial:
     """Parameters, by their index in the fit, each with a quantity and the columns (M, k) by which it may vary."""
 
     pairs: tuple[tuple[int, Covariate, Array], ...]
-    index: NDArray[np.int64]  # of its columns among those of all trials
+    index: Integers  # of its columns among those of all trials
 
     @property
     def ids(self) -> set[tuple[int, str]]:
@@ -120,7 +118,7 @@ class _Trials:
     def __init__(self, trials: list[_Trial], columns: Array) -> None:
         self.trials, self.columns = trials, columns
         # Batches of trials with equally many columns: which trials, the indices of their columns, their information.
-        self._batches: list[tuple[NDArray[np.int64], NDArray[np.int64], Array]] = []
+        self._batches: list[tuple[Integers, Integers, Array]] = []
         sizes = np.array([len(trial.index) for trial in trials])
         for size in np.unique(sizes):
             which = np.flatnonzero(sizes == size)

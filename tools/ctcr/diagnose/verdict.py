@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Mask
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.selection import Accepted
 from ctcr.fit import joint
@@ -28,7 +28,7 @@ def judge(
     with_effects: joint.Fit,
     accepted: list[Accepted],
     residual: Residual,
-    judged: NDArray[np.bool_],
+    judged: Mask,
     explained: dict[str, float],
     outdone: bool,
 ) -> Verdict:

@@ -9,14 +9,13 @@ from functools import cache
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 
-Array = NDArray[np.float64]
 NEEDS = ("order", "time", "orientation", "loads", "gravity")  # that data must have for some effects
 # What is taken from the library as it is.
 KEPT_OF_EFFECTS = ("id", "title", "physics", "signature", "measure", "reference")

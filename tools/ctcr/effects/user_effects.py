@@ -42,15 +42,13 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Integers
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, shown
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
 ACTS_ON = dict(zip(HOOKS, ("joints", "tip", "rod", "reading", "rod", "rod"), strict=True))  # where each hook acts
@@ -80,7 +78,7 @@ class Rows:
     """Rows of the table that a hook gets, in the order measured."""
 
     t: Array  # (M,) [s], NaN where unknown
-    run: NDArray[np.int64]  # (M,)
+    run: Integers  # (M,)
     beta: Array  # (M, N) [m]
     alpha: Array  # (M, N) [rad]
     force: Array  # (M, 3) [N], base frame

@@ -4,15 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Mask
 from ctcr.effects.user_effects import Effect, Rows
 from ctcr.errors import InputError, Problem
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.description import Robot
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Values = Mapping[str, float]  # of all parameters by full name
 
 PROFILES = ("curvature", "stiffness")

@@ -3,22 +3,18 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-Array = NDArray[np.float64]
-
 
 class Coverage:
     """Fisher information of groups of rows on the standard calibration: `rows` (M,) that count, `group` (M,) from 0."""
 
-    def __init__(
-        self, robot: Robot, measurements: Measurements, rows: NDArray[np.bool_], group: NDArray[np.int64]
-    ) -> None:
+    def __init__(self, robot: Robot, measurements: Measurements, rows: Mask, group: Integers) -> None:
         self._linearisations = [_information(J, group) for J in _linearisations(robot, measurements, rows)]
 
     def undetermined(self, held_out: Iterable[int]) -> Array:
@@ -33,7 +29,7 @@ def _undetermined(total: Array, information: Array, of_position: Array, held_out
     return np.einsum("ij,gji->g", covariance, of_position[held_out]) / 3
 
 
-def _information(jacobian: Array, group: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+def _information(jacobian: Array, group: Integers) -> tuple[Array, Array, Array]:
     """Information on the parameters, prior included (k, k), that of each group (G, k, k), and of its mean position."""
     whole, position = np.zeros((2, group.max() + 1, *2 * jacobian.shape[-1:]))
     for k in range(len(whole)):
@@ -43,7 +39,7 @@ def _information(jacobian: Array, group: NDArray[np.int64]) -> tuple[Array, Arra
     return np.eye(jacobian.shape[-1]) + whole.sum(axis=0), whole, position
 
 
-def _linearisations(robot: Robot, measurements: Measurements, rows: NDArray[np.bool_]) -> Iterable[Array]:
+def _linearisations(robot: Robot, measurements: Measurements, rows: Mask) -> Iterable[Array]:
     """Derivatives of poses (M, 6, k) by the standard parameters, in units of jitter and prior sd; 0 in other rows.
 
     At curved lengths as stated, longer and shorter by their sd: where a curve starts near the plate, that decides which

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ctcr import settings
+from ctcr.arrays import Integers, Mask
 from ctcr.compare import blocks
 from ctcr.compare.motion import follow
 from ctcr.errors import InputError, Problem
@@ -20,16 +20,13 @@ from ctcr.fit.coverage import Coverage
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-Mask = NDArray[np.bool_]
-Labels = NDArray[np.int64]
-
 
 @dataclass(frozen=True)
 class Split:
     """`part` (M,) of each row, 0 .. parts - 1; `kind`: what was kept together, runs or places (of joint space)."""
 
     kind: str
-    part: Labels
+    part: Integers
     parts: int
 
 
@@ -76,7 +73,7 @@ def runs_left_out(readings: Measurements, count: int) -> Split:
     return Split("runs", np.isin(index, chosen).astype(np.int64), 2)
 
 
-def groups(measurements: Measurements) -> Labels:
+def groups(measurements: Measurements) -> Integers:
     """The group of each row (M,), numbered from 0 in the order of measuring: its run, or a block of time where there
     are too few runs. Rows and runs without a pose do not count: each group holds something measured."""
     measured = measured_rows(measurements)
@@ -114,7 +111,7 @@ def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitte
     return np.isin(group, held_out)
 
 
-def _regions(readings: Measurements, lever: float) -> Labels:
+def _regions(readings: Measurements, lever: float) -> Integers:
     """The region of joint space of each row (M,), numbered from 0."""
     motion = follow(readings.t, readings.run, readings.beta, readings.alpha, lever)
     one_run = np.zeros_like(readings.run)

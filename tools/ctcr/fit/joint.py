@@ -12,9 +12,10 @@ from math import nan
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ctcr import _core, settings
+from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, one_sided
@@ -26,9 +27,6 @@ from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def fit(

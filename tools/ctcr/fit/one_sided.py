@@ -9,13 +9,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.fit.result import Fit
 from ctcr.model.protocol import LinearModel
-
-Array = NDArray[np.float64]
 
 
 def widened(fit: Fit) -> Fit:

@@ -8,17 +8,15 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
 from ctcr import _core
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.model import parameters
 from ctcr.model.noise import Noise
 from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -214,7 +212,7 @@ class Fit:
         return np.where(self.used[:, None], derivative, 0.0)
 
     @cached_property
-    def _fitted_numbers(self) -> NDArray[np.int64]:
+    def _fitted_numbers(self) -> Integers:
         return np.flatnonzero(np.repeat(self.weights > 0, 3, axis=1))
 
 

@@ -11,10 +11,11 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, joint
 from ctcr.fit.result import Fit, Priors, rms
@@ -25,15 +26,12 @@ from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
 
 @dataclass(frozen=True)
 class RunFrames:
     """The pose of each run's frame against the one that the robot has after the fit, tracker axes."""
 
-    run: NDArray[np.int64]  # (R,)
+    run: Integers  # (R,)
     shift: Array  # (R, 3) [m] of the base frame's origin
     turn: Array  # (R, 3) [rad] rotation vector
 

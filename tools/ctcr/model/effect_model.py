@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.frames import tracker_to_base
 from ctcr.model import user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ctcr import _core
+from ctcr.arrays import Array, Mask
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.frames import product
@@ -14,8 +15,6 @@ from ctcr.model import parameters as free_parameters
 from ctcr.model import recording
 from ctcr.model.effect_model import of_the_path, of_the_poses
 from ctcr.robot.description import Robot
-
-Array = NDArray[np.float64]
 
 INTEGRATORS = {
     "default": _core.Integrator.standard,
@@ -38,7 +37,7 @@ class Prediction:
     by_parameters: Array | None = None  # (M, 6, P), rows as above; columns: `Model.parameters`, SI
 
     @property
-    def solved(self) -> NDArray[np.bool_]:
+    def solved(self) -> Mask:
         """Which rows have a trustworthy answer (M,)."""
         return self.status == 0
 

@@ -1,13 +1,12 @@
 """The model of a robot that is moving now: it remembers the path, as effects such as friction and backlash do."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ctcr.arrays import Array
 from ctcr.model import user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 Row = tuple[float, Array, Array]  # t, joints (2N,), force (3,)
 

@@ -12,17 +12,15 @@ from math import inf, pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ctcr import _core
+from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.yaml_document import FieldPath
-
-Array = NDArray[np.float64]
 
 GROUPS = {  # short names
     "tracker.frame": ("tracker.position.*", "tracker.rotation.*"),

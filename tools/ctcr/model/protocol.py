@@ -3,10 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from ctcr.arrays import Array
 
 
 class ResidualModel(Protocol):

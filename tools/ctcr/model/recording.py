@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import _core, settings
+from ctcr.arrays import Array, Mask
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
 
 
 def names_of(n_tubes: int) -> tuple[str, ...]:
@@ -96,7 +94,7 @@ def recording_of(
     )
 
 
-def _residual(robot: Robot, measurements: Measurements, steps: int, rows: NDArray[np.bool_]) -> Array:
+def _residual(robot: Robot, measurements: Measurements, steps: int, rows: Mask) -> Array:
     """Residual (M, 6) at the robot file's values in some rows (M,); NaN in the others."""
     table = recording_of(robot, measurements, steps=steps)
     table.activate(rows.tolist())

@@ -9,8 +9,8 @@ from math import nan
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array
 from ctcr.frames import product, quaternion_from_rotation_vector
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of
@@ -18,7 +18,6 @@ from ctcr.robot.description import Robot
 from ctcr.show.output import atomic_writer
 from ctcr.table.measurements import Measurements, group_columns
 
-Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 
 NOISES = ("none", "jitter", "realistic")

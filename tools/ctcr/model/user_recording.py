@@ -6,10 +6,10 @@ from math import nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.effects import catalogue, user_effects
 from ctcr.effects.user_effects import Effect, Rows
 from ctcr.effects.user_hooks import PROFILES, Hooks
@@ -19,9 +19,6 @@ from ctcr.model import recording
 from ctcr.model.protocol import ResidualModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 def recording_of(robot: Robot, measurements: Measurements, names: Sequence[str] = (), **options: Any) -> Any:

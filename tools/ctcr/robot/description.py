@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from annotated_types import Len
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
+from ctcr.arrays import Array
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
 from ctcr.robot.yaml_document import YamlDocument
@@ -20,7 +20,6 @@ from ctcr.robot.yaml_document import YamlDocument
 MAX_TUBES = 4  # the compiled model covers 1 to 4
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
 
-Array = NDArray[np.float64]
 Three = Annotated[list[float], Len(3, 3)]
 TRANSLATIONS = Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
 ROTATIONS = Quantity("deg", usual=(0, 360), count="one number a tube,")

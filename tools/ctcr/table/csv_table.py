@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, file_faults, shown
 
 BLOCK_BYTES = 4 << 20
@@ -38,9 +38,7 @@ class Faults:
             examples = [*examples, Problem(message, self.file, row, column, line_name="row")]
         self._kinds[key] = (total + count, examples)
 
-    def where(
-        self, bad: NDArray[np.bool_], rows: NDArray[np.int64], column: str, kind: str, say: Callable[[int], str]
-    ) -> None:
+    def where(self, bad: Mask, rows: Integers, column: str, kind: str, say: Callable[[int], str]) -> None:
         """A fault of a kind in each row `rows[i]` where `bad[i]`; `say(i)` is its message."""
         found = np.flatnonzero(bad)
         for i in found[:SHOWN_PER_KIND]:
@@ -73,7 +71,7 @@ class NumberTable:
     start: int
     end: int
 
-    def blocks(self, faults: Faults) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float64], int]]:
+    def blocks(self, faults: Faults) -> Iterator[tuple[Integers, Array, int]]:
         """Blocks of rows: (row numbers, numbers (rows, columns), bytes read). Unreadable rows go to `faults`."""
         row = 2
         with open(self.path, "rb") as file:
@@ -92,7 +90,7 @@ class NumberTable:
                 row += len(lines)
 
 
-def read_columns(path: str | Path, columns: Sequence[str]) -> NDArray[np.float64]:
+def read_columns(path: str | Path, columns: Sequence[str]) -> Array:
     """The numbers (M, columns) of a table that has just these columns. Raises InputError with its faults."""
     table, faults = open_table(path), Faults(str(path))
     if table.columns != tuple(columns):
@@ -159,7 +157,7 @@ def _count_lines(file: BinaryIO, start: int, end: int) -> int:
     return lines
 
 
-def _numbers(lines: list[bytes], n_columns: int) -> NDArray[np.float64] | None:
+def _numbers(lines: list[bytes], n_columns: int) -> Array | None:
     """The numbers (lines, columns), or None where any line is faulty: fast; `_is_readable` then finds the line."""
     if any(line.count(b",") != n_columns - 1 for line in lines):
         return None

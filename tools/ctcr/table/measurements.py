@@ -10,9 +10,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
@@ -22,7 +22,6 @@ JOINT_ORDER_SLACK_M = 1e-6  # rounding of recorded joints
 UNIT_QUATERNION_SLACK = 1e-3
 _MAX_RUN = 1e15  # whole numbers that a float holds exactly
 
-Array = NDArray[np.float64]
 
 QUANTITIES = {  # values outside the usual range are in another unit, or garbage
     "beta": Quantity("m", usual=(1e-9, 5)),
@@ -38,13 +37,13 @@ class Measurements:
     """M readings of a robot with N tubes. Values that were not measured are NaN, or None where columns are absent."""
 
     t: Array  # (M,) [s]
-    run: NDArray[np.int64]  # (M,) the path that the reading belongs to
+    run: Integers  # (M,) the path that the reading belongs to
     beta: Array  # (M, N) grasped points [m], <= 0
     alpha: Array  # (M, N) base angles [rad]
     force: Array  # (M, 3) known force at the tip [N], base frame; zero where the columns are absent
     position: Array | None  # (M, 3) sensor [m], tracker frame
     quaternion: Array | None  # (M, 4) sensor (w, x, y, z), unit, tracker frame
-    row: NDArray[np.int64]  # (M,) row of the file; the header is row 1
+    row: Integers  # (M,) row of the file; the header is row 1
     warnings: list[Problem] = field(default_factory=list)
     from_home: bool = True  # whether the robot came to the first row straight from home; else it was at rest there
 
@@ -52,7 +51,7 @@ class Measurements:
         return len(self.run)
 
     @property
-    def oriented(self) -> NDArray[np.bool_]:
+    def oriented(self) -> Mask:
         """Whether the orientation was measured (M,)."""
         return np.zeros(len(self), bool) if self.quaternion is None else np.isfinite(self.quaternion).all(axis=1)
 
@@ -140,7 +139,7 @@ def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tub
             yield from ((column, f"this column is missing: {reason}") for column in absent)
 
 
-def _check(name: str, block: Array, rows: NDArray[np.int64], columns: list[str], faults: Faults) -> None:
+def _check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults) -> None:
     """Faults in the values (rows, columns) of one group."""
     quantity = QUANTITIES.get(name)
     needs = f": needs a number in {quantity.unit}" if quantity else ""
@@ -168,7 +167,7 @@ def _check(name: str, block: Array, rows: NDArray[np.int64], columns: list[str],
         faults.where(bad, rows, span, "norm", lambda i: f"quaternion of norm {norm[i]:.4g}: must be 1")
 
 
-def _check_joint_order(beta: Array, rows: NDArray[np.int64], columns: list[str], faults: Faults) -> None:
+def _check_joint_order(beta: Array, rows: Integers, columns: list[str], faults: Faults) -> None:
     usual = (np.abs(beta) <= QUANTITIES["beta"].usual[1]).all(1)  # else the unit is the fault
     in_front = usual & (beta[:, -1] > JOINT_ORDER_SLACK_M)
     faults.where(in_front, rows, columns[-1], "sign", lambda i: f"{beta[i, -1]:g} m: must be <= 0 m, behind the plate")
@@ -192,7 +191,7 @@ def _measurements(data: dict[str, Array], table: NumberTable) -> Measurements:
     return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings)
 
 
-def _warnings(t: Array, run: NDArray[np.int64], file: str) -> Iterator[Problem]:
+def _warnings(t: Array, run: Integers, file: str) -> Iterator[Problem]:
     same_run = run[1:] == run[:-1]
     late = np.flatnonzero(same_run & (t[1:] <= t[:-1]))
     if len(late):
