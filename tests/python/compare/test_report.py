@@ -11,7 +11,7 @@ import pytest
 from compare_bench import bench, stop_and_go
 from ctcr import cli
 from ctcr.commands import compare as compare_command
-from ctcr.compare import compare, report, scene
+from ctcr.compare import compare, report
 from ctcr.compare.summary import findings, headline
 from ctcr.show import output
 
@@ -75,13 +75,13 @@ def test_page():
 def test_scene():
     """The 3-D view is valid JSON with the true points and arrows."""
     result = compare(*planted())
-    drawing = json.loads(scene.scene(result))
+    drawing = json.loads(report.scene(result))
     by_name = {trace.get("name"): trace for trace in drawing["data"]}
-    rows = scene.shown_rows(result)
+    rows = report.shown_rows(result)
     for name, points in (("measured", result.headline.measured), ("predicted", result.headline.predicted)):
         shown = np.column_stack([by_name[name][axis] for axis in "xyz"])
         np.testing.assert_allclose(shown, points[rows] * 1e3, atol=5.1e-4)
-    factor = scene.arrow_factor(result)
+    factor = report.arrow_factor(result)
     assert factor >= 1
     shafts = by_name[f"error × {factor:g}"]
     start, end = (np.column_stack([shafts[axis][k::3] for axis in "xyz"]) for k in (0, 1))

@@ -5,7 +5,6 @@ import pytest
 from compare_bench import bench, stop_and_go, stream
 from ctcr import settings
 from ctcr.compare import crossvalidation as cv
-from ctcr.compare.blocks import split
 from ctcr.compare.dependence import local_frames
 from ctcr.compare.offsets import rigid_motion
 from ctcr.compare.sample import take_sample
@@ -64,7 +63,7 @@ def test_runs_are_blocks():
     """With enough runs the blocks are the runs."""
     random = np.random.default_rng(1)
     sample = take_sample(*bench(random, stop_and_go(random, runs=9)))
-    rows, label, kind = split(sample)
+    rows, label, kind = cv.split(sample.run, sample.motion.scaled)
     assert kind == "runs"
     np.testing.assert_array_equal(sample.run[rows], label)
 
@@ -73,7 +72,7 @@ def test_regions_are_blocks():
     """One run is split into regions of joint space; a region holds both passes, so that nothing leaks between them."""
     random = np.random.default_rng(2)
     sample = take_sample(*bench(random, stream(random)))
-    rows, label, kind = split(sample)
+    rows, label, kind = cv.split(sample.run, sample.motion.scaled)
     assert kind == "places"
     assert np.bincount(label).min() > 0.8 * len(rows) / settings.REGIONS
     region = np.empty(len(rows), int)

@@ -5,9 +5,8 @@ import pytest
 from compare_bench import JITTER_MM, bench, stop_and_go, stream
 from ctcr import settings
 from ctcr.compare import compare
-from ctcr.compare.motion import follow
 from ctcr.compare.noise import noise_floor
-from ctcr.compare.sample import take_sample
+from ctcr.compare.sample import follow, take_sample
 from ctcr.compare.visits import MIXED, OPPOSITE, SAME, find_revisits, find_stops
 
 

@@ -5,6 +5,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
 from ctcr import settings
+from ctcr.arrays import evenly
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.show import scene
 from ctcr.show.style import ERROR, FAINT, INK, NOISE, OUT
@@ -169,7 +170,7 @@ def view(c: Calibration) -> str:
     measured = 1e3 * c.readings.position
     states = {"robot file": 1e3 * c.fit.nominal_residual[:, :3], "calibrated": 1e3 * c.fit.residual[:, :3]}
     known = np.flatnonzero(np.isfinite(np.hstack([measured, *states.values()])).all(axis=1))
-    rows = known[scene.evenly(len(known), MOST_ARROWS)]
+    rows = known[evenly(len(known), MOST_ARROWS)]
     data, labels = [], []
     for name, error in states.items():
         error = error[rows]

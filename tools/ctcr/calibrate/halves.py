@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Array, Integers, evenly
 from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model import effect_model
@@ -44,7 +44,7 @@ def compare_halves(robot: Robot, readings: Measurements, first: Fit, second: Fit
     The effect of noise is sampled: the second fit's values are drawn about the first one's.
     """
     count = len(readings)
-    rows = np.unique(np.linspace(0, count - 1, min(count, settings.HALVES_ROWS)).astype(np.int64))
+    rows = evenly(count, settings.HALVES_ROWS)
     models = [fit.apply(robot) for fit in (first, second)]
     tips = [_tips(model, readings, rows) for model in models]
     eigenvalues, vectors = np.linalg.eigh(_difference_covariance(first, second))

@@ -7,9 +7,8 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
-from ctcr.compare.blocks import group_means, split
 from ctcr.compare.covariates import fixed_names, has_speed
-from ctcr.compare.crossvalidation import make_folds
+from ctcr.compare.crossvalidation import group_means, make_folds, split
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
@@ -110,7 +109,11 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
             )
         )
     tracker = robot.tracker
-    shift, turn = _constant_errors(sample)
+    rows, label, _ = split(sample.run, sample.motion.scaled)
+    folds, shift, turn = make_folds(label, settings.SIGN_TRIALS), None, None
+    if folds.count >= settings.FEWEST_BLOCKS:
+        shift = find_shift(sample.error[rows], folds)
+        turn = find_turn(sample.predicted[rows], sample.measured[rows], folds)
     headline, sample = sample, _aligned(sample) if turn and turn.gross else sample
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
@@ -158,14 +161,6 @@ def _spread(values: Array) -> Spread | None:
         return None
     rms, p95 = np.sqrt(np.mean(known**2)), np.percentile(known, 95)
     return Spread(len(known), float(known.mean()), float(rms), float(p95), float(known.max()))
-
-
-def _constant_errors(sample: Sample) -> tuple[Shift | None, FrameTurn | None]:
-    rows, label, _ = split(sample)
-    folds = make_folds(label, settings.SIGN_TRIALS)
-    if folds.count < settings.FEWEST_BLOCKS:
-        return None, None
-    return find_shift(sample.error[rows], folds), find_turn(sample.predicted[rows], sample.measured[rows], folds)
 
 
 def _aligned(sample: Sample) -> Sample:

@@ -1,4 +1,5 @@
-"""How much of the error a linear form predicts on held-out blocks, and how much chance would give.
+"""Blocks of a table that may be treated as independent: how much of the error a linear form predicts on held-out ones,
+and how much chance would give; standard errors by blocks.
 
 Everything is computed from the normal equations of the blocks, so the cost does not grow with the number of trials.
 A trial of chance flips the signs of whole blocks (runs or regions of joint space). That keeps all structure inside a
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Array, Integers, evenly
 
 
 @dataclass(frozen=True)
@@ -92,3 +93,57 @@ def held_out_prediction(design: Array, target: Array, folds: Folds) -> Array:
 def chance(observed: float, trials: Array) -> float:
     """p-value: fraction of results at least as large as the observed one, which itself counts as one of them."""
     return float((1 + np.sum(trials >= observed)) / (1 + len(trials)))
+
+
+def split(run: Integers, scaled: Array) -> tuple[Integers, Integers, str]:
+    """Rows used, their blocks in ascending order, and the kind of the blocks: "runs", or "places" in joint space.
+
+    run (K,); scaled (K, 2N) joints as lengths [m].
+    A place is a region of joint space. It holds every pass through it, in both directions, so that nothing leaks from
+    a pass to its return.
+    """
+    rows = evenly(len(run), settings.DEPENDENCE_ROWS)
+    runs, label = np.unique(run[rows], return_inverse=True)
+    kind = "runs" if len(runs) >= settings.FEWEST_BLOCKS else "places"
+    if kind == "runs":
+        label = (label * min(len(runs), settings.DEPENDENCE_BLOCKS)) // len(runs)
+    else:
+        label = _regions(scaled[rows])
+    order = np.argsort(label, kind="stable")
+    return rows[order], label[order], kind
+
+
+def _regions(scaled: Array) -> Integers:
+    """Region (K,) of each reading: halves along the widest joint, until there are REGIONS regions of equal size."""
+    label = np.zeros(len(scaled), np.int64)
+    for _ in range(int(np.log2(settings.REGIONS))):
+        label *= 2
+        for cell in np.unique(label):
+            members = np.flatnonzero(label == cell)
+            axis = np.argmax(np.ptp(scaled[members], axis=0))
+            order = np.argsort(scaled[members, axis], kind="stable")
+            label[members[order[len(order) // 2 :]]] += 1
+    return np.unique(label, return_inverse=True)[1]
+
+
+def segments(run: Integers) -> Integers:
+    """Blocks (P,) of pairs of visits in measured order: runs if there are enough, else time segments of the path."""
+    names, label = np.unique(run, return_inverse=True)
+    in_time = np.arange(len(run)) * settings.PATH_SEGMENTS // max(len(run), 1)
+    return label if len(names) >= settings.FEWEST_BLOCKS else in_time
+
+
+def block_error(values: Array, blocks: Integers) -> float:
+    """Standard error of the mean of (P,) values whose blocks are independent of one another; NaN with one block."""
+    count = np.bincount(blocks)
+    total = np.bincount(blocks, values)[count > 0]
+    count = count[count > 0]
+    if len(count) < 2:
+        return float("nan")
+    deviation = total - values.mean() * count
+    return float(np.sqrt(len(count) / (len(count) - 1) * np.sum(deviation**2)) / len(values))
+
+
+def group_means(values: Array, label: Integers) -> Array:
+    """Mean vector (G, C) of each group of the rows (K, C); label (K,) 0..G-1."""
+    return np.stack([np.bincount(label, column) / np.bincount(label) for column in values.T], axis=1)

@@ -12,9 +12,8 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
-from ctcr.compare.blocks import split
 from ctcr.compare.covariates import Covariate, covariates, has_speed
-from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, unexplained
+from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, split, unexplained
 from ctcr.compare.sample import Sample
 
 FRAME_NAMES = {
@@ -125,7 +124,7 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
 
     pitch_m: travel of a drive screw per revolution, None if unknown; alpha: level at which a form counts as found.
     """
-    rows, label, kind = split(sample)
+    rows, label, kind = split(sample.run, sample.motion.scaled)
     error = base_error[rows]
     folds = make_folds(label, settings.SIGN_TRIALS)
     frames = local_frames(sample, rows)

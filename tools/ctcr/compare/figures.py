@@ -7,12 +7,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
-from ctcr.arrays import Array
+from ctcr.arrays import Array, evenly
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
-from ctcr.show.scene import evenly
 from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
 
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them

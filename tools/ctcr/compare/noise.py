@@ -7,7 +7,7 @@ from scipy import stats
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
-from ctcr.compare.blocks import block_error, segments
+from ctcr.compare.crossvalidation import block_error, segments
 from ctcr.compare.visits import OPPOSITE, SAME, Revisits, Stops
 
 

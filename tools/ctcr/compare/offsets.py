@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
-from ctcr.compare.blocks import group_means
-from ctcr.compare.crossvalidation import Folds, chance, unexplained
+from ctcr.compare.crossvalidation import Folds, chance, group_means, unexplained
 from ctcr.compare.noise import rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import Revisits

@@ -11,24 +11,23 @@ SHOWN_RUNS = 15
 SHOWN_FORMS = 10
 SHOWN_ROWS = 20
 
-COLUMNS = ["", "unit", "mean", "RMS", "95 %", "max", "readings"]
-RUN_COLUMNS = ["run", "readings", "mean", "RMS", "95 %", "max", "mean x", "mean y", "mean z"]
-REPEAT_COLUMNS = ["", "RMS distance", "per axis", "pairs or rests"]
-RANKING_COLUMNS = ["depends on", "frame", "share", "size, mm", "p"]
+Table = tuple[str, list[str], list[list[str]], int]  # title, columns, rows, number of columns of text
 
 
 def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
     console.print(f"[bold]{c.robot}[/bold]", highlight=False)
     console.print(headline(c), markup=False)
-    console.print(table("Error, measured minus predicted", COLUMNS, error_rows(c), text_columns=2))
+    console.print(table(*errors(c)))
     if len(c.runs) > 1:
-        console.print(table("By run, mm", RUN_COLUMNS, run_rows(c)[:SHOWN_RUNS], text_columns=1))
+        _, columns, rows, _ = by_run(c)
+        console.print(table("By run, mm", columns, rows[:SHOWN_RUNS]))
         if len(c.runs) > SHOWN_RUNS:
             console.print(f"  and {len(c.runs) - SHOWN_RUNS} more runs (all of them: --json FILE or --report FILE)")
-    console.print(table("Repeatability, mm", REPEAT_COLUMNS, repeat_rows(c), text_columns=1))
+    console.print(table(*repeatability(c)))
     if c.ranking.alone:
-        console.print(table(ranking_title(c), RANKING_COLUMNS, ranking_rows(c)[:SHOWN_FORMS], text_columns=2))
+        title, columns, rows, texts = dependences(c)
+        console.print(table(title, columns, rows[:SHOWN_FORMS], texts))
     for title, lines in [("Findings", [item.text for item in findings(c)]), *remarks(c)]:
         if lines:
             console.print(f"[bold]{title}[/bold]")
@@ -49,29 +48,30 @@ def left_out(c: Comparison, most: int) -> list[str]:
     return [f"{len(rows)} rows {kind}: {listed(rows, most)}" for kind, rows in kinds.items() if len(rows)]
 
 
-def error_rows(c: Comparison) -> list[list[str]]:
+def errors(c: Comparison) -> Table:
     """Overall errors: position in mm and % of length, orientation in degrees."""
     spreads = [("position", "mm", c.position_mm), ("position", "% of length", c.percent_of_length)]
     spreads.append((c.angle_kind, "deg", c.angle_deg))
-    return [
+    rows = [
         [name, unit, *(f"{v:.3g}" for v in (s.mean, s.rms, s.p95, s.maximum)), str(s.count)]
         for name, unit, s in spreads
         if s
     ]
+    return "Error, measured minus predicted", ["", "unit", "mean", "RMS", "95 %", "max", "readings"], rows, 2
 
 
-def run_rows(c: Comparison) -> list[list[str]]:
-    """Errors of each run, mm, with the mean error vector in the tracker frame."""
-    rows = []
+def by_run(c: Comparison) -> Table:
+    """Errors of each run, with the mean error vector."""
+    columns, rows = ["run", "readings", "mean", "RMS", "95 %", "max", "mean x", "mean y", "mean z"], []
     for r in c.runs:
         p = r.position_mm
         sizes = [f"{v:.2f}" for v in (p.mean, p.rms, p.p95, p.maximum)]
         rows.append([str(r.run), str(p.count), *sizes, *(f"{v:+.2f}" for v in r.mean_error_mm)])
-    return rows
+    return "By run, mm; mean error vector in the tracker frame", columns, rows, 0
 
 
-def repeat_rows(c: Comparison) -> list[list[str]]:
-    """Noise floor and hysteresis beside the stated jitter, mm."""
+def repeatability(c: Comparison) -> Table:
+    """Noise floor and hysteresis beside the stated jitter."""
     n, d, root3 = c.noise, c.direction, 3**0.5
 
     def number(value: float) -> str:
@@ -87,19 +87,16 @@ def repeat_rows(c: Comparison) -> list[list[str]]:
     if d:
         rows.append(["hysteresis", f"{d.rms_mm:.3f} ± {number(d.uncertainty_mm)}", "", str(d.pairs)])
         rows.append(["floor of a model without history", f"{d.floor_mm:.3f}", "", ""])
-    return rows
+    return "Repeatability, mm", ["", "RMS distance", "per axis", "pairs or rests"], rows, 1
 
 
-def ranking_title(c: Comparison) -> str:
-    """Title that says how the shares of the ranking are judged."""
-    return f"What the error depends on, judged on {c.ranking.blocks} {held_out(c)}"
-
-
-def ranking_rows(c: Comparison) -> list[list[str]]:
+def dependences(c: Comparison) -> Table:
     """Dependences, strongest first; * marks the ones found one after another."""
     found = {item.name for item in c.ranking.chosen}
-    return [
+    rows = [
         [("* " if d.name in found else "  ") + d.label, d.form.frame]
         + [f"{100 * d.share:.1f} %", f"{d.size_mm:.2f}", f"{d.p_value:.3f}"]
         for d in c.ranking.distinct()
     ]
+    title = f"What the error depends on, judged on {c.ranking.blocks} {held_out(c)}"
+    return title, ["depends on", "frame", "share", "size, mm", "p"], rows, 2

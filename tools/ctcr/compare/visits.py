@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask
+from ctcr.arrays import Array, Integers, Mask, evenly
 from ctcr.compare.sample import Sample
 
 SAME, OPPOSITE, MIXED = 1, -1, 0
@@ -121,7 +121,7 @@ def find_revisits(stops: Stops, lever: float) -> Revisits:
 def _neighbours(scaled: Array, reach: float) -> tuple[Integers, Integers]:
     """Index pairs (visit, neighbour) within reach, the visit itself included; thinned when there are too many."""
     tree = cKDTree(scaled)
-    probe = np.linspace(0, len(scaled) - 1, min(len(scaled), 500)).astype(int)
+    probe = evenly(len(scaled), 500)
     typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
     stride = int(np.ceil(typical * len(scaled) / settings.MOST_NEIGHBOURS))
     queries = np.arange(0, len(scaled), stride)

@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from ctcr.arrays import evenly
 from ctcr.diagnose import figures
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.effects import catalogue
@@ -137,7 +138,7 @@ def scene(d: Diagnosis) -> str:
     """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
     measured = d.measurements.position
     rows = np.flatnonzero(np.isfinite(d.calibrated.residual[:, :3]).all(axis=1))
-    rows = rows[show.evenly(len(rows), MOST_ARROWS)]
+    rows = rows[evenly(len(rows), MOST_ARROWS)]
     tips = 1e3 * measured[rows]
     size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
     factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ctcr import _core, settings
-from ctcr.arrays import Array, Mask
+from ctcr.arrays import Array, Mask, evenly
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine
 from ctcr.effects import catalogue
@@ -55,7 +55,7 @@ def best_moment(
     if len(tried) < 3:
         tried = np.arange(1, len(fitted))
     while len(tried):
-        tried = tried[np.unique(np.linspace(0, len(tried) - 1, settings.MOMENTS_AT_A_TIME).astype(int))]
+        tried = tried[evenly(len(tried), settings.MOMENTS_AT_A_TIME)]
         gains = [worth(from_row(k)) for k in tried]
         if max(gains) <= gain:
             break

@@ -6,15 +6,14 @@ runs, blocks of time do, or regions of joint space with every pass through them.
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ctcr import settings
 from ctcr.arrays import Integers, Mask
-from ctcr.compare import blocks
-from ctcr.compare.motion import follow
+from ctcr.compare.crossvalidation import split
+from ctcr.compare.sample import follow
 from ctcr.errors import InputError, Problem
 from ctcr.fit.coverage import Coverage
 from ctcr.robot.description import Robot
@@ -114,6 +113,5 @@ def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitte
 def _regions(readings: Measurements, lever: float) -> Integers:
     """The region of joint space of each row (M,), numbered from 0."""
     motion = follow(readings.t, readings.run, readings.beta, readings.alpha, lever)
-    one_run = np.zeros_like(readings.run)
-    rows, label, _ = blocks.split(SimpleNamespace(row=readings.row, run=one_run, motion=motion))
+    rows, label, _ = split(np.zeros_like(readings.run), motion.scaled)
     return label[cKDTree(motion.scaled[rows]).query(motion.scaled)[1]]

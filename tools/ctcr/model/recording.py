@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ctcr import _core, settings
-from ctcr.arrays import Array, Mask
+from ctcr.arrays import Array, Mask, evenly
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
@@ -41,7 +41,7 @@ def steps_for(
     """
     count, least = len(measurements), settings.STEPS
     sample = np.zeros(count, bool)
-    sample[np.linspace(0, count - 1, min(count, settings.INTEGRATION_SAMPLE)).astype(np.int64)] = True
+    sample[evenly(count, settings.INTEGRATION_SAMPLE)] = True
     coarse, fine = (_residual(robot.standard, measurements, steps, sample) for steps in (least, 2 * least))
     error = (coarse - fine) * 16 / 15 / np.repeat([noise.position_jitter, noise.rotation_jitter], 3)
     known = np.isfinite(error).any(axis=1)

@@ -4,16 +4,11 @@ import json
 
 import numpy as np
 
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Array
 from ctcr.show.style import INK
 
 SCALE = [[0, "#f3c623"], [0.5, "#e0662b"], [1, "#8c1d18"]]  # of an error, from small to large
 COLOUR_BAR = {"title": {"text": "error, mm"}, "len": 0.6, "thickness": 12}
-
-
-def evenly(count: int, most: int) -> Integers:
-    """Indices of at most `most` of `count` rows, evenly spread."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
 
 
 def trace(points: Array, name: str = "", kind: str = "scatter3d", **style) -> dict:
