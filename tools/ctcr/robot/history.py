@@ -2,11 +2,10 @@
 
 import html
 from dataclasses import dataclass
-from pathlib import Path
 
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.output import table, write_text
+from ctcr.show.output import table
 from ctcr.show.style import ERROR, NOISE, OUT
 
 COLUMNS = ["date", "command", "from", "changes", "error"]
@@ -72,7 +71,7 @@ def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> 
         console.print(f"The figures come from different tables: {', '.join(sources)}", markup=False)
 
 
-def write_report(robot: Robot, target: str | Path, file: str) -> None:
+def page(robot: Robot, file: str) -> str:
     """Both as one HTML page that needs nothing else."""
     stages, lines = waterfall(robot), entries(robot)
     title = f"History: {robot.name}"
@@ -81,7 +80,7 @@ def write_report(robot: Robot, target: str | Path, file: str) -> None:
     if stages:
         sections.append(html_page.figure(draw_waterfall, stages, 10.4, 4.4, "RMS error after each step."))
     sections.append("<h2>Ledger</h2>" + html_page.table("Oldest first", COLUMNS, lines, len(COLUMNS)))
-    write_text(html_page.page(title, sections, file, "ctcr history"), target)
+    return html_page.page(title, sections, file, "ctcr history")
 
 
 def _lead(stages: list[Stage]) -> str:
