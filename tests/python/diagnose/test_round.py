@@ -43,11 +43,11 @@ def weighted(robot, plan):
 def test_unconverged_fit(weighted):
     """The gain of converging the fit before is no gain of a further effect."""
     ended = weighted.fit([MASS])
-    early = weighted.fit_like(ended, [MASS], max_iterations=1)
+    early = weighted.fit_like(ended, [MASS], {}, max_iterations=1, near=False)
     assert ended.log_evidence - early.log_evidence > 2 * settings.UNASKED
     accepted = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=early)
     others = [c for c in candidates(weighted.robot, weighted.measurements)[0] if c.id not in ("tip_load", "contact")]
-    round_ = rounds.run_round(weighted, early, others, [accepted], lambda _: None)
+    round_ = rounds.run_round(weighted, early, others, [accepted])
     assert round_.accepted is None
     assert round_.before.log_evidence == pytest.approx(ended.log_evidence, abs=1.0)
     assert max(one.score for one in round_.tried) < settings.DECISIVE
@@ -58,7 +58,7 @@ def test_contenders_converge(weighted, monkeypatch):
     monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)
     before = weighted.fit()
     screened = rounds.screen(weighted, before, pool(weighted, "tip_load", "softening"), {})
-    tried = rounds.Refits(weighted, before, {}, lambda _: None).of_all(screened)
+    tried = rounds.Refits(weighted, before, {}).of_all(screened)
     best = max(tried, key=lambda one: one.score)
     assert best.id == "tip_load" and best.fit.converged
     assert all(one.fit.iterations <= 1 for one in tried if one.score < settings.CONTENDS * best.score)
@@ -70,7 +70,7 @@ def test_best_of_few_rows(robot, plan, monkeypatch):
     engine = engine_for(robot, plan, {})
     before = engine.fit()
     screened = rounds.screen(engine, before, pool(engine, "tip_load", "softening", "straight_curvature"), {})
-    kept = rounds.Refits(engine, before, {}, lambda _: None).in_reach(screened)
+    kept = rounds.Refits(engine, before, {}).in_reach(screened)
     assert kept and {one.candidate for one in kept} <= {one.candidate for one in screened}
 
 
@@ -82,7 +82,7 @@ def test_cross_validation_vetoes(robot, plan, monkeypatch, offset, accepted):
     first = CandidateFit(Candidate("tip_load", (MASS,)), NO_GAIN, fit=before)
     monkeypatch.setattr(rounds, "predicts_better", lambda *_: False)
     monkeypatch.setattr(settings, "BEYOND_CROSS_VALIDATION", 90.0)  # these are few rows
-    round_ = rounds.run_round(engine, before, pool(engine, "sensor_offset"), [first], lambda _: None)
+    round_ = rounds.run_round(engine, before, pool(engine, "sensor_offset"), [first])
     assert (round_.tried[0].score > settings.BEYOND_CROSS_VALIDATION) == accepted and round_.tried[
         0
     ].score > round_.needed

@@ -128,7 +128,7 @@ def test_other_variant(robot, plan):
         gain = Gain(0.0, *4 * [np.zeros(1)])
         entered = CandidateFit(Candidate("friction", fitted), gain, fit=fit)
         one = Accepted(entered, ["friction"], 100.0, 50.0, 0.5)
-        selection = Selection(engine, lambda _: None, accepted=[one], fit=fit)
+        selection = Selection(engine, accepted=[one], fit=fit)
         selection.refine_form(one)
         after = selection.fit
         assert (np.max(fit.inflation) > settings.INFLATION_WRONG) == (given == "torque_per_length")

@@ -279,9 +279,8 @@ class _Fitter:
         first, *others = [dict(values) for values in starts]
         if not others:
             return first
-        options = {"near": True, "tolerance": settings.COARSE}
-        fit = self.engine.fit(own, start=first, **options)
-        fits = [fit, *(self.engine.fit_like(fit, own, start=other, **options) for other in others)]
+        fit = self.engine.fit(own, start=first, near=True, tolerance=settings.COARSE)
+        fits = [fit, *(self.engine.fit_like(fit, own, other, tolerance=settings.COARSE) for other in others)]
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
 
 

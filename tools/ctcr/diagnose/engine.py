@@ -1,6 +1,6 @@
 """Fits and linearisations of a robot with any effects: one table of measurements, one noise, one choice of rows."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,6 +15,8 @@ from ctcr.model import parameters, recording, user_recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
+Progress = Callable[[str], None]
+
 
 @dataclass
 class Engine:
@@ -24,6 +26,7 @@ class Engine:
     rows: Mask  # that are fitted
     robust: bool = True  # whether outliers count for little
     threads: int = 0
+    progress: Progress = lambda _: None  # is told each step
     free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in parameters.expand
     tolerance: float = settings.TOLERANCE  # of log evidence, in fits for which no other is given
     steps: int = field(init=False)  # of integration
@@ -58,17 +61,17 @@ class Engine:
         start: dict[str, float] | None = None,
         fixed: dict[str, float] | None = None,
         weights: Array | None = None,
-        inflation: Array | None = None,
         noise: Any = None,
-        max_iterations: int = settings.ITERATIONS,
         tolerance: float | None = None,
         near: bool = False,
+        **options: Any,
     ) -> joint.Fit:
         """Calibration and `added` parameters of effects together, the others of effects at their `fixed` values.
 
         near: the start is the end of a similar fit, so that a fit of a part of many rows would teach nothing.
         Frozen `weights` of outliers and `inflation` of the noise make evidences comparable. Without them both follow
-        the fit: where the model is wrong, the noise is inflated so that calibration stays plausible.
+        the fit: where the model is wrong, the noise is inflated so that calibration stays plausible. Other options as
+        in fit_joint().
         """
         names = [*self.base, *added]
         priors = Priors.of(self.robot, names, self.measurements.beta[self.rows])
@@ -87,18 +90,21 @@ class Engine:
             self.fitted,
             start=at,
             weights=weights,
-            inflation=inflation,
-            max_iterations=max_iterations,
             tolerance=tolerance or self.tolerance,
             few_first=not near,
+            **options,
         )
         if table.friction_is_solved:
             self._friction_path = table
         return fitted
 
-    def fit_like(self, other: joint.Fit, added: Iterable[str] = (), **options: Any) -> joint.Fit:
-        """As fit(), at the noise, weights and inflation of another fit: their evidences can be compared."""
-        return self.fit(added, noise=other.noise, weights=other.weights, inflation=other.inflation, **options)
+    def fit_like(
+        self, other: joint.Fit, added: Iterable[str] = (), start: dict[str, float] | None = None, **options: Any
+    ) -> joint.Fit:
+        """As fit(), at the noise, weights and inflation of another fit, so that their evidences can be compared; from
+        its values or a near start."""
+        frozen = {"noise": other.noise, "weights": other.weights, "inflation": other.inflation, "near": True}
+        return self.fit(added, start=values_of(other) if start is None else start, **frozen | options)
 
     def fit_with_field(
         self, added: Sequence[str], start: dict[str, float], fixed: dict[str, float] | None = None
@@ -109,7 +115,7 @@ class Engine:
             from_there = dict(zip(full.names, map(float, values), strict=True))
             if like is None:
                 return self.fit(added, start=from_there, fixed=fixed, near=True)
-            return self.fit_like(like, added, start=from_there, fixed=fixed, near=True, tolerance=settings.COARSE)
+            return self.fit_like(like, added, from_there, fixed=fixed, tolerance=settings.COARSE)
 
         full = self.fit(added, start=start, fixed=fixed, near=bool(start))
         full = one_sided.restarted(full, again)
@@ -125,7 +131,7 @@ class Engine:
         """Whether the readings say that the robot came to its first row otherwise than assumed: straight from home, or
         at rest there. If so, all later fits assume that."""
         other = replace(self, measurements=replace(self.measurements, from_home=not self.measurements.from_home))
-        there = other.fit_like(fit, added, start=values_of(fit), fixed=fixed, near=True, tolerance=settings.COARSE)
+        there = other.fit_like(fit, added, fixed=fixed, tolerance=settings.COARSE)
         if there.log_evidence - fit.log_evidence < settings.DECISIVE:
             return False
         self.measurements = other.measurements

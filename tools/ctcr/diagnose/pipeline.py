@@ -11,10 +11,10 @@ from ctcr.arrays import Mask
 from ctcr.audit.preparation import prepared
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
-from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.engine import Engine, Progress, values_of
 from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
-from ctcr.diagnose.round import Progress, Round, outlier_fraction, parameters_of
+from ctcr.diagnose.round import Round, outlier_fraction, parameters_of
 from ctcr.diagnose.selection import Accepted, select_effects
 from ctcr.diagnose.starts import rows_around
 from ctcr.diagnose.varying_coefficients import VaryingModel, may_outdo, varying_model
@@ -124,15 +124,16 @@ def diagnose(
     without those held-out runs that the others turn out not to determine.
     """
     began = perf_counter()
+    options = {"progress": progress, "threads": threads}
     measurements, notices = prepared(robot, measurements)
     for turn in range(settings.TURNS):
         held_out = folds.held_out_rows(robot, measurements, turn)
-        result = _diagnose_robustly(robot, measurements, held_out, progress, threads)
+        result = _diagnose_robustly(robot, measurements, held_out, **options)
         undetermined = _undetermined_groups(result)
         if undetermined:
             result.release_memory()
             held_out = folds.held_out_rows(robot, measurements, turn, undetermined)
-            again = _diagnose_robustly(robot, measurements, held_out, progress, threads)
+            again = _diagnose_robustly(robot, measurements, held_out, **options)
             if again.accepted or not result.accepted:  # else the runs that showed the effect are now held out
                 result = again
         if result.accepted or not _has_new_errors(result):
@@ -144,16 +145,14 @@ def diagnose(
     return result
 
 
-def _diagnose_robustly(
-    robot: Robot, measurements: Measurements, held_out: Mask, progress: Progress, threads: int
-) -> Diagnosis:
+def _diagnose_robustly(robot: Robot, measurements: Measurements, held_out: Mask, **options: Any) -> Diagnosis:
     """With outliers down-weighted, and also without where an effect that acts on few readings may look like them."""
-    result = _diagnose(robot, measurements, held_out, progress, threads, robust=True)
+    result = _diagnose(robot, measurements, held_out, robust=True, **options)
     clusters = result.residual.clusters
     if not result.mistakes_effect_for_outliers and not clusters:
         return result
     result.release_memory()
-    other = _diagnose(robot, measurements, held_out, progress, threads, robust=False)
+    other = _diagnose(robot, measurements, held_out, robust=False, **options)
     if clusters:
         there = np.isin(measurements.row, clusters)
         return min(result, other, key=lambda r: (outliers.outliers(r.with_effects).sum(), r.with_effects.rms_mm(there)))
@@ -184,12 +183,12 @@ def _has_new_errors(result: Diagnosis) -> bool:
 
 
 def _diagnose(
-    robot: Robot, measurements: Measurements, held_out: Mask, progress: Progress, threads: int, robust: bool
+    robot: Robot, measurements: Measurements, held_out: Mask, robust: bool, progress: Progress, threads: int
 ) -> Diagnosis:
     # Forward selection of effects on the fitted runs, each judged together with the calibration.
-    engine = Engine(robot, measurements, noise_of_readings(robot, measurements), ~held_out, robust, threads=threads)
+    engine = Engine(robot, measurements, noise_of_readings(robot, measurements), ~held_out, robust, threads, progress)
     pool, not_testable = candidates(robot, measurements)
-    chosen = select_effects(engine, [c for c in pool if c.id not in robot.effects], progress)
+    chosen = select_effects(engine, [c for c in pool if c.id not in robot.effects])
     accepted, fit = chosen.accepted, chosen.fit
     names, fixed = parameters_of(chosen.fits)
 

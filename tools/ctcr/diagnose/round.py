@@ -1,6 +1,6 @@
 """One round of forward selection: all candidates screened, the best ones fitted with the calibration, one accepted."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,8 +15,6 @@ from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.fit import folds, joint
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -125,21 +123,17 @@ def parameters_of(fits: Collection[CandidateFit]) -> tuple[list[str], dict[str, 
     return names, dict(pair for one in fits for pair in one.candidate.shape)
 
 
-def run_round(
-    engine: Engine, before: joint.Fit, candidates: list[Candidate], accepted: list[CandidateFit], progress: Progress
-) -> Round:
+def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], accepted: list[CandidateFit]) -> Round:
     """Screens all candidates, refits the best jointly with calibration and accepted effects, and decides."""
-    progress("screening all candidates")
+    engine.progress("screening all candidates")
     names, fixed = parameters_of(accepted)
     if accepted:  # what a refit without a further effect finds too is no gain of one
-        again = engine.fit_like(
-            before, names, start=values_of(before), fixed=fixed, near=True, tolerance=settings.COARSE
-        )
+        again = engine.fit_like(before, names, fixed=fixed, tolerance=settings.COARSE)
         before = max(before, again, key=lambda fit: fit.log_evidence)
     screened = screen(*engine.thinned(before), candidates, fixed)
     if not screened:
         return Round(before, [], reason="no effect is left to try")
-    refits = Refits(engine, before, fixed, progress)
+    refits = Refits(engine, before, fixed)
     tried = refits.of_all(refits.in_reach(_worth_a_refit(screened)))
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
@@ -207,7 +201,6 @@ class Refits:
     engine: Engine
     before: joint.Fit
     fixed: dict[str, float]
-    progress: Progress
 
     def __post_init__(self) -> None:
         self._log_evidence = segment_delays.log_evidence(self.engine, self.before)
@@ -218,8 +211,8 @@ class Refits:
         if few is None or len(chosen) < 2:
             return chosen
         engine = replace(self.engine, rows=few)
-        base = engine.fit_like(before, effects_in(before), start=values_of(before), fixed=self.fixed, near=True)
-        tried = Refits(engine, base, self.fixed, self.progress).of_all(chosen)
+        base = engine.fit_like(before, effects_in(before), fixed=self.fixed)
+        tried = Refits(engine, base, self.fixed).of_all(chosen)
         best = max(one.score for one in tried)
         reach = min(best, settings.IN_REACH * best)  # the best itself always is
         return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
@@ -236,7 +229,7 @@ class Refits:
 
     def _of(self, one: CandidateFit, iterations: int) -> CandidateFit:
         engine, before, candidate = self.engine, self.before, one.candidate
-        self.progress(f"fitting {candidate.label}")
+        engine.progress(f"fitting {candidate.label}")
         options = {
             "fixed": self.fixed | dict(candidate.shape),
             "max_iterations": iterations,
@@ -246,7 +239,7 @@ class Refits:
         first = values_of(one.fit) if one.fit else linearised_end(engine, before, one)
         for start in (first, values_of(before)):
             try:
-                fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start=start, **options)
+                fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start, **options)
                 break
             except InputError:
                 continue  # the model has no solution there
@@ -291,7 +284,7 @@ def _without_candidate(
     best = max((one for one in tried if one.fit), key=lambda one: one.score, default=None)
     if best is None:
         return before, tried
-    there = engine.fit_like(before, names, start=values_of(best.fit), fixed=fixed, near=True, tolerance=settings.COARSE)
+    there = engine.fit_like(before, names, values_of(best.fit), fixed=fixed, tolerance=settings.COARSE)
     found = there.log_evidence - before.log_evidence
     if found <= 0:
         return before, tried

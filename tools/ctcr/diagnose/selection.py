@@ -9,7 +9,7 @@ from ctcr.arrays import Array
 from ctcr.diagnose import segment_delays
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.round import CandidateFit, Progress, Round, fraction_explained, parameters_of, run_round
+from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
 
@@ -36,7 +36,6 @@ class Selection:
     """Effects that were accepted so far, the rounds that led to them, and the fits without and with them."""
 
     engine: Engine
-    progress: Progress
     rounds: list[Round] = field(default_factory=list)
     accepted: list[Accepted] = field(default_factory=list)
     calibrated: joint.Fit | None = None  # without effects
@@ -49,7 +48,7 @@ class Selection:
 
     def calibrate(self, fits: list[CandidateFit], start: dict[str, float]) -> joint.Fit:
         """Calibration and these effects together."""
-        self.progress("calibration")
+        self.engine.progress("calibration")
         names, fixed = parameters_of(fits)
         return self.engine.fit_with_field(names, start, fixed)
 
@@ -62,7 +61,7 @@ class Selection:
         while len(self.accepted) < settings.MAX_EFFECTS:
             taken = {identity for a in self.accepted for identity in a.ids}
             open_to = [c for c in pool if c.id not in taken]
-            round_ = run_round(self.engine, self.fit, open_to, self.fits, self.progress)
+            round_ = run_round(self.engine, self.fit, open_to, self.fits)
             sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= settings.DECISIVE)
             if more > 1 and not sure:
                 return
@@ -84,13 +83,12 @@ class Selection:
         one = Accepted(best, round_.ids, best.refit, round_.margin, best.explained, rejected_variants=variants)
         self.accepted.append(one)
         names, fixed = parameters_of(self.fits)
-        options = {"fixed": fixed, "near": True}
         converged = best.fit
         if not converged.converged:
-            converged = engine.fit_like(before, names, start=values_of(converged), **options)
+            converged = engine.fit_like(before, names, values_of(converged), fixed=fixed)
         self.fit = self.calibrate(self.fits, values_of(converged))
         if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
-            self.fit = engine.fit_like(before, names, start=values_of(converged), **options)
+            self.fit = engine.fit_like(before, names, values_of(converged), fixed=fixed)
         rejected = engine.rejects(self.fit)
         needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
         if needs_history and engine.revise_initial_history(self.fit, names, fixed):
@@ -133,26 +131,24 @@ class Selection:
         """Forms of an accepted effect, each fitted in the noise of the fit with the given form."""
         found, fit = [], self.fit
         for form in tried:
-            self.progress(f"freeing the shape of {form.id}")
+            self.engine.progress(f"freeing the shape of {form.id}")
             best = replace(one.best, candidate=form)
             names, fixed = parameters_of(self._with(one, best))
             neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
             start = neutral | one.rejected_variants | dict(form.shape) | values_of(fit)
-            found.append((best, self.engine.fit_like(fit, names, start=start, fixed=fixed, near=True)))
+            found.append((best, self.engine.fit_like(fit, names, start, fixed=fixed)))
         return found
 
     def eliminate(self) -> None:
         """Drops one accepted effect that the later ones have made superfluous."""
         for a in self.accepted[:-1]:
             rest = [b.best for b in self.accepted if b is not a]
-            self.progress(f"without {a.id}")
+            self.engine.progress(f"without {a.id}")
             names, fixed = parameters_of(rest)
-            start = values_of(self.fit)
+            start, options = values_of(self.fit), {"fixed": fixed, "tolerance": settings.COARSE, "near": False}
             # A fit that is far behind need not converge.
             for iterations in (settings.FIRST_ITERATIONS, settings.ITERATIONS):
-                without = self.engine.fit_like(
-                    self.fit, names, start=start, fixed=fixed, max_iterations=iterations, tolerance=settings.COARSE
-                )
+                without = self.engine.fit_like(self.fit, names, start, max_iterations=iterations, **options)
                 evidence = segment_delays.log_evidence
                 a.log_evidence = evidence(self.engine, self.fit) - evidence(self.engine, without)
                 if a.log_evidence > settings.SURELY_NEEDED:
@@ -164,13 +160,13 @@ class Selection:
                 return
 
 
-def select_effects(engine: Engine, pool: list[Candidate], progress: Progress) -> Selection:
+def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
     """The effects that explain the fitted readings. Of many readings a part decides rounds whose outcome is sure."""
-    chosen = Selection(engine, progress)
+    chosen = Selection(engine)
     few = folds.few_of(engine.fitted)
     start_plain, start = {}, {}
     if few is not None:
-        progress("a part of the readings first")
+        engine.progress("a part of the readings first")
         chosen.engine = replace(engine, rows=few, tolerance=settings.COARSE)
         chosen.fit = chosen.calibrate([], {})
         start_plain = values_of(chosen.fit)
