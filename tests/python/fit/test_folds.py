@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from ctcr import settings
 from ctcr.fit import folds
-from ctcr.fit.coverage import Coverage
-from ctcr.fit.folds import groups, held_out_rows
+from ctcr.fit.folds import Coverage, groups, held_out_rows
 from ctcr.model import parameters, recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import robot_file

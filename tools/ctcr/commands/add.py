@@ -3,6 +3,7 @@
 import click
 
 from ctcr.commands import options
+from ctcr.errors import InputError, Problem
 
 
 @click.command(name="add")
@@ -35,7 +36,6 @@ def command(robot, names, diagnosis, measurements, given, free, target, in_place
     from ctcr.diagnose import add
     from ctcr.effects import catalogue
     from ctcr.effects.settings import diagnosed, settings
-    from ctcr.errors import InputError, Problem
     from ctcr.robot import robot_file
     from ctcr.table import measurements as table
 

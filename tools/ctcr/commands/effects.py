@@ -1,5 +1,9 @@
 """`ctcr effects`: the physical effects that a robot may have beyond the standard model."""
 
+from dataclasses import replace
+from itertools import groupby
+from math import isinf
+
 import click
 
 from ctcr.commands import options
@@ -34,23 +38,16 @@ def command(name: str | None, tubes: int, out) -> None:
     out.write_json(data[0] if name else {"effects": data})
     if out.json_target == "-":
         return
-    console = out.console
-    console.soft_wrap = False
+    out.console.soft_wrap = False
     if name:
-        _describe(console, shown[0])
-    else:
-        _list(console, shown)
-
-
-def _list(console, shown) -> None:
-    from ctcr.show.output import table
-
+        _describe(out.console, shown[0])
+        return
+    columns = ["id", "name", "the data need", "looks like"]
     rows = [
         [e.id, e.title, ", ".join(need for need in _NEEDS if need in e.needs), "\n".join(e.look_alikes)] for e in shown
     ]
-    columns = ["id", "name", "the data need", "looks like"]
-    console.print(table(f"{len(shown)} physical effects", columns, rows, 4))
-    console.print("ctcr effects ID describes how an effect shows in the data and what to measure to see it.")
+    out.table(f"{len(shown)} physical effects", columns, rows, 4)
+    out.console.print("ctcr effects ID describes how an effect shows in the data and what to measure to see it.")
 
 
 def _describe(console, effect) -> None:
@@ -85,9 +82,6 @@ def _describe(console, effect) -> None:
 
 def _families(effect):
     """Parameters that differ in nothing but their names, together: what they are called, and the first of them."""
-    from dataclasses import replace
-    from itertools import groupby
-
     for _, alike in groupby(effect.parameters, lambda p: replace(p, name="", full_names=())):
         first, *others = alike
         name = _shown_name(first)
@@ -101,8 +95,6 @@ def _shown_name(p) -> str:
 
 
 def _interval(limits: tuple[float, float]) -> str:
-    from math import isinf
-
     low, high = limits
     if isinf(low) and isinf(high):
         return "any"

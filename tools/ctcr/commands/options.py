@@ -63,10 +63,10 @@ def new_robot(function):
 
 
 def _load_effects(context, parameter, files) -> None:
-    if files:
+    for file in files:
         from ctcr.effects import user_effects
 
-        user_effects.load_all(files)
+        user_effects.load(file)
 
 
 # Eager: the robot file may name these effects.

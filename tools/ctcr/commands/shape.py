@@ -3,6 +3,7 @@
 import click
 
 from ctcr.commands import options
+from ctcr.errors import InputError, Problem
 
 SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometres
 
@@ -40,7 +41,6 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     """
     import numpy as np
 
-    from ctcr.errors import InputError, Problem
     from ctcr.frames import matrix_from_quaternion
     from ctcr.model import effect_model
     from ctcr.model.model import Model, status_text
@@ -98,7 +98,6 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
 
 def _joints(name: str, given: dict, n_tubes: int):
     """Joints (N,) in SI units, of the one option that was given; `given` {option: (numbers, their unit)}."""
-    from ctcr.errors import InputError, Problem
     from ctcr.table.measurements import QUANTITIES
 
     found = [(option, values, unit) for option, (values, unit) in given.items() if values is not None]
@@ -115,8 +114,6 @@ def _joints(name: str, given: dict, n_tubes: int):
 
 def _finite(option: str, values, count: int):
     import numpy as np
-
-    from ctcr.errors import InputError, Problem
 
     if len(values) != count or not np.isfinite(values).all():
         raise InputError(Problem(f"needs {count} finite numbers, separated by commas", field=f"--{option}"))

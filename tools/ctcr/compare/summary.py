@@ -200,13 +200,9 @@ def quiet(c: Comparison) -> list[str]:
     return found
 
 
-def limits(c: Comparison) -> list[str]:
+def limits(c: Comparison) -> Iterator[str]:
     """Questions that these data cannot answer."""
-    return [*_noise_limits(c), *_design_limits(c)]
-
-
-def _noise_limits(c: Comparison) -> Iterator[str]:
-    n = c.noise
+    n, r = c.noise, c.run_offsets
     if n.source == "rest":
         yield (
             f"No joints were visited twice from the same direction: the noise ({n.axis_mm:.3f} mm per axis) is the "
@@ -224,9 +220,6 @@ def _noise_limits(c: Comparison) -> Iterator[str]:
         )
     if c.direction is None:
         yield "No joints were visited from opposite directions: hysteresis and delay cannot be examined."
-
-
-def _design_limits(c: Comparison) -> Iterator[str]:
     if len(c.runs) == 1:
         yield "There is one run: the findings are not tested on another run."
     if c.fixed:
@@ -246,7 +239,6 @@ def _design_limits(c: Comparison) -> Iterator[str]:
         )
     if len(c.ranking.rows) < len(c.sample.row):
         yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."
-    r = c.run_offsets
     if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not is_noise(c):
         yield (
             "No joints were visited in two runs: an offset that belongs to a run (frame, homing, drift) cannot be "

@@ -39,7 +39,7 @@ def show(console, c: Comparison) -> None:
 
 def remarks(c: Comparison) -> list[tuple[str, Sequence[str]]]:
     """Lists of sentences with their titles, beside the findings."""
-    return [("No finding", quiet(c)), ("Limits of these data", limits(c)), ("Changes to the table first", c.notices)]
+    return [("No finding", quiet(c)), ("Limits of these data", [*limits(c)]), ("Changes to the table first", c.notices)]
 
 
 def left_out(c: Comparison, most: int) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Mask
-from ctcr.audit.preparation import prepared
+from ctcr.audit import prepared
 from ctcr.calibrate.checks import sentence
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
@@ -82,9 +82,9 @@ def add(
     readings, said = prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
-    before = robot_before(robot, ids)
+    fitted = [identity for identity in robot.effects if identity not in ids]
+    before = robot.with_effects({identity: robot.effects[identity] for identity in fitted})
     held_out, everything = folds.held_out_rows(before, readings), np.ones(len(readings), bool)
-    fitted = [*before.effects]
     with Progress("fitting", 2 * len(ids) + 2) as progress:
         stage = _Fitter(robot, readings, free, fixed)
         now, nominal = stage.values(), stage.nominal(fitted)
@@ -115,19 +115,8 @@ def add(
         nuisances.append(smooth_field.message(smooth))
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
-    return Added(
-        fit.apply(stage.robot),
-        list(ids),
-        fit,
-        stages,
-        _name_of(readings, held_out),
-        [*said, *about_outliers, *_notices(robot, fit, ids), *nuisances],
-    )
-
-
-def robot_before(robot: Robot, ids: Sequence[str]) -> Robot:
-    """The robot without these effects."""
-    return robot.with_effects({name: given for name, given in robot.effects.items() if name not in ids})
+    notices = [*said, *about_outliers, *_notices(robot, fit, ids), *nuisances]
+    return Added(fit.apply(stage.robot), list(ids), fit, stages, _name_of(readings, held_out), notices)
 
 
 def write_added(
@@ -138,17 +127,9 @@ def write_added(
     figures: dict[str, Any] = {"added": added.ids, "rms_mm": added.rms("rms_mm")}
     if np.isfinite([stage.rms_deg for stage in added.stages]).all():
         figures["rms_deg"] = added.rms("rms_deg")
-    figures |= {"held_out": added.held_out, "parameters": added.parameters()}
-    figures["effects_before"] = before.effects
-    command = f"ctcr add {' '.join(added.ids)}"
-    return ledger.write(
-        before,
-        target,
-        changes,
-        Entry(command, [measurements], figures, " ".join(added.notices)),
-        effects=added.robot.effects,
-        in_place=in_place,
-    )
+    figures |= {"held_out": added.held_out, "parameters": added.parameters(), "effects_before": before.effects}
+    entry = Entry(f"ctcr add {' '.join(added.ids)}", [measurements], figures, " ".join(added.notices))
+    return ledger.write(before, target, changes, entry, effects=added.robot.effects, in_place=in_place)
 
 
 def write_values(before: Robot, after: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> Robot:

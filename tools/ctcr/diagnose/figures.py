@@ -23,25 +23,19 @@ def waterfall(figure, d: Diagnosis) -> None:
     for k, a in enumerate(d.accepted, start=1):
         reached = rms["with_effects"] if k == len(d.accepted) else d.rms_mm_after(a)
         bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
+    above = {"ha": "center", "va": "bottom", "weight": "bold"}
+    above["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 1}
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
-        axes.text(
-            i,
-            1.04 * value,
-            f"{short(value)} mm",
-            ha="center",
-            va="bottom",
-            weight="bold",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},
-        )
+        axes.text(i, 1.04 * value, f"{short(value)} mm", **above)
     axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
     last = len(bars) - 0.6
     axes.text(last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom")
     axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
-    axes.set_ylabel("RMS error on held-out runs, mm")
-    axes.set_yscale("log")
-    axes.set_ylim(0.5 * min([rms["noise_floor"], *[v for _, v, _ in bars]]), 2 * max(v for _, v, _ in bars))
+    sizes = [value for _, value, _ in bars]
+    limits = 0.5 * min(rms["noise_floor"], *sizes), 2 * max(sizes)
+    axes.set(ylabel="RMS error on held-out runs, mm", yscale="log", ylim=limits)
 
 
 def candidates(figure, d: Diagnosis) -> bool | None:
@@ -55,22 +49,14 @@ def candidates(figure, d: Diagnosis) -> bool | None:
         for i, one in enumerate(shown):
             value = one.linear if one.refit is None else one.refit
             accepted = one.id in round_.ids
-            axes.barh(
-                i,
-                max(value, 0.3),
-                color=GOOD if accepted else FAINT,
-                edgecolor=INK if accepted else "none",
-                linewidth=1.5,
-                alpha=PALE if one.refit is None else 1,
-            )
+            colours = {"color": GOOD, "edgecolor": INK} if accepted else {"color": FAINT, "edgecolor": "none"}
+            axes.barh(i, max(value, 0.3), linewidth=1.5, alpha=PALE if one.refit is None else 1, **colours)
             axes.text(max(value, 0.3), i, f" {value:.1f}", va="center", fontsize=9)
         axes.set_yticks(range(len(shown)), [one.id.replace("_", " ") for one in shown])
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
-        axes.set_xlim(0, 8 * max(10.0, *(max(one.linear, one.score) for one in shown)))
-        axes.set_xlabel("log evidence over none")
-        axes.set_title(f"round {number}")
-    return None
+        largest = max(10.0, *(max(one.linear, one.score) for one in shown))
+        axes.set(xlim=(0, 8 * largest), xlabel="log evidence over none", title=f"round {number}")
 
 
 def before_after(figure, d: Diagnosis) -> bool | None:
@@ -98,10 +84,8 @@ def before_after(figure, d: Diagnosis) -> bool | None:
             y = np.sum(vectors * along, axis=1)
             axes.plot(x, y, ".", color=colour, markersize=4, alpha=0.6, label=name)
         axes.axhline(0, color=INK, linewidth=0.6)
-        axes.set_xlabel(label)
-        axes.set_ylabel(f"along the {'motion' if frame == 'motion' else 'main direction'}, mm")
+        axes.set(xlabel=label, ylabel=f"along the {'motion' if frame == 'motion' else 'main direction'}, mm")
     panels[0].legend(markerscale=3)
-    return None
 
 
 def varying(figure, d: Diagnosis) -> None:
@@ -111,9 +95,7 @@ def varying(figure, d: Diagnosis) -> None:
         axes.plot(v.covariate.scale * v.covariate.value, v.change, ".", color=GOOD, markersize=4)
         axes.axhline(0, color=INK, linewidth=0.6)
         unit = f", {v.covariate.unit}" if v.covariate.unit else ""
-        axes.set_xlabel(f"{v.covariate.symbol}{unit}")
-        axes.set_ylabel(f"change, {v.unit}")
-        axes.set_title(v.label)
+        axes.set(xlabel=f"{v.covariate.symbol}{unit}", ylabel=f"change, {v.unit}", title=v.label)
 
 
 def overlap(figure, d: Diagnosis) -> bool | None:
@@ -132,7 +114,6 @@ def overlap(figure, d: Diagnosis) -> bool | None:
     axes.set_yticks(range(len(best)), names)
     axes.set_xlabel("imitated by")
     figure.colorbar(picture, ax=axes, label="fraction of the signal")
-    return None
 
 
 def fits_shown(d: Diagnosis) -> list[tuple[Fit, str, str]]:
@@ -152,7 +133,5 @@ def course(figure, d: Diagnosis) -> None:
     for start, end in zip(edges, edges[1:], strict=False):
         if end > start and d.held_out[start]:
             axes.axvspan(start + 0.5, end + 0.5, color="#eef2f5", zorder=0)
-    axes.set_yscale("log")
-    axes.set_xlabel("reading (grey: held-out runs)")
-    axes.set_ylabel("error, mm")
+    axes.set(yscale="log", xlabel="reading (grey: held-out runs)", ylabel="error, mm")
     axes.legend(markerscale=3)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Mask
-from ctcr.audit.preparation import prepared
+from ctcr.audit import prepared
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, Progress, values_of

@@ -8,6 +8,7 @@ import numpy as np
 from ctcr.arrays import evenly
 from ctcr.diagnose import figures
 from ctcr.diagnose.pipeline import Diagnosis
+from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.show import html_page
@@ -76,7 +77,7 @@ def _varying(d: Diagnosis) -> str:
         f"<h2>Parameters that vary</h2><p>{escape(d.varying.lead)}:</p>"
         + _listed(escape(v.message) for v in d.varying.variations)
         + figure(figures.varying, d, 10.4, 3.4, text, True)
-        + f"<p>{escape(d.varying.advice)}</p>"
+        + f"<p>{escape(ADVICE)}</p>"
     )
 
 

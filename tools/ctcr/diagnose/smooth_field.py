@@ -12,7 +12,7 @@ from ctcr import settings
 from ctcr.diagnose.engine import Engine
 from ctcr.effects import catalogue
 from ctcr.fit.joint import Fit
-from ctcr.model.noise import Noise, with_field
+from ctcr.model.noise import Noise, changed, with_field
 
 CORRECTED = "Errors with the effects found are corrected for it: those of held-out runs by readings nearby."
 
@@ -28,13 +28,7 @@ def likeliest_noise(engine: Engine, fit: Fit) -> Noise | None:
     stated = engine.noise
     ratio = stated.rotation_field / stated.position_field if stated.position_field > 0 else 0.0
     tried = (
-        Noise(
-            position_jitter=stated.position_jitter,
-            rotation_jitter=stated.rotation_jitter,
-            position_field=size,
-            rotation_field=turned * size,
-            correlation_length=length,
-        )
+        changed(stated, position_field=size, rotation_field=turned * size, correlation_length=length)
         for length, size, turned in product(settings.SMOOTH_LENGTHS, settings.SMOOTH_SIZES, {0.0, ratio})
     )
     fits = (engine.linear_fit(at, noise=noise, weights=at.weights) for noise in tried)

@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import Round
+from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
 from ctcr.show import output
 from ctcr.show.wording import deviation, number
@@ -57,7 +58,7 @@ def show(console: Any, result: Diagnosis) -> None:
     say(*result.residual.messages)
     if result.varying:
         say(f"{result.varying.lead}:", *(f"  • {variation.message}" for variation in result.varying.variations))
-        say(result.varying.advice, f"What to measure next: {result.varying.measure[0]}")
+        say(ADVICE, f"What to measure next: {result.varying.measure[0]}")
     say(*(f"{notice}." for notice in result.notices))
     say(*(f"Not tested: {identity}: {reason}." for identity, reason in result.not_testable.items()))
 

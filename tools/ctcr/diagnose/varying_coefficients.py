@@ -25,6 +25,7 @@ from ctcr.model import parameters
 
 SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
 
+ADVICE = "An effect of your own that acts there may be what is missing: see docs/effects.md."
 MEASURE = {  # by how the id of a quantity begins: what shows it best
     "time": "Come back to the same joints again and again, from the first reading to the last",
     "order": "Come back to the same joints again and again, from the first reading to the last",
@@ -94,10 +95,6 @@ class VaryingModel:
             f"It looks as if these were not constant, which explains {explained} of the unexplained chi-square of "
             "held-out runs (linearised)"
         )
-
-    @property
-    def advice(self) -> str:
-        return "An effect of your own that acts there may be what is missing: see docs/effects.md."
 
 
 @dataclass(frozen=True)

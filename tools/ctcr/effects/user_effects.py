@@ -173,11 +173,6 @@ def load(path: str | Path) -> list[Effect]:
     return made
 
 
-def load_all(paths: tuple[str, ...] | list[str]) -> list[Effect]:
-    """The effects of several files."""
-    return [effect for path in paths for effect in load(path)]
-
-
 def used_by(robot: Robot, names: Sequence[str] = ()) -> list[Effect]:
     """The effects of loaded files that a robot has or that some of the parameters belong to."""
     loaded = robot_file.user_effects

@@ -72,17 +72,9 @@ def fitted(fit) -> list[Fitted]:
     rows = []
     for i, name in enumerate(fit.names):
         field = field_of(name)
-        ratio = float(fit.ratio[i])
-        rows.append(
-            Fitted(
-                name,
-                field.unit,
-                *(float(field.factor * values[i]) for values in (fit.prior_mean, fit.prior_sd, fit.values, fit.sd)),
-                float(fit.shift[i]),
-                ratio,
-                _implausible(field, float(field.factor * fit.values[i])),
-            )
-        )
+        numbers = [float(field.factor * of[i]) for of in (fit.prior_mean, fit.prior_sd, fit.values, fit.sd)]
+        against_prior = float(fit.shift[i]), float(fit.ratio[i])
+        rows.append(Fitted(name, field.unit, *numbers, *against_prior, _implausible(field, numbers[2])))
     return rows
 
 

@@ -115,7 +115,7 @@ class Model:
         derivatives by the `parameters`, for motors that stand still. All are exact derivatives of the poses returned.
         """
         n = self.robot.n_tubes
-        beta, alpha = _rows("beta", beta, n), _rows("alpha", alpha, n)
+        beta, alpha = (_array(name, q, n, rows=True) for name, q in (("beta", beta), ("alpha", alpha)))
         rows = len(beta)
         own = [name for name in self.parameters if not name.startswith("actuation.")] if by_parameters else []
         known = recording.names_of(n)
@@ -169,10 +169,10 @@ class Model:
         """
         n = self.robot.n_tubes
         status, arc_length, position, quaternion, force, moment, angle, curvature, tube_moment = self._core.shape(
-            beta=_vector("beta", beta, n)[None],
-            alpha=_vector("alpha", alpha, n)[None],
-            force=None if force is None else _vector("force", force, 3)[None],
-            moment=None if moment is None else _vector("moment", moment, 3)[None],
+            beta=_array("beta", beta, n)[None],
+            alpha=_array("alpha", alpha, n)[None],
+            force=None if force is None else _array("force", force, 3)[None],
+            moment=None if moment is None else _array("moment", moment, 3)[None],
             points=points,
             steps=self.steps,
         )
@@ -196,17 +196,12 @@ def _acting(robot: Robot, integrator: str) -> dict[str, Any]:
     return of_the_poses(robot)
 
 
-def _vector(name: str, values: ArrayLike, size: int) -> Array:
+def _array(name: str, values: ArrayLike, last: int, rows: bool = False) -> Array:
+    """The values as an array (last,), or with `rows` (M, last)."""
     array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.shape != (size,):
-        raise ValueError(f"{name} must have the shape ({size},), not {array.shape}")
-    return array
-
-
-def _rows(name: str, values: ArrayLike, columns: int) -> Array:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != columns:
-        raise ValueError(f"{name} must have the shape (M, {columns}), not {array.shape}")
+    if array.ndim != 1 + rows or array.shape[-1] != last:
+        shape = f"(M, {last})" if rows else f"({last},)"
+        raise ValueError(f"{name} must have the shape {shape}, not {array.shape}")
     return array
 
 

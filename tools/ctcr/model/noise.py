@@ -46,13 +46,13 @@ def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = Tr
 
 def with_field(noise: Noise, part: float) -> Noise:
     """The same jitter with a part of the smooth field error."""
-    return Noise(
-        position_jitter=noise.position_jitter,
-        rotation_jitter=noise.rotation_jitter,
-        position_field=part * noise.position_field,
-        rotation_field=part * noise.rotation_field,
-        correlation_length=noise.correlation_length,
-    )
+    return changed(noise, position_field=part * noise.position_field, rotation_field=part * noise.rotation_field)
+
+
+def changed(noise: Noise, **values: float) -> Noise:
+    """The noise with other values of some of its members."""
+    names = ("position_jitter", "rotation_jitter", "position_field", "rotation_field", "correlation_length")
+    return Noise(**{name: values.get(name, getattr(noise, name)) for name in names})
 
 
 def _is_measured(measurements: Measurements, kind: str) -> bool:

@@ -68,12 +68,6 @@ def names_of(n_tubes: int) -> tuple[str, ...]:
 
 
 @cache
-def units_of(n_tubes: int) -> tuple[str, ...]:
-    """Their SI units."""
-    return tuple(p.unit for p in _core.robot_parameters(n_tubes))
-
-
-@cache
 def _fields() -> dict[str, Field]:
     """The field of every parameter of any robot."""
     found = {}
@@ -103,9 +97,9 @@ def value_at(robot: Robot, path: FieldPath) -> Any:
 
 def units_with_effects(robot: Robot) -> dict[str, str]:
     """SI unit by name, those of the robot's effects included."""
-    units = dict(zip(names_of(robot.n_tubes), units_of(robot.n_tubes), strict=True))
     known = catalogue.parameter_of(robot.n_tubes)
-    return units | {name: known[name].unit for name in of_effects(robot)}
+    own = {p.name: p.unit for p in _core.robot_parameters(robot.n_tubes)}
+    return own | {name: known[name].unit for name in of_effects(robot)}
 
 
 def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
