@@ -114,7 +114,11 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     if folds.count >= settings.FEWEST_BLOCKS:
         shift = find_shift(sample.error[rows], folds)
         turn = find_turn(sample.predicted[rows], sample.measured[rows], folds)
-    headline, sample = sample, _aligned(sample) if turn and turn.gross else sample
+    headline = sample
+    if turn and turn.gross:
+        rotation, move = rigid_motion(sample.predicted, sample.measured)
+        predicted = sample.predicted @ rotation.T + move
+        sample = replace(sample, predicted=predicted, rotation=rotation @ sample.rotation)
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
@@ -161,12 +165,6 @@ def _spread(values: Array) -> Spread | None:
         return None
     rms, p95 = np.sqrt(np.mean(known**2)), np.percentile(known, 95)
     return Spread(len(known), float(known.mean()), float(rms), float(p95), float(known.max()))
-
-
-def _aligned(sample: Sample) -> Sample:
-    """The sample in the tracker frame that fits best."""
-    turn, shift = rigid_motion(sample.predicted, sample.measured)
-    return replace(sample, predicted=sample.predicted @ turn.T + shift, rotation=turn @ sample.rotation)
 
 
 def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:

@@ -47,8 +47,9 @@ def candidates(robot: Robot, measurements: Measurements) -> tuple[list[Candidate
             not_testable[effect.id] = reason
             continue
         variants = _variants(effect)
-        if measurements.quaternion is None and len(variants) > 1:
-            variants = [names for names in variants if not _turns_reading(effect, names)]
+        if measurements.quaternion is None and len(variants) > 1 and effect.acts_on == {"reading"}:
+            turns = {name for p in effect.parameters if p.unit == "rad" for name in p.full_names}
+            variants = [names for names in variants if turns.isdisjoint(names)]
         found += [Candidate(effect.id, names, shape) for names in variants for shape in _starts(effect)]
     return found, not_testable
 
@@ -88,12 +89,6 @@ def _variants(effect: Effect) -> list[tuple[str, ...]]:
 def _starts(effect: Effect) -> list[tuple[tuple[str, float], ...]]:
     """The usual values, and further ones, by full name."""
     return [tuple((f"effects.{effect.id}.{name}", x) for name, x in start.items()) for start in ({}, *effect.starts)]
-
-
-def _turns_reading(effect: Effect, names: Collection[str]) -> bool:
-    return effect.acts_on == {"reading"} and any(
-        p.unit == "rad" and not set(p.full_names).isdisjoint(names) for p in effect.parameters
-    )
 
 
 def _not_testable(effect: Effect, robot: Robot, measurements: Measurements) -> str | None:

@@ -34,7 +34,7 @@ import re
 import sys
 import traceback
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -143,7 +143,9 @@ class Effect:
         try:
             return getattr(self, hook)(*arguments)
         except Exception as error:
-            raise InputError(_fault(error, _file_of(type(self)), f"{type(self).__name__}.{hook} fails: ")) from error
+            module = type(self).__module__
+            file = getattr(sys.modules.get(module), "__file__", None) or module
+            raise InputError(_fault(error, file, f"{type(self).__name__}.{hook} fails: ")) from error
 
 
 def load(path: str | Path) -> list[Effect]:
@@ -249,10 +251,6 @@ def _parameter_faults(p: Parameter):
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and isfinite(value)
-
-
-def _file_of(owner: Callable | type) -> str:
-    return getattr(sys.modules.get(owner.__module__), "__file__", None) or owner.__module__
 
 
 def _fault(error: BaseException, file: str, doing: str) -> Problem:

@@ -7,9 +7,10 @@ rad, tracker axes; residuals are measured - predicted: position, then rotation v
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import nan
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +30,19 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
+@dataclass(frozen=True)
+class FitOptions:
+    """How a fit is made."""
+
+    start: Array | None = None  # (n,); the priors' mean by default
+    weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
+    inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
+    # Log evidences of models can be compared at the same weights and inflation.
+    starts: int = 1  # that are compared, all but the first drawn from the priors
+    max_iterations: int = settings.ITERATIONS
+    tolerance: float = settings.TOLERANCE  # of log evidence
+
+
 def fit(
     robot: Robot,
     measurements: Measurements,
@@ -40,17 +54,13 @@ def fit(
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
     starts: int = settings.STARTS,
-    steps: int | None = None,
-    threads: int = 0,
 ) -> Fit:
     """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
     noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
-    steps    of integration per segment; as many as the readings call for by default (recording.steps_for)
-    threads  as in Model
-    Other options as in `fit_joint`. Raises InputError where no fit is possible.
+    Other options as in `FitOptions`. Raises InputError where no fit is possible.
     """
     began = perf_counter()
     robot, measurements, said = sensor_roll.usable(robot, measurements)
@@ -59,11 +69,11 @@ def fit(
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     rows, positions = folds.measured_rows(measurements) & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
-    steps = steps or recording.steps_for(robot, measurements, noise)
+    steps = recording.steps_for(robot, measurements, noise)
     given = {"weights": weights, "inflation": inflation}
 
     def model() -> ResidualModel:
-        return user_recording.recording_of(robot, measurements, names, steps=steps, threads=threads)
+        return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
         frozen = {"weights": like.weights, "inflation": like.inflation} if like else given
@@ -82,63 +92,40 @@ def fit_joint(
     positions: Array,
     rows: Mask | None = None,
     *,
-    start: Array | None = None,
-    weights: Array | None = None,
-    inflation: ArrayLike | None = None,
-    starts: int = 1,
-    max_iterations: int = settings.ITERATIONS,
-    tolerance: float = settings.TOLERANCE,
     few_first: bool = True,
+    **options: Any,
 ) -> Fit:
     """Fits a model to its readings, which the sensor took at `positions` (M, 3) [m], tracker frame.
 
     rows       (M,) that are fitted, all by default
-    start      (n,), the priors' mean by default
-    weights    (M, 2) robust weights of another fit, kept as they are; by default outliers are found. 0: not fitted
-    inflation  (2,) of another fit, kept as it is; by default jitter is added where the model misses what the noise
-               cannot explain. Log evidences of models can be compared at the same weights and inflation
-    starts     how many starts to compare, all but the first drawn from the priors
-    tolerance  of log evidence
     few_first  whether, of many rows, a fit to a few finds the start and compares the starts
+    options    those of FitOptions
     Raises InputError where no fit is possible.
     """
-    options = {"weights": weights, "inflation": inflation, "max_iterations": max_iterations}
-    arguments = model, priors, noise, positions
+    how, arguments = FitOptions(**options), (model, priors, noise, positions)
     rows = np.ones(len(positions), bool) if rows is None else rows
-    if weights is not None:
-        rows = rows & (weights > 0).any(axis=1)
+    if how.weights is not None:
+        rows = rows & (how.weights > 0).any(axis=1)
     few = folds.few_of(rows) if few_first else None
     if few is None:
         model.activate(rows.tolist())
-        return _fit_active(*arguments, start=start, starts=starts, tolerance=tolerance, **options)
+        return _fit_active(*arguments, how)
     model.activate(few.tolist())
-    first = _fit_active(*arguments, start=start, starts=starts, tolerance=settings.COARSE, **options)
+    first = _fit_active(*arguments, replace(how, tolerance=settings.COARSE))
     model.activate(rows.tolist())
-    fitted = _fit_active(*arguments, start=first.values, starts=1, tolerance=tolerance, **options)
+    fitted = _fit_active(*arguments, replace(how, start=first.values, starts=1))
     return replace(fitted, starts=first.starts)
 
 
-def _fit_active(
-    model: ResidualModel,
-    priors: Priors,
-    noise: Noise,
-    positions: Array,
-    *,
-    start: Array | None,
-    weights: Array | None,
-    inflation: ArrayLike | None,
-    starts: int,
-    max_iterations: int,
-    tolerance: float,
-) -> Fit:
+def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
     """As fit_joint(), of the active rows. With distributed friction the friction path depends on the parameters: fits
     and solutions of the path alternate until the path hardly changes."""
-    began = perf_counter()
-    start = np.asarray(priors.mean if start is None else start, dtype=float)
+    began, starts = perf_counter(), how.starts
+    start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
     try:
         moved = model.solve_friction(start)
-        evidence, found = -np.inf, None
-        alternates = moved > 0 and tolerance < settings.COARSE
+        evidence, found, few = -np.inf, None, settings.FRICTION_PATH_ITERATIONS
+        alternates = moved > 0 and how.tolerance < settings.COARSE
         for left in reversed(range(settings.FRICTION_PATH_ROUNDS if alternates else 1)):
             to_the_end = not left or moved < settings.FRICTION_PATH_CHANGE
             core, excluded = _core.identify(
@@ -152,13 +139,13 @@ def _fit_active(
                 within=list(priors.limits),
                 noise=noise,
                 positions=np.asarray(positions, dtype=float),
-                weights=weights,
-                inflation=None if inflation is None else np.asarray(inflation, dtype=float),
+                weights=how.weights,
+                inflation=None if how.inflation is None else np.asarray(how.inflation, dtype=float),
                 start=start,
                 first_weights=found,
                 starts=starts,
-                max_iterations=max_iterations if to_the_end else min(max_iterations, settings.FRICTION_PATH_ITERATIONS),
-                tolerance=tolerance if to_the_end else max(tolerance, settings.COARSE),
+                max_iterations=how.max_iterations if to_the_end else min(how.max_iterations, few),
+                tolerance=how.tolerance if to_the_end else max(how.tolerance, settings.COARSE),
             )
             start, starts, found = core.values, 1, core.weights
             gained, evidence = core.log_evidence - evidence, core.log_evidence

@@ -24,9 +24,9 @@ class Readings:
     status: NDArray[np.uint8]  # (M,), as of a prediction
 
 
-def readings(robot: Robot, measurements: Measurements, steps: int = 4, threads: int = 0) -> Readings:
+def readings(robot: Robot, measurements: Measurements, steps: int = 4) -> Readings:
     """Predicted readings of all rows of a table in their order, with all effects of the robot."""
-    recorded = user_recording.recording_of(robot, measurements, (), steps=steps, threads=threads)
+    recorded = user_recording.recording_of(robot, measurements, (), steps=steps)
     recorded.residual(np.empty(0))
     position, quaternion = tracker_to_base(robot.tracker, *recorded.predicted())
     solved = np.isfinite(position).all(axis=1)

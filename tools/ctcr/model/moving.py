@@ -25,8 +25,8 @@ class MovingModel:
     half second are kept: between them the joints move steadily.
     """
 
-    def __init__(self, robot: Robot, steps: int = 2):
-        self.robot, self._steps = robot, steps
+    def __init__(self, robot: Robot):
+        self.robot = robot
         self._turns: list[Row] = []  # where a joint turned back, and the newest row that is not recent
         self._recent: list[Row] = []
         self._start = 0.0
@@ -49,18 +49,9 @@ class MovingModel:
         t, rows = np.append(t, end), len(t) + 1
         n = self.robot.n_tubes
         joints, force = (np.vstack([column, column[-1:]]) for column in (joints, force))
-        table = Measurements(
-            t,
-            np.zeros(rows, np.int64),
-            joints[:, :n],
-            joints[:, n:],
-            force,
-            None,
-            None,
-            np.arange(rows),
-            from_home=False,
-        )
-        model = user_recording.recording_of(self.robot, table, steps=self._steps, threads=1)
+        run, row = np.zeros(rows, np.int64), np.arange(rows)
+        table = Measurements(t, run, joints[:, :n], joints[:, n:], force, None, None, row, from_home=False)
+        model = user_recording.recording_of(self.robot, table, threads=1)
         now = np.arange(rows) == rows - 2
         model.activate(now.tolist())
         model.residual(np.empty(0))

@@ -12,16 +12,10 @@ from ctcr.table.measurements import Measurements
 Noise = _core.Noise
 
 
-def noise_of(
-    robot: Robot,
-    correlation_length: float = settings.CORRELATION_LENGTH,
-    field: bool = True,
-    kinds: Sequence[str] = ("position", "rotation"),
-) -> Noise:
+def noise_of(robot: Robot, field: bool = True, kinds: Sequence[str] = ("position", "rotation")) -> Noise:
     """The tracker's noise: its jitter, and with `field` the smooth error that its 95 % accuracy implies.
 
-    `correlation_length` [m] is the distance over which that error changes; `kinds` is what was measured. Raises
-    InputError where the robot file does not state the jitter of one of these.
+    `kinds` is what was measured. Raises InputError where the robot file does not state the jitter of one of these.
     """
     tracker, problems, figures = robot.tracker, [], {}
     for kind, unit, scale in (("position", "mm", 1e-3), ("rotation", "deg", np.pi / 180)):
@@ -35,12 +29,13 @@ def noise_of(
         figures[f"{kind}_field"] = scale * _core.field_of_accuracy(accuracy, jitter) if smooth else 0.0
     if problems:
         raise InputError(problems)
-    return Noise(**figures, correlation_length=correlation_length)
+    return Noise(**figures, correlation_length=settings.CORRELATION_LENGTH)
 
 
 def noise_of_readings(robot: Robot, measurements: Measurements, field: bool = True) -> Noise:
     """As noise_of(), for the kinds of readings in the table: without orientations their jitter need not be stated."""
-    kinds = [kind for kind in ("position", "rotation") if _is_measured(measurements, kind)]
+    readings = {"position": measurements.position, "rotation": measurements.quaternion}
+    kinds = [kind for kind, of in readings.items() if of is not None and np.isfinite(of).all(axis=1).any()]
     return noise_of(robot, field=field, kinds=kinds)
 
 
@@ -53,8 +48,3 @@ def changed(noise: Noise, **values: float) -> Noise:
     """The noise with other values of some of its members."""
     names = ("position_jitter", "rotation_jitter", "position_field", "rotation_field", "correlation_length")
     return Noise(**{name: values.get(name, getattr(noise, name)) for name in names})
-
-
-def _is_measured(measurements: Measurements, kind: str) -> bool:
-    values = measurements.position if kind == "position" else measurements.quaternion
-    return values is not None and bool(np.isfinite(values).all(axis=1).any())

@@ -115,7 +115,7 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     problems, chosen = [], set()
     for name in filter(None, wanted):
         patterns = _standard(robot) if name == STANDARD else GROUPS.get(name, (name,))
-        found = {other for pattern in patterns for other in known if _stands_for(pattern, other)}
+        found = {other for p in patterns for other in known if other == p or ("*" in p and fnmatchcase(other, p))}
         if not found:
             meant = did_you_mean(name, [*known, *GROUPS, STANDARD])
             names = ", ".join([STANDARD, *GROUPS, known[0]])
@@ -152,7 +152,8 @@ def priors(
     given = {name: float(value) for item, value in (sd or {}).items() for name in expand(item, robot)}
     own = [name for name in names if name.startswith("effects.")]
     of_own = dict(zip(own, zip(*catalogue.priors(robot, own), strict=True), strict=True))
-    mean = [of_own[name][0] if name in of_own else _mean(robot, name) for name in names]
+    turns = [name for name in names if name.startswith("tracker.rotation.")]  # from the file's frame
+    mean = [of_own[name][0] if name in of_own else 0.0 if name in turns else _value(robot, name) for name in names]
     width = [given.get(name, of_own[name][1] if name in of_own else _stated_sd(robot, name)) for name in names]
     problems = [
         Problem(
@@ -255,10 +256,6 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
     return limits
 
 
-def _stands_for(pattern: str, name: str) -> bool:
-    return name == pattern or ("*" in pattern and fnmatchcase(name, pattern))
-
-
 def _standard(robot: Robot) -> list[str]:
     found = ["tracker.position.*", "tracker.rotation.*", "actuation.home_translation.*", "actuation.home_rotation.*"]
     for i, tube in enumerate(robot.tubes, start=1):
@@ -267,10 +264,6 @@ def _standard(robot: Robot) -> list[str]:
         own = _STANDARD_TUBE if curved else ("stiffness", "length")
         found += [f"tubes.{i}.{stiffness if name == 'stiffness' else name}" for name in own]
     return found
-
-
-def _mean(robot: Robot, name: str) -> float:
-    return 0.0 if name.startswith("tracker.rotation.") else _value(robot, name)
 
 
 def _value(robot: Robot, name: str) -> float:

@@ -60,11 +60,11 @@ def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
         file.writelines(",".join("" if value != value else f"{value:.12g}" for value in row) + "\n" for row in rows)
 
 
-def as_built(robot: Robot, rng: np.random.Generator, share: float = 0.5) -> Robot:
-    """A robot that differs from its file in every calibrated parameter: normal, with a share of the file's sd."""
+def as_built(robot: Robot, rng: np.random.Generator) -> Robot:
+    """A robot that differs from its file in every calibrated parameter: normal, with half the file's sd."""
     names = parameters.expand("standard", robot)
     mean, sd, low, high = parameters.priors(robot, names)
-    drawn = np.clip(mean + share * sd * rng.standard_normal(len(mean)), low, high)
+    drawn = np.clip(mean + 0.5 * sd * rng.standard_normal(len(mean)), low, high)
     return parameters.applied(robot, names, drawn)
 
 

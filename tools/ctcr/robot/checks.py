@@ -22,7 +22,9 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
     """Every fault of a parsed file, each once. `errors`: those that pydantic found, field by field."""
     tubes = _tubes(data)
     missing = [error["loc"] for error in errors if error["type"] == "missing"]
-    missing += _missing_of_tubes(tubes, weighed=_has_weight(data.get("gravity")))
+    gravity = data.get("gravity")
+    weighed = isinstance(gravity, list) and any(isinstance(g, int | float) and g != 0 for g in gravity)
+    missing += _missing_of_tubes(tubes, weighed)
     found: list[Fault] = []
     for error in errors:
         path = error["loc"]
@@ -178,10 +180,6 @@ def _tubes(data: dict) -> list[dict]:
 
 def _mapping(part: Any) -> dict:
     return part if isinstance(part, dict) else {}
-
-
-def _has_weight(gravity: Any) -> bool:
-    return isinstance(gravity, list) and any(isinstance(g, int | float) and g != 0 for g in gravity)
 
 
 def _number(section: dict, key: str) -> float:

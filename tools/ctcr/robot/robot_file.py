@@ -83,16 +83,12 @@ def dumped(yaml: YAML, document: Any) -> str:
     return text.getvalue()
 
 
-def known_effects() -> list[str]:
-    """Ids of the effects that a file may hold."""
-    return [effect.id for effect in _core.effect_catalogue()] + list(user_effects)
-
-
 def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
     effects = data.get("effects")
     if not isinstance(effects, dict):
         return []
-    known, hint = known_effects(), "`ctcr effects` lists those there are"
+    known = [*(effect.id for effect in _core.effect_catalogue()), *user_effects]
+    hint = "`ctcr effects` lists those there are"
     return [
         (("effects", name), f"unknown effect: {suggestion(str(name), known, hint)}")
         for name in effects
