@@ -1,6 +1,7 @@
 """`ctcr compare` finds planted errors, finds none in noise, and counts the rows that it left out."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -201,7 +202,7 @@ def test_gross_frame():
     random = np.random.default_rng(12)
     robot, readings, prediction = bench(random, stop_and_go(random), turn=(0, 0, 0))
     x, y, z = readings.position.T
-    readings.position = np.column_stack([-y, x, z])
+    readings = replace(readings, position=np.column_stack([-y, x, z]))
     result = compare(robot, readings, prediction)
     assert result.turn.turn_deg == pytest.approx(90, abs=0.5)
     np.testing.assert_allclose(result.turn.axis, (0, 0, 1), atol=0.01)
@@ -223,7 +224,8 @@ def test_orientation(roll):
     expected = {"roll": np.degrees(0.2) if roll == "known" else 0.0, "bend": np.degrees(0.1)}
     for name, vector in turned.items():
         spin = product(seen, np.tile(quaternion_from_rotation_vector(vector), (count, 1)))
-        readings.quaternion = spin * random.choice([-1.0, 1.0], (count, 1))  # q and -q are one rotation
+        measured = spin * random.choice([-1.0, 1.0], (count, 1))  # q and -q are one rotation
+        readings = replace(readings, quaternion=measured)
         result = compare(robot, readings, prediction)
         assert result.angle_deg.maximum == pytest.approx(expected[name], abs=1e-6)
     assert result.angle_kind == ("orientation" if roll == "known" else "tip direction")

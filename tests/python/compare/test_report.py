@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -109,7 +110,8 @@ def table(tmp_path, monkeypatch):
     """A table for a three-tube robot whose predictions are given, so that no compiled model is needed."""
     robot, readings, prediction = planted()
     third = np.zeros((len(readings.run), 1))
-    readings.beta, readings.alpha = np.hstack([readings.beta, third]), np.hstack([readings.alpha, third])
+    wider = {name: np.hstack([getattr(readings, name), third]) for name in ("beta", "alpha")}
+    readings = replace(readings, **wider)
     write_table(tmp_path / "table.csv", readings)
     monkeypatch.setattr(compare_command, "_predict", lambda robot, readings, steps: prediction)
     return tmp_path / "table.csv"

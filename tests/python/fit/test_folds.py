@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.fit import folds
 from ctcr.fit.folds import Coverage, groups, held_out_rows
 from ctcr.model import parameters, recording
 from ctcr.model.noise import noise_of_readings
@@ -55,7 +54,7 @@ def test_undetermined_run(robot):
     """A run that goes where no other went is never held out, whatever poses were read."""
     odd = np.unique(session(robot, np.random.default_rng(0), runs=12).run)[2]
     table = with_one_odd_run(robot, odd)
-    coverage = Coverage(robot, table, folds.measured_rows(table), groups(table))
+    coverage = Coverage(robot, table, table.measured, groups(table))
     assert coverage.undetermined([odd])[0] > 100 * settings.MOST_UNDETERMINED
     held_out = held_out_rows(robot, table)
     assert not held_out[table.run == odd].any() and len(np.unique(table.run[held_out])) == 3
@@ -82,7 +81,7 @@ def test_undetermined_variance(robot):
         found = np.linalg.solve(A.T @ A + np.eye(len(names)), A.T @ (A @ truth + error))
         missed = slopes[~fitted][:, :3] @ (sd * (found - truth))
         seen.append(np.mean(np.sum(missed**2, axis=1)))
-    undetermined = Coverage(robot, table, folds.measured_rows(table), groups(table)).undetermined([7])[0]
+    undetermined = Coverage(robot, table, table.measured, groups(table)).undetermined([7])[0]
     part = np.mean(seen) / (3 * noise.position_jitter**2) / undetermined
     assert 0.6 < part < 1.15, part  # undetermined is the worst of three lengths of the curves
 

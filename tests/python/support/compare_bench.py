@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from ctcr.frames import matrix_from_rotation_vector, quaternion_from_rotation_vector
+from ctcr.table.measurements import Measurements
 
 JITTER_MM = 0.05
 LENGTHS = (0.30, 0.20)
@@ -76,16 +77,15 @@ def bench(random, path, error=None, noise_mm=JITTER_MM, quaternion=None, **optio
     planted = np.zeros_like(position) if error is None else error(joints, t, run)
     measured = (position + planted) @ description.tracker.rotation.T + description.tracker.position
     measured = measured + random.normal(0, noise_mm * 1e-3, position.shape)
-    readings = SimpleNamespace(
-        t=np.asarray(t, float),
-        run=run,
-        beta=joints[:, :2],
-        alpha=joints[:, 2:],
-        force=np.zeros_like(position),
-        position=measured,
-        quaternion=quaternion,
+    readings = Measurements(
+        np.asarray(t, float),
+        np.asarray(run),
+        joints[:, :2],
+        joints[:, 2:],
+        np.zeros_like(position),
+        measured,
+        quaternion,
         row=np.arange(len(run)) + 2,
-        warnings=[],
     )
     prediction = SimpleNamespace(position=position, quaternion=orientation, status=np.zeros(len(run), int))
     return description, readings, prediction

@@ -71,8 +71,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
     m, tracker = measurements, robot.tracker
     lengths = np.array([tube.length for tube in robot.tubes])
     position = np.asarray(prediction.position, float)
-    measured = np.full_like(position, np.nan) if m.position is None else m.position
-    known = np.isfinite(measured).all(axis=1)
+    known = np.isfinite(m.positions).all(axis=1)
     solved = (np.asarray(prediction.status) == 0) & np.isfinite(position).all(axis=1)
     keep = known & solved
     lever = np.sqrt(np.mean(np.sum(position[solved, :2] ** 2, axis=1))) if solved.any() else 0.0
@@ -83,7 +82,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
         rotation_error = _rotation_error(m.quaternion[keep], orientation[keep], tracker.roll_known)
     velocity, step = _tip_motion(position, m.t, m.run, solved)
     arrays = {name: np.asarray(getattr(m, name)) for name in ("row", "t", "run", "beta", "alpha", "force")}
-    arrays |= {"measured": measured, "predicted": predicted, "base_position": position}
+    arrays |= {"measured": m.positions, "predicted": predicted, "base_position": position}
     arrays |= {
         "tip_velocity": velocity,
         "tip_step": step,

@@ -196,10 +196,9 @@ class _Fitter:
 
     def __init__(self, robot: Robot, readings: Measurements, free: Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.fixed = robot, fixed
-        measured = folds.measured_rows(readings)
-        if not measured.any():
+        if not readings.measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
-        self.engine = Engine(robot, readings, noise_of_readings(robot, readings), measured, free=free)
+        self.engine = Engine(robot, readings, noise_of_readings(robot, readings), readings.measured, free=free)
 
     def shapes(self, identity: str) -> list[str]:
         return [name for name in catalogue.get(identity, self.robot.n_tubes).shapes if name not in self.fixed]

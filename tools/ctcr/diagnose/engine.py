@@ -37,13 +37,12 @@ class Engine:
     def __post_init__(self) -> None:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
         self.base = parameters.expand(list(self.free), self.robot)
-        self.measured = folds.measured_rows(self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, settings.INTEGRATION_ERROR_COARSE)
 
     @property
     def fitted(self) -> Mask:
         """Rows that hold something to fit."""
-        return self.measured & self.rows
+        return self.measurements.measured & self.rows
 
     def priors(self, names: Sequence[str]) -> tuple[Array, Array, Array, Array]:
         """Mean, standard deviation, lower and upper bound of parameters of the robot and of effects."""

@@ -96,7 +96,7 @@ def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dic
     table = engine.measurements
     group, fractions = folds.groups(table), {}
     for k in np.unique(group[~engine.rows]):
-        rows = (group == k) & ~engine.rows & engine.measured
+        rows = (group == k) & ~engine.rows & table.measured
         unexplained = unexplained_of(engine, after, rows, positions_alone=True)
         to_explain = unexplained(before.residual)
         if to_explain > 3 * settings.RUN_UNEXPLAINED * np.sum(rows):

@@ -59,7 +59,7 @@ class Diagnosis:
     @property
     def judged(self) -> Mask:
         """Held-out rows that hold a reading, without isolated outliers (M,)."""
-        return self.held_out & ~self.isolated & folds.measured_rows(self.measurements)
+        return self.held_out & ~self.isolated & self.measurements.measured
 
     @property
     def rms_mm(self) -> dict[str, float]:

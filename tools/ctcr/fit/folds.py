@@ -30,15 +30,6 @@ class Split:
     parts: int
 
 
-def measured_rows(measurements: Measurements) -> Mask:
-    """Rows that hold a position or an orientation (M,)."""
-    found = np.zeros(len(measurements), bool)
-    for values in (measurements.position, measurements.quaternion):
-        if values is not None:
-            found |= np.isfinite(values).all(axis=1)
-    return found
-
-
 def few_of(rows: Mask, least: int | None = None) -> Mask | None:
     """At least `least` (default: FEW_ROWS) of many rows (M,), evenly spread; None of fewer than twice as many."""
     chosen = np.flatnonzero(rows)
@@ -76,7 +67,7 @@ def runs_left_out(readings: Measurements, count: int) -> Split:
 def groups(measurements: Measurements) -> Integers:
     """The group of each row (M,), numbered from 0 in the order of measuring: its run, or a block of time where there
     are too few runs. Rows and runs without a pose do not count: each group holds something measured."""
-    measured = measured_rows(measurements)
+    measured = measurements.measured
     runs, first = np.unique(measurements.run[measured], return_index=True)
     if len(runs) >= settings.FEWEST_RUNS:
         order = {run: i for i, run in enumerate(runs[np.argsort(first)])}
@@ -90,7 +81,7 @@ def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitte
     A held-out group that goes where no other one went cannot judge a model: the others do not determine what it shows.
     It is exchanged for one that they cover. Joints, loads and the model decide that, not poses.
     """
-    group, measured = groups(measurements), measured_rows(measurements)
+    group, measured = groups(measurements), measurements.measured
     few, known, folds = few_of(measured), np.unique(group), settings.FOLDS
     first = np.array(settings.HELD_OUT_ORDER)[known // folds % len(settings.HELD_OUT_ORDER)]
     held_out = known[known % folds == (first + turn) % folds].tolist()

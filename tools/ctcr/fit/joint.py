@@ -67,7 +67,7 @@ def fit(
     names = sensor_roll.with_roll(free, robot)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
-    rows, positions = folds.measured_rows(measurements) & chosen, sensor_positions(robot, measurements)
+    rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
     given = {"weights": weights, "inflation": inflation}
@@ -264,10 +264,7 @@ def tracker_error(fit: Fit, noise: Noise) -> tuple[float, float]:
 
 def sensor_positions(robot: Robot, measurements: Measurements) -> Array:
     """Where the sensor was (M, 3) [m], tracker frame: as measured, or where that is missing as predicted."""
-    if measurements.position is None:
-        positions = np.full((len(measurements), 3), nan)
-    else:
-        positions = measurements.position.copy()
+    positions = measurements.positions.copy()
     missing = np.isnan(positions).any(axis=1)
     if missing.any():
         beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
@@ -290,7 +287,7 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
         yield f"these joints never move: {', '.join(names)}"
     if len(np.unique(measurements.run[rows])) < 2:
         yield "there is only one run: readings that follow one another cannot check what was learned from them"
-    if measurements.quaternion is None or not np.isfinite(measurements.quaternion[rows]).any():
+    if not np.isfinite(measurements.quaternions[rows]).any():
         yield "no orientation was measured: positions alone tell the parameters apart less well"
 
 

@@ -70,8 +70,7 @@ def recording_of(
     known = names_of(robot.n_tubes)
     own = dict(zip(catalogue.names_of(robot.n_tubes), catalogue.values(robot), strict=True)) | dict(fixed or {})
     beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    missing = np.full((len(measurements), 4), np.nan)
-    position = missing[:, :3] if measurements.position is None else measurements.position
+    position = measurements.positions
     measured = position[np.isfinite(position).all(axis=1)]
     return _core.Recording(
         parameters=parameters.values(robot),
@@ -81,7 +80,7 @@ def recording_of(
         alpha=alpha,
         force=measurements.force,
         position=position,
-        quaternion=missing if measurements.quaternion is None else measurements.quaternion,
+        quaternion=measurements.quaternions,
         time=measurements.t,
         part=session_part(measurements),
         run=measurements.run.astype(np.int32),

@@ -29,6 +29,9 @@ def recording_of(robot: Robot, measurements: Measurements, names: Sequence[str] 
     return recording.recording_of(robot, measurements, names, **options)
 
 
+Poses = tuple[Array, Array]  # positions (M, 3) [m] and rotations (M, 3, 3)
+
+
 class UserRecording(ResidualModel):
     """The recording of a robot with `own_effects` of the user's.
 
@@ -79,7 +82,7 @@ class UserRecording(ResidualModel):
         hooks.check_neutral(self._nominal)
         self._reference = self._reference_poses()
         self._recording, self._inputs = None, None
-        self._measured_rotation = self._rotations(measurements.quaternion)
+        self._measured = measurements.positions, matrix_from_quaternion(measurements.quaternions)
         self._active, self._solvable = np.ones((2, len(measurements)), bool)
         self.residual(self.nominal())
         self._solvable = self._solved
@@ -117,10 +120,10 @@ class UserRecording(ResidualModel):
         inner.activate(wanted.tolist())
         start, jacobian, _ = inner.residual(self._inner_x(values), derivatives)
         position, quaternion = inner.predicted()
-        rotation = self._rotations(quaternion)
+        rotation = matrix_from_quaternion(quaternion)
         self._solved = wanted & np.isfinite(position).all(axis=1)
         self._reading = self._outer(position, rotation, values)
-        error = self._residual(*self._reading)
+        error = _apart(self._measured, self._reading)
         usable = bool((self._solved | ~wanted).all())
         if not derivatives:
             return error.ravel(), np.empty((0, 0)), usable
@@ -210,7 +213,7 @@ class UserRecording(ResidualModel):
                 other.activate(self._solved.tolist())
                 other.residual(self._inner_x(values))
                 position, quaternion = other.predicted()
-                sides.append((position, self._rotations(quaternion)))
+                sides.append((position, matrix_from_quaternion(quaternion)))
             else:
                 total[:, :, k] += _difference(*sides, 2 * step)
 
@@ -239,28 +242,10 @@ class UserRecording(ResidualModel):
         plain.residual(np.empty(0))
         quaternion = plain.predicted()[1]
         quaternion[~np.isfinite(quaternion).all(axis=1)] = (1.0, 0.0, 0.0, 0.0)
-        position = np.full((len(table), 3), nan) if table.position is None else table.position.copy()
+        position = table.positions.copy()
         missing = ~np.isfinite(position).all(axis=1)
         position[missing] = 0.0 if missing.all() else position[~missing].mean(axis=0)
         return position, quaternion
-
-    # ---- poses
-
-    def _residual(self, position: Array, rotation: Array) -> Array:
-        error = np.full((len(position), 6), nan)
-        good = np.isfinite(position).all(axis=1)
-        if self._table.position is not None:
-            error[:, :3] = self._table.position - position
-        both = good & np.isfinite(self._measured_rotation).all(axis=(1, 2))
-        if both.any():
-            turn = self._measured_rotation[both] @ np.swapaxes(rotation[both], 1, 2)
-            error[both, 3:] = Rotation.from_matrix(turn).as_rotvec()
-        error[~good] = nan
-        return error
-
-    def _rotations(self, quaternion: Array | None) -> Array:
-        missing = np.full((len(self._table), 3, 3), nan)
-        return missing if quaternion is None else matrix_from_quaternion(quaternion)
 
 
 def _by_prediction(error: Array) -> Array:
@@ -276,12 +261,17 @@ def _by_prediction(error: Array) -> Array:
     return made
 
 
-def _difference(plus: tuple[Array, Array], minus: tuple[Array, Array], width: float) -> Array:
-    """Derivative (M, 6) between two poses, position and rotation vector."""
-    made = np.zeros((len(plus[0]), 6))
-    good = np.isfinite(plus[0]).all(axis=1)
-    if good.any():
-        made[good, :3] = (plus[0][good] - minus[0][good]) / width
-        turn = plus[1][good] @ np.swapaxes(minus[1][good], 1, 2)
-        made[good, 3:] = Rotation.from_matrix(turn).as_rotvec() / width
+def _difference(plus: Poses, minus: Poses, width: float) -> Array:
+    """Derivative (M, 6) between two poses, position and rotation vector; 0 where either is not solved."""
+    return np.nan_to_num(_apart(plus, minus)) / width
+
+
+def _apart(first: Poses, second: Poses) -> Array:
+    """Position and rotation vector (M, 6) from the second poses to the first; NaN where not known."""
+    made = np.full((len(first[0]), 6), nan)
+    solved = np.isfinite(second[0]).all(axis=1)
+    made[solved, :3] = (first[0] - second[0])[solved]
+    both = solved & np.isfinite(first[1]).all(axis=(1, 2))
+    if both.any():
+        made[both, 3:] = Rotation.from_matrix(first[1][both] @ np.swapaxes(second[1][both], 1, 2)).as_rotvec()
     return made

@@ -51,9 +51,24 @@ class Measurements:
         return len(self.run)
 
     @property
+    def positions(self) -> Array:
+        """The positions (M, 3), NaN also where their columns are absent."""
+        return np.full((len(self), 3), np.nan) if self.position is None else self.position
+
+    @property
+    def quaternions(self) -> Array:
+        """The same of the quaternions (M, 4)."""
+        return np.full((len(self), 4), np.nan) if self.quaternion is None else self.quaternion
+
+    @property
     def oriented(self) -> Mask:
         """Whether the orientation was measured (M,)."""
-        return np.zeros(len(self), bool) if self.quaternion is None else np.isfinite(self.quaternion).all(axis=1)
+        return np.isfinite(self.quaternions).all(axis=1)
+
+    @property
+    def measured(self) -> Mask:
+        """Whether a position or an orientation was measured (M,)."""
+        return np.isfinite(self.positions).all(axis=1) | self.oriented
 
     @property
     def joint_space(self) -> Array:
