@@ -15,7 +15,7 @@ def robot(jitter_mm=JITTER_MM, roll="known", turn=(0.3, -0.2, 0.9)):
     return SimpleNamespace(
         name="surrogate",
         tubes=[SimpleNamespace(length=length) for length in LENGTHS],
-        actuation=SimpleNamespace(translation_mm_per_rev=None),
+        actuation=SimpleNamespace(screw_pitch=0.0),
         tracker=SimpleNamespace(
             rotation_vector_rad=list(turn),
             rotation=matrix_from_rotation_vector(turn),

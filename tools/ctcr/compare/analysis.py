@@ -127,8 +127,7 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     run_offsets = find_run_offsets(sample, revisits)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
-    pitch = robot.actuation.translation_mm_per_rev
-    ranking = rank(sample, error, pitch * 1e-3 if pitch else None, settings.LEVEL)
+    ranking = rank(sample, error, settings.LEVEL)
     length = np.linalg.norm(headline.error, axis=1) * 1e3
     rotation = headline.rotation_error
     angle = np.full(len(length), np.nan) if rotation is None else np.degrees(np.linalg.norm(rotation, axis=1))

@@ -56,12 +56,9 @@ class Covariate:
         return len(known) > 0 and np.ptp(known) > 1e-9 * max(1.0, np.abs(known).max())
 
 
-def covariates(sample: Sample, screw_pitch_m: float | None = None) -> list[Covariate]:
-    """All quantities that vary in this sample.
-
-    screw_pitch_m [m]: travel per motor revolution; given, the phase within a revolution is examined as well.
-    """
-    return [item for item in _all(sample, screw_pitch_m) if item.varies]
+def covariates(sample: Sample) -> list[Covariate]:
+    """All quantities that vary in this sample, among them the phases of drive screws of known pitch."""
+    return [item for item in _all(sample) if item.varies]
 
 
 def fixed_names(sample: Sample) -> list[str]:
@@ -77,15 +74,15 @@ def has_speed(sample: Sample) -> bool:
     return len(elapsed) > 0 and bool(np.median(elapsed) <= settings.STOP_AND_GO_S)
 
 
-def _all(sample: Sample, pitch: float | None) -> Iterator[Covariate]:
+def _all(sample: Sample) -> Iterator[Covariate]:
     yield from _joints(sample)
     yield from _differences(sample)
     yield from _motions(sample)
     yield from _load(sample)
     yield from _position(sample)
-    if pitch:
+    if sample.screw_pitch:
         for i, beta in enumerate(sample.beta.T, 1):
-            phase = 2 * np.pi * beta / pitch
+            phase = 2 * np.pi * beta / sample.screw_pitch
             yield Covariate(f"screw_phase{i}", f"phase of drive screw {i}", f"screw {i}", "deg", phase, "angle", i)
     yield Covariate("time", "time since the start", "t", "s", sample.t)
     yield Covariate("order", "order of measuring", "row", "", sample.row.astype(float))
@@ -108,18 +105,18 @@ def _differences(sample: Sample) -> Iterator[Covariate]:
 
 def _motions(sample: Sample) -> Iterator[Covariate]:
     """Direction of the last motion of each joint, and speeds where they are known."""
-    count = sample.beta.shape[1]
-    columns = [("alpha", "α", count + i, i + 1) for i in range(count)] + [("beta", "β", i, i + 1) for i in range(count)]
-    for joint, letter, column, tube in columns:
-        name, symbol, sign = f"direction_{joint}{tube}", f"{letter}{tube}", sample.motion.direction[:, column] * 1.0
-        label = f"direction of the last motion of {symbol}"
-        yield Covariate(name, label, f"sign of d{symbol}", "", sign, "direction", tube)
+    count, speeds = sample.beta.shape[1], []
+    for joint, letter, unit, first in (("alpha", "α", "deg/s", count), ("beta", "β", "mm/s", 0)):
+        for tube in range(1, count + 1):
+            symbol, column = f"{letter}{tube}", first + tube - 1
+            sign, rate = sample.motion.direction[:, column] * 1.0, sample.motion.rate[:, column]
+            label = f"direction of the last motion of {symbol}"
+            yield Covariate(f"direction_{joint}{tube}", label, f"sign of d{symbol}", "", sign, "direction", tube)
+            name = f"speed_{joint}{tube}"
+            speeds.append(Covariate(name, f"speed of {symbol}", f"d{symbol}/dt", unit, rate, tube=tube))
     if not has_speed(sample):
         return
-    for joint, letter, column, tube in columns:
-        name, symbol, rate = f"speed_{joint}{tube}", f"{letter}{tube}", sample.motion.rate[:, column]
-        unit = "deg/s" if joint == "alpha" else "mm/s"
-        yield Covariate(name, f"speed of {symbol}", f"d{symbol}/dt", unit, rate, tube=tube)
+    yield from speeds
     speed = np.linalg.norm(sample.tip_velocity, axis=1)
     yield Covariate("tip_speed", "speed of the tip", "tip speed", "mm/s", speed)
 

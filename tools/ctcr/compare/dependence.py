@@ -119,10 +119,10 @@ class Ranking:
         return shown
 
 
-def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float) -> Ranking:
+def rank(sample: Sample, base_error: Array, alpha: float) -> Ranking:
     """Rank all forms on the error (sample rows, 3) in the base frame, its offset already removed [m].
 
-    pitch_m: travel of a drive screw per revolution, None if unknown; alpha: level at which a form counts as found.
+    alpha: level at which a form counts as found.
     """
     rows, label, kind = split(sample.run, sample.motion.scaled)
     error = base_error[rows]
@@ -132,7 +132,7 @@ def rank(sample: Sample, base_error: Array, pitch_m: float | None, alpha: float)
     total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if enough else 0.0
     if total == 0:
         return Ranking([], [], np.nan, 0.0, error, rows, folds.count, kind, frames)
-    forms = all_forms(sample, rows, covariates(sample, pitch_m), frames)
+    forms = all_forms(sample, rows, covariates(sample), frames)
     alone, by_chance = _judge(forms, error, folds, total)
     chosen, left, best = [], error, alone
     while len(chosen) < settings.MOST_DEPENDENCES and best:

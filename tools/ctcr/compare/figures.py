@@ -81,8 +81,7 @@ def course(figure: Figure, c: Comparison) -> None:
 
 def hysteresis(figure: Figure, c: Comparison) -> bool | None:
     """Left: how far apart visits of the same joints are. Right: the error out and on return along the path."""
-    inside = c.revisits.select(~c.revisits.between_runs)
-    opposite, same = inside.select(inside.kind == OPPOSITE), inside.select(inside.kind == SAME)
+    opposite, same = c.revisits.inside(OPPOSITE), c.revisits.inside(SAME)
     if len(opposite) == 0:
         return False
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))

@@ -50,7 +50,7 @@ class DirectionDifference:
 
 def noise_floor(stops: Stops, revisits: Revisits, stated_mm: float) -> NoiseFloor:
     """Scatter of one reading from same-direction revisits inside a run, else from rests, else as stated."""
-    pairs = revisits.select((revisits.kind == SAME) & ~revisits.between_runs)
+    pairs = revisits.inside(SAME)
     resting = np.isfinite(stops.dwell_variance)
     freedom = stops.size[resting] - 1
     rest_square = np.sum(stops.dwell_variance[resting] * freedom)
@@ -86,16 +86,12 @@ def direction_difference(
     share all but the direction, and with the tracker's own scatter: a pose that depends on history may differ between
     same-direction visits as well.
     """
-    inside = revisits.select(~revisits.between_runs)
-    opposite, same = inside.select(inside.kind == OPPOSITE), inside.select(inside.kind == SAME)
+    opposite, same = revisits.inside(OPPOSITE), revisits.inside(SAME)
     if len(opposite) == 0:
         return None
     blocks, same_blocks = segments(stops.run[opposite.later]), segments(stops.run[same.later])
-    square, scaled, reference = (
-        opposite.square,
-        opposite.square / opposite.noise_factor,
-        same.square / same.noise_factor,
-    )
+    square = opposite.square
+    scaled, reference = (pairs.square / pairs.noise_factor for pairs in (opposite, same))
     known = [axis for axis in (floor.axis_mm, floor.rest_axis_mm, floor.stated_axis_mm) if np.isfinite(axis)]
     quiet = min(known, default=np.nan) * 1e-3
     p_quiet = _beyond(scaled, settings.NOTABLE * quiet, blocks) if known else np.nan

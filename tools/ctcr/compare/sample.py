@@ -47,6 +47,7 @@ class Sample:
     roll_known: bool
     deployed: Array  # (K,) arc length of the sensor's tip in front of the plate
     tube_lengths: Array  # (N,)
+    screw_pitch: float  # [m] of travel by a turn of a motor; 0: unknown
     lever: float  # typical distance of the tip from the insertion axis [m]
     motion: Motion
     not_measured: Integers  # file lines
@@ -95,6 +96,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
         rotation_error=rotation_error,
         roll_known=tracker.roll_known,
         tube_lengths=lengths,
+        screw_pitch=robot.actuation.screw_pitch,
         lever=lever,
         motion=follow(m.t, m.run, m.beta, m.alpha, lever).rows(keep),
         not_measured=np.setdiff1d(m.row[~known], m.row[known]),

@@ -60,6 +60,10 @@ class Revisits:
         """Some of the pairs."""
         return Revisits(*(getattr(self, field.name)[mask] for field in fields(self)))
 
+    def inside(self, kind: int) -> "Revisits":
+        """The pairs of one kind inside a run."""
+        return self.select((self.kind == kind) & ~self.between_runs)
+
     def __len__(self) -> int:
         return len(self.later)
 

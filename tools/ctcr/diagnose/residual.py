@@ -65,10 +65,4 @@ def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
     weight = fit.weights[rows, 0]
     left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < settings.OUTLIER_WEIGHT))] = 0.0
     error = left @ sample.rotation
-    return rank(sample, error - error.mean(axis=0), screw_pitch(engine), settings.DEPENDENCE_SIGNIFICANCE)
-
-
-def screw_pitch(engine: Engine) -> float | None:
-    """Translation per turn of the motor [m], where the robot file states it."""
-    pitch = engine.robot.actuation.translation_mm_per_rev
-    return 1e-3 * pitch if pitch else None
+    return rank(sample, error - error.mean(axis=0), settings.DEPENDENCE_SIGNIFICANCE)

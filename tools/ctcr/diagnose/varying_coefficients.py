@@ -19,7 +19,6 @@ from ctcr.compare.sample import Sample
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.held_out import unexplained_of
 from ctcr.diagnose.linearised import Linear, laplace
-from ctcr.diagnose.residual import screw_pitch
 from ctcr.fit.joint import Fit
 from ctcr.model import parameters
 
@@ -184,7 +183,7 @@ def _trials(engine: Engine, fit: Fit, sample: Sample, derivatives: Array) -> tup
     """Each parameter with each quantity; parameters of one kind of all tubes with one quantity, or each with its own
     tube's. With the whitened derivatives by their columns (columns, readings)."""
     rows = np.searchsorted(engine.measurements.row, sample.row)
-    quantities = covariates(sample, screw_pitch(engine))
+    quantities = covariates(sample)
     if any(quantity.name == "time" for quantity in quantities):  # the order of measuring is nearly the same
         quantities = [quantity for quantity in quantities if quantity.name != "order"]
     trials: list[_Trial] = []

@@ -152,7 +152,7 @@ def neutral(robot: Robot) -> dict[str, float]:
     """The neutral value of every parameter; periods follow from the robot's transmission."""
     values = {name: p.neutral for name, p in parameter_of(robot.n_tubes).items()}
     periods = {
-        "screw_pitch": 1e-3 * abs(robot.actuation.translation_mm_per_rev or 0.0),
+        "screw_pitch": abs(robot.actuation.screw_pitch),
         "gear_ratio": 1 / abs(robot.actuation.rotation_rev_per_rev or inf),
     }
     for quantity, period in periods.items():

@@ -119,6 +119,8 @@ class Actuation(Section):
     recorded_home_translation_mm: Annotated[list[float] | None, TRANSLATIONS] = None
     recorded_home_rotation_deg: Annotated[list[float] | None, ROTATIONS] = None
 
+    screw_pitch = _si("translation_mm_per_rev", 1e-3, "Translation of a tube by a turn of its motor [m]; 0: unknown.")
+
     @property
     def translation_correction(self) -> Array:
         """Correction (N,) [m] to add to the joints beta of a table."""
