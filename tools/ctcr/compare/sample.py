@@ -84,11 +84,8 @@ def take_sample(robot, measurements, prediction) -> Sample:
     velocity, step = _tip_motion(position, m.t, m.run, solved)
     arrays = {name: np.asarray(getattr(m, name)) for name in ("row", "t", "run", "beta", "alpha", "force")}
     arrays |= {"measured": m.positions, "predicted": predicted, "base_position": position}
-    arrays |= {
-        "tip_velocity": velocity,
-        "tip_step": step,
-        "deployed": (lengths + m.beta)[:, tracker.sensor_on_tube - 1],
-    }
+    arrays |= {"tip_velocity": velocity, "tip_step": step}
+    arrays["deployed"] = (lengths + m.beta)[:, tracker.sensor_on_tube - 1]
     return Sample(
         **{name: values[keep] for name, values in arrays.items()},
         tip_rotation=matrix_from_quaternion(prediction.quaternion[keep]),

@@ -89,8 +89,7 @@ def fit_with_frames(
     model = FramedRecording(robot, readings, names, noise)
     nominal = model.nominal()
     before = model.with_frames_fixed(nominal)
-    for _ in range(settings.FRAME_ALIGNMENTS):
-        model.align(nominal)
+    model.align(nominal, settings.FRAME_ALIGNMENTS)
     rows = rows & model.solvable(nominal)
     # The gauges of a robot change its frame, too, which is profiled out.
     priors = replace(Priors.of(robot, names, readings.beta[rows], sd), gauges=())
@@ -110,10 +109,10 @@ def fit_with_frames(
 def error_with_frames(robot: Robot, readings: Measurements, noise: Noise) -> tuple[float, float]:
     """RMS position error [mm] with the robot's one frame, and with the frame for each run that fits best."""
     model = FramedRecording(robot, readings, [], noise)
-    before = model.with_frames_fixed(model.nominal())
-    for _ in range(settings.FRAME_ALIGNMENTS):
-        model.align(model.nominal())
-    after = model.with_frames_fixed(model.nominal())
+    nominal = model.nominal()
+    before = model.with_frames_fixed(nominal)
+    model.align(nominal, settings.FRAME_ALIGNMENTS)
+    after = model.with_frames_fixed(nominal)
     return 1e3 * rms(before[:, :3]), 1e3 * rms(after[:, :3])
 
 
@@ -157,14 +156,15 @@ class FramedRecording(ResidualModel):
         self.activate([True] * len(self.readings))
         return self.table.residual(values)[0].reshape(-1, 6)
 
-    def align(self, values: Array) -> None:
-        """Moves each run's frame to where it fits best at these values."""
-        residual = self.with_frames_fixed(values).ravel()
-        moves = self._frame_part(residual, residual[:, None])[1]
-        turn = Rotation.from_rotvec(self.turn)
-        self.shift = self.shift + turn.apply(moves[:, :3])
-        self.turn = (turn * Rotation.from_rotvec(moves[:, 3:])).as_rotvec()
-        self._read()
+    def align(self, values: Array, steps: int = 1) -> None:
+        """Moves each run's frame to where it fits best at these values, by Gauss-Newton steps."""
+        for _ in range(steps):
+            residual = self.with_frames_fixed(values).ravel()
+            moves = self._frame_part(residual, residual[:, None])[1]
+            turn = Rotation.from_rotvec(self.turn)
+            self.shift = self.shift + turn.apply(moves[:, :3])
+            self.turn = (turn * Rotation.from_rotvec(moves[:, 3:])).as_rotvec()
+            self._read()
 
     def frames(self) -> tuple[RunFrames, tuple[Array, Array]]:
         """The frames against the typical one, and that against the robot file's."""

@@ -151,10 +151,10 @@ def priors(
     names = list(names)
     given = {name: float(value) for item, value in (sd or {}).items() for name in expand(item, robot)}
     own = [name for name in names if name.startswith("effects.")]
-    of_own = dict(zip(own, zip(*catalogue.priors(robot, own), strict=True), strict=True))
-    turns = [name for name in names if name.startswith("tracker.rotation.")]  # from the file's frame
-    mean = [of_own[name][0] if name in of_own else 0.0 if name in turns else _value(robot, name) for name in names]
-    width = [given.get(name, of_own[name][1] if name in of_own else _stated_sd(robot, name)) for name in names]
+    known = dict(zip(own, zip(*catalogue.priors(robot, own), strict=True), strict=True))
+    known |= {name: _prior(robot, name) for name in names if name not in known}
+    mean, stated, low, high = zip(*(known[name] for name in names), strict=True)
+    width = [given.get(name, sd) for name, sd in zip(names, stated, strict=True)]
     problems = [
         Problem(
             f"{name}: its prior standard deviation is {value:g}, but must be above 0; leave a parameter that is known "
@@ -167,10 +167,7 @@ def priors(
     ]
     if problems:
         raise InputError(problems)
-    low, high = np.transpose(
-        [of_own[name][2:] if name in of_own else _bounds(name, value) for name, value in zip(names, mean, strict=True)]
-    )
-    return np.array(mean), np.array(width), low, high
+    return tuple(np.array(column, float) for column in (mean, width, low, high))
 
 
 def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
@@ -308,10 +305,11 @@ def _stated_sd(robot: Robot, name: str) -> float | None:
     }.get(kind)
 
 
-def _bounds(name: str, value: float) -> tuple[float, float]:
-    """Beyond these no robot file may hold the value."""
+def _prior(robot: Robot, name: str) -> tuple[float, float | None, float, float]:
+    """Mean and stated standard deviation of a parameter, and the bounds of its possible values."""
     field = field_of(name)
-    return 1e-3 * value if field.lowest == 0 else field.lowest, field.highest
+    value = _value(robot, name) if field.path else 0.0  # the tracker frame turns from that of the file
+    return value, _stated_sd(robot, name), 1e-3 * value if field.lowest == 0 else field.lowest, field.highest
 
 
 def _replaced(vector: Iterable[float], index: int, value: float) -> list[float]:

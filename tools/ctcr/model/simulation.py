@@ -43,18 +43,10 @@ def simulate(robot: Robot, plan: Measurements, noise: str = "jitter", seed: int 
 def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
     """The table in the format of measurements; columns without any value are left out."""
     columns = group_columns(n_tubes)
-    groups = {
-        "t": readings.t[:, None],
-        "run": readings.run[:, None],
-        "beta": readings.beta,
-        "alpha": readings.alpha,
-        "force": readings.force,
-        "position": readings.position,
-        "quaternion": readings.quaternion,
-    }
-    kept = [name for name in groups if groups[name] is not None and np.isfinite(groups[name]).any()]
+    present = {name: getattr(readings, name) for name in columns if getattr(readings, name) is not None}
+    kept = {name: values.reshape(len(readings), -1) for name, values in present.items() if np.isfinite(values).any()}
     header = ",".join(column for name in kept for column in columns[name])
-    rows = np.hstack([groups[name] for name in kept]).tolist()
+    rows = np.hstack(list(kept.values())).tolist()
     with atomic_writer(target) as file:
         file.write(header + "\n")
         file.writelines(",".join("" if value != value else f"{value:.12g}" for value in row) + "\n" for row in rows)
