@@ -124,5 +124,4 @@ def _as_data(effect) -> dict:
     for p in parameters:
         if p["kind"] == "amplitude":
             p["kind"] = "strength"  # the word of the JSON format
-    data = {key: getattr(effect, key) for key in _EFFECT}
-    return data | {"needs": sorted(effect.needs), "parameters": parameters}
+    return {key: getattr(effect, key) for key in _EFFECT} | {"needs": sorted(effect.needs), "parameters": parameters}

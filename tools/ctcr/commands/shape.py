@@ -51,8 +51,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     alpha = _joints("alpha", {"alpha": (alpha, 1.0), "alpha-deg": (alpha_deg, np.pi / 180)}, loaded.n_tubes)
     force = _finite("force", force, 3)
     with_history = effect_model.of_the_path(loaded) if loaded.effects else []
-    kept = {name: given for name, given in loaded.effects.items() if name not in with_history}
-    used = loaded.with_effects(kept)
+    used = loaded.with_effects({name: given for name, given in loaded.effects.items() if name not in with_history})
     model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
@@ -102,8 +101,7 @@ def _joints(name: str, given: dict, n_tubes: int):
 
     found = [(option, values, unit) for option, (values, unit) in given.items() if values is not None]
     if len(found) != 1:
-        text = f"give either --{' or --'.join(given)}: {n_tubes} numbers, innermost tube first"
-        raise InputError(Problem(text))
+        raise InputError(Problem(f"give either --{' or --'.join(given)}: {n_tubes} numbers, innermost tube first"))
     option, values, unit = found[0]
     joints = unit * _finite(option, values, n_tubes)
     for value in joints:

@@ -117,8 +117,7 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
     headline = sample
     if turn and turn.gross:
         rotation, move = rigid_motion(sample.predicted, sample.measured)
-        predicted = sample.predicted @ rotation.T + move
-        sample = replace(sample, predicted=predicted, rotation=rotation @ sample.rotation)
+        sample = replace(sample, predicted=sample.predicted @ rotation.T + move, rotation=rotation @ sample.rotation)
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))

@@ -34,8 +34,7 @@ class Folds:
 def make_folds(label: Integers, trials: int, seed: int = 0) -> Folds:
     """Folds for ascending labels 0..G-1 with a fixed seed, so that a report can be repeated."""
     count = int(label.max()) + 1
-    random = np.random.default_rng(seed)
-    flips = random.choice([-1.0, 1.0], size=(trials, count))
+    flips = np.random.default_rng(seed).choice([-1.0, 1.0], size=(trials, count))
     return Folds(label, np.vstack([np.ones((1, count)), flips]))
 
 

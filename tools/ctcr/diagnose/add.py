@@ -12,6 +12,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import prepared
 from ctcr.calibrate.checks import sentence
+from ctcr.calibrate.joint_fit import Stage
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
@@ -31,22 +32,13 @@ from ctcr.table.measurements import Measurements
 
 
 @dataclass(frozen=True)
-class Stage:
-    """RMS error of the judged rows at one stage; NaN: not measured."""
-
-    name: str
-    rms_mm: float
-    rms_deg: float
-
-
-@dataclass(frozen=True)
 class Added:
     """Effects fitted to measurements."""
 
     robot: Robot  # with them
     ids: list[str]
     fit: joint.Fit  # of all rows
-    stages: list[Stage]  # nominal, calibrated, each effect, noise floor
+    stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
     held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
 

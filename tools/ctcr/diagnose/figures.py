@@ -81,8 +81,7 @@ def before_after(figure, d: Diagnosis) -> bool | None:
             (before, ERROR, "error after calibration"),
             (explained, GOOD, "explained by the effects found"),
         ):
-            y = np.sum(vectors * along, axis=1)
-            axes.plot(x, y, ".", color=colour, markersize=4, alpha=0.6, label=name)
+            axes.plot(x, np.sum(vectors * along, axis=1), ".", color=colour, markersize=4, alpha=0.6, label=name)
         axes.axhline(0, color=INK, linewidth=0.6)
         axes.set(xlabel=label, ylabel=f"along the {'motion' if frame == 'motion' else 'main direction'}, mm")
     panels[0].legend(markerscale=3)

@@ -38,8 +38,7 @@ class Linear:
 
     def __init__(self, residual: Array, jacobian: Array) -> None:
         self.residual, self.jacobian = residual, jacobian
-        information = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
-        self.cholesky = np.linalg.cholesky(information)
+        self.cholesky = np.linalg.cholesky(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
 
     def imitation(self, columns: Array) -> Array:
         """The change (n, k) of the fitted parameters that imitates columns (K, k) best, given their priors."""

@@ -143,8 +143,7 @@ def scene(d: Diagnosis) -> str:
     tips = 1e3 * measured[rows]
     size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
     factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
-    marker = {"size": 2, "color": "#6b7785"}
-    data = [show.trace(tips, "measured", hoverinfo="name", mode="markers", marker=marker)]
+    data = [show.trace(tips, "measured", hoverinfo="name", mode="markers", marker={"size": 2, "color": "#6b7785"})]
     for fit, colour, name in figures.fits_shown(d):
         lines = show.shafts(tips, tips - factor * 1e3 * fit.residual[rows, :3])
         style = {"mode": "lines", "hoverinfo": "name", "line": {"width": 4, "color": colour}, "connectgaps": False}

@@ -113,8 +113,7 @@ class Hooks:
 
 def _pair(effect: Effect, hook: str, answer: Any, first: tuple, second: tuple, free: Mask | None = None):
     if not isinstance(answer, tuple | list) or len(answer) != 2:
-        text = f"must return two arrays, of shape {first} and {second}"
-        raise InputError(Problem(text, field=f"{effect.id}.{hook}"))
+        raise InputError(Problem(f"must return two arrays, of shape {first} and {second}", field=f"{effect.id}.{hook}"))
     return _array(effect, hook, answer[0], first, free), _array(effect, hook, answer[1], second, free)
 
 
@@ -126,8 +125,7 @@ def _array(effect: Effect, hook: str, answer: Any, shape: tuple, free: Mask | No
     except (TypeError, ValueError):
         raise InputError(Problem("must return arrays of numbers", field=where)) from None
     if array.shape != shape:
-        text = f"returned an array of shape {array.shape}, but it must be {shape}"
-        raise InputError(Problem(text, field=where))
+        raise InputError(Problem(f"returned an array of shape {array.shape}, but it must be {shape}", field=where))
     bad = ~np.isfinite(array).all(axis=tuple(range(1, array.ndim)))
     bad = bad if free is None else bad & ~free
     if bad.any():

@@ -277,8 +277,7 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
     """Shortcomings of the fitted rows (M,)."""
     if not rows.any():
         return
-    joints = np.hstack([measurements.beta, measurements.alpha])[rows]
-    fixed = np.ptp(joints, axis=0) == 0
+    fixed = np.ptp(np.hstack([measurements.beta, measurements.alpha])[rows], axis=0) == 0
     if fixed.all():
         yield "all joints are the same in every row: one pose determines few of the parameters"
     elif fixed.any():

@@ -153,8 +153,7 @@ class UserRecording(ResidualModel):
         beta, alpha, force, profiles = inputs
         position, quaternion = self._reference
         rows = replace(self._table, beta=beta, alpha=alpha, force=force, position=position, quaternion=quaternion)
-        options = self._options | {"profiles": profiles}
-        return recording.recording_of(self._library_robot, rows, self._inner, **options)
+        return recording.recording_of(self._library_robot, rows, self._inner, **self._options | {"profiles": profiles})
 
     def _outer(self, position: Array, rotation: Array, values: dict[str, float]) -> tuple[Array, Array]:
         """The reading of the sensor's pose, for a tracker frame as `values` have it."""

@@ -103,8 +103,7 @@ def read_columns(path: str | Path, columns: Sequence[str]) -> Array:
 def open_table(path: str | Path) -> NumberTable:
     """Reads the header and counts the rows. Raises InputError where the file is no table of text."""
     with file_faults(path, "read"), open(path, "rb") as file:
-        header = file.readline(MAX_HEADER_BYTES)
-        columns = header_names(header, str(path))
+        columns = header_names(file.readline(MAX_HEADER_BYTES), str(path))
         start = file.tell()
         end = _end_of_content(file, start)
         n_rows = _count_lines(file, start, end)
