@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from ctcr.errors import Problem, did_you_mean, shown
-from ctcr.robot.description import Actuation, Robot, Section, Tracker, Tube, Uncertainty
+from ctcr.robot.description import Robot, Section
 from ctcr.robot.units import LARGEST
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
 Fault = tuple[FieldPath, str]
 
-_SECTIONS = {"tubes": Tube, "actuation": Actuation, "tracker": Tracker, "uncertainty": Uncertainty}
 _PER_TUBE = ("home_translation_mm", "home_rotation_deg", "recorded_home_translation_mm", "recorded_home_rotation_deg")
 _MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
 
@@ -28,7 +27,7 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
     found: list[Fault] = []
     for error in errors:
         path = error["loc"]
-        section, field = _owner(path)
+        section, field = Robot.owner(path)
         if error["type"] in ("extra_forbidden", "invalid_key"):
             meant = did_you_mean(str(field), section.model_fields)
             missing = [other for other in missing if other != (*path[:-1], meant)]  # one mistake, one fault
@@ -36,16 +35,15 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
         elif error["type"] != "missing":
             found.append((path, f"{_complaint(error)}: needs {section.expected(field)}"))
     for path in dict.fromkeys(missing):
-        section, field = _owner(path)
+        section, field = Robot.owner(path)
         found.append((path, f"is missing: needs {section.expected(field)}"))
     return found + list(_relations(data, tubes))
 
 
 def doubts(robot: Robot) -> Iterator[Fault]:
     """Values that are possible but look wrong, and unknown ones that the model could use."""
-    yield from _unusual(robot, ())
+    yield from robot.unusual()
     for i, tube in enumerate(robot.tubes):
-        yield from _unusual(tube, ("tubes", i))
         if (strain := tube.straightened_strain) > _MAX_STRAIN:
             text = f"straightening this tube strains it by {100 * strain:.1f} %: it yields"
             yield ("tubes", i, "curvature_per_m"), text
@@ -55,8 +53,6 @@ def doubts(robot: Robot) -> Iterator[Fault]:
     for i, (tube, around) in enumerate(pairwise(robot.tubes)):
         if around.inner_diameter > 0 and tube.outer_diameter > around.inner_diameter:
             yield _too_narrow(around.inner_diameter_mm, i, tube.outer_diameter_mm)
-    for name in ("actuation", "tracker", "uncertainty"):
-        yield from _unusual(getattr(robot, name), (name,))
     if robot.gravity is None:
         yield ("gravity",), "not known: the tubes' own weight is left out"
     elif 0 < (size := np.linalg.norm(robot.gravity)) < 9.7:
@@ -132,14 +128,6 @@ def _missing_of_tubes(tubes: list[dict], weighed: bool) -> list[FieldPath]:
     return absent
 
 
-def _unusual(section: Section, path: FieldPath) -> Iterator[Fault]:
-    for field in type(section).model_fields:
-        quantity, value = section.quantity(field), getattr(section, field)
-        for index, number in enumerate(value) if isinstance(value, list) else ((None, value),):
-            if quantity and number is not None and not quantity.is_usual(number):
-                yield (*path, field, *(() if index is None else (index,))), quantity.doubt(number)
-
-
 def _unknown(section: type[Section], field: str, meant: str | None) -> str:
     if meant is None:
         return "unknown field: the fields here are " + ", ".join(section.model_fields)
@@ -163,14 +151,6 @@ def _complaint(error: dict[str, Any]) -> str:
             return f"{shown(value)} is not a number"
         case _:
             return f"{shown(value)} does not fit"
-
-
-def _owner(path: FieldPath) -> tuple[type[Section], str]:
-    """The section that holds the field at `path`, and the field's name."""
-    depth = 2 if path[0] == "tubes" else 1
-    if path[0] in _SECTIONS and len(path) > depth:
-        return _SECTIONS[path[0]], path[depth]
-    return Robot, path[0]
 
 
 def _tubes(data: dict) -> list[dict]:

@@ -3,7 +3,7 @@
 Tubes go from the innermost outwards. Base frame: origin where the tubes leave the front plate, z along insertion.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import pi
 from typing import Annotated, Any, Literal, get_args
 
@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 from ctcr.arrays import Array
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
-from ctcr.robot.yaml_document import YamlDocument
+from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
@@ -44,6 +44,28 @@ class Section(BaseModel):
         may_be_null = info.is_required() and type(None) in get_args(info.annotation)
         return (quantity.expected if quantity else info.description) + (" (null: not known)" if may_be_null else "")
 
+    @classmethod
+    def owner(cls, path: FieldPath) -> tuple[type["Section"], str | int]:
+        """The innermost section on the way to the field at `path`, and the name of the field there."""
+        section, field = cls, path[0]
+        for step in path[1:]:
+            inner = _section_in(section.model_fields[field].annotation) if field in section.model_fields else None
+            if inner is None:
+                break
+            section, field = (inner, step) if isinstance(step, str) else (section, field)
+        return section, field
+
+    def unusual(self, path: FieldPath = ()) -> Iterator[tuple[FieldPath, str]]:
+        """Possible values that look wrong, here and in the sections below: the path of each, and a doubt in words."""
+        for field in type(self).model_fields:
+            quantity, value = self.quantity(field), getattr(self, field)
+            for index, part in enumerate(value if isinstance(value, list) else [value]):
+                where = (*path, field, index) if isinstance(value, list) else (*path, field)
+                if isinstance(part, Section):
+                    yield from part.unusual(where)
+                elif quantity and isinstance(part, int | float) and not quantity.is_usual(part):
+                    yield where, quantity.doubt(part)
+
     @field_validator("*")
     @classmethod
     def _possible(cls, value: Any, info: ValidationInfo) -> Any:
@@ -52,6 +74,13 @@ class Section(BaseModel):
             if quantity and number is not None and not quantity.is_possible(number):
                 raise PydanticCustomError("impossible", "{value} is impossible", {"value": f"{number:g}"})
         return value
+
+
+def _section_in(annotation: Any) -> type[Section] | None:
+    """The section that a field holds by its annotation, in a list or where it is optional too."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return annotation
+    return next(filter(None, map(_section_in, get_args(annotation))), None)
 
 
 def _si(field: str, factor: float, meaning: str) -> property:

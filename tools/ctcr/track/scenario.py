@@ -138,16 +138,6 @@ class Scenario(Section):
         return 9.80665e-3 * mass_g * direction / np.linalg.norm(direction)
 
 
-_SECTIONS = {
-    "trajectory": Trajectory,
-    "start": Start,
-    "tasks": Tasks,
-    "limits": Limits,
-    "obstacle": Obstacle,
-    "load": TipLoad,
-}
-
-
 def shipped(name: str) -> Scenario:
     """One of the scenarios that come with the package, for three tubes: S1 to S4 of the paper, and S5."""
     text = (files("ctcr") / "track" / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")
@@ -182,7 +172,7 @@ def _scenario(document: yaml_document.YamlDocument, n_tubes: int) -> Scenario:
 def _fault(error: dict) -> tuple[tuple, str]:
     """Path and message of a fault that pydantic found."""
     path = error["loc"]
-    section, field = (_SECTIONS[path[0]], path[1]) if len(path) > 1 and path[0] in _SECTIONS else (Scenario, path[0])
+    section, field = Scenario.owner(path)
     if error["type"] == "extra_forbidden":
         meant = did_you_mean(str(field), section.model_fields)
         return path, f"unknown field{f': did you mean {meant}?' if meant else ''}"
@@ -238,11 +228,7 @@ def _relations(s: Scenario, n: int):
 
 def _unusual(s: Scenario):
     """Values that look like another unit: in a file that moves a robot they are faults."""
-    for path in ((), *((name,) for name in _SECTIONS)):
-        section = getattr(s, path[0]) if path else s
-        for field in type(section).model_fields if section else ():
-            quantity, value = type(section).quantity(field), getattr(section, field)
-            numbers = [x for x in (value if isinstance(value, list) else [value]) if isinstance(x, float | int)]
-            strange = [x for x in numbers if quantity and not quantity.is_usual(x)]
-            if strange:
-                yield (*path, field), quantity.doubt(strange[0])
+    first: dict[tuple, str] = {}  # of each field
+    for path, doubt in s.unusual():
+        first.setdefault(tuple(step for step in path if isinstance(step, str)), doubt)
+    yield from first.items()

@@ -124,10 +124,7 @@ def load(path: str | Path) -> Bench:
 
 def _complaint(fault: dict) -> str:
     """What pydantic found, and what the field needs."""
-    name, *inner = fault["loc"]
-    section, field = (Bench, name)
-    if inner:
-        section, field = {"tracker": TrackerPort, "motors": Motors, "limits": Limits}.get(name, Bench), inner[0]
+    section, field = Bench.owner(fault["loc"])
     if fault["type"] == "extra_forbidden":
         meant = did_you_mean(str(field), section.model_fields)
         return "unknown field" + (f": did you mean {meant}?" if meant else "")
