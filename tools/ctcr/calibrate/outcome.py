@@ -8,6 +8,7 @@ from typing import Any
 
 from ctcr.calibrate.procedure_figures import WIDTH
 from ctcr.errors import InputError, Problem
+from ctcr.model.parameters import value_at
 from ctcr.robot import ledger
 from ctcr.robot.ledger import Change, Entry
 from ctcr.robot.yaml_document import FieldPath
@@ -73,10 +74,7 @@ def computed(procedure: Callable, file: str, **arguments):
 
 def in_file(robot, path: FieldPath) -> float:
     """The number at a path such as ("tubes", 0, "length_mm"); NaN without a robot, or where the file has none."""
-    value = robot
-    for step in path:
-        if value is not None:
-            value = value[step] if isinstance(step, int) else getattr(value, step)
+    value = value_at(robot, path)
     return nan if value is None else value
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ctcr.arrays import Array
-from ctcr.model import parameters
+from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 
 
@@ -89,10 +89,7 @@ def all_varied(robot: Robot) -> list[Varied]:
 
 def together(robot: Robot, varied: list[Varied]) -> tuple[Array, Array]:
     """Lowest and highest value of every parameter when all vary; the turn of the tracker frame counts from it."""
-    low = parameters.values(robot)
-    for i, name in enumerate(parameters.names_of(robot.n_tubes)):
-        if name.startswith("tracker.rotation."):
-            low[i] = 0.0
+    low = recording.values(robot)[: len(parameters.names_of(robot.n_tubes))]
     high = low.copy()
     for one in varied:
         low[one.index], high[one.index] = min(one.ends), max(one.ends)
