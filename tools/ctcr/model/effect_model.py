@@ -36,19 +36,12 @@ def readings(robot: Robot, measurements: Measurements, steps: int = 4) -> Readin
 
 def of_the_poses(robot: Robot) -> dict[str, Any]:
     """The robot's effects that change the poses of its tubes: all but those of the tracker alone."""
-    known = catalogue.catalogue(robot.n_tubes)
-    return {
-        identity: given
-        for identity, given in robot.effects.items()
-        if identity not in known or known[identity].acts_on != {"reading"}
-    }
+    alone = {effect.id for effect in catalogue.catalogue(robot.n_tubes).values() if effect.acts_on == {"reading"}}
+    return {identity: given for identity, given in robot.effects.items() if identity not in alone}
 
 
 def of_the_path(robot: Robot) -> list[str]:
     """The robot's effects that depend on the path to a configuration, and all effects of users' files."""
     known = catalogue.catalogue(robot.n_tubes)
-    return [
-        identity
-        for identity in of_the_poses(robot)
-        if identity not in known or known[identity].needs & {"order", "time"}
-    ]
+    without = {effect.id for effect in known.values() if not effect.needs & {"order", "time"}}
+    return [identity for identity in of_the_poses(robot) if identity not in without]

@@ -191,20 +191,20 @@ def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robo
 
 def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
     """Changes of the parameters that leave the readings (nearly) as they are, with words, where all are free."""
-    axis = robot.tracker.rotation[:, 2]
-    yaw = {f"actuation.home_rotation.{i + 1}": 1.0 for i in range(robot.n_tubes)}
-    yaw |= {f"tracker.rotation.{'xyz'[j]}": -axis[j] for j in range(3)}
-    candidates = [("common rotation of all tubes = yaw of the tracker frame about the robot's axis", yaw)]
-    candidates += [
-        (
-            f"translation offset of tube {i} against its length",
-            {f"actuation.home_translation.{i}": 1.0, f"tubes.{i}.length": -1.0},
-        )
-        for i in range(1, robot.n_tubes + 1)
-    ]
-    shift = {f"actuation.home_translation.{i + 1}": 1.0 for i in range(robot.n_tubes)}
-    shift |= {f"tracker.position.{'xyz'[j]}": -axis[j] for j in range(3)}
-    candidates.append(("common translation of all tubes = shift of the tracker frame along the robot's axis", shift))
+    tubes, axis = range(1, robot.n_tubes + 1), dict(zip("xyz", robot.tracker.rotation[:, 2], strict=True))
+
+    def along_axis(home: str, frame: str) -> dict[str, float]:
+        """The same change of all homes, and that of the frame which undoes it."""
+        homes = {f"actuation.{home}.{i}": 1.0 for i in tubes}
+        return homes | {f"tracker.{frame}.{name}": -part for name, part in axis.items()}
+
+    yaw = "common rotation of all tubes = yaw of the tracker frame about the robot's axis"
+    shift = "common translation of all tubes = shift of the tracker frame along the robot's axis"
+    candidates = [(yaw, along_axis("home_rotation", "rotation"))]
+    for i in tubes:
+        change = {f"actuation.home_translation.{i}": 1.0, f"tubes.{i}.length": -1.0}
+        candidates.append((f"translation offset of tube {i} against its length", change))
+    candidates.append((shift, along_axis("home_translation", "position")))
     stiffness = {name: _value(robot, name) for name in names if name.endswith(("youngs_modulus", "bending_stiffness"))}
     if len(stiffness) == robot.n_tubes:
         candidates.append(("common stiffness of all tubes", stiffness))
@@ -223,27 +223,19 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
     longer curved than it is long. 99 rows in 100 stay possible; where fewer are, none more become impossible.
     """
     beta = beta + robot.actuation.translation_correction
-    tip, tubes = beta + [tube.length for tube in robot.tubes], range(1, robot.n_tubes + 1)
+    tip, last = beta + [tube.length for tube in robot.tubes], robot.n_tubes
     home, length, curved = "actuation.home_translation.{}", "tubes.{}.length", "tubes.{}.curved_length"
-    last = robot.n_tubes
     found = [
         (f"tube {last} is grasped at the plate", {home: {last: -1}}, -beta[:, -1]),
         (f"the tip of tube {last} is flush with the plate", {home: {last: 1}, length: {last: 1}}, tip[:, -1]),
     ]
-    for i in tubes[:-1]:
-        apart = {i: 1, i + 1: -1}
-        found += [
-            (f"tubes {i} and {i + 1} are grasped at one place", {home: {i: -1, i + 1: 1}}, beta[:, i] - beta[:, i - 1]),
-            (f"the tips of tubes {i} and {i + 1} are flush", {home: apart, length: apart}, tip[:, i - 1] - tip[:, i]),
-        ]
-    found += [
-        (
-            f"tube {i} is curved over all its length",
-            {length: {i: 1}, curved: {i: -1}},
-            np.array([robot.tubes[i - 1].length - robot.tubes[i - 1].curved_length]),
-        )
-        for i in tubes
-    ]
+    for i in range(1, last):
+        apart, gaps = {i: 1, i + 1: -1}, (beta[:, i] - beta[:, i - 1], tip[:, i - 1] - tip[:, i])
+        found.append((f"tubes {i} and {i + 1} are grasped at one place", {home: {i: -1, i + 1: 1}}, gaps[0]))
+        found.append((f"the tips of tubes {i} and {i + 1} are flush", {home: apart, length: apart}, gaps[1]))
+    for i, tube in enumerate(robot.tubes, start=1):
+        straight = np.array([tube.length - tube.curved_length])
+        found.append((f"tube {i} is curved over all its length", {length: {i: 1}, curved: {i: -1}}, straight))
     limits = []
     for text, parts, room in found:
         change = {kind.format(i): float(sign) for kind, signs in parts.items() for i, sign in signs.items()}
