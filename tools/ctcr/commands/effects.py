@@ -106,16 +106,9 @@ def _interval(limits: tuple[float, float]) -> str:
 # JSON keys and the members that they show.
 _EFFECT = ("id", "title", "physics", "signature", "measure", "needs", "look_alikes", "reference")
 _PARAMETER = {
-    "name": "name",
-    "full_names": "full_names",
-    "unit": "unit",
-    "kind": "kind",
-    "neutral": "neutral",
-    "sd": "sigma",
-    "usual": "soft",
-    "possible": "hard",
-    "per_tube": "per_tube",
-    "meaning": "meaning",
+    **{key: key for key in ("name", "full_names", "unit", "kind", "neutral")},
+    **{"sd": "sigma", "usual": "soft", "possible": "hard"},
+    **{key: key for key in ("per_tube", "meaning")},
 }
 
 

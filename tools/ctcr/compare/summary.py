@@ -24,13 +24,11 @@ CAUSES = {  # by how the name of a dependence begins
     "alpha": "a wrong angle offset, precurvature or stiffness ratio",
     "length": "a wrong length, curved length, stiffness or insertion scale",
     "direction": "friction or play",
-    "speed": "a delay, or friction that grows with speed",
-    "tip_speed": "a delay, or friction that grows with speed",
+    ("speed", "tip_speed"): "a delay, or friction that grows with speed",
     "force": "a wrong stiffness, or compliance that the model takes as rigid",
     "place": "a rotated tracker frame, a distorted tracker field or wrong precurvatures",
     "screw": "a periodic error of a drive screw",
-    "time": "drift, creep or temperature",
-    "order": "drift, creep or temperature",
+    ("time", "order"): "drift, creep or temperature",
 }
 
 
@@ -169,7 +167,7 @@ def _dependence_text(item: Dependence, c: Comparison) -> str:
     if item.indistinct:
         names = [name.removeprefix("a ") for name in item.indistinct[:3]]
         text += f"These data do not distinguish it from the {join(names)}. "
-    cause = next((CAUSES[start] for start in CAUSES if item.name.startswith(start)), "")
+    cause = next((cause for starts, cause in CAUSES.items() if item.name.startswith(starts)), "")
     return (text + (f"Possible cause: {cause}." if cause else "")).strip()
 
 

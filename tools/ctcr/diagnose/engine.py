@@ -81,18 +81,8 @@ class Engine:
             table.begin_at(self._friction_path)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
-        fitted = joint.fit_joint(
-            table,
-            priors,
-            noise or self.noise,
-            self.positions,
-            self.fitted,
-            start=at,
-            weights=weights,
-            tolerance=tolerance or self.tolerance,
-            few_first=not near,
-            **options,
-        )
+        options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
+        fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
         if table.friction_is_solved:
             self._friction_path = table
         return fitted
@@ -102,8 +92,8 @@ class Engine:
     ) -> joint.Fit:
         """As fit(), at the noise, weights and inflation of another fit, so that their evidences can be compared; from
         its values or a near start."""
-        frozen = {"noise": other.noise, "weights": other.weights, "inflation": other.inflation, "near": True}
-        return self.fit(added, start=values_of(other) if start is None else start, **frozen | options)
+        options = {"noise": other.noise, "near": True} | other.frozen | options
+        return self.fit(added, start=values_of(other) if start is None else start, **options)
 
     def fit_with_field(
         self, added: Sequence[str], start: dict[str, float], fixed: dict[str, float] | None = None

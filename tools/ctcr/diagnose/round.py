@@ -244,16 +244,12 @@ class Refits:
                 continue  # the model has no solution there
         else:
             return replace(one, fit=None)
+        refit = segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty
         explained = fraction_explained(before, fit, len(candidate.names))
-        return replace(
-            one,
-            refit=segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty,
-            explained=explained,
-            # A chi-square removed has a standard deviation of twice its root.
-            explained_sd=2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0)),
-            fit=fit,
-            implausible=tuple(_implausible(engine, fit, candidate)),
-        )
+        # A chi-square removed has a standard deviation of twice its root.
+        sd = 2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0))
+        implausible = tuple(_implausible(engine, fit, candidate))
+        return replace(one, refit=refit, explained=explained, explained_sd=sd, fit=fit, implausible=implausible)
 
 
 def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict[str, float]:

@@ -86,7 +86,7 @@ def corrected(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
     if _unexplained(engine, there) > settings.LAGS_LEAVE * _unexplained(engine, fit):
         return fit, []
     # Once more with its weights: then rows that were not fitted have a residual, too.
-    seen = engine.linear_fit(fit, more=more, noise=noise, weights=there.weights, inflation=there.inflation)
+    seen = engine.linear_fit(fit, more=more, noise=noise, **there.frozen)
     return seen, [_message(engine, fit, lags)]
 
 

@@ -40,15 +40,9 @@ def likeliest_noise(engine: Engine, fit: Fit) -> Noise | None:
 def corrected(engine: Engine, fit: Fit, noise: Noise) -> Fit:
     """The linearised fit under that noise, to readings without the smooth error; rows that were not fitted are
     corrected by those near to them."""
-    there = engine.linear_fit(fit, noise=noise, weights=fit.weights, inflation=fit.inflation)
-    return engine.linear_fit(
-        there,
-        more=-np.nan_to_num(there.field),
-        noise=with_field(noise, 0.0),
-        weights=there.weights,
-        inflation=there.inflation,
-        max_iterations=0,
-    )
+    there = engine.linear_fit(fit, noise=noise, **fit.frozen)
+    more, jitter = -np.nan_to_num(there.field), with_field(noise, 0.0)
+    return engine.linear_fit(there, more=more, noise=jitter, max_iterations=0, **there.frozen)
 
 
 def message(noise: Noise) -> str:

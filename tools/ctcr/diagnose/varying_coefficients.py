@@ -26,12 +26,10 @@ SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9
 
 ADVICE = "An effect of your own that acts there may be what is missing: see docs/effects.md."
 MEASURE = {  # by how the id of a quantity begins: what shows it best
-    "time": "Come back to the same joints again and again, from the first reading to the last",
-    "order": "Come back to the same joints again and again, from the first reading to the last",
-    "speed": "Pass the same joints at several speeds, and rest there",
-    "tip_speed": "Pass the same joints at several speeds, and rest there",
-    "direction": "Come to the same joints from both sides",
-    "force": "Come to the same joints with several loads",
+    ("time", "order"): "Come back to the same joints again and again, from the first reading to the last",
+    ("speed", "tip_speed"): "Pass the same joints at several speeds, and rest there",
+    ("direction",): "Come to the same joints from both sides",
+    ("force",): "Come to the same joints with several loads",
 }
 
 
@@ -55,7 +53,7 @@ class Variation:
     @property
     def measure(self) -> str:
         """The measurement that would show it best."""
-        known = (text for start, text in MEASURE.items() if self.covariate.name.startswith(start))
+        known = (text for starts, text in MEASURE.items() if self.covariate.name.startswith(starts))
         alone = f"Change the {self.covariate.label} alone, there and back, with everything else constant"
         return f"{next(known, alone)}: does the {self.label} follow?"
 
@@ -146,7 +144,7 @@ def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | No
     unexplained = unexplained_of(engine, fit, ~engine.rows)
     thin, at = engine.thinned(fit, settings.VARYING_ROWS)
     if at is not fit:  # that is the optimum for all readings, not for these
-        at = thin.linear_fit(at, weights=at.weights, inflation=at.inflation)
+        at = thin.linear_fit(at, **at.frozen)
     residual, jacobian = at.whitened()
     whitened = jacobian * at.prior_sd
     columns = derivatives = np.nan_to_num(at.jacobian_all).reshape(*at.residual.shape, -1) * at.prior_sd

@@ -76,8 +76,8 @@ def fit(
         return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
-        frozen = {"weights": like.weights, "inflation": like.inflation} if like else given
-        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **frozen)
+        kept = like.frozen if like else given
+        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept)
 
     start = _with_frame(model(), priors, noise, positions, rows, **given)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
@@ -157,21 +157,9 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
                 break
     except ValueError as error:
         raise InputError([Problem(line) for line in str(error).splitlines()]) from None
-    return Fit(
-        priors,
-        noise,
-        positions,
-        core,
-        model,
-        excluded,
-        values=core.values,
-        sd=core.sd,
-        covariance=core.covariance,
-        ratio=core.ratio,
-        starts=core.starts,
-        warnings=[*core.warnings, *_exclusion_warnings(excluded)],
-        seconds=perf_counter() - began,
-    )
+    own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
+    warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded)], perf_counter() - began
+    return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
 
 
 def _as_function(model: ResidualModel):

@@ -102,6 +102,11 @@ class Fit:
         """Rows that were fitted (M,)."""
         return (self.weights > 0).any(axis=1)
 
+    @property
+    def frozen(self) -> dict[str, Array]:
+        """Options of fits that keep its weights and inflation, so that their evidences can be compared."""
+        return {"weights": self.weights, "inflation": self.inflation}
+
     def without_readings(self) -> "Fit":
         """Its values and statistics alone: small, however many rows there are. It has no residual."""
         public = (name for name in dir(self.core) if not name.startswith("_"))
