@@ -227,8 +227,8 @@ def _with_rivals(items: list[Dependence], others: list[Dependence], error: Array
         return fields / np.maximum(np.linalg.norm(fields, axis=1, keepdims=True), 1e-300)
 
     alike = directions(items) @ directions(others).T >= settings.SAME_ERROR
-    names = [[other.label for other, same in zip(others, row, strict=True) if same] for row in alike]
-    return [
-        replace(item, indistinct=tuple(name for name in rivals if name != item.label))
-        for item, rivals in zip(items, names, strict=True)
-    ]
+    found = []
+    for item, row in zip(items, alike, strict=True):
+        rivals = (other.label for other, same in zip(others, row, strict=True) if same and other.label != item.label)
+        found.append(replace(item, indistinct=tuple(rivals)))
+    return found

@@ -19,7 +19,8 @@ _MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
 
 def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
     """Every fault of a parsed file, each once. `errors`: those that pydantic found, field by field."""
-    tubes = _tubes(data)
+    listed = data.get("tubes")
+    tubes = [_mapping(tube) for tube in listed] if isinstance(listed, list) else []
     missing = [error["loc"] for error in errors if error["type"] == "missing"]
     gravity = data.get("gravity")
     weighed = isinstance(gravity, list) and any(isinstance(g, int | float) and g != 0 for g in gravity)
@@ -151,11 +152,6 @@ def _complaint(error: dict[str, Any]) -> str:
             return f"{shown(value)} is not a number"
         case _:
             return f"{shown(value)} does not fit"
-
-
-def _tubes(data: dict) -> list[dict]:
-    tubes = data.get("tubes")
-    return [_mapping(tube) for tube in tubes] if isinstance(tubes, list) else []
 
 
 def _mapping(part: Any) -> dict:
