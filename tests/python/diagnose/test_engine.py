@@ -52,7 +52,7 @@ def test_released_memory(fit):
     """A fit at rest holds no large array, and computes the same again."""
     before = fit.jacobian_all.copy()
     assert any(np.size(part) >= before.size for part in fit.__dict__["_report"])
-    rested = fit.at_rest()
+    rested = replace(fit)
     assert "_report" not in rested.__dict__
     np.testing.assert_array_equal(rested.jacobian_all, before)
     np.testing.assert_array_equal(rested.residual, fit.residual)

@@ -67,11 +67,6 @@ class Comparison:
     revisits: Revisits
     notices: Sequence[str]  # changes made to the table before it was compared
 
-    @property
-    def noise_share(self) -> float:
-        """Fraction of the squared position error that noise of the floor's size accounts for."""
-        return min(1.0, (self.noise.rms_mm / self.position_mm.rms) ** 2) if self.position_mm.rms else 1.0
-
     def as_dict(self) -> dict:
         """The numbers for JSON, without the readings themselves."""
         data: dict = {name: getattr(self, name) for name in NUMBERS}

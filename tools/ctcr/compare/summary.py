@@ -54,7 +54,8 @@ def headline(c: Comparison) -> str:
     source = "scatter at rest" if noise.source == "rest" else "as stated"
     if noise.source == "revisits":
         source = f"{noise.pairs} revisits from the same direction, ± {noise.uncertainty_mm * np.sqrt(3):.2g} mm"
-    size, left = f"{mm(noise.rms_mm)} RMS ({source})", most(1 - c.noise_share)
+    size, by_noise = f"{mm(noise.rms_mm)} RMS ({source})", (noise.rms_mm / p.rms) ** 2 if p.rms else 1.0
+    left = most(1 - min(1.0, by_noise))
     if noise.source == "revisits" and noise.axis_mm > settings.NOTABLE * noise.stated_axis_mm:
         stated = mm(noise.stated_axis_mm * 3**0.5)
         return text + (

@@ -1,6 +1,6 @@
 """The whole diagnosis: which effects are missing, judged on runs that no fit has seen."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -84,10 +84,9 @@ class Diagnosis:
         return 1e3 * rms(accepted.residual, self.judged)
 
     def release_memory(self) -> None:
-        """Drops what its fits can compute again."""
-        self.calibrated, self.with_effects, self.final = (
-            fit.at_rest() for fit in (self.calibrated, self.with_effects, self.final)
-        )
+        """Drops what its fits can compute again, as a copy of a fit has no cached residual."""
+        fits = self.calibrated, self.with_effects, self.final
+        self.calibrated, self.with_effects, self.final = map(replace, fits)
 
     def parameters(self, accepted: Accepted) -> dict[str, float]:
         """Fitted values, and those of its choices, by name without the id."""

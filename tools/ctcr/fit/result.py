@@ -114,10 +114,6 @@ class Fit:
         core = SimpleNamespace(**{name: value for name, value in found.items() if not callable(value)})
         return replace(self, core=core, model=None, positions=None)
 
-    def at_rest(self) -> "Fit":
-        """Itself without what it can compute again of its readings."""
-        return replace(self)
-
     def _activate_all(self) -> None:
         """Activates all rows but the excluded ones: those that were not fitted, too."""
         solved = np.ones(len(self.weights), bool)
