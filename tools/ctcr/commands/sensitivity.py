@@ -31,7 +31,7 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
     from ctcr.robot import robot_file
     from ctcr.sensitivity import closed_loop as closed
     from ctcr.sensitivity import open_loop as opened
-    from ctcr.sensitivity import report
+    from ctcr.sensitivity import terminal
     from ctcr.sensitivity.ranges import all_varied
     from ctcr.show.output import Progress
     from ctcr.track import scenario as scenario_file
@@ -53,5 +53,5 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
             found["closed_loop"] = closed.study(loaded, varied, wanted, advance=progress.advance, **chosen)
     source = robot + (f" in {closed_loop}" if closed_loop else "")
     out.write_report("sensitivity.report", found, source, accuracy=accuracy)
-    out.write_json(report.as_data(loaded.name, found, accuracy))
-    report.show(out.console, found, accuracy)
+    out.write_json(terminal.as_data(loaded.name, found, accuracy))
+    terminal.show(out.console, found, accuracy)
