@@ -27,7 +27,8 @@ bool run_newton(int passes) {
     for (std::size_t i = 0; i < solved.configurations.size(); ++i) {
       const Configuration& c = solved.configurations[i];
       ctcr::evaluate<Case::derivatives, loading, ctcr::MagnusRk4>(solved.model.coefficients(), c.joints, c.load,
-                                                                  solved.workspaces[i].guess, 1, evaluation);
+                                                                  solved.workspaces[i].guess, solved.workspaces[i].steps,
+                                                                  evaluation);
       good = good && evaluation.residual < 1e-9;
     }
   return good;
@@ -60,7 +61,7 @@ bool run_effects(int passes) {
     for (std::size_t i = 0; i < n_configurations; ++i) {
       const Configuration& c = configurations[i];
       ctcr::evaluate<all, ctcr::Loading::weight, ctcr::MagnusRk4>(model.coefficients(), c.joints, c.load,
-                                                                  workspaces[i].guess, 1, evaluation);
+                                                                  workspaces[i].guess, workspaces[i].steps, evaluation);
       converged += evaluation.residual < 1e-9;
     }
   return converged >= passes * n_configurations * 97 / 100;

@@ -31,7 +31,7 @@ TEST(RelativeTorsion, Derivatives) {
     RecordedPrediction<3, Catalogue> prediction;
     const auto torsion = [&](const System<3, Catalogue>& now) {
       EXPECT_EQ(predict(now, row, now.model.effects().history(), ws, prediction), Status::ok);
-      return relative_torsion(prediction.model, ws, now.settings.steps, {});
+      return relative_torsion(prediction.model, ws, {});
     };
     (void)torsion(system);
     std::vector<int> parameters{V::index(Parameter::curvature, 0),   V::index(Parameter::youngs_modulus, 1),
@@ -43,7 +43,7 @@ TEST(RelativeTorsion, Derivatives) {
     for (int j = 0; j < int(parameters.size()); ++j)
       variables.put(first_variable<3> + j, j, parameters[std::size_t(j)]);
     const auto derivatives = detail::torsion_derivatives(system, row, prediction, ws, variables);
-    const auto by_friction_alone = torsion_derivatives(prediction.model, ws, system.settings.steps);
+    const auto by_friction_alone = torsion_derivatives(prediction.model, ws);
     EXPECT_LT((derivatives.by_friction - by_friction_alone.by_friction).norm(), 1e-10);
     const auto check = [&](const auto& column, double change, double tolerance, const auto& moved) {
       const auto more = torsion(moved(change)), less = torsion(moved(-change));

@@ -94,7 +94,7 @@ TEST(SolveFriction, Consistency) {
       RecordedPrediction<2, Catalogue> p;
       ASSERT_EQ(predict(walk.system, walk.rows[row], history[row], ws, p), Status::ok);
       const auto& torsion = walk.rows[row].torsion.back();
-      const auto found = relative_torsion(p.model, ws, walk.system.settings.steps, torsion);
+      const auto found = relative_torsion(p.model, ws, torsion);
       for (std::size_t k = 0; k < torsion.size(); ++k) EXPECT_NEAR(found[k], torsion[k], 2e-4) << row;
       changed = std::max(changed, std::abs(torsion[0] - plain[row].torsion.back()[0]));
     }

@@ -138,14 +138,21 @@ private:
     if constexpr (!Fx::none) {
       const auto equilibrium = [&](const auto& effects, const Joints<N>& tubes) {
         to.model = Model<N, Fx>(system_.model.robot(), effects);
-        const Status status = step<Derivatives::none>(to.model, tubes, load, to.ws, to.solution, system_.settings);
-        return has_equilibrium(status) ? &to.model : nullptr;
+        return has_equilibrium(follow<Derivatives::none>(to, tubes, load)) ? &to.model : nullptr;
       };
-      q = to.live.advance(motors, time_, to.ws, system_.settings.steps, equilibrium);
+      q = to.live.advance(motors, time_, to.ws, equilibrium);
       to.model = Model<N, Fx>(system_.model.robot(), to.live.effects());
     }
-    (void)step<D>(to.model, q, load, to.ws, to.solution, system_.settings);
+    (void)follow<D>(to, q, load);
     return q;
+  }
+
+  /// Equilibrium of the model at the joints of the tubes: by a control step, or anew where that does not reach it.
+  template <Derivatives D>
+  Status follow(Moving& to, const Joints<N>& q, const TipLoad& load) const noexcept {
+    const Status status = step<D>(to.model, q, load, to.ws, to.solution, system_.settings);
+    if (status != Status::needs_solve) return status;
+    return solve<D>(to.model, q, load, to.ws, to.solution, system_.settings);
   }
 
   /// What the tip has done in the last `reading_age`, by the model [m].

@@ -16,11 +16,10 @@ public:
   explicit LiveEffects(const Model<N, Fx>& model) noexcept : effects_(model.effects()), radius_(model.robot()) {}
 
   /// Takes the next joints of the motors, and their time [s]; returns the joints that the tubes have.
-  /// @param steps        of integration, per segment
   /// @param equilibrium  equilibrium(effects, joints of the tubes): the model with these effects, its equilibrium left in
   ///                     ws; or null if none
   /// Real time: as `equilibrium`, which is called at most 9 times.
-  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, int steps,
+  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws,
                     const auto& equilibrium) noexcept {
     const std::size_t row = add(motors, time);
     const auto effects_at = [&](const RelativeTorsion<N>& torsion) {
@@ -35,8 +34,8 @@ public:
         const Model<N, Fx>* last = nullptr;
         const auto found = [&](const Effects& with) { return last = equilibrium(with, tubes(with, motors)); };
         rows_[row].jumps = jumps_;  // of the period before: they change slowly
-        effects_ = torsion_solver_.solve(found, effects_at, ws, steps, torsion_, most);
-        if (last) jumps_ = moment_jumps(*last, ws, steps, jumps_);
+        effects_ = torsion_solver_.solve(found, effects_at, ws, torsion_, most);
+        if (last) jumps_ = moment_jumps(*last, ws, jumps_);
         rows_[row].torsion = torsion_;
         return tubes(effects_, motors);
       }
@@ -47,7 +46,7 @@ public:
 
   /// The same of tubes that are stiff in torsion. Real time: yes.
   Joints<N> advance(const Joints<N>& motors, double time) noexcept {
-    return advance(motors, time, {}, 1,
+    return advance(motors, time, {},
                    [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
   }
 

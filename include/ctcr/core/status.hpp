@@ -8,8 +8,10 @@ enum class [[nodiscard]] Status : std::uint8_t {
   ok,                   ///< the outputs solve the model to the asked tolerance
   joints_out_of_order,  ///< an outer tube is grasped behind, or reaches beyond, an inner one; or beta > 0
   tip_behind_plate,     ///< a tube's tip is behind the front plate
-  not_converged,        ///< iteration limit reached; the outputs are the best iterate
-  singular,             ///< near a bifurcation: the equilibrium is about to snap, derivatives are unbounded
+  not_converged,        ///< no equilibrium found; the outputs are the best iterate
+  singular,             ///< solved, but about to snap: near a bifurcation derivatives are unbounded
+  inaccurate,           ///< solved, but integration errs by more than the asked accuracy in the most steps allowed
+  needs_solve,          ///< a control step has spent its evaluations: solve() has to be asked
   not_finite,           ///< an input or a result is NaN or infinite
 };
 
@@ -24,6 +26,8 @@ constexpr const char* to_string(Status status) noexcept {
     case Status::tip_behind_plate: return "tip behind the plate";
     case Status::not_converged: return "not converged";
     case Status::singular: return "singular: near a bifurcation";
+    case Status::inaccurate: return "inaccurate: integration errs by more than asked";
+    case Status::needs_solve: return "needs solve: the control step has spent its evaluations";
     case Status::not_finite: return "not finite";
   }
   return "unknown";

@@ -27,9 +27,9 @@ class TipSystem {
 public:
   using V = TipVariables<N, Loaded>;
 
-  TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int end) noexcept {
+  TipSystem(const Robot<N>& robot, const Workspace<N>& at, int tube, int end) noexcept {
     for (int pass = 0; pass < V::passes(end); ++pass)
-      rotation_ = TipPass<N, Loaded, Stepper>(robot, at, tube, steps, pass * V::pass_lanes).write(row_);
+      rotation_ = TipPass<N, Loaded, Stepper>(robot, at, tube, pass * V::pass_lanes).write(row_);
     constexpr auto lane = [](int j) constexpr { return j; };
     det_ = eliminate<V::unknowns>(row_, lane);
     if constexpr (Loaded) det_ = -det_;  // three rows carry the opposite sign
@@ -96,31 +96,31 @@ void put_gravity(const TipSystem<N, true, Stepper>& system, TipDerivatives<N>& o
 
 /// The workspace with the tip frame as it is: its guess may leave turns open that only other loads make felt.
 template <class Stepper, int N>
-Workspace<N> with_tip_frame(const Robot<N>& robot, const Workspace<N>& ws, int steps) noexcept {
+Workspace<N> with_tip_frame(const Robot<N>& robot, const Workspace<N>& ws) noexcept {
   Workspace<N> found = ws;
   typename TipVariables<N, true>::Row unused[TipVariables<N, true>::rows];
-  if (robot.gravity.isZero(0.0)) found.guess.rotation = TipPass<N, true, Stepper>(robot, ws, 0, steps, 0).write(unused);
+  if (robot.gravity.isZero(0.0)) found.guess.rotation = TipPass<N, true, Stepper>(robot, ws, 0, 0).write(unused);
   return found;
 }
 
 inline Status status_of(double det) noexcept { return det < singular_det ? Status::singular : Status::ok; }
 
 template <class Stepper, int N>
-Status differentiate_unloaded(const Robot<N>& robot, const Workspace<N>& ws, int tube, int steps,
+Status differentiate_unloaded(const Robot<N>& robot, const Workspace<N>& ws, int tube,
                               TipDerivatives<N>& out) noexcept {
-  const TipSystem<N, false, Stepper> system(robot, ws, tube, steps, TipVariables<N, false>::count);
+  const TipSystem<N, false, Stepper> system(robot, ws, tube, TipVariables<N, false>::count);
   put_columns(system, robot, out);
   Workspace<N> found = ws;
   found.guess.rotation = system.rotation();
-  put_gravity(TipSystem<N, true, Stepper>(robot, found, tube, steps, TipVariables<N, true>::beta), out);
+  put_gravity(TipSystem<N, true, Stepper>(robot, found, tube, TipVariables<N, true>::beta), out);
   return status_of(system.det());
 }
 
 template <class Stepper, int N>
-Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int tube, int steps, TipDerivatives<N>& out,
+Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
                             Mat6* compliance) noexcept {
   using V = TipVariables<N, true>;
-  const TipSystem<N, true, Stepper> system(robot, with_tip_frame<Stepper>(robot, ws, steps), tube, steps,
+  const TipSystem<N, true, Stepper> system(robot, with_tip_frame<Stepper>(robot, ws), tube,
                                            compliance ? V::count : V::load);
   put_columns(system, robot, out);
   put_gravity(system, out);
@@ -138,21 +138,19 @@ Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int t
 /// get zero columns. Where two breakpoints coincide the derivatives are one-sided. A tube of no curvature counts as
 /// curved, for its derivatives by curvature: its curve then starts at a breakpoint that solve() does not have. Those by
 /// gravity at zero gravity are of the model with weight, integrated in as many steps.
-/// @param ws        as solve() or step() left it for this model
-/// @param tube      whose tip, 0 is the innermost   @param settings  as given to solve(); its steps are used
+/// @param ws    as solve() or step() left it for this model   @param tube  whose tip, 0 is the innermost
 /// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
 ///         last two leave zeros. Real time: yes, about N + 1 integrations with eight columns each.
 template <class Stepper = MagnusRk4, int N>
-CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
-                                       const Settings& settings = {}) noexcept {
+CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out) noexcept {
   Status status = Status::not_converged;
   const bool loaded = !model.robot().gravity.isZero(0.0) || !ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0);
   if (!ws.warm)
     out = {};
   else if (loaded)
-    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, settings.steps, out, nullptr);
+    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, out, nullptr);
   else
-    status = detail::differentiate_unloaded<Stepper>(model.robot(), ws, tube, settings.steps, out);
+    status = detail::differentiate_unloaded<Stepper>(model.robot(), ws, tube, out);
   if (out.by_joints.allFinite() && out.by_parameters.allFinite()) return status;
   out = {};
   return Status::not_finite;
@@ -162,10 +160,10 @@ CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>
 /// equations with load, which solve<Derivatives::compliance>() integrates too, whether or not there is one.
 template <class Stepper = MagnusRk4, int N>
 CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out,
-                                       Mat6& compliance, const Settings& settings = {}) noexcept {
+                                       Mat6& compliance) noexcept {
   Status status = Status::not_converged;
   if (ws.warm) {
-    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, settings.steps, out, &compliance);
+    status = detail::differentiate_loaded<Stepper>(model.robot(), ws, tube, out, &compliance);
     if (out.by_joints.allFinite() && out.by_parameters.allFinite() && compliance.allFinite()) return status;
     status = Status::not_finite;
   }

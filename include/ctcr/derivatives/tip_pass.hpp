@@ -43,7 +43,7 @@ class TipPass {
 
 public:
   /// @param first  the variables first..first + pass_lanes - 1 are differentiated along
-  TipPass(const Robot<N>& robot, const Workspace<N>& at, int tube, int steps, int first) noexcept : first_(first) {
+  TipPass(const Robot<N>& robot, const Workspace<N>& at, int tube, int first) noexcept : first_(first) {
     const Coefficients<N, S> c = coefficients(robot);
     for (int i = 0; i < N; ++i) {
       beta_[std::size_t(i)] = variable(at.q.beta[i], V::beta + i);
@@ -64,7 +64,7 @@ public:
     };
     base_ = state_at_tip(robot, at, c);
     TubeTips<N> tips;
-    (void)Rod::run(c, sort_events(c, at.q.beta), arc_length, steps, base_, frame_, tips, keep_tip);
+    (void)Rod::run(c, sort_events(c, at.q.beta), arc_length, at.steps, base_, frame_, tips, keep_tip);
   }
 
   /// Writes the tangents of the equations and of the pose into the rows. The equations: the tip turns as

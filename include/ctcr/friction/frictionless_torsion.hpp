@@ -37,8 +37,8 @@ void set_frictionless_torsion(const System<N>& system, std::span<RecordedRow<N>>
       const RecordedRow<N> here = sample_of<N>(rows, row, k);
       if (solve(system.model, joints(system.transmission, here.theta), here.load, ws, solution, system.settings) ==
           Status::ok) {
-        torsion = relative_torsion(system.model, ws, system.settings.steps, torsion);
-        jumps = moment_jumps(system.model, ws, system.settings.steps, jumps);
+        torsion = relative_torsion(system.model, ws, torsion);
+        jumps = moment_jumps(system.model, ws, jumps);
         if (!known)
           for (RecordedRow<N>& earlier : rows.first(row + 1))
             std::ranges::fill(earlier.torsion, torsion), std::ranges::fill(earlier.jumps, jumps);

@@ -17,7 +17,7 @@ TorsionDerivatives<N> torsion_derivatives(const System<N, Fx>& system, const Rec
                                           const Variables<N, Fx>& variables) noexcept {
   const auto& effects = prediction.model.effects();
   return ctcr::torsion_derivatives<SystemParameters<N, Fx>::count>(
-      prediction.model, ws, system.settings.steps, variables.size(), [&](const auto& window) {
+      prediction.model, ws, variables.size(), [&](const auto& window) {
         using S = typename std::remove_cvref_t<decltype(window)>::S;
         auto in = rod_inputs<S>(system, here, prediction.load, variables.seeding(window), [&](auto& beta, auto& alpha) {
           variables.template effects<typename Fx::OnJoints>(effects, window).actuate(here.at, beta, alpha);
@@ -76,7 +76,7 @@ public:
     Vec::Map(torsion.data()) += difference_;
     effects_ = torsion_solver_.solve([&](const Effects& with) { return predicted(system, sample, with); },
                                      [&](const RelativeTorsion<N>& with) { return effects_at(with); }, ws_,
-                                     system.settings.steps, torsion, most);
+                                     torsion, most);
     difference_ = Vec::Map(torsion.data()) - Vec::Map(given.data());
     here_.torsion = torsion;
   }

@@ -42,27 +42,26 @@ private:
 
 /// Integrates the rod in the equilibrium of ws once more. @param met  as EffectRod::run() takes it
 template <int N, class Fx>
-void visit_breakpoints(const Model<N, Fx>& model, const Workspace<N>& ws, int steps, const auto& met) noexcept {
+void visit_breakpoints(const Model<N, Fx>& model, const Workspace<N>& ws, const auto& met) noexcept {
   using Rod = RodInEquilibrium<N, Fx>;
   const Rod rod(model, ws.q, ws.load);
   auto y = rod.at_tip(ws.guess);
   Frame<double> frame;
-  rod.rod.run(rod.events, steps, y, frame, met, typename Rod::NoNode{});
+  rod.rod.run(rod.events, ws.steps, y, frame, met, typename Rod::NoNode{});
 }
 
 }  // namespace detail
 
 /// Relative torsion in equilibrium.
-/// @param ws     the model's equilibrium, as solve() left it; else `last` is returned
-/// @param steps  per segment, with which it was solved
-/// @param last   of the configuration before; this one differs from it by less than half a turn
+/// @param ws    the model's equilibrium, as solve() left it; else `last` is returned
+/// @param last  of the configuration before; this one differs from it by less than half a turn
 /// Real time: yes; one integration.
 template <int N, class Fx>
-[[nodiscard]] RelativeTorsion<N> relative_torsion(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+[[nodiscard]] RelativeTorsion<N> relative_torsion(const Model<N, Fx>& model, const Workspace<N>& ws,
                                                   RelativeTorsion<N> last) noexcept {
   if (!ws.warm) return last;
   detail::ContactAngles<N, double> angles;
-  detail::visit_breakpoints(model, ws, steps, [&](int breakpoint, const auto&, const auto& state, const auto&) {
+  detail::visit_breakpoints(model, ws, [&](int breakpoint, const auto&, const auto& state, const auto&) {
     angles(breakpoint, state);
   });
   for (int i = 0; i + 1 < N; ++i) {
@@ -78,12 +77,12 @@ template <int N, class Fx>
 /// Jumps of the bending moments in equilibrium; arguments as above, but without an equilibrium `last` is returned.
 /// Real time: yes; one integration.
 template <int N, class Fx>
-[[nodiscard]] MomentJumps<N> moment_jumps(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+[[nodiscard]] MomentJumps<N> moment_jumps(const Model<N, Fx>& model, const Workspace<N>& ws,
                                           const MomentJumps<N>& last) noexcept {
   if (!ws.warm) return last;
   MomentJumps<N> jumps;
   jumps.fill(0);
-  detail::visit_breakpoints(model, ws, steps, [&](int breakpoint, const auto&, const auto&, const auto& moments) {
+  detail::visit_breakpoints(model, ws, [&](int breakpoint, const auto&, const auto&, const auto& moments) {
     const auto [far, near] = moments();
     double dx = 0, dy = 0;
     for (std::size_t i = 0; i < N; ++i) {
@@ -116,7 +115,7 @@ inline constexpr int first_variable = N + 2 + Contacts<N>::count;
 ///                   first_variable<N> on
 /// Real time: yes without variables, else it allocates; an integration for each 16 of unknowns, contacts and variables.
 template <int Most, int N, class Fx>
-[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws, int steps,
+[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws,
                                                         int variables, const auto& inputs) noexcept {
   using Window = detail::Window<4>;
   using Pass = detail::EffectPass<N, Fx, Window::groups>;
@@ -141,7 +140,7 @@ template <int Most, int N, class Fx>
         for (int k = 0; k < contacts; ++k) window.add(effect.history.state[std::size_t(k)], unknowns + k, 1);
     });
     detail::ContactAngles<N, S> angles;
-    const Pass pass(in, sort_events(model.coefficients().plain, ws.q.beta), ws.guess, 0, steps, window,
+    const Pass pass(in, sort_events(model.coefficients().plain, ws.q.beta), ws.guess, 0, ws.steps, window,
                     [&](int breakpoint, const auto& state) { angles(breakpoint, state); });
     LaneRow<Window::groups> row[Pass::rows];
     pass.write(row, 0);
@@ -162,11 +161,10 @@ template <int Most, int N, class Fx>
 
 /// By friction alone. Real time: yes.
 template <int N, class Fx>
-[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws,
-                                                        int steps) noexcept {
+[[nodiscard]] TorsionDerivatives<N> torsion_derivatives(const Model<N, Fx>& model, const Workspace<N>& ws) noexcept {
   using S = typename detail::Window<4>::S;
   const RodInputs<N, S, Fx> in = detail::constant_inputs<S>(model.coefficients(), ws.q, ws.load);
-  return torsion_derivatives<0>(model, ws, steps, 0, [&](const auto&) { return in; });
+  return torsion_derivatives<0>(model, ws, 0, [&](const auto&) { return in; });
 }
 
 }  // namespace ctcr

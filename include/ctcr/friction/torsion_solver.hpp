@@ -21,16 +21,15 @@ class TorsionSolver {
 public:
   /// @param equilibrium  equilibrium(effects): the model with these effects, its equilibrium left in ws; or null if none
   /// @param effects_at   effects_at(torsion): the effects after the motion to this sample, if this is the torsion there
-  /// @param steps        of integration, per segment
   /// @param torsion      in: a guess; out: the solution [rad], unchanged without an equilibrium
   /// @param most         equilibria that are tried
   /// @return the effects at the solution. Real time: as equilibrium and effects_at.
-  Effects solve(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, int steps,
+  Effects solve(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws,
                 RelativeTorsion<N>& torsion, int most) noexcept {
     if constexpr (contacts == 0)
       return effects_at(torsion);
     else
-      return iterate(equilibrium, effects_at, ws, steps, torsion, most);
+      return iterate(equilibrium, effects_at, ws, torsion, most);
   }
 
   /// Takes the derivative of the torsion by friction, computed at a sample close to the next one.
@@ -49,13 +48,13 @@ private:
     Vec residual = Vec::Zero();  ///< torsion of the equilibrium with these effects, minus this torsion
   };
 
-  Effects iterate(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, int steps,
+  Effects iterate(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws,
                   RelativeTorsion<N>& torsion, int most) noexcept {
     constexpr double tolerance = 1e-4;  // [rad]
     const auto evaluate = [&](Iterate& at) {
       const Model<N, Fx>* model = equilibrium(at.effects);
       if (model == nullptr) return false;
-      at.residual = as_vector(relative_torsion(*model, ws, steps, at.torsion)) - as_vector(at.torsion);
+      at.residual = as_vector(relative_torsion(*model, ws, at.torsion)) - as_vector(at.torsion);
       return true;
     };
     Iterate best;
@@ -78,7 +77,7 @@ private:
       } else {
         if (worse) {
           if (const Model<N, Fx>* model = equilibrium(best.effects))
-            set_derivative(torsion_derivatives(*model, ws, steps).by_friction);
+            set_derivative(torsion_derivatives(*model, ws).by_friction);
           derivative_is_new = true;
         }
         step = newton_step(best, effects_at);

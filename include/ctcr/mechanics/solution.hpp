@@ -5,14 +5,9 @@
 #include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
 #include "ctcr/mechanics/evaluation.hpp"
+#include "ctcr/mechanics/settings.hpp"
 
 namespace ctcr {
-
-struct Settings {
-  int max_iterations = 50;   ///< evaluations allowed to each attempt of a solve
-  double tolerance = 1e-10;  ///< on ||b|| [rad], and on the force of contacts at the tip [N]
-  int steps = 1;             ///< integration steps per segment, >= 1
-};
 
 /// The answer of a solve or a step. Every field is defined whatever the status.
 template <int N>
@@ -21,6 +16,9 @@ struct Solution {
   int iterations = 0;                                         ///< evaluations used
   double residual = std::numeric_limits<double>::infinity();  ///< ||b|| [rad]
   double stability = 0;  ///< det B_u: 1 without interaction between tubes or load, 0 where the robot snaps or buckles
+  /// Estimated error of the tip position by the steps of integration [m], as found where it was last checked: at a solve,
+  /// and again whenever the robot has moved far. Infinity: not checked.
+  double integration_error = std::numeric_limits<double>::infinity();
 
   Vec3 position = Vec3::Zero();      ///< tip, base frame [m]
   Mat3 rotation = Mat3::Identity();  ///< R_base_tip: material frame of tube 1 at its tip
@@ -43,10 +41,18 @@ struct Workspace {
   bool warm = false;          ///< whether the guess may be used
   bool knows_joints = false;  ///< whether the change of the guess with the joints is known
   bool knows_load = false;    ///< and with the load
+  int steps = 1;              ///< integration steps per segment that the guess belongs to
+  /// Error of the tip position by these steps [m], and how far the robot has moved since it was found: turns of the tip
+  /// and of the tubes [rad], travel as a part of the robot's length.
+  double integration_error = std::numeric_limits<double>::infinity(), moved = 0;
   /// Change of the unknowns (turn of the tip in base axes, psi_2..N) by beta, alpha, force, moment.
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 
-  void reset() noexcept { warm = knows_joints = knows_load = false; }
+  void reset() noexcept {
+    warm = knows_joints = knows_load = false;
+    steps = 1;
+    integration_error = std::numeric_limits<double>::infinity();
+  }
   /// Lets the next solve begin at a guess, whatever was solved before.
   void begin_at(const TipGuess<N>& other) noexcept {
     reset();

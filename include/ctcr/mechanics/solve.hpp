@@ -2,8 +2,8 @@
 // Newton's method on the shooting problem, and its real-time form: one evaluation per control period.
 #include <algorithm>
 
-#include "ctcr/mechanics/effect_evaluation.hpp"
 #include "ctcr/mechanics/solution.hpp"
+#include "ctcr/mechanics/step_count.hpp"
 
 namespace ctcr {
 namespace detail {
@@ -14,10 +14,11 @@ inline constexpr double step_limit = 1.0;
 inline constexpr double singular_det = 1e-2;
 /// Starts from anywhere before a solve is given up.
 inline constexpr int scattered_starts = 16;
-/// ||b|| up to which the pose after one evaluation is good to about ||b||^2 [rad].
-inline constexpr double one_step_residual = 0.05;
-/// Newton step up to which that holds: a longer one from so small a residual comes near a fold [rad].
-inline constexpr double one_step_change = 0.1;
+/// Part of det B_u up to which a Newton step may be the last of a control step [rad]. Ref: Kantorovich's theorem: Newton's
+/// method converges where that ratio is small against the curvature of the residual, which is of the order of 1.
+inline constexpr double last_step = 0.01;
+/// Way of the robot after which the error of its integration is estimated anew [rad], or as a part of its length.
+inline constexpr double checked_range = 0.3;
 
 template <int N>
 inline TipGuess<N> straight_guess(const Joints<N>& q) noexcept {
@@ -60,10 +61,10 @@ inline VecN<N + 2> newton_step(const Ev& ev) noexcept {
 /// Damped Newton iteration from `guess`. On return `ev` belongs to `guess`.
 /// @return evaluations used; ev.residual tells whether it converged
 template <Derivatives D, Loading L, class Stepper, int N, class C>
-inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, TipGuess<N>& guess,
-                  Evaluation<N, L, D>& ev) noexcept {
+inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int steps,
+                  TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
   int used = 1;
-  evaluate<D, L, Stepper>(c, q, load, guess, settings.steps, ev);
+  evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
   if constexpr (L == Loading::none) guess.rotation = ev.rotation;
   while (!(ev.residual < settings.tolerance) && used < settings.max_iterations) {
     const double before = ev.residual;
@@ -75,13 +76,13 @@ inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Set
     bool accepted = false;
     for (int halving = 0; halving < 6 && used < settings.max_iterations && !accepted; ++halving, scale *= 0.5) {
       next = moved<N>(guess, dx, scale);
-      evaluate<D, L, Stepper>(c, q, load, next, settings.steps, ev);
+      evaluate<D, L, Stepper>(c, q, load, next, steps, ev);
       ++used;
       accepted = ev.residual < (1.0 - 0.1 * scale) * before || ev.residual < settings.tolerance;
     }
     if (!(ev.residual < before)) {
       // Stay at the best iterate; rounding can stop the descent just above the tolerance.
-      evaluate<D, L, Stepper>(c, q, load, guess, settings.steps, ev);
+      evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
       return used + 1;
     }
     guess = next;
@@ -107,29 +108,31 @@ inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weig
 
 /// Unloaded equilibrium from the angles of `guess`; the tip frame follows without iteration.
 template <class Stepper, int N, class C>
-inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, TipGuess<N>& guess) noexcept {
+inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, int steps,
+                          TipGuess<N>& guess) noexcept {
   if constexpr (has_effects<C>) {
     Evaluation<N, Loading::weight, Derivatives::none> ev;
-    return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, guess, ev);
+    return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, steps, guess,
+                                                               ev);
   } else {
     Evaluation<N, Loading::none, Derivatives::none> ev;
-    return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, guess, ev);
+    return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, steps, guess, ev);
   }
 }
 
 /// Brings the load, or if that fails the precurvature, from nothing to its full size in small steps.
 template <Loading L, class Stepper, int N, class C>
 inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
-                        bool ramp_curvature, TipGuess<N>& guess) noexcept {
+                        int steps, bool ramp_curvature, TipGuess<N>& guess) noexcept {
   constexpr int ramp_steps = 16;
   Evaluation<N, L, Derivatives::none> ev;
   int used = 0;
   guess = straight_guess(q);
-  if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, guess);
+  if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, steps, guess);
   for (int k = 1; k <= ramp_steps; ++k) {
     const double part = double(k) / ramp_steps;
     used += newton<Derivatives::none, L, Stepper>(scaled(c, part, ramp_curvature ? part : 1), q,
-                                                  TipLoad{load.force * part, load.moment * part}, settings, guess, ev);
+                                                  TipLoad{load.force * part, load.moment * part}, settings, steps, guess, ev);
   }
   return used;
 }
@@ -220,40 +223,84 @@ inline TipGuess<N> predicted_guess(const Workspace<N>& ws, const Joints<N>& q, c
   return size < step_limit ? moved<N>(ws.guess, dx, 1.0) : ws.guess;
 }
 
+/// Way between two guesses: turn of the tip and of the tubes [rad].
+template <int N>
+inline double distance(const TipGuess<N>& a, const TipGuess<N>& b) noexcept {
+  // Two frames that differ by a turn t differ by 2 sqrt(2) sin(t / 2) in the norm of their entries.
+  return std::sqrt(0.5 * (a.rotation - b.rotation).squaredNorm() + (a.psi - b.psi).squaredNorm());
+}
+
+/// Length of the robot beyond the front plate [m].
+template <int N, class Fx>
+inline double length_of(const Model<N, Fx>& model, const Joints<N>& q) noexcept {
+  return model.robot().tubes[0].length + q.beta[0];
+}
+
+/// Whether the error of integration is estimated and kept. Schemes for comparison take their steps as they are told.
+template <class Stepper>
+inline bool takes_more_steps(const Settings& settings) noexcept {
+  return !requires { Stepper::general_equations; } && settings.accuracy < std::numeric_limits<double>::infinity();
+}
+
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                        Solution<N>& out, const Settings& settings) noexcept {
   const auto& c = model.coefficients();
+  const double length = length_of(model, q), allowed = settings.accuracy * length;
+  const bool refines = takes_more_steps<Stepper>(settings);
+  const TipGuess<N> last = ws.guess;
+  const double travelled = ws.moved + (q.beta - ws.q.beta).norm() / length, error_there = ws.integration_error;
+  const int steps_there = ws.steps;
+  int steps = settings.steps;
+  if (refines) steps = std::max({steps, first_steps(c, q.beta, load, settings.max_steps), steps_there});
   Evaluation<N, L, D> ev;
   TipGuess<N> guess;
   const auto converged = [&] { return ev.residual < settings.tolerance && ev.det > 0; };
-  const auto attempt = [&] { out.iterations += newton<D, L, Stepper>(c, q, load, settings, guess, ev); };
+  const auto attempt = [&] { out.iterations += newton<D, L, Stepper>(c, q, load, settings, steps, guess, ev); };
   const auto attempt_from = [&](const TipGuess<N>& start) {
     guess = start;
-    if constexpr (L != Loading::none) out.iterations += unloaded_guess<Stepper>(c, q, settings, guess);
+    if constexpr (L != Loading::none) out.iterations += unloaded_guess<Stepper>(c, q, settings, steps, guess);
     attempt();
   };
-  const bool warm = ws.warm;
-  if (warm) {
-    guess = predicted_guess(ws, q, load);
-    attempt();
-  }
-  if (!warm || !converged()) attempt_from(straight_guess(q));
-  for (const bool ramp_curvature : {false, true}) {
-    if (converged() || (L == Loading::none && !ramp_curvature)) continue;
-    out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, ramp_curvature, guess);
-    attempt();
-  }
-  if (N > 1 && !converged()) {
-    // A fold, or an unstable equilibrium: those that are stable lie to its sides.
-    const TipGuess<N> found = guess;
-    for (int k = 1; k <= scattered_starts && !converged(); ++k) attempt_from(scattered_guess(q, k));
-    if (!converged()) {
-      guess = found;
+  const auto search = [&](bool from_guess) {
+    if (from_guess) attempt();
+    if (!from_guess || !converged()) attempt_from(straight_guess(q));
+    for (const bool ramp_curvature : {false, true}) {
+      if (converged() || (L == Loading::none && !ramp_curvature)) continue;
+      out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, steps, ramp_curvature, guess);
       attempt();
+    }
+    if (N > 1 && !converged()) {
+      // A fold, or an unstable equilibrium: those that are stable lie to its sides.
+      const TipGuess<N> found = guess;
+      for (int k = 1; k <= scattered_starts && !converged(); ++k) attempt_from(scattered_guess(q, k));
+      if (!converged()) {
+        guess = found;
+        attempt();
+      }
+    }
+  };
+  if (ws.warm) guess = predicted_guess(ws, q, load);
+  search(ws.warm);
+  double error = std::numeric_limits<double>::infinity(), moved = 0;
+  if (refines && converged()) {
+    const double way = travelled + distance(last, guess);
+    if (steps == steps_there && error_there <= allowed && way < checked_range) {
+      error = error_there;
+      moved = way;
+    }
+    while (!(error <= allowed) && converged()) {
+      error = integration_error<L, Stepper>(c, q, load, guess, steps, ev.position);
+      ++out.iterations;
+      if (error <= allowed || steps >= settings.max_steps) break;
+      steps = refined_steps(steps, error, allowed, settings.max_steps);
+      search(true);
     }
   }
   publish(ev, q, load, guess, guess, ws, out);
+  ws.steps = steps;
+  ws.moved = moved;
+  out.integration_error = ws.integration_error = error;
   const bool finite = std::isfinite(ev.residual) && std::isfinite(ev.det) && ev.position.allFinite() &&
                       out.jacobian.allFinite() && out.compliance.allFinite();
   if (!finite) {
@@ -265,36 +312,69 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   }
   if (!(ev.residual < settings.tolerance)) {
     ws.reset();
-    return std::abs(ev.det) < singular_det ? Status::singular : Status::not_converged;
+    return Status::not_converged;
   }
-  return ev.det < singular_det ? Status::singular : Status::ok;
+  if (ev.det < singular_det) return Status::singular;
+  return refines && !(error <= allowed) ? Status::inaccurate : Status::ok;
 }
 
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                       Solution<N>& out, const Settings& settings) noexcept {
-  if (!ws.warm) return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
   using Ev = Evaluation<N, L, D>;
+  constexpr bool jacobian = Ev::Col::jacobian;
+  const auto spent = [&] {
+    const int iterations = out.iterations;
+    out = Solution<N>{};
+    out.iterations = iterations;
+    return Status::needs_solve;
+  };
+  if (!ws.warm) return spent();
+  const auto& c = model.coefficients();
+  const int steps = std::max(ws.steps, settings.steps);
   Ev ev;
-  const TipGuess<N> guess = predicted_guess(ws, q, load);
-  evaluate<D, L, Stepper>(model.coefficients(), q, load, guess, settings.steps, ev);
-  out.iterations = 1;
-  const VecN<N + 2> dx = newton_step<Ev, N>(ev);
-  if (!(ev.residual < one_step_residual && dx.squaredNorm() < one_step_change * one_step_change))
-    return solve_as<D, L, Stepper>(model, q, load, ws, out, settings);
-  TipGuess<N> next = moved<N>(guess, dx, 1.0);
-  if constexpr (L == Loading::none) next.rotation = ev.rotation;
-  publish(ev, q, load, guess, next, ws, out);
-  // The pose at the end of the Newton step: the tangent is known, so it costs nothing.
-  if constexpr (Ev::Col::turns == 3) {
-    out.rotation = next.rotation;
-  } else if constexpr (Ev::Col::jacobian) {
-    const Vec3 turn(ev.pose(3, Ev::Col::newton), ev.pose(4, Ev::Col::newton), ev.pose(5, Ev::Col::newton));
-    out.rotation = rotation_matrix(turn) * ev.rotation;
+  TipGuess<N> guess, next = predicted_guess(ws, q, load);
+  for (bool last = false; !last;) {
+    if (out.iterations == settings.evaluations) return spent();
+    guess = next;
+    evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
+    ++out.iterations;
+    const VecN<N + 2> dx = newton_step<Ev, N>(ev);
+    next = moved<N>(guess, dx, 1.0);
+    if constexpr (L == Loading::none) next.rotation = ev.rotation;
+    const double most = (jacobian ? last_step : last_step * last_step) * std::min(ev.det, 1.0);
+    last = most > 0 && dx.squaredNorm() < most * most;
   }
-  if constexpr (Ev::Col::jacobian)
-    for (int k = 0; k < 3; ++k) out.position[k] += ev.pose(k, Ev::Col::newton);
-  out.tube_tips[0] = {out.rotation, out.position};
+  // The pose at the end of the Newton step: the tangent is known, so it costs nothing.
+  Pose tip{ev.rotation, ev.position};
+  if constexpr (Ev::Col::turns == 3) {
+    tip.rotation = next.rotation;
+  } else if constexpr (jacobian) {
+    const Vec3 turn(ev.pose(3, Ev::Col::newton), ev.pose(4, Ev::Col::newton), ev.pose(5, Ev::Col::newton));
+    tip.rotation = rotation_matrix(turn) * ev.rotation;
+  }
+  if constexpr (jacobian)
+    for (int k = 0; k < 3; ++k) tip.position[k] += ev.pose(k, Ev::Col::newton);
+
+  double error = ws.integration_error, way = 0;
+  if (takes_more_steps<Stepper>(settings)) {
+    const double length = length_of(model, q), allowed = settings.accuracy * length;
+    way = ws.moved + distance(ws.guess, next) + (q.beta - ws.q.beta).norm() / length;
+    if (!(error <= allowed && way < checked_range && steps == ws.steps)) {
+      if (!jacobian || out.iterations == settings.evaluations) return spent();
+      error = integration_error<L, Stepper>(c, q, load, next, steps, tip.position);
+      ++out.iterations;
+      if (!(error <= allowed)) return spent();
+      way = 0;
+    }
+  }
+  publish(ev, q, load, guess, next, ws, out);
+  out.position = tip.position;
+  out.rotation = tip.rotation;
+  out.tube_tips[0] = tip;
+  out.integration_error = ws.integration_error = error;
+  ws.steps = steps;
+  ws.moved = way;
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
@@ -335,8 +415,10 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// @param ws    warm start of this thread; updated
 /// @param out   pose, and with D the Jacobian J (6 x 2N) and the compliance C (6 x 6); always defined
 /// @return ok; joints_out_of_order, tip_behind_plate, not_finite: input refused, nothing computed; not_converged: best
-///         iterate; singular: solved, but at a bifurcation or an unstable equilibrium
-/// Real time: yes; at most about 70 * max_iterations evaluations, 1 to 3 from a warm start.
+///         iterate; singular: solved, but about to snap; inaccurate: solved, but max_steps leave a larger error of
+///         integration than `settings.accuracy` asks for
+/// Real time: yes; at most about 70 * max_iterations evaluations for each number of steps tried, 1 to 3 from a warm start,
+/// and one more where the robot has moved by more than 0.3 rad since its integration error was last estimated.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
@@ -346,11 +428,15 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
   });
 }
 
-/// One evaluation from the warm start predicted to the new joints: the control step. Falls back to solve() when there is
-/// no warm start, the joints moved too far (||b|| > 0.05 rad) or the robot is about to snap (Newton step > 0.1 rad).
-/// out.residual is that before the final correction, whose square bounds the error. Ask for the Jacobian to have the
-/// prediction and the corrected pose; tips of the outer tubes are those before the correction.
-/// Real time: yes, one evaluation.
+/// The control step: Newton's method from the warm start predicted to the new joints, in at most `settings.evaluations`
+/// evaluations; one is usual. The last Newton step is at most 0.01 det B_u [rad], so what is left is of the order of its
+/// square. Ask for the Jacobian to have the prediction and the corrected pose (without it, the last Newton step is at most
+/// 1e-4 det B_u); tips of the outer tubes are those before that step. Where the robot has moved by more than 0.3 rad since
+/// the integration error was last estimated, one of the evaluations, in twice as many steps, estimates it.
+/// out.residual is that before the last Newton step.
+/// @return as solve(); needs_solve: no warm start, joints or load moved too far, the robot snaps within this step, or it
+///         needs more integration steps; `ws` is as before and `out` is blank: ask solve()
+/// Real time: yes, settings.evaluations evaluations at most.
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                           Solution<N>& out, const Settings& settings = {}) noexcept {

@@ -104,7 +104,7 @@ private:
         const auto k = std::size_t(i % 3);
         window.add(i < 3 ? in.force[k] : in.moment[k], force_ + i, 1);
       }
-      Pass(in, events, ws_.guess, system_.sensor.tube, system_.settings.steps, window)
+      Pass(in, events, ws_.guess, system_.sensor.tube, ws_.steps, window)
           .write(rows_, window.first / lane_count);
     }
     constexpr auto lane = [](int j) constexpr { return j; };
@@ -116,8 +116,8 @@ private:
     TipDerivatives<N> tip;
     const Model<N> standard(model().robot());
     const Status status =
-        compliance ? differentiate_tip(standard, ws_, system_.sensor.tube, tip, *compliance, system_.settings)
-                   : differentiate_tip(standard, ws_, system_.sensor.tube, tip, system_.settings);
+        compliance ? differentiate_tip(standard, ws_, system_.sensor.tube, tip, *compliance)
+                   : differentiate_tip(standard, ws_, system_.sensor.tube, tip);
     for (const int v : asked_)
       if (v < V::robot_count)
         for (int k = 0; k < 6; ++k) rows_[unknowns + k].add(variables_.lane(v), tip.by_parameters(k, v));

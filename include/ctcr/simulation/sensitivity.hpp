@@ -94,7 +94,7 @@ public:
       settings_(settings),
       right_(reading(nominal.sensor, found.tube_tips).position),
       here_(nominal.model.coefficients(), q),
-      around_(here_, load.force, found, ws.guess, nominal.sensor.tube, settings.steps) {}
+      around_(here_, load.force, found, ws.guess, nominal.sensor.tube, ws.steps) {}
 
   /// Of a system whose tip is where the nominal one's is.
   void add_known(const System<N>& system, DistanceStatistics& out) const noexcept {

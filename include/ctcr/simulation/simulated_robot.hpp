@@ -71,7 +71,7 @@ private:
         model_ = Model<N, Fx>(system_.model.robot(), effects);
         return has_equilibrium(solve(model_, tubes, load_, ws_, solution_, system_.settings)) ? &model_ : nullptr;
       };
-      q = live_.advance(q, time_, ws_, system_.settings.steps, equilibrium);
+      q = live_.advance(q, time_, ws_, equilibrium);
       model_ = Model<N, Fx>(system_.model.robot(), live_.effects());
     }
     (void)solve<Derivatives::jacobian>(model_, q, load_, ws_, solution_, system_.settings);

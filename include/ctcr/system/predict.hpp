@@ -44,7 +44,7 @@ Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const
   const auto columns = [&](Parameter kind) { return out.by_parameters.middleCols(P::index(kind), P::size(kind)); };
   Status status = prediction.solution.status;
   TipDerivatives<N> tip;
-  if (has_equilibrium(status)) status = differentiate_tip(system.model, ws, system.sensor.tube, tip, system.settings);
+  if (has_equilibrium(status)) status = differentiate_tip(system.model, ws, system.sensor.tube, tip);
   const Mat6 by_tip = reading_by_tip(system.sensor), by_frame = reading_by_frame(system.sensor, prediction.reading);
   const Eigen::Matrix<double, 6, N> by_beta = by_tip * tip.by_joints.template leftCols<N>();
   const Eigen::Matrix<double, 6, N> by_alpha = by_tip * tip.by_joints.template rightCols<N>();

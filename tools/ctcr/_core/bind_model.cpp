@@ -75,6 +75,8 @@ NB_MODULE(_core, m) {
       .value("tip_behind_plate", Status::tip_behind_plate)
       .value("not_converged", Status::not_converged)
       .value("singular", Status::singular)
+      .value("inaccurate", Status::inaccurate)
+      .value("needs_solve", Status::needs_solve)
       .value("not_finite", Status::not_finite);
   nb::enum_<Integrator>(m, "Integrator", "Schemes of integration along the robot.")
       .value("standard", Integrator::standard)

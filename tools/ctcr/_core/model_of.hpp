@@ -158,7 +158,7 @@ private:
         PoseDerivatives<N> by;
         by.compliance = s.compliance;
         if (options.tip_of > 0 || !options.by_parameters.empty())
-          (void)differentiate_tip(model_, ws, options.tip_of, tip, by.compliance, settings);
+          (void)differentiate_tip(model_, ws, options.tip_of, tip, by.compliance);
         by.jacobian = tip.by_joints;
         by.by_parameters = tip.by_parameters(Eigen::all, options.by_parameters);
         writer.put(i, s, &by);

@@ -79,10 +79,8 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
   CTCR_SOLVE(kind, solve, compliance, N)                                                                            \
   CTCR_SOLVE(kind, step, jacobian, N)                                                                               \
   CTCR_SOLVE(kind, step, compliance, N)                                                                             \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,        \
-                                              const Settings&) noexcept;                                            \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&, Mat6&, \
-                                              const Settings&) noexcept;                                            \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept;                                            \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&, Mat6&) noexcept;                                            \
   kind Status predict<N, python::AllEffects>(const System<N, python::AllEffects>&, const RecordedRow<N>&,           \
                                              const typename python::AllEffects::On<N>::History&, Workspace<N>&,     \
                                              RecordedPrediction<N, python::AllEffects>&) noexcept;                  \

@@ -1,0 +1,70 @@
+#pragma once
+// How many integration steps a segment needs: a first guess from bounds, and the error that a number of steps makes.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "ctcr/mechanics/effect_evaluation.hpp"
+#include "ctcr/mechanics/settings.hpp"
+
+namespace ctcr::detail {
+
+/// Largest step, in units of the length over which the state of the rod changes. From there on the error of a step of
+/// MagnusRk4 falls with its fifth power.
+inline constexpr double largest_step = 1.0;
+
+/// Steps per segment from which refinement starts. The length over which the state changes follows from bounds on
+/// curvature u and force F in each segment: 1 / sqrt(F / EI + u^2 / 4 + rho u / 2), the wave number of a loaded rod, half
+/// the turn of its frame, and the growth of relative torsion. Neither angles nor unknowns enter, so that a path through
+/// the same joints takes the same steps. Real time: yes.
+template <int N>
+inline int first_steps(const Coefficients<N>& c, const VecN<N>& beta, const TipLoad& load, int most) noexcept {
+  const Events<N> events = sort_events(c, beta);
+  const double length = std::max(events.s[0], 0.0), moment = load.moment.norm(),
+               force = load.force.norm() + c.gravity.norm() * c.weight[N - 1] * length;
+  std::array<bool, N> curved{};
+  int present = 0;
+  double steps = 1;
+  for (std::size_t e = 0; e < 2 * N && events.s[e] > 0; ++e) {
+    const int id = events.id[e];
+    if (id < N)
+      present = id + 1, curved[std::size_t(id)] = c.curved[std::size_t(id)];
+    else
+      curved[std::size_t(id - N)] = false;
+    const double h = events.s[e] - (e + 1 < 2 * N ? std::max(events.s[e + 1], 0.0) : 0.0);
+    double bending = moment, rho = 0;
+    for (std::size_t i = 0; i < N; ++i)
+      if (curved[i]) bending += std::abs(c.a[i]), rho = std::max(rho, std::abs(c.rho[i]));
+    const double compliance = c.compliance[std::size_t(present - 1)], u = compliance * bending;
+    steps = std::max(steps, h * std::sqrt(force * compliance + 0.25 * u * u + 0.5 * rho * u) / largest_step);
+  }
+  return steps < most ? int(std::ceil(steps)) : most;
+}
+template <int N, class Fx>
+inline int first_steps(const EffectCoefficients<N, Fx>& c, const VecN<N>& beta, const TipLoad& load,
+                       int most) noexcept {
+  return first_steps(c.plain, beta, load, most);
+}
+
+/// Error of the tip position [m] that integration in `steps` steps a segment makes: its distance from the tip of the
+/// equilibrium in twice as many steps, found by one Newton step from the same guess.
+/// @param position  of the tip in `steps` steps [m]   Real time: yes, one evaluation.
+template <Loading L, class Stepper, int N, class C>
+CTCR_NOINLINE double integration_error(const C& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
+                                       int steps, const Vec3& position) noexcept {
+  using Ev = Evaluation<N, L, Derivatives::jacobian>;
+  Ev fine;
+  evaluate<Derivatives::jacobian, L, Stepper>(c, q, load, guess, 2 * steps, fine);
+  Vec3 change = fine.position - position;
+  for (int k = 0; k < 3; ++k) change[k] += fine.pose(k, Ev::Col::newton);
+  return change.norm();
+}
+
+/// Steps for which the error, of fourth order, falls below the allowed one. Real time: yes.
+inline int refined_steps(int steps, double error, double allowed, int most) noexcept {
+  const double ratio = 1.5 * error / allowed;
+  const double wanted = ratio < 1e6 ? steps * std::sqrt(std::sqrt(ratio)) : 32.0 * steps;  // not finite: 32
+  return wanted < most ? std::max(int(std::ceil(wanted)), std::min(steps + 1, most)) : most;
+}
+
+}  // namespace ctcr::detail
