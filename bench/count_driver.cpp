@@ -27,8 +27,8 @@ bool run_newton(int passes) {
     for (std::size_t i = 0; i < solved.configurations.size(); ++i) {
       const Configuration& c = solved.configurations[i];
       ctcr::evaluate<Case::derivatives, loading, ctcr::MagnusRk4>(solved.model.coefficients(), c.joints, c.load,
-                                                                  solved.workspaces[i].guess, solved.workspaces[i].steps,
-                                                                  evaluation);
+                                                                  solved.workspaces[i].guess,
+                                                                  solved.workspaces[i].steps, evaluation);
       good = good && evaluation.residual < 1e-9;
     }
   return good;

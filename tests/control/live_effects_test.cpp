@@ -89,8 +89,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
     return has ? &model : nullptr;
   };
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    (void)live.advance(joints(system.transmission, rows[k].theta), rows[k].at.time, ws,
-                       equilibrium);
+    (void)live.advance(joints(system.transmission, rows[k].theta), rows[k].at.time, ws, equilibrium);
     const auto& now = std::get<0>(live.effects().list).history.state;
     for (std::size_t i = 0; i < now.size(); ++i)
       EXPECT_NEAR(now[i], std::get<0>(recorded[k]).state[i], 5e-3) << "row " << k;

@@ -26,9 +26,10 @@
                                                  Solution<N>&, const Settings&) noexcept;                           \
   CTCR_TEST_EVALUATIONS_##D(kind, MagnusRk4, N)
 #define CTCR_TEST_DIRECT(kind, D, N) CTCR_TEST_EVALUATIONS_##D(kind, DirectMagnusRk4, N)
-#define CTCR_TEST_PARAMETERS(kind, D, N)                                                                            \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept;                                            \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&, Mat6&) noexcept;
+#define CTCR_TEST_PARAMETERS(kind, D, N)                                                                               \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept; \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,           \
+                                              Mat6&) noexcept;
 
 #define CTCR_TEST_DECLARE(KIND, N)                                                          \
   CTCR_TEST_##KIND(extern template, none, N) CTCR_TEST_##KIND(extern template, jacobian, N) \

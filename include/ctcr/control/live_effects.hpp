@@ -19,8 +19,7 @@ public:
   /// @param equilibrium  equilibrium(effects, joints of the tubes): the model with these effects, its equilibrium left in
   ///                     ws; or null if none
   /// Real time: as `equilibrium`, which is called at most 9 times.
-  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws,
-                    const auto& equilibrium) noexcept {
+  Joints<N> advance(const Joints<N>& motors, double time, const Workspace<N>& ws, const auto& equilibrium) noexcept {
     const std::size_t row = add(motors, time);
     const auto effects_at = [&](const RelativeTorsion<N>& torsion) {
       Effects now = effects_;
@@ -46,8 +45,7 @@ public:
 
   /// The same of tubes that are stiff in torsion. Real time: yes.
   Joints<N> advance(const Joints<N>& motors, double time) noexcept {
-    return advance(motors, time, {},
-                   [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
+    return advance(motors, time, {}, [](const Effects&, const Joints<N>&) -> const Model<N, Fx>* { return nullptr; });
   }
 
   /// With the internal state of now.

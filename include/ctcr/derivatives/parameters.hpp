@@ -142,7 +142,8 @@ Status differentiate_loaded(const Robot<N>& robot, const Workspace<N>& ws, int t
 /// @return ok; singular: near a bifurcation, large derivatives; not_converged: `ws` holds no solution; not_finite. The
 ///         last two leave zeros. Real time: yes, about N + 1 integrations with eight columns each.
 template <class Stepper = MagnusRk4, int N>
-CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube, TipDerivatives<N>& out) noexcept {
+CTCR_NOINLINE Status differentiate_tip(const Model<N>& model, const Workspace<N>& ws, int tube,
+                                       TipDerivatives<N>& out) noexcept {
   Status status = Status::not_converged;
   const bool loaded = !model.robot().gravity.isZero(0.0) || !ws.load.force.isZero(0.0) || !ws.load.moment.isZero(0.0);
   if (!ws.warm)

@@ -74,9 +74,9 @@ public:
     begin(path, k);
     RelativeTorsion<N> torsion = given;
     Vec::Map(torsion.data()) += difference_;
-    effects_ = torsion_solver_.solve([&](const Effects& with) { return predicted(system, sample, with); },
-                                     [&](const RelativeTorsion<N>& with) { return effects_at(with); }, ws_,
-                                     torsion, most);
+    effects_ =
+        torsion_solver_.solve([&](const Effects& with) { return predicted(system, sample, with); },
+                              [&](const RelativeTorsion<N>& with) { return effects_at(with); }, ws_, torsion, most);
     difference_ = Vec::Map(torsion.data()) - Vec::Map(given.data());
     here_.torsion = torsion;
   }

@@ -61,9 +61,8 @@ template <int N, class Fx>
                                                   RelativeTorsion<N> last) noexcept {
   if (!ws.warm) return last;
   detail::ContactAngles<N, double> angles;
-  detail::visit_breakpoints(model, ws, [&](int breakpoint, const auto&, const auto& state, const auto&) {
-    angles(breakpoint, state);
-  });
+  detail::visit_breakpoints(
+      model, ws, [&](int breakpoint, const auto&, const auto& state, const auto&) { angles(breakpoint, state); });
   for (int i = 0; i + 1 < N; ++i) {
     const double at_base = ws.q.alpha[i] - ws.q.alpha[i + 1];
     for (int breakpoint = 0; breakpoint < Contacts<N>::breakpoints; ++breakpoint) {

@@ -24,8 +24,8 @@ public:
   /// @param torsion      in: a guess; out: the solution [rad], unchanged without an equilibrium
   /// @param most         equilibria that are tried
   /// @return the effects at the solution. Real time: as equilibrium and effects_at.
-  Effects solve(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws,
-                RelativeTorsion<N>& torsion, int most) noexcept {
+  Effects solve(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, RelativeTorsion<N>& torsion,
+                int most) noexcept {
     if constexpr (contacts == 0)
       return effects_at(torsion);
     else
@@ -48,8 +48,8 @@ private:
     Vec residual = Vec::Zero();  ///< torsion of the equilibrium with these effects, minus this torsion
   };
 
-  Effects iterate(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws,
-                  RelativeTorsion<N>& torsion, int most) noexcept {
+  Effects iterate(const auto& equilibrium, const auto& effects_at, const Workspace<N>& ws, RelativeTorsion<N>& torsion,
+                  int most) noexcept {
     constexpr double tolerance = 1e-4;  // [rad]
     const auto evaluate = [&](Iterate& at) {
       const Model<N, Fx>* model = equilibrium(at.effects);

@@ -122,8 +122,8 @@ inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settin
 
 /// Brings the load, or if that fails the precurvature, from nothing to its full size in small steps.
 template <Loading L, class Stepper, int N, class C>
-inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings,
-                        int steps, bool ramp_curvature, TipGuess<N>& guess) noexcept {
+inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int steps,
+                        bool ramp_curvature, TipGuess<N>& guess) noexcept {
   constexpr int ramp_steps = 16;
   Evaluation<N, L, Derivatives::none> ev;
   int used = 0;
@@ -132,7 +132,8 @@ inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, con
   for (int k = 1; k <= ramp_steps; ++k) {
     const double part = double(k) / ramp_steps;
     used += newton<Derivatives::none, L, Stepper>(scaled(c, part, ramp_curvature ? part : 1), q,
-                                                  TipLoad{load.force * part, load.moment * part}, settings, steps, guess, ev);
+                                                  TipLoad{load.force * part, load.moment * part}, settings, steps,
+                                                  guess, ev);
   }
   return used;
 }

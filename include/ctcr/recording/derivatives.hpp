@@ -104,8 +104,7 @@ private:
         const auto k = std::size_t(i % 3);
         window.add(i < 3 ? in.force[k] : in.moment[k], force_ + i, 1);
       }
-      Pass(in, events, ws_.guess, system_.sensor.tube, ws_.steps, window)
-          .write(rows_, window.first / lane_count);
+      Pass(in, events, ws_.guess, system_.sensor.tube, ws_.steps, window).write(rows_, window.first / lane_count);
     }
     constexpr auto lane = [](int j) constexpr { return j; };
     (void)eliminate<unknowns>(rows_, lane);
@@ -115,9 +114,8 @@ private:
   Status take_standard(Mat6* compliance) noexcept {
     TipDerivatives<N> tip;
     const Model<N> standard(model().robot());
-    const Status status =
-        compliance ? differentiate_tip(standard, ws_, system_.sensor.tube, tip, *compliance)
-                   : differentiate_tip(standard, ws_, system_.sensor.tube, tip);
+    const Status status = compliance ? differentiate_tip(standard, ws_, system_.sensor.tube, tip, *compliance)
+                                     : differentiate_tip(standard, ws_, system_.sensor.tube, tip);
     for (const int v : asked_)
       if (v < V::robot_count)
         for (int k = 0; k < 6; ++k) rows_[unknowns + k].add(variables_.lane(v), tip.by_parameters(k, v));

@@ -69,27 +69,28 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
   kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                               \
       const EffectCoefficients<N, python::AllEffects>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, int, \
       Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;
-#define CTCR_SOLVERS(kind, N)                                                                                       \
-  namespace ctcr {                                                                                                  \
-  CTCR_EVALUATE(kind, none, N)                                                                                      \
-  CTCR_EVALUATE(kind, jacobian, N)                                                                                  \
-  CTCR_EVALUATE(kind, compliance, N)                                                                                \
-  CTCR_SOLVE(kind, solve, none, N)                                                                                  \
-  CTCR_SOLVE(kind, solve, jacobian, N)                                                                              \
-  CTCR_SOLVE(kind, solve, compliance, N)                                                                            \
-  CTCR_SOLVE(kind, step, jacobian, N)                                                                               \
-  CTCR_SOLVE(kind, step, compliance, N)                                                                             \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept;                                            \
-  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&, Mat6&) noexcept;                                            \
-  kind Status predict<N, python::AllEffects>(const System<N, python::AllEffects>&, const RecordedRow<N>&,           \
-                                             const typename python::AllEffects::On<N>::History&, Workspace<N>&,     \
-                                             RecordedPrediction<N, python::AllEffects>&) noexcept;                  \
-  kind Status differentiate<N, python::AllEffects>(const System<N, python::AllEffects>&, const RecordedRow<N>&,     \
-                                                   const Workspace<N>&,                                             \
-                                                   const RecordedPrediction<N, python::AllEffects>&,                \
-                                                   std::span<const int>,                                            \
-                                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,            \
-                                                   const RowHistorySensitivities&, Mat6*) noexcept;                 \
+#define CTCR_SOLVERS(kind, N)                                                                                          \
+  namespace ctcr {                                                                                                     \
+  CTCR_EVALUATE(kind, none, N)                                                                                         \
+  CTCR_EVALUATE(kind, jacobian, N)                                                                                     \
+  CTCR_EVALUATE(kind, compliance, N)                                                                                   \
+  CTCR_SOLVE(kind, solve, none, N)                                                                                     \
+  CTCR_SOLVE(kind, solve, jacobian, N)                                                                                 \
+  CTCR_SOLVE(kind, solve, compliance, N)                                                                               \
+  CTCR_SOLVE(kind, step, jacobian, N)                                                                                  \
+  CTCR_SOLVE(kind, step, compliance, N)                                                                                \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept; \
+  kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,           \
+                                              Mat6&) noexcept;                                                         \
+  kind Status predict<N, python::AllEffects>(const System<N, python::AllEffects>&, const RecordedRow<N>&,              \
+                                             const typename python::AllEffects::On<N>::History&, Workspace<N>&,        \
+                                             RecordedPrediction<N, python::AllEffects>&) noexcept;                     \
+  kind Status differentiate<N, python::AllEffects>(const System<N, python::AllEffects>&, const RecordedRow<N>&,        \
+                                                   const Workspace<N>&,                                                \
+                                                   const RecordedPrediction<N, python::AllEffects>&,                   \
+                                                   std::span<const int>,                                               \
+                                                   Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>>,               \
+                                                   const RowHistorySensitivities&, Mat6*) noexcept;                    \
   }
 #define CTCR_INSTANTIATE_SYSTEMS(N) CTCR_SOLVERS(template, N)
 
