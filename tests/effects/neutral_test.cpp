@@ -56,10 +56,8 @@ TYPED_TEST(NeutralEffects, GiveTheStandardModel) {
     EXPECT_LE((general.compliance - plain.compliance).norm(), 1e-9 * plain.compliance.norm()) << n;
     const auto error = (general.jacobian - plain.jacobian).eval();
     EXPECT_LE(error.template rightCols<2 * N - 1>().norm(), 1e-9 * plain.jacobian.norm()) << n;
-    // The standard path moves the plate by the continuous rates there, not by those of a step; and where tubes are flush,
-    // each path has the slope of one side.
-    if (test::smallest_gap(robot, q) < 1e-9) continue;
-    EXPECT_LE(error.col(0).norm(), 1e-4 * plain.jacobian.norm()) << n;
+    if (test::smallest_gap(robot, q) < 1e-9) continue;  // where tubes are flush, each path has the slope of one side
+    EXPECT_LE(error.col(0).norm(), 1e-9 * plain.jacobian.norm()) << n;
   }
   EXPECT_GT(compared, test::cases(60) / 2);
 }
