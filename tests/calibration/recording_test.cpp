@@ -162,7 +162,7 @@ TEST(Recording, GivesTheSameByTheGeneralPath) {
     Robot<2> robot = system.model.robot();
     robot.gravity = gravity;
     system.model = Model<2>(robot);
-    system.settings = {.tolerance = 1e-12, .steps = 8};
+    system.settings = {.tolerance = 1e-12, .steps = 8, .accuracy = test::as_told};
     const System<2, Catalogue> general{system.transmission, Model<2, Catalogue>(robot, test::hardly_any_effects<2>()),
                                        system.sensor, system.settings};
     const Table table = path(system, changed(system, P::index(Parameter::length), 1e-3), 9, random);

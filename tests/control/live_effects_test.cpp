@@ -85,7 +85,7 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   Model<3, Rubbing> model = system.model;
   const auto equilibrium = [&](const auto& effects, const Joints<3>& tubes) {
     model = Model<3, Rubbing>(system.model.robot(), effects);
-    const bool has = step<Derivatives::none>(model, tubes, {}, ws, solution, system.settings) == Status::ok;
+    const bool has = solve<Derivatives::none>(model, tubes, {}, ws, solution, system.settings) == Status::ok;
     return has ? &model : nullptr;
   };
   for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -107,7 +107,7 @@ void expect_equal_to_differences(Acting acting, const Settings& settings, bool c
 constexpr Acting all[] = {Acting::nothing, Acting::force, Acting::wrench, Acting::weight};
 
 TEST(TipDerivatives, AreThoseOfTheDiscreteModel) {
-  const Settings settings{.tolerance = 1e-12};
+  const Settings settings{.tolerance = 1e-12, .accuracy = test::as_told};
   for (const Acting acting : all) {
     expect_equal_to_differences<1>(acting, settings, true, 10);
     expect_equal_to_differences<2>(acting, settings, true, 20);
@@ -116,7 +116,7 @@ TEST(TipDerivatives, AreThoseOfTheDiscreteModel) {
 }
 
 TEST(TipDerivatives, AreThoseOfTheFineModel) {
-  const Settings settings{.tolerance = 1e-12, .steps = 30};
+  const Settings settings{.tolerance = 1e-12, .steps = 30, .accuracy = test::as_told};
   for (const Acting acting : all) {
     expect_equal_to_differences<1>(acting, settings, false, 4);
     expect_equal_to_differences<2>(acting, settings, false, 4);
@@ -127,7 +127,7 @@ TEST(TipDerivatives, AreThoseOfTheFineModel) {
 TEST(TipDerivatives, ByJointsAreTheJacobianOfTheSolution) {
   test::Random random(1);
   // The solution's columns of beta are exact up to the error of the integration.
-  const Settings settings{.tolerance = 1e-12, .steps = 30};
+  const Settings settings{.tolerance = 1e-12, .steps = 30, .accuracy = test::as_told};
   for (const Acting acting : all)
     for (int n = 0; n < 10; ++n) {
       const Solved<3> c = random_case<3>(acting, settings, false, random);
@@ -167,7 +167,7 @@ TEST(TipDerivatives, StiffnessRatiosMatterUnloaded) {
 
 TEST(TipDerivatives, StiffnessLoadAndWeightScaleTogether) {
   test::Random random(3);
-  const Settings settings{.tolerance = 1e-13};
+  const Settings settings{.tolerance = 1e-13, .accuracy = test::as_told};
   for (int n = 0; n < 50; ++n) {
     Solved<3> c = random_case<3>(Acting::weight, settings, false, random);
     for (Tube& tube : c.robot.tubes) tube.bending_stiffness = 0;
@@ -186,7 +186,7 @@ TEST(TipDerivatives, StiffnessLoadAndWeightScaleTogether) {
 
 TEST(TipDerivatives, ByLoadsAreTheComplianceOfAnyTube) {
   test::Random random(5);
-  const Settings settings{.tolerance = 1e-12};
+  const Settings settings{.tolerance = 1e-12, .accuracy = test::as_told};
   for (const Acting acting : all)
     for (int n = 0; n < 12; ++n) {
       Solved<3> c = random_case<3>(acting, settings, false, random);

@@ -17,7 +17,7 @@ Solution<N> solved(const Robot<N>& robot, const Catalogue::On<N>& effects, const
   Workspace<N> ws;
   Solution<N> s;
   EXPECT_EQ(solve<Derivatives::compliance>(Model<N, Catalogue>(robot, effects), q, load, ws, s,
-                                           {.tolerance = 1e-12, .steps = steps}),
+                                           {.tolerance = 1e-12, .steps = steps, .accuracy = test::as_told}),
             Status::ok);
   return s;
 }

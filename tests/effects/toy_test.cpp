@@ -43,7 +43,7 @@ TEST(ToyEffect, EqualsTheRobotThatItAmountsTo) {
       tube.bending_stiffness = tube.EI() * std::get<0>(toys.list).values[2 + i];
       tube.poisson_ratio = tube.EI() / GJ - 1;  // torsion as before
     }
-    const Settings settings{.tolerance = 1e-12, .steps = 2};
+    const Settings settings{.tolerance = 1e-12, .steps = 2, .accuracy = test::as_told};
     Workspace<2> ws;
     Solution<2> with_toys;
     ASSERT_EQ(solve(Model<2, Toys>(robot, toys), q, load, ws, with_toys, settings), Status::ok);

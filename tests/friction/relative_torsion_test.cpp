@@ -25,7 +25,7 @@ TEST(RelativeTorsion, Derivatives) {
     const System<3, Catalogue> system{{2e-4, -1, {-0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}},
                                       Model<3, Catalogue>(c.robot, effects),
                                       {},
-                                      {.tolerance = 1e-12, .steps = 3}};
+                                      {.tolerance = 1e-12, .steps = 3, .accuracy = test::as_told}};
     const RecordedRow<3> row{motor_angles(system.transmission, c.q), c.load, {}};
     Workspace<3> ws;
     RecordedPrediction<3, Catalogue> prediction;

@@ -14,15 +14,17 @@ struct TipDerivative : testing::Test {};
 TYPED_TEST_SUITE(TipDerivative, test::TubeCounts);
 
 /// Solves near a solution, from its warm start, more tightly than any difference can feel.
-template <int N>
+template <int N, Derivatives D = Derivatives::none>
 class Nearby {
 public:
-  explicit Nearby(const test::Case<N>& c) : model_(c.robot), c_(c) { pose(c.q, c.load); }
+  explicit Nearby(const test::Case<N>& c, int steps = fine) : model_(c.robot), c_(c), steps_(steps) {
+    pose(c.q, c.load);
+  }
 
   Pose pose(const Joints<N>& q, const TipLoad& load) {
     Workspace<N> ws = ws_;
     Solution<N> solution;
-    (void)solve<Derivatives::none>(model_, q, load, ws, solution, {.tolerance = 1e-13, .steps = fine});
+    (void)solve<D>(model_, q, load, ws, solution, {.tolerance = 1e-13, .steps = steps_, .accuracy = test::as_told});
     EXPECT_LT(solution.residual, 1e-11);
     if (!ws_.warm) ws_ = ws;
     return solution.pose();
@@ -54,6 +56,7 @@ private:
 
   Model<N> model_;
   test::Case<N> c_;
+  int steps_;
   Workspace<N> ws_;
 };
 
@@ -124,6 +127,38 @@ TYPED_TEST(TipDerivative, ComplianceIsSymmetric) {
     // A moment of constant direction has no potential, but at zero moment its work is symmetric, too.
     EXPECT_LT(asymmetry(C), 1e-6);
   }
+}
+
+template <class T>
+struct CoarseJacobian : testing::Test {};
+TYPED_TEST_SUITE(CoarseJacobian, test::OneToFiveTubes);
+
+/// However coarse the integration is: J belongs to the map that is solved, not to the finer one it stands for. Held
+/// against 1 for beta and against the robot's length for alpha; turns of the tip count at the robot's length.
+TYPED_TEST(CoarseJacobian, IsThatOfTheDiscreteMap) {
+  constexpr int N = TypeParam::N;
+  constexpr auto D = Derivatives::jacobian;  // all solves, so that five tubes are compiled once
+  Random random(28 + N);
+  int compared = 0;
+  for (int n = 0; n < test::cases(60); ++n) {
+    const int steps = 1 + n % 3, kind = n % 4;  // unloaded, force, force and moment, all with weight
+    test::Case<N> c{test::random_robot<N>(random), {}, {}};
+    if (kind > 0) c.load = test::random_load(random, 0.3, kind > 1 ? 0.01 : 0);
+    if (kind > 2) c.robot.gravity = test::tilted_gravity;
+    c.q = test::random_joints(c.robot, random);
+    if (test::smallest_gap(c.robot, c.q) < 5e-4) continue;
+    const Solution<N> solution = test::solved<D>(c.robot, c.q, c.load, steps);
+    if (solution.status != Status::ok || solution.stability < 0.05) continue;
+    ++compared;
+    Nearby<N, D> near(c, steps);
+    const double length = c.robot.tubes[0].length;
+    for (int j = 0; j < 2 * N; ++j) {
+      Vec6 error = solution.jacobian.col(j) - near.by_joint(j, solution.jacobian.col(j));
+      error.template tail<3>() *= length;
+      EXPECT_LT(error.norm(), 1e-6 * (j < N ? 1 : length)) << "case " << n << ", column " << j;
+    }
+  }
+  EXPECT_GT(compared, test::cases(60) / 3);
 }
 
 }  // namespace derivatives_test

@@ -38,9 +38,10 @@ void expect_warm_equals_cold(double max_force, const Vec3& gravity) {
     const Model<N> model(c.robot);
     Workspace<N> ws;
     Solution<N> warm;
-    ASSERT_EQ(solve<D>(model, c.q, c.load, ws, warm), Status::ok);
+    const Settings settings{.accuracy = test::as_told};
+    ASSERT_EQ(solve<D>(model, c.q, c.load, ws, warm, settings), Status::ok);
     const int cold_evaluations = warm.iterations;
-    ASSERT_EQ(solve<D>(model, move.q, move.load, ws, warm), Status::ok);
+    ASSERT_EQ(solve<D>(model, move.q, move.load, ws, warm, settings), Status::ok);
     const Solution<N> cold = test::solved<D>(c.robot, move.q, move.load);
     EXPECT_LT(test::difference(cold.pose(), warm.pose()).norm(), 1e-9);
     EXPECT_LT((cold.jacobian - warm.jacobian).norm(), 1e-7 * (1 + cold.jacobian.norm()));
@@ -115,8 +116,9 @@ TYPED_TEST(WarmStart, StepTakesOneEvaluation) {
     const Model<N> model(c.robot);
     Workspace<N> ws;
     Solution<N> s;
-    ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s), Status::ok);
-    ASSERT_EQ(step<Derivatives::compliance>(model, move.q, move.load, ws, s), Status::ok);
+    const Settings settings{.accuracy = test::as_told};
+    ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s, settings), Status::ok);
+    ASSERT_EQ(step<Derivatives::compliance>(model, move.q, move.load, ws, s, settings), Status::ok);
     EXPECT_EQ(s.iterations, 1);
     const Vec6 error = test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
     EXPECT_LT(error.norm(), 10 * s.residual * s.residual + 1e-9);
@@ -143,20 +145,64 @@ TYPED_TEST(WarmStart, StepsAlongAPathStayOnIt) {
   }
 }
 
-TEST(Step, SolvesWhereThereIsNoStartOrItIsTooFar) {
+/// Without a start, or too far from it, it keeps its budget, says so, and leaves the start as it was.
+TEST(Step, AsksForASolve) {
   Random random(68);
   const test::Case<3> c = test::smooth_case<3>(random, 0.2, 0, Vec3::Zero());
   const Model<3> model(c.robot);
   Workspace<3> ws;
   Solution<3> s;
-  ASSERT_EQ(step<Derivatives::jacobian>(model, c.q, c.load, ws, s), Status::ok);
-  EXPECT_LT(s.residual, 1e-10);
+  EXPECT_EQ(step<Derivatives::jacobian>(model, c.q, c.load, ws, s), Status::needs_solve);
+  EXPECT_EQ(s.iterations, 0);
+  EXPECT_FALSE(ws.warm);
+  ASSERT_EQ(solve<Derivatives::jacobian>(model, c.q, c.load, ws, s), Status::ok);
+  const TipGuess<3> before = ws.guess;
   Joints<3> far = c.q;
   far.alpha += Eigen::Vector3d(1.5, -1.0, 0.7);
-  const Solution<3> cold = test::solved<Derivatives::jacobian>(c.robot, far, c.load);
-  if (cold.status != Status::ok) GTEST_SKIP();
-  ASSERT_EQ(step<Derivatives::jacobian>(model, far, c.load, ws, s), Status::ok);
-  EXPECT_LT(s.residual, 1e-10);
+  for (const int budget : {1, 2, 3}) {
+    EXPECT_EQ(step<Derivatives::jacobian>(model, far, c.load, ws, s, {.evaluations = budget}), Status::needs_solve);
+    EXPECT_EQ(s.iterations, budget);
+    EXPECT_TRUE(ws.guess.psi == before.psi && ws.guess.rotation == before.rotation && ws.q.alpha == c.q.alpha);
+  }
+}
+
+/// Walks until the robot snaps: a step that says ok is on the branch that a walk of small solves stays on.
+TEST(Step, DoesNotMissASnap) {
+  constexpr auto D = Derivatives::compliance;
+  Random random(77);
+  int walked = 0, ends = 0;
+  for (int n = 0; n < test::cases(150); ++n) {
+    Robot<2> robot = test::random_robot<2>(random);
+    for (Tube& tube : robot.tubes) tube.curvature = uniform(random, 5, 25);
+    Joints<2> q = test::random_joints(robot, random);
+    q.alpha << 0, uniform(random, 2, 4.2);
+    const TipLoad load{test::random_vector(random, n % 2 ? 0.1 : 0), Vec3::Zero()};
+    const Model<2> model(robot);
+    Workspace<2> ws;
+    Solution<2> s, exact;
+    if (solve<D>(model, q, load, ws, s) != Status::ok) continue;
+    const double turn = uniform(random, -0.03, 0.03), length = robot.tubes[0].length + q.beta[0];
+    for (int k = 0; k < 60; ++k) {
+      Workspace<2> small = ws;
+      const Joints<2> from = q;
+      q.alpha[1] += turn;
+      if (step<D>(model, q, load, ws, s) != Status::ok) {
+        ++ends;
+        break;
+      }
+      Status status = Status::ok;
+      Joints<2> at = from;
+      for (int j = 1; j <= 20; ++j) {
+        at.alpha[1] = from.alpha[1] + turn * j / 20;
+        status = solve<D>(model, at, load, small, exact);
+      }
+      if (!has_equilibrium(status)) break;
+      ASSERT_LT((s.position - exact.position).norm(), 1e-3 * length) << "walk " << n << ", step " << k;
+      ++walked;
+    }
+  }
+  EXPECT_GT(walked, test::cases(150) * 10);
+  EXPECT_GT(ends, 0);
 }
 
 }  // namespace warm_start_test

@@ -58,8 +58,11 @@ Recorded<N> random_recording(const Catalogue::On<N>& effects, int tube, Random& 
     const Transmission<N> transmission{uniform(random, 2e-4, 5e-4), -uniform(random, 0.5, 2), 0.1 * home, home};
     const PoseSensor sensor{
         {rotation_matrix(random_vector(random, 3)), random_vector(random, 0.3)}, tube, uniform(random, -3, 3)};
-    Recorded<N> recorded{
-        {transmission, Model<N, Catalogue>(c.robot, effects), sensor, {.tolerance = 1e-12, .steps = 4}}, {}};
+    Recorded<N> recorded{{transmission,
+                          Model<N, Catalogue>(c.robot, effects),
+                          sensor,
+                          {.tolerance = 1e-12, .steps = 4, .accuracy = test::as_told}},
+                         {}};
     const Vec3 centre = (sensor.T_tracker_base * Pose{Mat3::Identity(), {0, 0, 0.1}}).position;
     constexpr int last = 5;
     for (int k = 0; k <= last; ++k) {

@@ -49,7 +49,7 @@ public:
       if constexpr (!std::is_same_v<Watch, NoRecord>)
         watch(s, jacobian(y, f, guess.rotation * f.rotation(), VecN<N>::Zero()).determinant());
     };
-    Pass::run(c_, sort_events(c_, q_.beta), arc_length, steps_per_segment_, y_, frame, tips, record);
+    Pass::run(c_, sort_events(c_, q_.beta), arc_length, 0.0, steps_per_segment_, y_, frame, tips, record);
     frame_ = frame;
     const double base_angle = y_.psi[0].v + q_.beta[0] * y_.w[0].v;
     rotation = rotation_z(q_.alpha[0] - base_angle) * frame.rotation().transpose();

@@ -17,6 +17,7 @@ struct TubeCount {
   static constexpr int N = N_;
 };
 using TubeCounts = ::testing::Types<TubeCount<1>, TubeCount<2>, TubeCount<3>, TubeCount<4>>;
+using OneToFiveTubes = ::testing::Types<TubeCount<1>, TubeCount<2>, TubeCount<3>, TubeCount<4>, TubeCount<5>>;
 using TwoAndThreeTubes = ::testing::Types<TubeCount<2>, TubeCount<3>>;
 
 /// Earth's gravity in a direction that no axis shares [m/s^2].
@@ -27,7 +28,7 @@ template <Derivatives D, int N>
 Solution<N> solved(const Robot<N>& robot, const Joints<N>& q, const TipLoad& load, int steps = 1) {
   Workspace<N> ws;
   Solution<N> solution;
-  (void)solve<D>(Model<N>(robot), q, load, ws, solution, {.steps = steps});
+  (void)solve<D>(Model<N>(robot), q, load, ws, solution, {.steps = steps, .accuracy = as_told});
   return solution;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 // The solver, compiled once for all tests: its instantiations are long, the tests of its laws are short.
 // Link ctcr_test_solver (solver.cmake), which holds what is declared here.
+#include <limits>
+
 #include "ctcr/ctcr.hpp"
 #include "ctcr/derivatives/parameters.hpp"
 
@@ -36,6 +38,11 @@
       CTCR_TEST_##KIND(extern template, compliance, N)
 
 namespace ctcr {
+namespace test {
+/// Settings::accuracy with which solves integrate in the steps they are told to: for laws of the discrete map.
+inline constexpr double as_told = std::numeric_limits<double>::infinity();
+}  // namespace test
+
 CTCR_TEST_DECLARE(SOLVER, 1)
 CTCR_TEST_DECLARE(SOLVER, 2)
 CTCR_TEST_DECLARE(SOLVER, 3)

@@ -31,7 +31,7 @@ Command<N> random_command(bool loaded, int tube, test::Random& random) {
   const PoseSensor sensor{{rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.5)},
                           tube,
                           test::uniform(random, -3, 3)};
-  return {{transmission, Model<N>(c.robot), sensor, {.tolerance = 1e-12, .steps = 20}},
+  return {{transmission, Model<N>(c.robot), sensor, {.tolerance = 1e-12, .steps = 20, .accuracy = test::as_told}},
           motor_angles(transmission, c.q),
           c.load};
 }

@@ -64,7 +64,7 @@ public:
     };
     base_ = state_at_tip(robot, at, c);
     TubeTips<N> tips;
-    (void)Rod::run(c, sort_events(c, at.q.beta), arc_length, at.steps, base_, frame_, tips, keep_tip);
+    Rod::run(c, sort_events(c, at.q.beta), arc_length, 0.0, at.steps, base_, frame_, tips, keep_tip);
   }
 
   /// Writes the tangents of the equations and of the pose into the rows. The equations: the tip turns as

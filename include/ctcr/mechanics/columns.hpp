@@ -22,11 +22,13 @@ enum class Loading {
 
 /// Lanes of the directions of differentiation, in a pass of integration and in the linear system behind it:
 ///
-///   pass:    turns of the tip, or with compliance tip force and moment (6) | psi_2..N | beta_2..N (Jacobian) | residual
-///   system:  the lanes of the pass | alpha_1..N, common shift of all beta (Jacobian) | turns of the tip, where not above
+///   pass:    turns of the tip, or with compliance tip force and moment (6) | psi_2..N | beta_2..N, common (Jacobian)
+///   system:  the lanes of the pass | alpha_1..N (Jacobian), residual | turns of the tip, where not above
 ///
-/// psi are the angles of tubes 2..N at their tips. The pass integrates its own lanes alone; the further ones follow at the
-/// front plate: alpha and the common shift from the rates there, turns of the tip from the columns of force and moment.
+/// psi are the angles of tubes 2..N at their tips, common is the shift of all beta together. The pass integrates its own
+/// lanes alone; the further ones follow at the front plate: alpha and the residual from the values there, turns of the tip
+/// from the columns of force and moment. Without the Jacobian the residual is the last lane of the pass, where it stays 0,
+/// so that it takes no group of its own.
 template <int N, Loading L, Derivatives D>
 struct Columns {
   static constexpr bool jacobian = D != Derivatives::none;
@@ -39,14 +41,14 @@ struct Columns {
   static constexpr bool integrates_turns = loaded && (weight || !compliance);
   static constexpr int force = integrates_turns ? turns : 0;  ///< only with compliance
   static constexpr int moment = force + 3;
-  static constexpr int psi = force + (compliance ? 6 : 0);      ///< of tube 2
-  static constexpr int beta = psi + N - 1;                      ///< of tube 2
-  static constexpr int newton = beta + (jacobian ? N - 1 : 0);  ///< the residual, solved along with the others
-  static constexpr int groups = lane_groups(newton + 1);
-  static constexpr int first_beta_group = jacobian && N > 1 ? beta / lane_count : groups;
+  static constexpr int psi = force + (compliance ? 6 : 0);  ///< of tube 2
+  static constexpr int beta = psi + N - 1;                  ///< of tube 2; only with the Jacobian
+  static constexpr int common = beta + N - 1;               ///< all beta together; only with the Jacobian
+  static constexpr int groups = lane_groups(jacobian ? common + 1 : beta + 1);
+  static constexpr int first_beta_group = jacobian ? beta / lane_count : groups;
 
-  static constexpr int alpha = groups * lane_count;  ///< of tube 1; only with the Jacobian
-  static constexpr int common = alpha + N;           ///< all beta together
+  static constexpr int alpha = groups * lane_count;           ///< of tube 1; only with the Jacobian
+  static constexpr int newton = jacobian ? alpha + N : beta;  ///< the residual, solved along with the others
   static constexpr int joint_groups = jacobian ? lane_groups(N + 1) : 0;
   static constexpr int turn = integrates_turns ? 0 : (groups + joint_groups) * lane_count;
   static constexpr int system_groups = groups + joint_groups + (loaded && !integrates_turns ? 1 : 0);
@@ -55,12 +57,13 @@ struct Columns {
   /// Lane of unknown j: turns of the tip, then psi_2..N.
   static constexpr int unknown(int j) noexcept { return j < turns ? turn + j : psi + j - turns; }
 
-  /// Number of tubes that must be near for lane group g to differ from zero: 1 from the robot tip on, N + 1 never.
+  /// What must be near for lane group g to differ from zero, counted from the robot tip: 1 tube 1, ..., N tube N,
+  /// N + 1 the plate, N + 2 nothing (it always is zero).
   static constexpr int starts_with(int g) noexcept {
     if (g * lane_count < psi) return 1;
     for (int tube = 1; tube < N; ++tube)
       if ((psi + tube - 1) / lane_count == g || (jacobian && (beta + tube - 1) / lane_count == g)) return tube + 1;
-    return N + 1;
+    return jacobian && common / lane_count == g ? N + 1 : N + 2;
   }
 };
 

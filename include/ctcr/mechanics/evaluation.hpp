@@ -124,20 +124,19 @@ CTCR_INLINE RobotState<S, N> tip_state(const Coefficients<N>& c, const TipLoad& 
 template <class Col, int N>
 struct EventDirections {
   static constexpr int groups = Col::groups - Col::first_beta_group;
-  alignas(32) double d[N][groups * lane_count] = {};
+  alignas(32) double d[N + 1][groups * lane_count] = {};  ///< of each tube's events, and of the plate
 
   constexpr EventDirections() noexcept {
-    for (int tube = 1; tube < N; ++tube) {
-      const int lane = Col::beta + tube - 1 - Col::first_beta_group * lane_count;
-      if (lane >= 0 && lane < groups * lane_count) d[tube][lane] = 1.0;
-    }
+    constexpr int first = Col::first_beta_group * lane_count;
+    for (int tube = 1; tube < N; ++tube) d[tube][Col::beta + tube - 1 - first] = 1.0;
+    d[N][Col::common - first] = -1.0;
   }
 };
 template <class Col, int N>
 inline constexpr EventDirections<Col, N> event_directions{};
 
-/// Arc length of an event with its derivatives by beta_2..N. The robot tip stays where it is: beta_1 is left to the
-/// common shift.
+/// Arc length of an event, or of the plate (event 2N), with its derivatives by beta_2..N and by the common shift. The robot
+/// tip stays where it is: beta_1 is left to the common shift, which moves the plate back instead of all events forward.
 template <class Col, int N, class H>
 CTCR_INLINE H event_arc_length(int event, double s) noexcept {
   if constexpr (std::is_same_v<H, double>) {
@@ -150,12 +149,11 @@ CTCR_INLINE H event_arc_length(int event, double s) noexcept {
   }
 }
 
-/// Lanes of alpha_1..N and of the common shift.
-template <class Col, int N>
-CTCR_INLINE void joint_lanes(LaneRow<Col::system_groups>& row, double alpha_1, double common) noexcept {
+/// Lanes of alpha_1..N and of the residual: they start with what alpha_1 does.
+template <class Col>
+CTCR_INLINE void joint_lanes(LaneRow<Col::system_groups>& row, double alpha_1) noexcept {
   for (int g = 0; g < Col::joint_groups; ++g) row.x[Col::groups + g] = Lanes{};
-  row.x[Col::common / lane_count] += common * unit_lane(Col::common % lane_count);
-  if (alpha_1 != 0) row.x[Col::alpha / lane_count] += alpha_1 * unit_lane(0);
+  if (alpha_1 != 0) row.x[Col::groups] = alpha_1 * unit_lane(0);
 }
 
 /// Columns of tip turns from those of force and moment: turning the tip by t turns the loads it sees by -t.
@@ -180,20 +178,18 @@ using Pass = Shooting<
     Col::loaded, Col::weight, Stepper, Col>;
 
 /// Integrates from the state at the tip to the front plate.
-/// @return tubes of the last segment
 template <class Stepper, class Col, int N, class S>
-CTCR_INLINE SegmentTubes<N> integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state,
-                                 Frame<S>& frame, TubeTips<N>& tips) noexcept {
+CTCR_INLINE void integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state, Frame<S>& frame,
+                      TubeTips<N>& tips) noexcept {
   using H = typename Pass<N, Stepper, Col>::Length;
   const auto arc_length = [](int event, double s) noexcept { return event_arc_length<Col, N, H>(event, s); };
-  return Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, steps, state, frame, tips);
+  Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, arc_length(2 * N, 0.0), steps, state, frame, tips);
 }
 
 /// What follows from state and frame at the front plate; out.axis and out.tips are there already.
-template <Derivatives D, Loading L, class Stepper, int N, class S>
-CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
-                     const RobotState<S, N>& base, const Frame<S>& f, const SegmentTubes<N>& tubes,
-                     Evaluation<N, L, D>& out) noexcept {
+template <Derivatives D, Loading L, int N, class S>
+CTCR_INLINE void assemble(const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess, const RobotState<S, N>& base,
+                     const Frame<S>& f, Evaluation<N, L, D>& out) noexcept {
   using Ev = Evaluation<N, L, D>;
   using Col = typename Ev::Col;
   constexpr int G = Col::groups;
@@ -228,8 +224,16 @@ CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const Ti
   Row* const rotation = Ev::pose_rows == 6 ? position + 3 : scratch + 3;
   for (int g = 0; g < G; ++g) {
     for (int i = 0; i < N; ++i) angle[i].x[g] = base.psi[std::size_t(i)].d[g] + base.w[std::size_t(i)].d[g] * q.beta[i];
+    if constexpr (Col::jacobian) {
+      // Behind the plate a tube twists over the length -beta_i, which changes with its own column and the common shift.
+      for (int i = 0; i < N; ++i) {
+        if (g == Col::common / lane_count) angle[i].x[g] += out.w[i] * unit_lane(Col::common % lane_count);
+        const int beta = Col::beta + i - 1;
+        if (i > 0 && g == beta / lane_count) angle[i].x[g] += out.w[i] * unit_lane(beta % lane_count);
+      }
+    }
     if constexpr (Col::loaded || Col::jacobian) {
-      if (Col::starts_with(g) > N) {
+      if (Col::starts_with(g) > N + 1) {
         for (int k = 0; k < 3; ++k) rotation[k].x[g] = position[k].x[g] = Lanes{};
         continue;
       }
@@ -247,20 +251,12 @@ CTCR_INLINE void assemble(const Coefficients<N>& c, const Joints<N>& q, const Ti
     }
   }
   if constexpr (Col::jacobian) {
-    // All beta together: the plate moves back along the rod. alpha_1 turns the whole robot about z.
-    const BaseRates<double, N> rates = Pass<N, Stepper, Col>::rates(c, tubes, base);
-    const double ux = rates.u[0], uy = rates.u[1];
-    const double ox = cg * ux - sg * uy, oy = sg * ux + cg * uy, oz = q.beta[0] * rates.F[0];
-    for (int i = 0; i < N; ++i) {
-      joint_lanes<Col, N>(angle[i], 0.0, -q.beta[i] * rates.F[std::size_t(i)]);
-      if (i > 0) angle[i].add(Col::beta + i - 1, out.w[i]);
-    }
-    joint_lanes<Col, N>(rotation[0], 0.0, ox);
-    joint_lanes<Col, N>(rotation[1], 0.0, oy);
-    joint_lanes<Col, N>(rotation[2], 1.0, oz);
-    joint_lanes<Col, N>(position[0], -r[1], oy * r[2] - oz * r[1]);
-    joint_lanes<Col, N>(position[1], r[0], oz * r[0] - ox * r[2]);
-    joint_lanes<Col, N>(position[2], 0.0, 1.0 + ox * r[1] - oy * r[0]);
+    // alpha_1 turns the whole robot about z.
+    for (int i = 0; i < N; ++i) joint_lanes<Col>(angle[i], 0.0);
+    for (int k = 0; k < 3; ++k) joint_lanes<Col>(rotation[k], k == 2 ? 1.0 : 0.0);
+    joint_lanes<Col>(position[0], -r[1]);
+    joint_lanes<Col>(position[1], r[0]);
+    joint_lanes<Col>(position[2], 0.0);
   }
   if constexpr (Col::loaded && !Col::integrates_turns) {
     for (int i = 0; i < N; ++i) turns_from_loads<L, Col>(angle[i], load, out.axis);
@@ -314,8 +310,8 @@ CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q,
   using S = Dual<Col::groups>;
   RobotState<S, N> state = detail::tip_state<Col, S>(c, load, guess, out.axis);
   Frame<S> frame;
-  const SegmentTubes<N> tubes = detail::integrate<Stepper, Col>(c, q, steps, state, frame, out.tips);
-  detail::assemble<D, L, Stepper>(c, q, load, guess, state, frame, tubes, out);
+  detail::integrate<Stepper, Col>(c, q, steps, state, frame, out.tips);
+  detail::assemble<D, L>(q, load, guess, state, frame, out);
 }
 
 }  // namespace ctcr

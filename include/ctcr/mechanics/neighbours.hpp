@@ -202,7 +202,7 @@ private:
     Frame<Four> f;
     TipPositions tips;
     const auto arc_length = [&](int event, double) noexcept { return pack.arc_length[std::size_t(event)]; };
-    (void)Rod::run(pack.c, pack.events, arc_length, steps_, y, f, tips);
+    Rod::run(pack.c, pack.events, arc_length, 0.0, steps_, y, f, tips);
 
     Row out;
     std::array<Four, N> angle;

@@ -141,7 +141,7 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
   // Where the plate is, as seen from the tip, is known only after a first pass.
   State plate = tip;
   Frame<double> frame;
-  Pass::run(c, events, arc_length, steps, plate, frame, tips);
+  Pass::run(c, events, arc_length, 0.0, steps, plate, frame, tips);
   BaseView base;
   base.turn = q.alpha[0] - (plate.psi[0] + q.beta[0] * plate.w[0]);
   base.T_base_tip = Pose{rotation_z(base.turn), Vec3::Zero()} * Pose{frame.rotation(), frame.position()}.inverse();
@@ -153,7 +153,8 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
       ShapePoint<N>& point = points[left - 1];
       Node here = node;
       Pass::advance(c, here.tubes, point.s - here.s, here.s, 1, here.y, here.frame, NoRecord{});
-      fill_point<Col::loaded>(model, base, here.tubes, here.y, here.frame, Pass::rates(c, here.tubes, here.y).u, point);
+      fill_point<Col::loaded>(model, base, here.tubes, here.y, here.frame,
+                              Pass::centreline_curvature(c, here.tubes, here.y), point);
     }
   };
   const auto record = [&](double s, const SegmentTubes<N>& tubes, const State& y, const Frame<double>& f,
@@ -162,7 +163,7 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
     node = {s, tubes, y, f};
   };
   State y = tip;
-  Pass::run(c, events, arc_length, steps, y, frame, tips, record);
+  Pass::run(c, events, arc_length, 0.0, steps, y, frame, tips, record);
   fill_down_to(-2 * same_arc_length);
   for (; left > 0; --left) fill_behind_plate(model.robot(), q, base, plate.psi, plate.w, points[left - 1]);
 }

@@ -19,13 +19,6 @@ struct RobotState {
   std::array<S, 3> g;       ///< gravity [m/s^2]
 };
 
-/// Rates at the front plate.
-template <class S, int N>
-struct BaseRates {
-  std::array<S, N> F;  ///< w' [rad/m^2]
-  std::array<S, 2> u;  ///< curvature of the centreline [1/m]
-};
-
 /// The tips of tubes 2..N in the frame of the robot tip: a Bishop frame and the angle of the tube in it.
 template <int N>
 struct TubeTips {
@@ -49,7 +42,7 @@ struct NoRecord {
 template <int N>
 struct SegmentTubes {
   int present = 0;  ///< tubes 1..present
-  int near = 0;     ///< tubes present or beginning at the far end of the segment
+  int near = 0;     ///< tubes present or beginning at the far end of the segment, where the plate counts as one
   int curved_count = 0, straight_count = 0;
   std::array<int, N> curved{}, straight{};
 
@@ -81,21 +74,21 @@ public:
 
   /// Integrates from the tip to s = 0.
   /// @param arc_length  H arc_length(event, s): arc length of an event with its derivatives [m]
+  /// @param plate   0 with its derivatives [m]
   /// @param steps   integration steps per segment, >= 1
   /// @param y       in: state at the tip; out: at the front plate
   /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
   /// @param tips    tips.keep(tube, frame, angle) at the tip of each tube but the first
   /// @param record  record(s, tubes, state, frame, u) at both ends of every step
-  /// @return tubes of the last segment
   /// Real time: yes (2N segments, `steps` steps each).
   template <class ArcLength, class Tips, class Record = NoRecord>
-  static CTCR_INLINE SegmentTubes<N> run(const Coefficients<N, P>& c, const Events<N>& events, const ArcLength& arc_length,
-                                   int steps, State& y, Frame<S>& frame, Tips& tips,
-                                   const Record& record = {}) noexcept {
+  static CTCR_INLINE void run(const Coefficients<N, P>& c, const Events<N>& events, const ArcLength& arc_length,
+                        const H& plate, int steps, State& y, Frame<S>& frame, Tips& tips,
+                        const Record& record = {}) noexcept {
     SegmentTubes<N> tubes;
     set_identity(frame);
     H here = arc_length(events.id[0], events.s[0]);
-    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || tubes.present < N); ++e) {
+    for (std::size_t e = 0;; ++e) {
       const int id = events.id[e];
       if (id < N) {
         tubes.add(id, c.curved[std::size_t(id)]);
@@ -103,13 +96,15 @@ public:
       } else {
         tubes.straighten(id - N);
       }
-      const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
-      const H next = last ? H{} : arc_length(events.id[e + 1], events.s[e + 1]);
-      tubes.near = tubes.present + (!last && events.id[e + 1] < N);
+      // Tips at the plate leave segments of no length: the plate may move in the last of them only, with all tubes.
+      const bool at_plate = e + 1 == 2 * N || !(events.s[e + 1] > 0);
+      const bool last = at_plate && tubes.present == N;
+      const H next = last ? plate : at_plate ? H{} : arc_length(events.id[e + 1], events.s[e + 1]);
+      tubes.near = tubes.present + (last || (!at_plate && events.id[e + 1] < N));
       advance(c, tubes, next - here, events.s[e], steps, y, frame, record);
+      if (last) return;
       here = next;
     }
-    return tubes;
   }
 
   /// Integrates over `h` from `s`, inside the segment of `tubes`, in `steps` steps. Real time: yes.
@@ -122,14 +117,13 @@ public:
     advance_curved<NC>(c, tubes, h, s, steps, y, frame, record);
   }
 
-  /// Rates of the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
+  /// Curvature of the centreline [1/m] for the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
   template <int NC = 0>
-  static CTCR_INLINE BaseRates<double, N> rates(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
-                                          const State& y) noexcept {
+  static CTCR_INLINE std::array<double, 2> centreline_curvature(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
+                                                          const State& y) noexcept {
     if constexpr (NC < N) {
-      if (tubes.curved_count != NC) return rates<NC + 1>(c, tubes, y);
+      if (tubes.curved_count != NC) return centreline_curvature<NC + 1>(c, tubes, y);
     }
-    BaseRates<double, N> base{};
     if constexpr (NC > 0 || Loaded) {
       RodSection<double, double, NC> r;
       RodRates<double, NC> k;
@@ -142,11 +136,10 @@ public:
       }
       if constexpr (Loaded) m = {value(y.m[0]), value(y.m[1])};
       curvature<Loaded>(r, psi, m, k);
-      base.u = k.u;
-      if constexpr (Loaded || NC > 1)
-        for (std::size_t i = 0; i < NC; ++i) base.F[std::size_t(tubes.curved[i])] = k.F[i];
+      return k.u;
+    } else {
+      return {};
     }
-    return base;
   }
 
 private:
@@ -250,7 +243,8 @@ private:
       for (int i = 0; i < steps; ++i) tangent_step<NC>(c, tubes, k, y, frame);
     } else {
       const auto observe = [&] {
-        if constexpr (!std::is_same_v<Record, NoRecord>) record(s, tubes, y, frame, rates<NC>(c, tubes, y).u);
+        if constexpr (!std::is_same_v<Record, NoRecord>)
+          record(s, tubes, y, frame, centreline_curvature<NC>(c, tubes, y));
       };
       for (int i = 0; i < steps; ++i) {
         observe();
@@ -318,7 +312,7 @@ private:
                                    A&... rest) noexcept {
     if constexpr (g < groups_of<S>) {
       constexpr int first = Col::starts_with(g);
-      if constexpr (first <= N)
+      if constexpr (first <= N + 1)
         if (first == 1 || tubes.near >= first) tangent_group<g>(c, r, tubes, rest...);
       tangent_groups<g + 1>(c, r, tubes, rest...);
     }
