@@ -35,7 +35,7 @@ void expect_newtons_tips(double max_force, const Vec3& gravity) {
     const auto tube = std::size_t(n % N);
     Workspace<N> ws;
     Solution<N> solution;
-    ASSERT_EQ(solve(model, c.q, c.load, ws, solution), Status::ok);
+    ASSERT_EQ(solve(model, c.q, c.load, ws, solution, {.accuracy = test::as_told}), Status::ok);
     const Neighbours<N, L> around({model.coefficients(), c.q}, c.load.force, solution, ws.guess, int(tube), 1);
     std::array<Neighbour<N>, lane_count> robots;
     std::array<NeighbourTip, lane_count> exact;
@@ -47,7 +47,8 @@ void expect_newtons_tips(double max_force, const Vec3& gravity) {
       for (int k = 0; k < N; ++k) q.alpha[k] += uniform(random, -0.05, 0.05);
       robots[i] = {models[i].coefficients(), q};
       Workspace<N> own = ws;
-      exact[i].solved = solve(models[i], q, c.load, own, solution, {.tolerance = 1e-12}) == Status::ok;
+      exact[i].solved =
+          solve(models[i], q, c.load, own, solution, {.tolerance = 1e-12, .accuracy = test::as_told}) == Status::ok;
       exact[i].position = solution.tube_tips[tube].position;
       if (!exact[i].solved || !robots[i].comparable(robots[0])) robots[i] = robots[0], exact[i] = exact[0];
     }

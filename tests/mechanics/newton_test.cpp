@@ -44,7 +44,8 @@ public:
   explicit Shots(const test::Case<N>& c) : c_(c), coefficients_(make_coefficients(c.robot)) {
     Workspace<N> ws;
     Solution<N> solution;
-    (void)solve<Derivatives::none>(Model<N>(c.robot), c.q, c.load, ws, solution, {.tolerance = 1e-13});
+    (void)solve<Derivatives::none>(Model<N>(c.robot), c.q, c.load, ws, solution,
+                                   {.tolerance = 1e-13, .accuracy = test::as_told});
     EXPECT_LT(solution.residual, 1e-11);
     guess_ = ws.guess;
     detail::turn_axes<K::L>(c.load, axis_);

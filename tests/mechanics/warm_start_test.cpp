@@ -106,10 +106,11 @@ TEST(Step, IsAccurateAfterASmallMove) {
   EXPECT_LT((mean_error_of_step<Derivatives::jacobian, 3>(test::paper_robot(), 0, 65)), 1e-7);
 }
 
-/// And its residual bounds its error.
-TYPED_TEST(WarmStart, StepTakesOneEvaluation) {
+/// One evaluation is usual, two are the budget, and the residual bounds the error.
+TYPED_TEST(WarmStart, StepKeepsItsBudget) {
   constexpr int N = TypeParam::N;
   Random random(66);
+  int ones = 0;
   for (int n = 0; n < test::cases(50); ++n) {
     const test::Case<N> c = test::smooth_case<N>(random, 0.3, 0, Vec3::Zero());
     const Move<N> move = nearby(c, random, 5e-4, 0.02, 0.01);
@@ -119,11 +120,13 @@ TYPED_TEST(WarmStart, StepTakesOneEvaluation) {
     const Settings settings{.accuracy = test::as_told};
     ASSERT_EQ(solve<Derivatives::compliance>(model, c.q, c.load, ws, s, settings), Status::ok);
     ASSERT_EQ(step<Derivatives::compliance>(model, move.q, move.load, ws, s, settings), Status::ok);
-    EXPECT_EQ(s.iterations, 1);
+    EXPECT_LE(s.iterations, 2);
+    ones += s.iterations == 1;
     const Vec6 error = test::difference(test::solved<Derivatives::none>(c.robot, move.q, move.load).pose(), s.pose());
     EXPECT_LT(error.norm(), 10 * s.residual * s.residual + 1e-9);
     EXPECT_TRUE(s.tube_tips[0].position == s.position && s.tube_tips[0].rotation == s.rotation);
   }
+  EXPECT_GT(ones, test::cases(50) * 3 / 4);
 }
 
 TYPED_TEST(WarmStart, StepsAlongAPathStayOnIt) {

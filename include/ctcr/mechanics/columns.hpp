@@ -25,10 +25,10 @@ enum class Loading {
 ///   pass:    turns of the tip, or with compliance tip force and moment (6) | psi_2..N | beta_2..N, common (Jacobian)
 ///   system:  the lanes of the pass | alpha_1..N (Jacobian), residual | turns of the tip, where not above
 ///
-/// psi are the angles of tubes 2..N at their tips, common is the shift of all beta together. The pass integrates its own
-/// lanes alone; the further ones follow at the front plate: alpha and the residual from the values there, turns of the tip
-/// from the columns of force and moment. Without the Jacobian the residual is the last lane of the pass, where it stays 0,
-/// so that it takes no group of its own.
+/// psi are the angles of tubes 2..N at their tips, common is the shift of all beta together: only the length of the last
+/// segment depends on it. The pass integrates its own lanes alone; the further ones follow at the front plate: alpha and
+/// the residual from the values there, turns of the tip from the columns of force and moment. Without the Jacobian the
+/// residual is the last lane of the pass, which leaves it at 0, so that it takes no group of its own.
 template <int N, Loading L, Derivatives D>
 struct Columns {
   static constexpr bool jacobian = D != Derivatives::none;

@@ -135,8 +135,8 @@ struct EventDirections {
 template <class Col, int N>
 inline constexpr EventDirections<Col, N> event_directions{};
 
-/// Arc length of an event, or of the plate (event 2N), with its derivatives by beta_2..N and by the common shift. The robot
-/// tip stays where it is: beta_1 is left to the common shift, which moves the plate back instead of all events forward.
+/// Arc length of an event, or of the plate (event 2N), with its derivatives by beta_2..N and by the common shift. The
+/// robot tip stays where it is: beta_1 is left to the common shift, which moves the plate back, not the events forward.
 template <class Col, int N, class H>
 CTCR_INLINE H event_arc_length(int event, double s) noexcept {
   if constexpr (std::is_same_v<H, double>) {

@@ -42,7 +42,7 @@ struct NoRecord {
 template <int N>
 struct SegmentTubes {
   int present = 0;  ///< tubes 1..present
-  int near = 0;     ///< tubes present or beginning at the far end of the segment, where the plate counts as one
+  int near = 0;     ///< tubes present or beginning at the far end of the segment; with the Jacobian the plate is one
   int curved_count = 0, straight_count = 0;
   std::array<int, N> curved{}, straight{};
 
@@ -88,7 +88,7 @@ public:
     SegmentTubes<N> tubes;
     set_identity(frame);
     H here = arc_length(events.id[0], events.s[0]);
-    for (std::size_t e = 0;; ++e) {
+    for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || tubes.present < N); ++e) {
       const int id = events.id[e];
       if (id < N) {
         tubes.add(id, c.curved[std::size_t(id)]);
@@ -96,13 +96,11 @@ public:
       } else {
         tubes.straighten(id - N);
       }
-      // Tips at the plate leave segments of no length: the plate may move in the last of them only, with all tubes.
+      // Tips at the plate leave segments of no length: the plate moves in the last of them, which has all tubes.
       const bool at_plate = e + 1 == 2 * N || !(events.s[e + 1] > 0);
-      const bool last = at_plate && tubes.present == N;
-      const H next = last ? plate : at_plate ? H{} : arc_length(events.id[e + 1], events.s[e + 1]);
-      tubes.near = tubes.present + (last || (!at_plate && events.id[e + 1] < N));
+      const H next = !at_plate ? arc_length(events.id[e + 1], events.s[e + 1]) : tubes.present == N ? plate : H{};
+      tubes.near = tubes.present + (at_plate ? Col::jacobian : events.id[e + 1] < N);
       advance(c, tubes, next - here, events.s[e], steps, y, frame, record);
-      if (last) return;
       here = next;
     }
   }
@@ -117,7 +115,7 @@ public:
     advance_curved<NC>(c, tubes, h, s, steps, y, frame, record);
   }
 
-  /// Curvature of the centreline [1/m] for the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
+  /// Curvature of the centreline [1/m] at the state `y` in the segment of `tubes`, without derivatives. Real time: yes.
   template <int NC = 0>
   static CTCR_INLINE std::array<double, 2> centreline_curvature(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes,
                                                           const State& y) noexcept {

@@ -3,6 +3,7 @@
 // grow with their number.
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <span>
 #include <utility>
@@ -140,7 +141,10 @@ private:
   void add_alone(const System<N>& system, const Joints<N>& q, DistanceStatistics& out) noexcept {
     Workspace<N> ws = ws_;
     Solution<N> solution;
-    const Status status = ctcr::solve(system.model, q, load_, ws, solution, settings_);
+    Settings same = settings_;  // as many steps as the nominal one, so that errors of integration cancel
+    same.steps = ws.steps;
+    same.accuracy = std::numeric_limits<double>::infinity();
+    const Status status = ctcr::solve(system.model, q, load_, ws, solution, same);
     evaluations += solution.iterations;
     if (status == Status::ok)
       out.add((reading(system.sensor, solution.tube_tips).position - right_).norm());
