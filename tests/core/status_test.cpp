@@ -11,9 +11,9 @@ namespace status_test {
 TEST(Status, EachHasItsOwnName) {
   std::set<std::string> names;
   for (const Status status : {Status::ok, Status::joints_out_of_order, Status::tip_behind_plate, Status::not_converged,
-                              Status::singular, Status::not_finite})
+                              Status::singular, Status::not_finite, Status::invalid_robot})
     names.insert(to_string(status));
-  EXPECT_EQ(names.size(), 6u);
+  EXPECT_EQ(names.size(), 7u);
   EXPECT_FALSE(names.contains("unknown"));
   EXPECT_STREQ(to_string(static_cast<Status>(200)), "unknown");
 }

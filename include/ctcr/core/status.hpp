@@ -11,6 +11,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   not_converged,        ///< iteration limit reached; the outputs are the best iterate
   singular,             ///< near a bifurcation: the equilibrium is about to snap, derivatives are unbounded
   not_finite,           ///< an input or a result is NaN or infinite
+  invalid_robot,        ///< the robot cannot exist, see check_robot(); nothing is computed
 };
 
 /// Whether the outputs solve the model; where it is about to snap they do, too. Real time: yes.
@@ -25,6 +26,7 @@ constexpr const char* to_string(Status status) noexcept {
     case Status::not_converged: return "not converged";
     case Status::singular: return "singular: near a bifurcation";
     case Status::not_finite: return "not finite";
+    case Status::invalid_robot: return "invalid robot";
   }
   return "unknown";
 }

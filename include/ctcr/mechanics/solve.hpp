@@ -2,6 +2,7 @@
 // Newton's method on the shooting problem, and its real-time form: one evaluation per control period.
 #include <algorithm>
 
+#include "ctcr/mechanics/defined_outputs.hpp"
 #include "ctcr/mechanics/effect_evaluation.hpp"
 #include "ctcr/mechanics/solution.hpp"
 
@@ -298,22 +299,16 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
-/// Chooses the cheapest equations that hold, and answers invalid input.
+/// Chooses the cheapest equations that hold, answers invalid input and sees to it that all outputs are defined.
 /// @param run  run(std::integral_constant<Loading, ..>) -> Status
 template <Derivatives D, class Stepper, int N, class Fx, class Run>
-inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Solution<N>& out,
-                       const Run& run) noexcept {
+inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                       Solution<N>& out, const Run& run) noexcept {
   out.iterations = 0;
-  out.status = check_joints(model.robot(), q);
-  if (out.status == Status::ok && !(load.force.allFinite() && load.moment.allFinite())) out.status = Status::not_finite;
-  if (out.status != Status::ok) {
-    const int iterations = 0;
-    const Status status = out.status;
-    out = Solution<N>{};
-    out.status = status;
-    out.iterations = iterations;
-    return status;
-  }
+  out.status = model.check();
+  if (out.status == Status::ok) out.status = check_joints(model.robot(), q);
+  if (out.status == Status::ok && !all_finite(load.force, load.moment)) out.status = Status::not_finite;
+  if (out.status != Status::ok) return blank(out.status, out);
   using enum Loading;
   if constexpr (!Fx::none || requires { Stepper::general_equations; })
     out.status = run(std::integral_constant<Loading, weight>{});
@@ -324,6 +319,9 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     out.status = run(std::integral_constant<Loading, force>{});
   else if constexpr (D != Derivatives::compliance)
     out.status = run(std::integral_constant<Loading, none>{});
+  const double reach = Fx::none ? reach_of(model.robot(), q) : std::numeric_limits<double>::infinity();
+  if (!are_defined<D>(out, reach)) [[unlikely]]
+    out.status = define(out, reach, ws);
   return out.status;
 }
 
@@ -334,14 +332,15 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// @param load  tip wrench in the base frame [N], [N m]
 /// @param ws    warm start of this thread; updated
 /// @param out   pose, and with D the Jacobian J (6 x 2N) and the compliance C (6 x 6); always defined
-/// @return ok; joints_out_of_order, tip_behind_plate, not_finite: input refused, nothing computed; not_converged: best
-///         iterate; singular: solved, but at a bifurcation or an unstable equilibrium
+/// @return ok; invalid_robot, joints_out_of_order, tip_behind_plate: input refused, nothing computed; not_finite: the same,
+///         or a result that is no number; not_converged: best iterate; singular: solved, but at a bifurcation or an
+///         unstable equilibrium
 /// Real time: yes; at most about 70 * max_iterations evaluations, 1 to 3 from a warm start.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                            Solution<N>& out, const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+  return detail::dispatch<D, Stepper>(model, q, load, ws, out, [&](auto loading) noexcept {
     return detail::solve_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
 }
@@ -354,7 +353,7 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                           Solution<N>& out, const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+  return detail::dispatch<D, Stepper>(model, q, load, ws, out, [&](auto loading) noexcept {
     return detail::step_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
 }

@@ -75,7 +75,8 @@ NB_MODULE(_core, m) {
       .value("tip_behind_plate", Status::tip_behind_plate)
       .value("not_converged", Status::not_converged)
       .value("singular", Status::singular)
-      .value("not_finite", Status::not_finite);
+      .value("not_finite", Status::not_finite)
+      .value("invalid_robot", Status::invalid_robot);
   nb::enum_<Integrator>(m, "Integrator", "Schemes of integration along the robot.")
       .value("standard", Integrator::standard)
       .value("ssp_rk3", Integrator::ssp_rk3)
