@@ -13,6 +13,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   inaccurate,           ///< solved, but integration errs by more than the asked accuracy in the most steps allowed
   needs_solve,          ///< a control step has spent its evaluations: solve() has to be asked
   not_finite,           ///< an input or a result is NaN or infinite
+  invalid_robot,        ///< the robot cannot exist, see check_robot(); nothing is computed
 };
 
 /// Whether the outputs solve the model; where it is about to snap they do, too. Real time: yes.
@@ -29,6 +30,7 @@ constexpr const char* to_string(Status status) noexcept {
     case Status::inaccurate: return "inaccurate: integration errs by more than asked";
     case Status::needs_solve: return "needs solve: the control step has spent its evaluations";
     case Status::not_finite: return "not finite";
+    case Status::invalid_robot: return "invalid robot";
   }
   return "unknown";
 }

@@ -12,6 +12,12 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat3 = Eigen::Matrix3d;
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 
+/// Whether all entries of all matrices are finite: 0 times anything else is NaN. Real time: yes, without a branch.
+template <class... Matrices>
+inline bool all_finite(const Matrices&... m) noexcept {
+  return ((m * 0.0).sum() + ...) == 0;
+}
+
 /// Rigid transform T_a_b: maps coordinates in frame b to frame a, x_a = rotation * x_b + position.
 struct Pose {
   Mat3 rotation = Mat3::Identity();

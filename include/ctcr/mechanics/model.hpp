@@ -3,6 +3,7 @@
 
 #include "ctcr/effects/hooks.hpp"
 #include "ctcr/mechanics/coefficients.hpp"
+#include "ctcr/robot/robot_check.hpp"
 
 namespace ctcr {
 
@@ -39,7 +40,8 @@ public:
   using Effects = typename Fx::template On<N>;
   using Numbers = std::conditional_t<Fx::none, Coefficients<N>, EffectCoefficients<N, Fx>>;
 
-  explicit Model(const Robot<N>& robot, const Effects& effects = {}) noexcept : robot_(robot), effects_(effects) {
+  explicit Model(const Robot<N>& robot, const Effects& effects = {}) noexcept
+    : robot_(robot), effects_(effects), check_(check_robot(robot)) {
     if constexpr (Fx::none)
       coefficients_ = make_coefficients(robot);
     else
@@ -47,6 +49,8 @@ public:
                        effects.act_on_rod()};
   }
 
+  /// ok, or invalid_robot: then no equilibrium is looked for. Real time: yes.
+  [[nodiscard]] Status check() const noexcept { return check_; }
   [[nodiscard]] const Robot<N>& robot() const noexcept { return robot_; }
   [[nodiscard]] const Effects& effects() const noexcept { return effects_; }
   [[nodiscard]] const Numbers& coefficients() const noexcept { return coefficients_; }
@@ -55,6 +59,7 @@ private:
   Robot<N> robot_;
   [[no_unique_address]] Effects effects_;
   Numbers coefficients_;
+  Status check_;
 };
 
 }  // namespace ctcr

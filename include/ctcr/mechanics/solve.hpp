@@ -2,6 +2,7 @@
 // Newton's method on the shooting problem, and its real-time form: one evaluation per control period.
 #include <algorithm>
 
+#include "ctcr/mechanics/defined_outputs.hpp"
 #include "ctcr/mechanics/solution.hpp"
 #include "ctcr/mechanics/step_count.hpp"
 
@@ -231,12 +232,6 @@ inline double distance(const TipGuess<N>& a, const TipGuess<N>& b) noexcept {
   return std::sqrt(0.5 * (a.rotation - b.rotation).squaredNorm() + (a.psi - b.psi).squaredNorm());
 }
 
-/// Length of the robot beyond the front plate [m].
-template <int N, class Fx>
-inline double length_of(const Model<N, Fx>& model, const Joints<N>& q) noexcept {
-  return model.robot().tubes[0].length + q.beta[0];
-}
-
 /// Whether the error of integration is estimated and kept. Schemes for comparison take their steps as they are told.
 template <class Stepper>
 inline bool takes_more_steps(const Settings& settings) noexcept {
@@ -247,7 +242,7 @@ template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                        Solution<N>& out, const Settings& settings) noexcept {
   const auto& c = model.coefficients();
-  const double length = length_of(model, q), allowed = settings.accuracy * length;
+  const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
   const bool refines = takes_more_steps<Stepper>(settings);
   const TipGuess<N> last = ws.guess;
   const double travelled = ws.moved + (q.beta - ws.q.beta).norm() / length, error_there = ws.integration_error;
@@ -302,15 +297,6 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   ws.steps = steps;
   ws.moved = moved;
   out.integration_error = ws.integration_error = error;
-  const bool finite = std::isfinite(ev.residual) && std::isfinite(ev.det) && ev.position.allFinite() &&
-                      out.jacobian.allFinite() && out.compliance.allFinite();
-  if (!finite) {
-    const int iterations = out.iterations;
-    out = Solution<N>{};
-    out.iterations = iterations;
-    ws.reset();
-    return Status::not_finite;
-  }
   if (!(ev.residual < settings.tolerance)) {
     ws.reset();
     return Status::not_converged;
@@ -324,19 +310,13 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
                       Solution<N>& out, const Settings& settings) noexcept {
   using Ev = Evaluation<N, L, D>;
   constexpr bool jacobian = Ev::Col::jacobian;
-  const auto spent = [&] {
-    const int iterations = out.iterations;
-    out = Solution<N>{};
-    out.iterations = iterations;
-    return Status::needs_solve;
-  };
-  if (!ws.warm) return spent();
+  if (!ws.warm) return Status::needs_solve;
   const auto& c = model.coefficients();
   const int steps = std::max(ws.steps, settings.steps);
   Ev ev;
   TipGuess<N> guess, next = predicted_guess(ws, q, load);
   for (bool last = false; !last;) {
-    if (out.iterations == settings.evaluations) return spent();
+    if (out.iterations == settings.evaluations) return Status::needs_solve;
     guess = next;
     evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
     ++out.iterations;
@@ -359,13 +339,13 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
 
   double error = ws.integration_error, way = 0;
   if (takes_more_steps<Stepper>(settings)) {
-    const double length = length_of(model, q), allowed = settings.accuracy * length;
+    const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
     way = ws.moved + distance(ws.guess, next) + (q.beta - ws.q.beta).norm() / length;
     if (!(error <= allowed && way < checked_range && steps == ws.steps)) {
-      if (!jacobian || out.iterations == settings.evaluations) return spent();
+      if (!jacobian || out.iterations == settings.evaluations) return Status::needs_solve;
       error = integration_error<L, Stepper>(c, q, load, next, steps, tip.position);
       ++out.iterations;
-      if (!(error <= allowed)) return spent();
+      if (!(error <= allowed)) return Status::needs_solve;
       way = 0;
     }
   }
@@ -379,22 +359,16 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   return ev.det < singular_det ? Status::singular : Status::ok;
 }
 
-/// Chooses the cheapest equations that hold, and answers invalid input.
+/// Chooses the cheapest equations that hold, answers invalid input and sees to it that all outputs are defined.
 /// @param run  run(std::integral_constant<Loading, ..>) -> Status
 template <Derivatives D, class Stepper, int N, class Fx, class Run>
-inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Solution<N>& out,
-                       const Run& run) noexcept {
+inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
+                       Solution<N>& out, const Run& run) noexcept {
   out.iterations = 0;
-  out.status = check_joints(model.robot(), q);
-  if (out.status == Status::ok && !(load.force.allFinite() && load.moment.allFinite())) out.status = Status::not_finite;
-  if (out.status != Status::ok) {
-    const int iterations = 0;
-    const Status status = out.status;
-    out = Solution<N>{};
-    out.status = status;
-    out.iterations = iterations;
-    return status;
-  }
+  out.status = model.check();
+  if (out.status == Status::ok) out.status = check_joints(model.robot(), q);
+  if (out.status == Status::ok && !all_finite(load.force, load.moment)) out.status = Status::not_finite;
+  if (out.status != Status::ok) return blank(out.status, out);
   using enum Loading;
   if constexpr (!Fx::none || requires { Stepper::general_equations; })
     out.status = run(std::integral_constant<Loading, weight>{});
@@ -405,6 +379,10 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     out.status = run(std::integral_constant<Loading, force>{});
   else if constexpr (D != Derivatives::compliance)
     out.status = run(std::integral_constant<Loading, none>{});
+  if (out.status == Status::needs_solve) return blank(out.status, out);
+  const double reach = Fx::none ? reach_of(model.robot(), q) : std::numeric_limits<double>::infinity();
+  if (!are_defined<D>(out, reach)) [[unlikely]]
+    out.status = define(out, reach, ws);
   return out.status;
 }
 
@@ -415,16 +393,16 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// @param load  tip wrench in the base frame [N], [N m]
 /// @param ws    warm start of this thread; updated
 /// @param out   pose, and with D the Jacobian J (6 x 2N) and the compliance C (6 x 6); always defined
-/// @return ok; joints_out_of_order, tip_behind_plate, not_finite: input refused, nothing computed; not_converged: best
-///         iterate; singular: solved, but about to snap; inaccurate: solved, but max_steps leave a larger error of
-///         integration than `settings.accuracy` asks for
+/// @return ok; invalid_robot, joints_out_of_order, tip_behind_plate: input refused, nothing computed; not_finite: the same,
+///         or a result that is no number; not_converged: best iterate; singular: solved, but about to snap; inaccurate:
+///         solved, but max_steps leave a larger error of integration than `settings.accuracy` asks for
 /// Real time: yes; at most about 70 * max_iterations evaluations for each number of steps tried, 1 to 3 from a warm start,
 /// and one more where the robot has moved by more than 0.3 rad since its integration error was last estimated.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                            Solution<N>& out, const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+  return detail::dispatch<D, Stepper>(model, q, load, ws, out, [&](auto loading) noexcept {
     return detail::solve_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
 }
@@ -441,7 +419,7 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 template <Derivatives D = Derivatives::jacobian, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status step(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                           Solution<N>& out, const Settings& settings = {}) noexcept {
-  return detail::dispatch<D, Stepper>(model, q, load, out, [&](auto loading) noexcept {
+  return detail::dispatch<D, Stepper>(model, q, load, ws, out, [&](auto loading) noexcept {
     return detail::step_as<D, decltype(loading)::value, Stepper>(model, q, load, ws, out, settings);
   });
 }

@@ -19,7 +19,7 @@ struct Joints {
 /// @return ok, joints_out_of_order, tip_behind_plate or not_finite. Real time: yes.
 template <int N>
 [[nodiscard]] Status check_joints(const Robot<N>& robot, const Joints<N>& q, double slack = 1e-6) noexcept {
-  if (!q.beta.allFinite() || !q.alpha.allFinite()) return Status::not_finite;
+  if (!all_finite(q.beta, q.alpha)) return Status::not_finite;
   bool ordered = q.beta[N - 1] <= slack;
   bool deployed = robot.tubes[N - 1].length + q.beta[N - 1] >= -slack;
   for (std::size_t i = 0; i + 1 < N; ++i) {
