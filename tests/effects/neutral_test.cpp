@@ -14,7 +14,12 @@ using test::Random;
 static_assert(std::is_same_v<Model<3>, Model<3, EffectList<>>>);
 static_assert(std::is_same_v<Model<3>::Numbers, Coefficients<3>>);
 static_assert(std::is_empty_v<Standard::On<3>> && Standard::On<3>::count == 0);
-static_assert(sizeof(Model<3>) == sizeof(Robot<3>) + sizeof(Coefficients<3>));
+struct Parts {
+  Robot<3> robot;
+  Coefficients<3> coefficients;
+  Status check;
+};
+static_assert(sizeof(Model<3>) == sizeof(Parts));
 static_assert(std::is_trivially_destructible_v<Model<3, Catalogue>>);
 
 template <class T>

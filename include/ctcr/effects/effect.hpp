@@ -118,7 +118,7 @@ struct EffectValues {
     for (int j = 0; j < k; ++j) tube += size(j);
     return tube;
   }
-  static constexpr int count = index(int(List.size()));
+  static constexpr int count = index(int(List.size()), 0);
 
   static constexpr int states = States;
   using History = EffectHistory<States, P>;

@@ -8,18 +8,45 @@ namespace ctcr {
 inline constexpr int lane_count = 4;
 
 #if defined(__GNUC__) && !defined(CTCR_SCALAR_LANES)
-#if !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wpsabi"  // lanes never cross a compiled interface
-#endif
 #define CTCR_VECTOR_LANES
-typedef double Lanes __attribute__((vector_size(32)));
 #define CTCR_INLINE inline __attribute__((always_inline))
 #define CTCR_NOINLINE __attribute__((noinline))
+#if defined(__AVX__) || !(defined(__x86_64__) || defined(__i386__))
+typedef double LaneVector __attribute__((vector_size(32)));
+typedef LaneVector Lanes;
+CTCR_INLINE const LaneVector& lane_vector(const Lanes& x) noexcept { return x; }
+#else
+// Without AVX a bare vector of 32 bytes is passed in another way than with it, and compilers warn of that (-Wpsabi)
+// wherever it is an argument or a result, inlined or not: here it is wrapped, and aligned to 16 bytes.
+typedef double LaneVector __attribute__((vector_size(32), aligned(16)));
+struct Lanes {
+  LaneVector v;
+
+  Lanes() = default;
+  CTCR_INLINE constexpr Lanes(double a, double b, double c, double d) noexcept : v{a, b, c, d} {}
+  CTCR_INLINE explicit constexpr Lanes(const LaneVector& x) noexcept : v(x) {}
+  CTCR_INLINE double operator[](auto i) const noexcept { return v[i]; }
+  CTCR_INLINE double& operator[](auto i) noexcept { return reinterpret_cast<double*>(&v)[i]; }
+};
+CTCR_INLINE const LaneVector& lane_vector(const Lanes& x) noexcept { return x.v; }
+#define CTCR_LANE_OPERATOR(op)                                                                         \
+  CTCR_INLINE Lanes operator op(const Lanes& a, const Lanes& b) noexcept { return Lanes(a.v op b.v); } \
+  CTCR_INLINE Lanes operator op(double a, const Lanes& b) noexcept { return Lanes(a op b.v); }         \
+  CTCR_INLINE Lanes operator op(const Lanes& a, double b) noexcept { return Lanes(a.v op b); }         \
+  CTCR_INLINE Lanes& operator op##=(Lanes & a, const Lanes & b) noexcept { return a.v = a.v op b.v, a; }
+CTCR_LANE_OPERATOR(+)
+CTCR_LANE_OPERATOR(-)
+CTCR_LANE_OPERATOR(*)
+#undef CTCR_LANE_OPERATOR
+CTCR_INLINE Lanes operator-(const Lanes& a) noexcept {
+  return Lanes(-a.v);
+}
+#endif
 #else
 struct alignas(32) Lanes {
   double x[lane_count];
-  double& operator[](std::size_t i) { return x[i]; }
-  double operator[](std::size_t i) const { return x[i]; }
+  double& operator[](auto i) { return x[i]; }
+  double operator[](auto i) const { return x[i]; }
 };
 #define CTCR_INLINE inline
 #define CTCR_NOINLINE

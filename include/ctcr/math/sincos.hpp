@@ -62,10 +62,12 @@ CTCR_INLINE void sincos(const Lanes& x, Lanes& s, Lanes& c) noexcept {
   }
   ps = r + r * z * ps;
   pc = 1.0 - 0.5 * z + z * z * pc;
-  const Bits quadrant = std::bit_cast<Bits>(t);
-  const Choice swap = std::bit_cast<Choice>(quadrant << 63) < 0;
-  s = std::bit_cast<Lanes>(std::bit_cast<Bits>(swap ? pc : ps) ^ ((quadrant >> 1) << 63));
-  c = std::bit_cast<Lanes>(std::bit_cast<Bits>(swap ? ps : pc) ^ (((quadrant + 1) >> 1) << 63));
+  // Casts of vectors keep their bits.
+  const LaneVector &sine = lane_vector(ps), &cosine = lane_vector(pc);
+  const Bits quadrant = (Bits)lane_vector(t);
+  const Choice swap = (Choice)(quadrant << 63) < 0;
+  s = Lanes((LaneVector)((Bits)(swap ? cosine : sine) ^ ((quadrant >> 1) << 63)));
+  c = Lanes((LaneVector)((Bits)(swap ? sine : cosine) ^ (((quadrant + 1) >> 1) << 63)));
 #else
   for (std::size_t i = 0; i < lane_count; ++i) sincos(x[i], s[i], c[i]);
 #endif
@@ -87,10 +89,11 @@ CTCR_INLINE Lanes sincos_pair(double x, double y) noexcept {
   Lanes p = series(5);
   for (int i = 4; i >= 0; --i) p = p * z + series(i);
   p = (Lanes{r[0], 1, r[2], 1} - z * Lanes{0, 0.5, 0, 0.5}) + z * Lanes{r[0], z[1], r[2], z[3]} * p;
-  const Bits quadrant = std::bit_cast<Bits>(t), sign = ((quadrant + Bits{0, 1, 0, 1}) >> 1) << 63;
+  const Bits quadrant = (Bits)lane_vector(t), sign = ((quadrant + Bits{0, 1, 0, 1}) >> 1) << 63;
   const Lanes swapped{p[1], p[0], p[3], p[2]};
   typedef std::int64_t Choice __attribute__((vector_size(32)));
-  return std::bit_cast<Lanes>(std::bit_cast<Bits>(std::bit_cast<Choice>(quadrant << 63) < 0 ? swapped : p) ^ sign);
+  const LaneVector &other = lane_vector(swapped), &own = lane_vector(p);
+  return Lanes((LaneVector)((Bits)((Choice)(quadrant << 63) < 0 ? other : own) ^ sign));
 #else
   Lanes r;
   sincos(x, r[0], r[1]);

@@ -92,8 +92,8 @@ public:
   static constexpr int size(Parameter kind) noexcept { return first[std::size_t(kind) + 1] - first[std::size_t(kind)]; }
   /// Index of a kind's entry i: tube i + 1, or axis i.
   static constexpr int index(Parameter kind, int i = 0) noexcept { return first[std::size_t(kind)] + i; }
-  static constexpr int robot_count = index(Parameter::translation_ratio);      ///< those of Robot<N>: tubes and gravity
-  static constexpr int count = index(Parameter(int(parameter_kinds.size())));  ///< all
+  static constexpr int robot_count = index(Parameter::translation_ratio, 0);  ///< those of Robot<N>: tubes and gravity
+  static constexpr int count = index(Parameter(int(parameter_kinds.size())), 0);  ///< all
 
   /// The kind at an index, and the entry within it.
   struct Entry {
