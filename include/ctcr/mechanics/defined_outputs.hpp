@@ -88,19 +88,20 @@ inline Mat3 orthonormalised(const Mat3& R) noexcept {
 
 /// Makes a pose one: its rotation, and its position within reach. @return whether it was far from one
 template <int N>
-inline bool define(Mat3& rotation, Vec3& position, double reach) noexcept {
+inline bool define(Mat3& rotation, Vec3& position, double reach, double drift) noexcept {
   const double error = (rotation * rotation.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
   const double distance = position.stableNorm();
   if (!(error <= rotation_error)) rotation = orthonormalised(rotation);
   if (distance > reach + reach_slack<N>) position *= reach / distance;
-  return !(error <= no_rotation) || distance > (1 + overreach) * reach + reach_slack<N>;
+  return !(error <= drift) || distance > (1 + overreach) * reach + reach_slack<N>;
 }
 
 /// Makes outputs defined that are not: blank where not finite, else the nearest poses that can be. An equilibrium that
 /// needed more than rounding is none.
+/// @param reach  of the robot [m]   @param drift  of a rotation that the scheme of integration leaves
 /// @return the status
 template <int N>
-CTCR_NOINLINE Status define(Solution<N>& out, double reach, Workspace<N>& ws) noexcept {
+CTCR_NOINLINE Status define(Solution<N>& out, double reach, double drift, Workspace<N>& ws) noexcept {
   bool finite =
       all_finite(out.position, out.rotation, out.jacobian, out.compliance) && 0.0 * (out.residual + out.stability) == 0;
   for (const Pose& tip : out.tube_tips) finite = finite && all_finite(tip.position, tip.rotation);
@@ -108,8 +109,8 @@ CTCR_NOINLINE Status define(Solution<N>& out, double reach, Workspace<N>& ws) no
     ws.reset();
     return blank(Status::not_finite, out);
   }
-  bool far = define<N>(out.rotation, out.position, reach);
-  for (Pose& tip : out.tube_tips) far = define<N>(tip.rotation, tip.position, reach) || far;
+  bool far = define<N>(out.rotation, out.position, reach, drift);
+  for (Pose& tip : out.tube_tips) far = define<N>(tip.rotation, tip.position, reach, drift) || far;
   if (ws.warm) ws.guess.rotation = orthonormalised(ws.guess.rotation);
   if (far) ws.reset();
   return far && has_equilibrium(out.status) ? Status::not_converged : out.status;

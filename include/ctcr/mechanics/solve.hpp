@@ -232,10 +232,14 @@ inline double distance(const TipGuess<N>& a, const TipGuess<N>& b) noexcept {
   return std::sqrt(0.5 * (a.rotation - b.rotation).squaredNorm() + (a.psi - b.psi).squaredNorm());
 }
 
-/// Whether the error of integration is estimated and kept. Schemes for comparison take their steps as they are told.
+/// Whether a scheme serves to compare (integrators.hpp): its errors are shown as they are, in the steps that it is told.
+template <class Stepper>
+inline constexpr bool is_for_comparison = requires { Stepper::general_equations; };
+
+/// Whether the error of integration is estimated and kept.
 template <class Stepper>
 inline bool takes_more_steps(const Settings& settings) noexcept {
-  return !requires { Stepper::general_equations; } && settings.accuracy < std::numeric_limits<double>::infinity();
+  return !is_for_comparison<Stepper> && settings.accuracy < std::numeric_limits<double>::infinity();
 }
 
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
@@ -370,7 +374,7 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   if (out.status == Status::ok && !all_finite(load.force, load.moment)) out.status = Status::not_finite;
   if (out.status != Status::ok) return blank(out.status, out);
   using enum Loading;
-  if constexpr (!Fx::none || requires { Stepper::general_equations; })
+  if constexpr (!Fx::none || is_for_comparison<Stepper>)
     out.status = run(std::integral_constant<Loading, weight>{});
   else if (!model.coefficients().gravity.isZero(0.0) || !load.moment.isZero(0.0) ||
            (D == Derivatives::compliance && load.force.isZero(0.0)))
@@ -380,9 +384,10 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   else if constexpr (D != Derivatives::compliance)
     out.status = run(std::integral_constant<Loading, none>{});
   if (out.status == Status::needs_solve) return blank(out.status, out);
-  const double reach = Fx::none ? reach_of(model.robot(), q) : std::numeric_limits<double>::infinity();
+  constexpr double any = std::numeric_limits<double>::infinity();
+  const double reach = Fx::none && !is_for_comparison<Stepper> ? reach_of(model.robot(), q) : any;
   if (!are_defined<D>(out, reach)) [[unlikely]]
-    out.status = define(out, reach, ws);
+    out.status = define(out, reach, is_for_comparison<Stepper> ? any : no_rotation, ws);
   return out.status;
 }
 
