@@ -126,7 +126,6 @@ TEST(TipDerivatives, AreThoseOfTheFineModel) {
 
 TEST(TipDerivatives, ByJointsAreTheJacobianOfTheSolution) {
   test::Random random(1);
-  // The solution's columns of beta are exact up to the error of the integration.
   const Settings settings{.tolerance = 1e-12, .steps = 30, .accuracy = test::as_told};
   for (const Acting acting : all)
     for (int n = 0; n < 10; ++n) {

@@ -134,9 +134,7 @@ void expect_defined_by_all(const test::Case<N>& c, int n, test::Random& random) 
 
 template <class T>
 struct DefinedOutputs : testing::Test {};
-using UpToFive =
-    testing::Types<test::TubeCount<1>, test::TubeCount<2>, test::TubeCount<3>, test::TubeCount<4>, test::TubeCount<5>>;
-TYPED_TEST_SUITE(DefinedOutputs, UpToFive);
+TYPED_TEST_SUITE(DefinedOutputs, test::OneToFiveTubes);
 
 TYPED_TEST(DefinedOutputs, OfGarbageRobots) {
   constexpr int N = TypeParam::N;

@@ -1,5 +1,5 @@
 #pragma once
-// Newton's method on the shooting problem, and its real-time form: one evaluation per control period.
+// Newton's method on the shooting problem, and its real-time form within a budget of evaluations.
 #include <algorithm>
 
 #include "ctcr/mechanics/defined_outputs.hpp"
@@ -320,7 +320,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   Ev ev;
   TipGuess<N> guess, next = predicted_guess(ws, q, load);
   for (bool last = false; !last;) {
-    if (out.iterations == settings.evaluations) return Status::needs_solve;
+    if (out.iterations >= settings.evaluations) return Status::needs_solve;
     guess = next;
     evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
     ++out.iterations;
@@ -346,7 +346,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
     const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
     way = ws.moved + distance(ws.guess, next) + (q.beta - ws.q.beta).norm() / length;
     if (!(error <= allowed && way < checked_range && steps == ws.steps)) {
-      if (!jacobian || out.iterations == settings.evaluations) return Status::needs_solve;
+      if (!jacobian || out.iterations >= settings.evaluations) return Status::needs_solve;
       error = integration_error<L, Stepper>(c, q, load, next, steps, tip.position);
       ++out.iterations;
       if (!(error <= allowed)) return Status::needs_solve;

@@ -9,14 +9,10 @@
 
 namespace ctcr::detail {
 
-/// Largest step, in units of the length over which the state of the rod changes. From there on the error of a step of
-/// MagnusRk4 falls with its fifth power.
-inline constexpr double largest_step = 1.0;
-
-/// Steps per segment from which refinement starts. The length over which the state changes follows from bounds on
-/// curvature u and force F in each segment: 1 / sqrt(F / EI + u^2 / 4 + rho u / 2), the wave number of a loaded rod, half
-/// the turn of its frame, and the growth of relative torsion. Neither angles nor unknowns enter, so that a path through
-/// the same joints takes the same steps. Real time: yes.
+/// Steps per segment from which refinement starts: no step is longer than the length over which the state of the rod
+/// changes, 1 / sqrt(F / EI + u^2 / 4 + rho u / 2). Its terms are the wave number of a loaded rod, half the turn of its
+/// frame, and the growth of relative torsion, with bounds on curvature u and force F in the segment. Neither angles nor
+/// unknowns enter, so the same joints and load give the same number. Real time: yes.
 template <int N>
 inline int first_steps(const Coefficients<N>& c, const VecN<N>& beta, const TipLoad& load, int most) noexcept {
   const Events<N> events = sort_events(c, beta);
@@ -36,7 +32,7 @@ inline int first_steps(const Coefficients<N>& c, const VecN<N>& beta, const TipL
     for (std::size_t i = 0; i < N; ++i)
       if (curved[i]) bending += std::abs(c.a[i]), rho = std::max(rho, std::abs(c.rho[i]));
     const double compliance = c.compliance[std::size_t(present - 1)], u = compliance * bending;
-    steps = std::max(steps, h * std::sqrt(force * compliance + 0.25 * u * u + 0.5 * rho * u) / largest_step);
+    steps = std::max(steps, h * std::sqrt(force * compliance + 0.25 * u * u + 0.5 * rho * u));
   }
   return steps < most ? int(std::ceil(steps)) : most;
 }
