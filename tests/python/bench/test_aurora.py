@@ -3,6 +3,8 @@
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +23,8 @@ from ctcr.errors import InputError
 from ctcr.frames import angle_between, base_to_tracker
 from ctcr.model.model import Model
 from ctcr.robot import robot_file
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from simulated_bench import ROBOT, ctcr, running
 
 SENSOR = 0x0A
@@ -249,6 +253,77 @@ def test_no_device(tmp_path):
     pytest.importorskip("serial", reason="pyserial is not installed")
     with pytest.raises(DeviceFault, match="cannot open the port .*dialout"):
         tracker(str(tmp_path / "nothing")).connect()
+
+
+# ---- driver on a line of the test's
+
+
+class Line:
+    """A serial port whose device answers at once, by answer(name, arguments) of a command."""
+
+    baudrate, timeout, in_waiting = ndi.RESET_BAUD, 0, 0
+
+    def __init__(self, answer):
+        self.answer, self.reply, self.commands = answer, b"", 0
+
+    def write(self, data: bytes) -> None:
+        self.commands += 1
+        assert self.commands < 10_000, "it never ends"
+        name, _, arguments = data[:-5].decode().partition(":")
+        self.reply = ndi.framed(self.answer(name, arguments).encode("latin-1"))
+
+    def send_break(self, seconds: float) -> None:
+        self.reply = ndi.RESET_MESSAGE
+
+    def read_until(self, end: bytes) -> bytes:
+        line, found, self.reply = self.reply.partition(end)
+        return line + found
+
+    def reset_input_buffer(self) -> None:
+        self.reply = b""
+
+    def close(self) -> None: ...
+
+
+@pytest.fixture
+def on_line(monkeypatch):
+    """on_line(answer): a tracker whose device answers so, and its line."""
+    from ctcr.bench.devices import aurora
+
+    def make(answer):
+        line = Line(answer)
+        monkeypatch.setattr(aurora, "needed", lambda *_: SimpleNamespace(Serial=lambda *_, **options: line))
+        monkeypatch.setattr(aurora, "time", SimpleNamespace(sleep=lambda seconds: None, monotonic=time.monotonic))
+        return tracker("/dev/nothing"), line
+
+    return make
+
+
+def test_stuck_tool(on_line):
+    """A tool that waits for ever, though its initialisation was confirmed, is a fault that names it and a remedy."""
+    aurora, line = on_line(lambda name, arguments: "010A001" if (name, arguments) == ("PHSR", "02") else "00OKAY")
+    with pytest.raises(DeviceFault, match="tool 0A waits again .*: unplug the tool"):
+        aurora.connect()
+    assert line.commands < 20
+
+
+REPLIES = ["OKAY", "", "00", "010A001", "020A0010B001", "FF" + "0A001" * 255, "ERROR0C", "ERROR", "ERRORxx", "-1", "1"]
+
+
+@settings(
+    max_examples=300,
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(data=st.data(), kinds=st.lists(st.sampled_from(REPLIES) | st.text(st.characters(codec="latin-1")), min_size=1))
+def test_any_replies(on_line, data, kinds):
+    """Whatever a device answers, connecting ends soon: well, or with a fault."""
+    source = data.draw(st.randoms(use_true_random=False))
+    aurora, _ = on_line(lambda name, arguments: source.choice(kinds).replace("\r", ""))
+    with suppress(DeviceFault):
+        aurora.connect()
 
 
 # ---- clients written by others

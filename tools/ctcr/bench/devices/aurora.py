@@ -153,9 +153,14 @@ class Aurora(AbstractContextManager):
     def _find_tools(self) -> None:
         for handle in self._handles("01"):
             self._ask("PHF", f"{handle:02X}")
+        begun: set[int] = set()
         while waiting := self._handles("02"):  # the second coil of a plug shows once the first is initialised
             for handle in waiting:
+                if handle in begun:
+                    text = f"the tool {handle:02X} waits again after it was initialised"
+                    raise self._fault(text, "unplug the tool, switch the device off and on, and plug the tool in")
                 self._ask("PINIT", f"{handle:02X}")
+                begun.add(handle)
         self.tools = []
         for handle in self._handles("03"):
             about = self._ask("PHINF", f"{handle:02X}0005")
@@ -223,7 +228,10 @@ class Aurora(AbstractContextManager):
         if b"%04X" % ndi.crc16(text) != line[-4:]:
             raise Garbled("wrong CRC")
         if text.startswith(b"ERROR"):
-            code = int(text[5:7], 16)
+            try:
+                code = int(text[5:7], 16)
+            except ValueError:
+                raise Garbled("a refusal without its code") from None
             what, remedy = ndi.ERRORS.get(code, ("refused", "see the device's manual for this code"))
             raise self._fault(f"error {code:02X}, {what}", remedy, code)
         return text
