@@ -258,6 +258,10 @@ def test_load(file, robot, tmp_path):
         (("def joints", "def other"), "needs at least one of the functions joints"),
         (("class Mine(Effect)", "class Mine"), "holds no effect"),
         (("import numpy as np", "import nonsense_module"), "nonsense_module"),
+        (("import numpy as np", "raise SystemExit"), "line 2: ends the program"),
+        (("import numpy as np", "print('loaded')"), "prints 'loaded"),
+        (("    def joints", "    def __init__(self): raise SystemExit\n    def joints"), "line 7: ends the program"),
+        (("parameters =", "measure = 5; parameters ="), "mine.measure: needs a text"),
     ],
 )
 def test_faults_of_a_file(change, message, file):
@@ -284,6 +288,10 @@ def test_all_faults(file):
         ("return rows.beta, rows.alpha / (values.gain - values.gain)", "not finite, first in row 2"),
         ("return rows.beta, rows.nothing", "mine.py, line 8: Mine.joints fails"),
         ("return 'a', 'b'", "arrays of numbers"),
+        ("raise SystemExit(0)", "mine.py, line 8: Mine.joints ends the program"),
+        ("raise KeyboardInterrupt", "mine.py, line 8: Mine.joints was interrupted"),
+        ("raise GeneratorExit('x')", "mine.py, line 8: Mine.joints fails: x (GeneratorExit)"),
+        ("print('seen'); return rows.beta, rows.alpha", "mine.py: Mine.joints prints 'seen\\n' to standard output"),
     ],
 )
 def test_faults_of_a_function(body, message, file, robot, readings):
@@ -293,6 +301,22 @@ def test_faults_of_a_function(body, message, file, robot, readings):
     with pytest.raises(InputError) as error, np.errstate(all="ignore"):
         UserRecording(robot, readings, ["effects.mine.gain"], own)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("ending", ["import sys; sys.exit(0)", "raise KeyboardInterrupt", "print(1)"])
+@pytest.mark.parametrize("when", ["values.gain == 0", "values.gain != 0"])
+def test_endings_of_a_command(ending, when, file, readings, tmp_path, capsys):
+    """A function that would end the program or print, at once or in the middle of a fit, fails the command by name; no
+    file is written and nothing printed."""
+    path, made, new = file(GOOD), tmp_path / "m.csv", tmp_path / "new.yaml"
+    path.write_text(path.read_text().replace("        return", f"        if {when}: {ending}\n        return"))
+    table2 = ROOT / "examples" / "robots" / "table2.yaml"
+    simulation.write(simulation.simulate(robot_file.load(table2), readings, "jitter"), made, 3)
+    fit = ["--fit", made, "--free", "tubes.1.curvature", "--json", "-", "-o", new, "--effects", path]
+    assert cli.run([str(word) for word in ("add", table2, "mine", *fit)]) == 1
+    printed = capsys.readouterr()
+    assert str(path) in printed.err and "Mine.joints" in printed.err and "this should not happen" not in printed.err
+    assert printed.out == "" and not new.exists()
 
 
 def test_unknown_name(robot, readings):

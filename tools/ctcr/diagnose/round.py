@@ -13,7 +13,6 @@ from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.diagnose.held_out import predicts_better
 from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
-from ctcr.errors import InputError
 from ctcr.fit import folds, joint
 
 
@@ -240,8 +239,8 @@ class Refits:
             try:
                 fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start, **options)
                 break
-            except InputError:
-                continue  # the model has no solution there
+            except joint.NoFit:
+                continue
         else:
             return replace(one, fit=None)
         refit = segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty

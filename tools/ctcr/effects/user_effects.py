@@ -27,14 +27,18 @@ amplitudes an effect must change nothing. Hooks, any of them; M rows in the orde
         factor on the tube's bending stiffness at the same arc lengths
     reading(position, rotation, rows, values) -> position, rotation
         pose that the tracker reads for the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
+
+Standard output carries the results of a command: neither the file nor a hook prints there.
 """
 
 import importlib.util
+import io
 import re
 import sys
 import traceback
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
@@ -52,6 +56,7 @@ from ctcr.table.measurements import Measurements
 
 HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
 ACTS_ON = dict(zip(HOOKS, ("joints", "tip", "rod", "reading", "rod", "rod"), strict=True))  # where each hook acts
+TEXTS = ("title", "physics", "signature", "measure", "reference")  # of an effect
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 
@@ -120,10 +125,9 @@ class Effect:
             )
             for p in self.parameters
         )
-        kept = ("id", "physics", "signature", "measure", "reference")
         return catalogue.Effect(
-            **{name: getattr(self, name) for name in kept},
-            title=self.title or self.id,
+            id=self.id,
+            **{name: " ".join(getattr(self, name).split()) for name in TEXTS},
             look_alikes=tuple(self.look_alikes),
             needs=frozenset(self.needs),
             acts_on=frozenset(ACTS_ON[hook] for hook in self.hooks),
@@ -140,12 +144,10 @@ class Effect:
 
     def call(self, hook: str, *arguments: Any) -> Any:
         """The answer of a hook. Raises InputError with the line of the user's file where it failed."""
-        try:
+        module = type(self).__module__
+        file = getattr(sys.modules.get(module), "__file__", None) or module
+        with _users_code(file, f"{type(self).__name__}.{hook}"):
             return getattr(self, hook)(*arguments)
-        except Exception as error:
-            module = type(self).__module__
-            file = getattr(sys.modules.get(module), "__file__", None) or module
-            raise InputError(_fault(error, file, f"{type(self).__name__}.{hook} fails: ")) from error
 
 
 def load(path: str | Path) -> list[Effect]:
@@ -170,7 +172,8 @@ def load(path: str | Path) -> list[Effect]:
     ]
     if problems:
         raise InputError(problems)
-    made = [found() for found in classes]
+    with _users_code(str(path)):
+        made = [found() for found in classes]
     robot_file.user_effects.update((effect.id, effect) for effect in made)
     return made
 
@@ -195,13 +198,31 @@ def _module(path: Path) -> ModuleType:
     writes = sys.dont_write_bytecode
     sys.dont_write_bytecode = True  # no __pycache__ beside the user's file
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
+        with _users_code(str(path)):
+            spec.loader.exec_module(module)
+    except InputError:
         del sys.modules[name]
-        raise InputError(_fault(error, str(path), "")) from None
+        raise
     finally:
         sys.dont_write_bytecode = writes
     return module
+
+
+@contextmanager
+def _users_code(file: str, hook: str = "") -> Iterator[None]:
+    """Runs code of the user's file, which must neither end the program nor print among its results.
+
+    Raises InputError at the line of the file that was reached.
+    """
+    printed = io.StringIO()
+    try:
+        with redirect_stdout(printed):
+            yield
+    except BaseException as error:  # also sys.exit(), which would look like success, and Ctrl+C in an endless loop
+        raise InputError(_fault(error, file, hook)) from error
+    if said := printed.getvalue():
+        text = f"prints {shown(said)} to standard output, which carries the results: print(..., file=sys.stderr)"
+        raise InputError(Problem(f"{hook} {text}".strip(), file))
 
 
 def _faults(found: type[Effect], file: str) -> list[Problem]:
@@ -215,8 +236,9 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
         say("needs an id of small letters, digits and _, such as rotation_pickup", "id")
     elif found.id in catalogue.catalogue(1):
         say("the library has an effect of this id: choose another one", "id")
-    for name in ("title", "physics"):
-        if not isinstance(getattr(found, name), str) or not getattr(found, name).strip():
+    for name in TEXTS:
+        given = getattr(found, name)
+        if not isinstance(given, str) or (name in ("title", "physics") and not given.strip()):
             say("needs a text", name)
     for need in [need for need in found.needs if need not in catalogue.NEEDS][:1]:
         say(f"{shown(need)} is none of {', '.join(catalogue.NEEDS)}", "needs")
@@ -253,11 +275,18 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and isfinite(value)
 
 
-def _fault(error: BaseException, file: str, doing: str) -> Problem:
+def _fault(error: BaseException, file: str, hook: str) -> Problem:
     """An exception of the user's code, at the last line of it that was reached."""
-    reason = " ".join(str(getattr(error, "msg", None) or error).split()) or "no reason given"
+    match error:
+        case SystemExit():
+            text = "ends the program with sys.exit(): raise an error that says what is wrong"
+        case KeyboardInterrupt():
+            text = "was interrupted"
+        case _:
+            reason = " ".join(str(getattr(error, "msg", None) or error).split()) or "no reason given"
+            text = f"{'fails: ' if hook else ''}{reason} ({type(error).__name__})"
     line = getattr(error, "lineno", None)
     for frame in traceback.extract_tb(error.__traceback__):
         if frame.filename == file or Path(frame.filename).resolve() == Path(file).resolve():
             line = frame.lineno
-    return Problem(f"{doing}{reason} ({type(error).__name__})", file, line)
+    return Problem(f"{hook} {text}".strip(), file, line)

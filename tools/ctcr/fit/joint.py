@@ -30,6 +30,10 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
+class NoFit(InputError):
+    """No fit is possible: the model has no solution where it starts."""
+
+
 @dataclass(frozen=True)
 class FitOptions:
     """How a fit is made."""
@@ -60,7 +64,7 @@ def fit(
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
     noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
-    Other options as in `FitOptions`. Raises InputError where no fit is possible.
+    Other options as in `FitOptions`. Raises NoFit where none is possible.
     """
     began = perf_counter()
     robot, measurements, said = sensor_roll.usable(robot, measurements)
@@ -100,7 +104,7 @@ def fit_joint(
     rows       (M,) that are fitted, all by default
     few_first  whether, of many rows, a fit to a few finds the start and compares the starts
     options    those of FitOptions
-    Raises InputError where no fit is possible.
+    Raises NoFit where none is possible.
     """
     how, arguments = FitOptions(**options), (model, priors, noise, positions)
     rows = np.ones(len(positions), bool) if rows is None else rows
@@ -156,7 +160,7 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
             if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break
     except ValueError as error:
-        raise InputError([Problem(line) for line in str(error).splitlines()]) from None
+        raise NoFit([Problem(line) for line in str(error).splitlines()]) from None
     own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
     warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded)], perf_counter() - began
     return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
