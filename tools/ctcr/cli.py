@@ -1,5 +1,6 @@
 """The `ctcr` command. Each subcommand is a module of `ctcr.commands`, loaded when it is called."""
 
+import io
 import os
 import pkgutil
 import sys
@@ -8,6 +9,7 @@ from importlib import import_module
 import click
 
 from ctcr import commands
+from ctcr.show.wording import visible
 
 
 class LazyGroup(click.Group):
@@ -42,6 +44,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs the command line and exits: 0 when it did what was asked, 1 with what was wrong on standard error."""
     # Before numpy loads: its matrices are too small for threads, which only wait for each other. The core has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if sys.stdout:
+        sys.stdout.reconfigure(errors="backslashreplace")  # a letter that this terminal lacks must not stop a command
     sys.exit(run(arguments))
 
 
@@ -52,7 +56,9 @@ def run(arguments: list[str] | None = None) -> int:
         sys.stdout.flush()
         return code if isinstance(code, int) else 0
     except click.ClickException as error:
-        error.show()
+        usage = io.StringIO()
+        error.show(usage)
+        click.echo("\n".join(map(visible, usage.getvalue().split("\n"))), err=True, nl=False)
     except click.Abort:
         _say("stopped")
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
@@ -66,8 +72,7 @@ def _report(error: Exception) -> None:
     from ctcr.errors import InputError
 
     if isinstance(error, InputError):
-        lines = str(error).splitlines()
-        _say(lines[0] if len(lines) == 1 else "\n  ".join(["the input cannot be used:", *lines]))
+        _say(*error.lines if len(error.lines) == 1 else ("the input cannot be used:", *error.lines))
     elif isinstance(error, ModuleNotFoundError) and error.name == "ctcr._core":
         _say("the compiled part of ctcr is missing: install the package with `pip install .` or `tools/dev setup`")
     elif isinstance(error, MemoryError):
@@ -79,5 +84,7 @@ def _report(error: Exception) -> None:
         _say(f"{reason} ({type(error).__name__}; this should not happen: CTCR_DEBUG=1 shows where)")
 
 
-def _say(text: str) -> None:
+def _say(*lines: str) -> None:
+    """An error of one or more lines."""
+    text = "\n  ".join(map(visible, lines))
     click.echo(f"{click.style('Error:', fg='red')} {text}", err=True)

@@ -29,11 +29,13 @@ class InputError(Exception):
         self.omitted = omitted
         super().__init__(str(self))
 
+    @property
+    def lines(self) -> list[str]:
+        """A line a problem, and one for those left out."""
+        return [*map(str, self.problems), *([f"and {self.omitted} more"] if self.omitted else [])]
+
     def __str__(self) -> str:
-        lines = [str(problem) for problem in self.problems]
-        if self.omitted:
-            lines.append(f"and {self.omitted} more")
-        return "\n".join(lines)
+        return "\n".join(self.lines)
 
 
 def did_you_mean(name: str, choices: Iterable[str]) -> str | None:

@@ -1,6 +1,5 @@
 """The result of a calibration procedure, and how it is given back: table, JSON, report, robot file."""
 
-import html
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isfinite, nan
@@ -98,7 +97,7 @@ def write_robot(outcome: Outcome, robot, target: str, command: str, source: str,
 def show(console, outcome: Outcome) -> None:
     console.print(output.table(outcome.title, *cells(outcome), text_columns=2))
     for notice in outcome.notices:
-        console.print(f"  • {notice}", markup=False)
+        console.print(f"  • {notice}")
 
 
 def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
@@ -115,9 +114,7 @@ def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
 def page(outcome: Outcome, source: str, command: str, robot=None) -> str:
     """The whole HTML text; `source` names the table."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
-    sections = [f"<h1>{html.escape(title)}</h1>"]
-    if outcome.notices:
-        sections.append("<h2>To know</h2>" + bullets(outcome.notices))
+    sections = ["<h2>To know</h2>" + bullets(outcome.notices)] if outcome.notices else []
     if outcome.picture:
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))

@@ -1,6 +1,5 @@
 """A joint fit on a terminal, and as one HTML page that needs nothing else: no network, no other file."""
 
-import html
 from math import isfinite
 
 import numpy as np
@@ -9,7 +8,7 @@ from ctcr.calibrate import figures
 from ctcr.calibrate.joint_fit import Calibration, Stage
 from ctcr.model.fields import doubts
 from ctcr.show import html_page, output
-from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.html_page import bullets, cards, figure, paragraph, table
 from ctcr.show.wording import deviation, mm, number
 
 WIDE = 10.4  # [in] of a figure as wide as the page
@@ -21,8 +20,8 @@ NEEDED_WIDTH = 108  # of the table of parameters; a narrower terminal wraps its 
 
 def show(console, c: Calibration) -> None:
     """Prints a calibration on a rich console."""
-    console.print(f"[bold]{c.before.name}[/bold]", highlight=False)
-    console.print(headline(c), markup=False)
+    console.print(c.before.name, style="bold")
+    console.print(headline(c))
     console.print(output.table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c)))
     made = output.table("Parameters", PARAMETER_COLUMNS, parameter_rows(c), text_columns=2)
     for column in made.columns:
@@ -33,9 +32,9 @@ def show(console, c: Calibration) -> None:
     lists = ("Doubts", doubts(c.fitted)), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
     for title, lines in lists:
         if lines:
-            console.print(f"[bold]{title}[/bold]")
+            console.print(title, style="bold")
         for line in lines:
-            console.print(f"  • {line}", markup=False)
+            console.print(f"  • {line}")
 
 
 def headline(c: Calibration) -> str:
@@ -102,11 +101,11 @@ def page(c: Calibration, source: str) -> str:
     title = f"Calibration: {c.before.name}"
     lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
     known = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
-    sections = [_opening(c, title), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
+    sections = [_opening(c), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
     return html_page.page(title, sections, source, "ctcr calibrate fit", figures.view(c))
 
 
-def _opening(c: Calibration, title: str) -> str:
+def _opening(c: Calibration) -> str:
     numbers = [
         ("error", f"{c.stages[0].rms_mm:.3g} mm", "RMS error with the values of the robot file"),
         ("good", f"{c.stages[-1].rms_mm:.3g} mm", f"RMS error with {len(c.fitted)} parameters fitted"),
@@ -119,7 +118,7 @@ def _opening(c: Calibration, title: str) -> str:
         ("noise", expected, f"noise floor: expected error of a right model (jitter{smooth}, parameters)"),
         ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"),
     ]
-    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
+    return paragraph(headline(c), "lead") + cards(numbers)
 
 
 def _fit(c: Calibration) -> list[str]:
@@ -156,7 +155,7 @@ def _halves(c: Calibration) -> str:
     )
     caption = "Left, middle: where the two disagree. Right: against what noise can do (line) and twice that (dashed)."
     picture = figure(figures.half_difference, c, WIDE, 4.6, caption, wide=True)
-    return f"<h2>Two halves of the data</h2><p>{html.escape(text)}</p>{picture}"
+    return f"<h2>Two halves of the data</h2>{paragraph(text)}{picture}"
 
 
 def _residuals(c: Calibration) -> str:

@@ -46,5 +46,5 @@ def _tell(target, hidden, short) -> int:
     out, report = options.Output(), f"{target}/report.html"
     story = Story(new_folder(target), out.console)
     bench_story.tell(story, short)
-    out.say(bench_report.write(story, hidden, report), f"Report: {report}")
+    out.say(*bench_report.write(story, hidden, report), f"Report: {report}")
     return 0

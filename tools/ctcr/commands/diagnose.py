@@ -33,4 +33,4 @@ def command(robot: str, measurements: str, threads: int, out) -> None:
     if result.accepted and not result.verdict.names_no_cause:
         known = out.json_target not in (None, "-")
         way = f"ctcr add {robot} --diagnosis {out.json_target if known else 'FILE'} --fit {measurements} -o NEW.yaml"
-        out.console.print(f"To add: {way}{'' if known else ' (FILE: that of --json)'}", markup=False, soft_wrap=True)
+        out.console.print(f"To add: {way}{'' if known else ' (FILE: that of --json)'}")

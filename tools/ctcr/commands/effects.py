@@ -43,9 +43,7 @@ def command(name: str | None, tubes: int, out) -> None:
         _describe(out.console, shown[0])
         return
     columns = ["id", "name", "the data need", "looks like"]
-    rows = [
-        [e.id, e.title, ", ".join(need for need in _NEEDS if need in e.needs), "\n".join(e.look_alikes)] for e in shown
-    ]
+    rows = [[e.id, e.title, ", ".join(need for need in _NEEDS if need in e.needs), list(e.look_alikes)] for e in shown]
     out.table(f"{len(shown)} physical effects", columns, rows, 4)
     out.console.print("ctcr effects ID describes how an effect shows in the data and what to measure to see it.")
 
@@ -56,7 +54,8 @@ def _describe(console, effect) -> None:
     from ctcr.show.output import table
 
     needs = ", ".join(_NEEDS[need] for need in _NEEDS if need in effect.needs) or "nothing special"
-    console.print(f"[bold]{effect.title}[/bold]  ({effect.id})\n")
+    console.print(f"{effect.title}  ({effect.id})", style="bold")
+    console.print()
     facts = Table.grid(padding=(0, 2))
     facts.add_column(style="bold", no_wrap=True)
     for title, text in (

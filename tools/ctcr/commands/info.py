@@ -24,11 +24,11 @@ def command(robot: str, out) -> None:
     out.write_json(_as_data(loaded, doubts))
     if out.json_target == "-":
         return
-    out.console.print(f"[bold]{loaded.name}[/bold]: {loaded.n_tubes} tubes, innermost first")
+    out.console.print(f"{loaded.name}: {loaded.n_tubes} tubes, innermost first", style="bold")
     out.table("Tubes", *_tube_rows(loaded), 2)
     out.table("Sensor and frame", ["", "value", "unit"], _bench_rows(loaded))
     if doubts:
-        out.console.print("[bold yellow]What looks wrong[/bold yellow]")
+        out.console.print("What looks wrong", style="bold yellow")
         out.say(*(f"  {doubt}" for doubt in doubts))
     else:
         out.say("Nothing looks wrong.")

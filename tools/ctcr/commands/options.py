@@ -115,7 +115,7 @@ class Output:
     def say(self, *lines) -> None:
         """Prints each line as it is."""
         for line in lines:
-            self.console.print(str(line), markup=False)
+            self.console.print(str(line))
 
     def table(self, title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1) -> None:
         """Prints a table; the first columns are text, the others numbers."""

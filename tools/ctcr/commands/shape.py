@@ -78,7 +78,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
             "samples": {"arc_length_m": shape.arc_length, "position_m": shape.position},
         }
     )
-    out.console.print(f"[bold]{loaded.name}[/bold], base frame")
+    out.console.print(f"{loaded.name}, base frame", style="bold")
     rows = [
         [f"tube {i}", f"{1e3 * s:.2f}", *(f"{1e3 * x:.3f}" for x in position)]
         for i, (s, position) in enumerate(zip(ends, tips, strict=True), start=1)

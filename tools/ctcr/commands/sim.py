@@ -41,7 +41,7 @@ def aurora(robot, folder, scenario, seed, **physics) -> None:
     from ctcr.bench.simulators.bench import serve
 
     simulator = AuroraSimulator(_robot(robot, seed, **physics), folder, scenario, seed)
-    click.echo(f"tracker: {simulator.line.link}")
+    options.Output().say(f"tracker: {simulator.line.link}")
     serve(simulator)
 
 
@@ -66,7 +66,7 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     if not interface:
         make_cable()
     simulator = EthercatSimulator(interface or BUS, folder, motors, variant, scenario, seed)
-    click.echo(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
+    options.Output().say(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
     serve(simulator)
 
 

@@ -20,8 +20,8 @@ def command(release: bool, folder) -> None:
 
     if not release:
         emergency_stop.stop(folder, "ctcr stop was called")
-        click.echo("stopped; release with `ctcr stop --release`")
+        options.Output().say("stopped; release with `ctcr stop --release`")
         return
     reason = emergency_stop.reason(folder)
     emergency_stop.release(folder)
-    click.echo(f"released; the reason of the stop was: {reason}" if reason else "nothing was stopped")
+    options.Output().say(f"released; the reason of the stop was: {reason}" if reason else "nothing was stopped")

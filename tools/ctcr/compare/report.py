@@ -1,6 +1,5 @@
 """The comparison as one HTML page that needs nothing else: no network, no other file."""
 
-import html
 from functools import partial
 
 import numpy as np
@@ -11,7 +10,7 @@ from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show import scene as show
-from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table
 from ctcr.show.style import INK, OUT
 
 MOST_ARROWS = 1500
@@ -22,11 +21,11 @@ HEAD_SHARE = 0.015  # of the workspace that an arrow head is long
 def page(c: Comparison, source: str) -> str:
     """The whole HTML text; `source` says what was compared."""
     title = f"Model and measurement: {c.robot}"
-    sections = [_opening(c, title), _findings(c), _view(c), _figures(c), _tables(c)]
+    sections = [_opening(c), _findings(c), _view(c), _figures(c), _tables(c)]
     return html_page.page(title, sections, source, "ctcr compare", scene(c))
 
 
-def _opening(c: Comparison, title: str) -> str:
+def _opening(c: Comparison) -> str:
     p, n, d = c.position_mm, c.noise, c.direction
     numbers = [
         ("error", f"{p.rms:.3g} mm", f"RMS error: {c.percent_of_length.rms:.2g} % of the deployed length"),
@@ -40,13 +39,12 @@ def _opening(c: Comparison, title: str) -> str:
         numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
     if d:
         numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {d.pairs} pairs of visits"))
-    return f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(headline(c))}</p>{cards(numbers)}'
+    return paragraph(headline(c), "lead") + cards(numbers)
 
 
 def _findings(c: Comparison) -> str:
     items = "".join(
-        f'<li>{html.escape(item.text)}<span class="bar">'
-        f'<i style="width:{100 * min(item.share, 1):.1f}%"></i></span></li>'
+        f'<li>{as_html(item.text)}<span class="bar"><i style="width:{100 * min(item.share, 1):.1f}%"></i></span></li>'
         for item in findings(c)
     )
     found = (
@@ -109,7 +107,7 @@ def _tables(c: Comparison) -> str:
         terminal.by_run,
         *([terminal.dependences] * bool(c.ranking.alone)),
     ]
-    lines = (f"<p>{line}</p>" for line in terminal.left_out(c, 200))
+    lines = map(paragraph, terminal.left_out(c, 200))
     return "".join(["<h2>Numbers</h2>", *(table(*description(c)) for description in shown), *lines])
 
 

@@ -16,8 +16,8 @@ Table = tuple[str, list[str], list[list[str]], int]  # title, columns, rows, num
 
 def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
-    console.print(f"[bold]{c.robot}[/bold]", highlight=False)
-    console.print(headline(c), markup=False)
+    console.print(c.robot, style="bold")
+    console.print(headline(c))
     console.print(table(*errors(c)))
     if len(c.runs) > 1:
         _, columns, rows, _ = by_run(c)
@@ -30,11 +30,11 @@ def show(console, c: Comparison) -> None:
         console.print(table(title, columns, rows[:SHOWN_FORMS], texts))
     for title, lines in [("Findings", [item.text for item in findings(c)]), *remarks(c)]:
         if lines:
-            console.print(f"[bold]{title}[/bold]")
+            console.print(title, style="bold")
             for line in lines:
-                console.print(f"  • {line}", markup=False)
+                console.print(f"  • {line}")
     for line in left_out(c, SHOWN_ROWS):
-        console.print(line, markup=False)
+        console.print(line)
 
 
 def remarks(c: Comparison) -> list[tuple[str, Sequence[str]]]:

@@ -1,6 +1,5 @@
 """The story at the bench as one HTML page that needs nothing else."""
 
-import html
 import json
 import re
 from pathlib import Path
@@ -21,7 +20,7 @@ from ctcr.model import parameters as free_parameters
 from ctcr.robot import history, robot_file
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import cards, figure, table
+from ctcr.show.html_page import as_html, cards, figure, table
 from ctcr.show.output import write_text
 from ctcr.table import measurements
 from ctcr.track import scenario
@@ -31,23 +30,26 @@ TITLE = "A hidden effect, found on the bench"
 SHOWN = ("actuation.home_rotation_deg", "tracker.position_mm")  # of the calibrated parameters
 
 
-def write(story: Story, hidden: Robot, target) -> str:
-    """The end of the story in words. `hidden` is the robot on the bench. Raises InputError where it cannot write."""
+def write(story: Story, hidden: Robot, target) -> list[str]:
+    """Writes the page and returns the end of the story in sentences. `hidden` is the robot on the bench.
+
+    Raises InputError where the page cannot be written.
+    """
     drives = _drives(story.folder)
     write_text(page(story, hidden, drives), target)
     rms = story.answers["added"]["rms_mm"]
-    text = (
+    said = [
         f"The error of the model fell from {rms['nominal']:.2f} to {rms['calibrated']:.2f} mm by calibration, and to "
         f"{rms[EFFECT]:.2f} mm with {EFFECT}."
-    )
+    ]
     if drives:
         without, with_it = drives.values()
-        text += (
-            f"\nDriven blindly along a cube, the tip was off by {without.blind.mean():.2f} mm before and "
+        said.append(
+            f"Driven blindly along a cube, the tip was off by {without.blind.mean():.2f} mm before and "
             f"{with_it.blind.mean():.2f} mm after; under control by {without.controlled.mean():.2f} and "
             f"{with_it.controlled.mean():.2f} mm."
         )
-    return text
+    return said
 
 
 def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
@@ -116,7 +118,6 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
             numbers.append(("good", f"{before.mean():.2f} → {after.mean():.2f}", f"mm off a cube that was {how}"))
     count = len(free_parameters.expand("standard", found))
     return (
-        f"<h1>{TITLE}</h1>"
         f'<p class="lead">A robot stands on a simulated bench. It is off its file in {count} calibrated parameters, '
         f"and {EFFECT} acts between its tubes, which its file does not know. The commands below met it through the "
         f"devices' own protocols only, and took {minutes} min {seconds} s.</p>{cards(numbers)}"
@@ -125,8 +126,8 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
 
 def _steps(story: Story) -> str:
     rows = "".join(
-        f'<li><b>{html.escape(step.why)}</b> <span class="soft">{step.seconds:.0f} s</span><br>'
-        f"<code>{html.escape(step.command)}</code><br>{html.escape(step.found)}</li>"
+        f'<li>{as_html("", bold=step.why)} <span class="soft">{step.seconds:.0f} s</span><br>'
+        f"<code>{as_html(step.command)}</code><br>{as_html(step.found)}</li>"
         for step in story.steps
     )
     return f'<h2>The steps</h2><ol class="steps">{rows}</ol>'

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from ctcr.errors import InputError, Problem, file_faults
+from ctcr.show.output import Terminal
 
 LOG = "log.txt"
 
@@ -44,7 +43,7 @@ def new_folder(path: str | Path) -> Path:
 class Story:
     """Runs `ctcr` commands in a folder, with their output in its log, and prints each step."""
 
-    def __init__(self, folder: Path, console: Console):
+    def __init__(self, folder: Path, console: Terminal):
         self.folder, self.steps, self.answers = folder, [], {}
         self._console = console
 
@@ -54,8 +53,8 @@ class Story:
 
         Raises InputError with the message of the command where it fails.
         """
-        self._console.print(f"[bold]{len(self.steps) + 1:2}. {why}[/bold]")
-        self._console.print(f"    $ ctcr {command}", style="dim", markup=False)
+        self._console.print(f"{len(self.steps) + 1:2}. {why}", style="bold")
+        self._console.print(f"    $ ctcr {command}", style="dim")
         start, told = time.monotonic(), None
         self._run(shlex.split(command) + (["--json", f"{answer}.json"] if answer else []), command)
         if answer:
@@ -63,7 +62,7 @@ class Story:
         words = found(told) if callable(found) else found.format_map(told or {})
         step = Step(why, f"ctcr {command}", words, time.monotonic() - start)
         self.steps.append(step)
-        self._console.print(f"    {step.found} ({step.seconds:.0f} s)", style="green", markup=False)
+        self._console.print(f"    {step.found} ({step.seconds:.0f} s)", style="green")
 
     def _run(self, arguments: list[str], command: str) -> None:
         with open(self.folder / LOG, "a", encoding="utf-8") as log:
@@ -79,6 +78,6 @@ class Story:
             )
             log.write(f"{done.stderr or ''}\n")
         if done.returncode:
-            said = (done.stderr or "").strip().removeprefix("Error: ")
+            said = " ".join((done.stderr or "").split()).removeprefix("Error: ")
             where = f"ctcr {command} (see {self.folder / LOG})"
             raise InputError(Problem(f"failed{': ' + said if said else ''}", where))

@@ -1,7 +1,6 @@
 """The diagnosis as one HTML page that needs nothing else: verdict first."""
 
 from collections.abc import Iterable
-from html import escape
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ctcr.effects import catalogue
 from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
-from ctcr.show.html_page import cards, figure, table
+from ctcr.show.html_page import as_html, cards, figure, paragraph, table
 from ctcr.show.wording import short
 
 MOST_ARROWS = 800
@@ -23,7 +22,7 @@ def page(d: Diagnosis, source: str) -> str:
     """The whole HTML text; `source` says what was diagnosed."""
     title = f"Diagnosis: {d.robot.name}"
     parts = [_found, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
-    sections = [_opening(d, title), *(part(d) for part in parts)]
+    sections = [_opening(d), *(part(d) for part in parts)]
     return html_page.page(title, sections, source, "ctcr diagnose", scene(d))
 
 
@@ -31,7 +30,7 @@ def _listed(lines: Iterable[str]) -> str:
     return f"<ul>{''.join(f'<li>{line}</li>' for line in lines)}</ul>"
 
 
-def _opening(d: Diagnosis, title: str) -> str:
+def _opening(d: Diagnosis) -> str:
     rms = {name: f"{short(value)} mm" for name, value in d.rms_mm.items()}
     effects = [("good", rms["with_effects"], "with the effects found")] if d.accepted else []
     numbers = [
@@ -42,9 +41,9 @@ def _opening(d: Diagnosis, title: str) -> str:
     ]
     verdict = d.verdict.word.replace("_", " ").capitalize()
     return (
-        f"<h1>{escape(title)}</h1>"
-        f'<p class="lead"><b>{escape(verdict)}.</b> {escape(" ".join(d.verdict.sentences))}</p>{cards(numbers)}'
-        f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. A right model would leave '
+        paragraph(" " + " ".join(d.verdict.sentences), "lead", bold=f"{verdict}.")
+        + cards(numbers)
+        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. A right model would leave '
         f"{short(d.expected_mm)} mm there: noise, and the uncertainty of its parameters.</p>"
     )
 
@@ -54,7 +53,7 @@ def _found(d: Diagnosis) -> str:
         return ""
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
-    return f"<h2>{heading}</h2>" + _listed(f"<b>{escape(e.title)}</b> ({e.id}). {escape(e.physics)}" for e in effects)
+    return f"<h2>{heading}</h2>" + _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
 
 
 def _errors(d: Diagnosis) -> str:
@@ -74,10 +73,10 @@ def _varying(d: Diagnosis) -> str:
         return ""
     text = "How each parameter would have to change over the readings, beside its calibrated value."
     return (
-        f"<h2>Parameters that vary</h2><p>{escape(d.varying.lead)}:</p>"
-        + _listed(escape(v.message) for v in d.varying.variations)
+        f"<h2>Parameters that vary</h2>{paragraph(d.varying.lead + ':')}"
+        + _listed(as_html(v.message) for v in d.varying.variations)
         + figure(figures.varying, d, 10.4, 3.4, text, True)
-        + f"<p>{escape(ADVICE)}</p>"
+        + paragraph(ADVICE)
     )
 
 
@@ -101,7 +100,7 @@ def _candidates(d: Diagnosis) -> str:
     )
     apart = figure(figures.overlap, d, 5.2, 4.2, text)
     why = next((r.why_not for r in reversed(d.rounds) if r.why_not), "")
-    below = f'<div class="pair">{apart}<div><p>{escape(why)}</p></div></div>'
+    below = f'<div class="pair">{apart}<div>{paragraph(why)}</div></div>'
     return f"<h2>All candidates</h2>{drawn}{below}" if drawn else ""
 
 
@@ -109,8 +108,8 @@ def _next(d: Diagnosis) -> str:
     """Further measurements that would make the answer surer."""
     named = [] if d.verdict.names_no_cause else d.accepted
     ids = list(dict.fromkeys(identity for a in named for identity in a.ids))
-    advice = [f"<b>{i}</b>: {escape(catalogue.get(i, d.robot.n_tubes).measure)}" for i in ids]
-    advice += map(escape, d.varying.measure if d.varying else [])
+    advice = [as_html(f": {catalogue.get(i, d.robot.n_tubes).measure}", bold=i) for i in ids]
+    advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:
         return ""
     runs = "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
@@ -132,7 +131,7 @@ def _parameters(d: Diagnosis) -> str:
 def _limits(d: Diagnosis) -> str:
     not_tested = (f"{identity}: {reason}" for identity, reason in d.not_testable.items())
     lines = [*d.residual.messages, *d.notices, *not_tested]
-    return "<h2>The residual, and limits of these data</h2>" + _listed(map(escape, lines))
+    return "<h2>The residual, and limits of these data</h2>" + _listed(map(as_html, lines))
 
 
 def scene(d: Diagnosis) -> str:

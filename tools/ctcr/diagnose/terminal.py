@@ -6,8 +6,7 @@ from contextlib import contextmanager
 from itertools import groupby
 from typing import Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TimeElapsedColumn
 
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import Round
@@ -32,8 +31,8 @@ def progress() -> Iterator[Callable[[str], None]]:
     if not sys.stderr.isatty():
         yield lambda _: None
         return
-    columns = (BarColumn(20), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    columns = (BarColumn(20), TimeElapsedColumn(), "{task.description}")
+    with Progress(*columns, console=output.Terminal(stderr=True), transient=True) as bar:
         task = bar.add_task("reading", total=None)  # the number of rounds depends on the data
         yield lambda text: bar.update(task, description=text)
 
@@ -41,9 +40,9 @@ def progress() -> Iterator[Callable[[str], None]]:
 def show(console: Any, result: Diagnosis) -> None:
     def say(*lines: str) -> None:
         for line in lines:
-            console.print(line, markup=False)
+            console.print(line)
 
-    console.print(f"[bold]{result.verdict.word.upper().replace('_', ' ')}[/bold]")
+    console.print(result.verdict.word.upper().replace("_", " "), style="bold")
     say(*result.verdict.sentences, "")
     console.print(_errors(result))
     for number_, round_ in enumerate(result.rounds, start=1):

@@ -31,7 +31,6 @@ def page(claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made
         (sensitivity.bars, found.opened, 10.4, 8, "Wrong parameters in open loop (Section V.A)."),
     ]
     sections = [
-        f"<h1>{title}</h1>"
         '<p class="lead">Boyer et al., On High Performance Control of Concentric Tube Continuum Robots through '
         "Parsimonious Calibration, RA-L 2024.</p>",
         cards([("good", str(len(claims)), "values of the paper beside ours"), ("noise", made, shown)]),

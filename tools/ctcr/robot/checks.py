@@ -27,9 +27,9 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
     missing += _missing_of_tubes(tubes, weighed)
     found: list[Fault] = []
     for error in errors:
-        path = error["loc"]
+        path = error["loc"] or (error["input"],)  # a key that is no Unicode comes without a path
         section, field = Robot.owner(path)
-        if error["type"] in ("extra_forbidden", "invalid_key"):
+        if error["type"] in ("extra_forbidden", "invalid_key") or not error["loc"]:
             meant = did_you_mean(str(field), section.model_fields)
             missing = [other for other in missing if other != (*path[:-1], meant)]  # one mistake, one fault
             found.append((path, _unknown(section, str(field), meant)))

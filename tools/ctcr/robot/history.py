@@ -1,12 +1,12 @@
 """The ledger of a robot file as a table and as a waterfall: the error from the first file down to the noise floor."""
 
-import html
 from dataclasses import dataclass
 
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
 from ctcr.show.output import table
 from ctcr.show.style import ERROR, NOISE, OUT
+from ctcr.show.wording import visible
 
 COLUMNS = ["date", "command", "from", "changes", "error"]
 FLOOR = "noise floor"
@@ -54,7 +54,7 @@ def waterfall(robot: Robot) -> list[Stage]:
 def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> None:
     """Both on the terminal."""
     if not lines:
-        console.print(f"{robot.name}: nothing was changed yet (ctcr calibrate, ctcr add)", markup=False)
+        console.print(f"{robot.name}: nothing was changed yet (ctcr calibrate, ctcr add)")
         return
     console.soft_wrap = False
     console.print(table(f"Ledger of {robot.name}", COLUMNS, lines, 5))
@@ -65,10 +65,10 @@ def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> 
     console.print("Error, mm RMS, on held-out runs where there were any")
     for before, stage in zip([None, *stages], stages, strict=False):
         bar = "█" * max(1, round(_BAR * stage.rms_mm / most))
-        console.print(f"  {stage.name:{width}}  {stage.rms_mm:7.3f}  {bar}{_change(before, stage)}", markup=False)
+        console.print(f"  {stage.name:{width}}  {stage.rms_mm:7.3f}  {bar}{_change(before, stage)}")
     sources = list(dict.fromkeys(stage.source for stage in stages if stage.source))
     if len(sources) > 1:
-        console.print(f"The figures come from different tables: {', '.join(sources)}", markup=False)
+        console.print(f"The figures come from different tables: {', '.join(sources)}")
 
 
 def page(robot: Robot, file: str) -> str:
@@ -76,7 +76,7 @@ def page(robot: Robot, file: str) -> str:
     stages, lines = waterfall(robot), entries(robot)
     title = f"History: {robot.name}"
     lead = _lead(stages) if stages else "Nothing was changed yet." if not lines else ""
-    sections = [f'<h1>{html.escape(title)}</h1><p class="lead">{html.escape(lead)}</p>']
+    sections = [html_page.paragraph(lead, "lead")]
     if stages:
         sections.append(html_page.figure(draw_waterfall, stages, 10.4, 4.4, "RMS error after each step."))
     sections.append("<h2>Ledger</h2>" + html_page.table("Oldest first", COLUMNS, lines, len(COLUMNS)))
@@ -99,7 +99,7 @@ def draw_waterfall(figure, stages: list[Stage]) -> None:
         axes.annotate(f"{stage.rms_mm:.3g}{_change(before, stage)}", (x, stage.rms_mm), (0, 3), **above)
     if stages[-1].name == FLOOR:
         axes.axhline(stages[-1].rms_mm, color=NOISE, ls="--", lw=1)
-    axes.set_xticks(range(len(stages)), [stage.name.replace(" ", "\n", 1) for stage in stages])
+    axes.set_xticks(range(len(stages)), [visible(stage.name).replace(" ", "\n", 1) for stage in stages])
     axes.set(ylabel="error, mm RMS", ylim=(0, 1.14 * max(stage.rms_mm for stage in stages)))
     axes.grid(axis="x", visible=False)
 

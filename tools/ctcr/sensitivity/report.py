@@ -15,7 +15,7 @@ from ctcr.show.style import AXES, ERROR, FAINT
 
 def page(found: dict[str, Any], source: str, accuracy: float) -> str:
     """The whole HTML text; `accuracy` [mm]."""
-    sections = ["<h1>Which parameters matter</h1>", bullets(closing(found, accuracy))]
+    sections = [bullets(closing(found, accuracy))]
     if study := found.get("open_loop"):
         text = (
             f"Distance between the tips that the nominal robot and a wrong one predict, at {study.configurations} "

@@ -54,7 +54,7 @@ def show(console, found: dict[str, Any], accuracy: float) -> None:
         title = f"Closed loop: increase of the error; with true parameters: {nominal}"
         console.print(output.table(title, CLOSED_COLUMNS, closed_rows(study), 2))
     for line in closing(found, accuracy):
-        console.print(line, markup=False)
+        console.print(line)
 
 
 def as_data(robot: str, found: dict[str, Any], accuracy: float) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 from plotly.offline import get_plotlyjs
 
 from ctcr.show.style import draw
+from ctcr.show.wording import visible
 
 
 def page(
@@ -16,29 +17,29 @@ def page(
 ) -> str:
     """The whole HTML text.
 
-    title     plain text
-    sections  HTML; empty ones are left out
+    title     plain text, the heading of the page
+    sections  HTML by the functions below; empty ones are left out
     footer    plain text: the sources of the page; `command` made it
     drawing   JSON of a 3-D view, which one of the sections has the element `view` for
     reload_s  interval at which the browser reloads the page; 0: never
     """
-    title = html.escape(title)
+    title = as_html(title)
     reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
     style = (files("ctcr.show") / "html_page.css").read_text(encoding="utf-8")
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"{reload}"
-        f"<title>{title}</title><style>{style}</style></head><body>"
+        f"<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>"
         + "\n".join(filter(None, sections))
-        + f"<footer>{html.escape(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"
+        + f"<footer>{as_html(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"
         + (_drawn(drawing) if drawing is not None else "")
         + "</body></html>\n"
     )
 
 
 def _drawn(drawing: str) -> str:
-    text = drawing.replace("</", "<\\/")
+    text = drawing.replace("<", "\\u003c")  # in JSON they stand in strings only; no text may end or open a script
     return (
         f"<script>{get_plotlyjs()}</script>"
         f"<script>const drawing = {text};\n"
@@ -46,12 +47,22 @@ def _drawn(drawing: str) -> str:
     )
 
 
+def as_html(text: str, bold: str = "") -> str:
+    """Plain text after a beginning in bold: here, and nowhere else, names of the user's become HTML."""
+    return (f"<b>{as_html(bold)}</b>" if bold else "") + html.escape(visible(text))
+
+
+def paragraph(text: str, kind: str = "", bold: str = "") -> str:
+    """Plain text; `kind`: lead or soft, a class of the style sheet."""
+    return f'<p class="{kind}">{as_html(text, bold)}</p>' if kind else f"<p>{as_html(text, bold)}</p>"
+
+
 def cards(numbers: Iterable[tuple[str, str, str]]) -> str:
     """Large numbers side by side: (kind, value, meaning)."""
     return (
         '<div class="numbers">'
         + "".join(
-            f'<div class="number {kind}"><b>{html.escape(value)}</b><span>{html.escape(text)}</span></div>'
+            f'<div class="number {kind}"><b>{as_html(value)}</b><span>{as_html(text)}</span></div>'
             for kind, value, text in numbers
         )
         + "</div>"
@@ -59,14 +70,14 @@ def cards(numbers: Iterable[tuple[str, str, str]]) -> str:
 
 
 def bullets(lines: Iterable[str]) -> str:
-    return '<ul class="limits">' + "".join(f"<li>{html.escape(line)}</li>" for line in lines) + "</ul>"
+    return '<ul class="limits">' + "".join(f"<li>{as_html(line)}</li>" for line in lines) + "</ul>"
 
 
 def figure(plot: Any, subject: Any, width: float, height: float, caption: str, wide: bool = False) -> str:
     """A picture of `subject` with its caption; empty where there is nothing to draw."""
     drawn = draw(plot, subject, width, height)
     kind = ' class="wide"' if wide else ""
-    return f"<figure{kind}>{drawn}<figcaption>{html.escape(caption)}</figcaption></figure>" if drawn else ""
+    return f"<figure{kind}>{drawn}<figcaption>{as_html(caption)}</figcaption></figure>" if drawn else ""
 
 
 def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int) -> str:
@@ -74,11 +85,11 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], t
 
     def cell(tag: str, index: int, value: str) -> str:
         kind = ' class="text"' if index < text_columns else ""
-        return f"<{tag}{kind}>{html.escape(value)}</{tag}>"
+        return f"<{tag}{kind}>{as_html(value)}</{tag}>"
 
     head = "".join(cell("th", i, name) for i, name in enumerate(columns))
     body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
     return (
-        f'<div class="scroll"><table><caption>{html.escape(caption)}</caption>'
+        f'<div class="scroll"><table><caption>{as_html(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )

@@ -12,11 +12,13 @@ from pathlib import Path
 from typing import IO, Any
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.progress import Progress as Bar
 from rich.table import Table
+from rich.text import Text
 
 from ctcr.errors import InputError, Problem, file_faults
+from ctcr.show.wording import visible
 
 PROGRESS_AFTER_S = 1.0
 
@@ -80,27 +82,42 @@ def plain(data: Any) -> Any:
     return data
 
 
-def console(json_target: str | None = None):
-    """A rich console for human readers; it leaves standard output alone when that carries JSON."""
-    return Console(stderr=json_target == "-", highlight=False, soft_wrap=True)
+class Terminal(Console):
+    """The way to the terminal: names of the user's reach it as they are written, whatever they hold.
+
+    No markup is read, and `visible` shows what does not print. It leaves one line of a text: print each by itself.
+    """
+
+    def __init__(self, **options: Any):
+        super().__init__(markup=False, emoji=False, highlight=False, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(visible(text), **options)
 
 
-def table(title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1, text: Collection[int] = ()):
-    """A rich table: the first columns, or those of `text`, are text, the others numbers.
+def console(json_target: str | None = None) -> Terminal:
+    """A terminal for human readers; it leaves standard output alone when that carries JSON."""
+    return Terminal(stderr=json_target == "-", soft_wrap=True)
+
+
+def table(
+    title: str, columns: list[str], rows: list[list[str | list[str]]], text_columns: int = 1, text: Collection[int] = ()
+):
+    """A rich table: the first columns, or those of `text`, are text, the others numbers. A cell may have several lines.
 
     On a narrow terminal text wraps between words, so that numbers and names are not cut.
     """
     made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
         is_text = i in text if text else i < text_columns
-        cells = [row[i].strip() for row in rows]
+        cells = [line.strip() for row in rows for line in ([row[i]] if isinstance(row[i], str) else row[i])]
         folds = is_text and any(" " in cell for cell in cells)
         longest = max((len(word) for cell in cells for word in cell.split()), default=0)
         made.add_column(
             column, justify="left" if is_text else "right", no_wrap=not folds, min_width=longest if folds else None
         )
     for row in rows:
-        made.add_row(*row)
+        made.add_row(*(cell if isinstance(cell, str) else Group(*cell) for cell in row))
     return made
 
 
@@ -123,7 +140,8 @@ class Progress(AbstractContextManager):
             self._bar.update(self._id, completed=self.done)
 
     def _show(self) -> None:
-        self._bar = Bar(console=Console(stderr=True), transient=True)
+        columns = ("{task.description}", *Bar.get_default_columns()[1:])  # theirs would read markup
+        self._bar = Bar(*columns, console=Terminal(stderr=True), transient=True)
         self._id = self._bar.add_task(self.task, total=self.total)
         self._bar.start()
 

@@ -12,6 +12,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from ctcr.arrays import Array
 from ctcr.show.output import atomic_writer
+from ctcr.show.wording import visible
 
 TUBE_COLOURS = ("#e8871e", "#3f8fc4", "#6b7a8f", "#3d4757")  # innermost first; apart for colour-blind eyes too
 AXIS_COLOURS = ("#c0392b", "#27934b", "#2255aa")
@@ -167,5 +168,7 @@ def _explain(figure, robot, ends: Array, title: str) -> None:
         label = f"tube {i + 1}: {ends[i]:.1f} mm out{width}"
         handles.append(Line2D([], [], color=TUBE_COLOURS[i], linewidth=3 + 1.2 * i, label=label))
     figure.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.025, 0.865), frameon=False, fontsize=10)
-    figure.text(0.035, 0.955, robot.name, fontsize=15, fontweight="bold", color="#2b3440", va="top")
+    figure.text(
+        0.035, 0.955, visible(robot.name), parse_math=False, fontsize=15, fontweight="bold", color="#2b3440", va="top"
+    )
     figure.text(0.035, 0.915, title, fontsize=9.5, color="#55606e", va="top", linespacing=1.4)

@@ -18,6 +18,7 @@ STYLE = {
     "axes.edgecolor": "#8794a0",
     "axes.labelcolor": INK,
     "text.color": INK,
+    "text.parse_math": False,  # a name with two dollar signs is no formula
     "xtick.color": INK,
     "ytick.color": INK,
     "axes.spines.top": False,

@@ -1,10 +1,24 @@
-"""Numbers and lists as messages and pages show them."""
+"""Numbers, names and lists as messages and pages show them."""
 
 from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any
 
 NAMED = 6  # rows, runs and the like that a sentence names: more are not read
+
+
+def visible(text: str) -> str:
+    """The text on one line, with an escape such as \\x1b for all that does not print.
+
+    It can neither act on a terminal nor hide.
+    """
+
+    def shown(letter: str) -> str:
+        if letter.isprintable():
+            return letter
+        return " " if letter.isspace() else letter.encode("unicode_escape").decode()
+
+    return "".join(map(shown, text))
 
 
 def short(value: float) -> str:

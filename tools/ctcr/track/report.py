@@ -1,10 +1,8 @@
 """A scenario as one HTML page that needs nothing else: no network, no other file."""
 
-import html
-
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import bullets, cards, figure, table
+from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
@@ -46,9 +44,9 @@ def _opening(numbers: dict, scenario: Scenario) -> str:
         clearance = min(f["obstacle_mm"] for f in numbers.values())
         shown.append(("error" if clearance < 0 else "good", f"{clearance:.2f} mm", "least distance to the obstacle"))
     shown.append(("error" if failed else "good", str(len(failed)), f"weights failed, of {len(numbers)}"))
-    lead = f"<p class='lead'>{html.escape(scenario.about)}</p>" if scenario.about else ""
+    lead = paragraph(scenario.about, "lead") if scenario.about else ""
     verdicts = bullets(f"{weight}: {f['verdict']}" for weight, f in numbers.items())
-    return f"<h1>Scenario {html.escape(scenario.name)}</h1>{lead}{cards(shown)}{verdicts}"
+    return f"{lead}{cards(shown)}{verdicts}"
 
 
 def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) -> str:
@@ -71,5 +69,5 @@ def _one(run: Run, scenario: Scenario, robot: Robot) -> str:
     joints = figure(figures.actuators, (run, robot, scenario), 10.4, 3.6, text, wide=True)
     text = "The error, and when each task gave way."
     tasks = figure(figures.tasks, (run, scenario), 10.4, 3.8, text, wide=True)
-    heading = html.escape(f"{run.mass_g:g} g, run {run.repetition}: {run.verdict()}")
+    heading = as_html(f"{run.mass_g:g} g, run {run.repetition}: {run.verdict()}")
     return f"<h2>{heading}</h2>{joints}{tasks}"

@@ -9,6 +9,7 @@ from ctcr.arrays import Array
 from ctcr.bench.devices.bench_file import SIMULATED, Bench
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import AURORA
+from ctcr.show.wording import visible
 
 GRAVITY = 9.80665  # [m/s^2]
 
@@ -44,7 +45,7 @@ class Person:
 
 
 def _ask(text: str) -> None:
-    click.prompt(f"{text}, then press Enter", default="", show_default=False, prompt_suffix=" ", err=True)
+    click.prompt(f"{visible(text)}, then press Enter", default="", show_default=False, prompt_suffix=" ", err=True)
 
 
 class SimulatedPerson(Person):

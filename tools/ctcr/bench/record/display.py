@@ -5,12 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from math import isnan
 
-from rich.console import Console, Group
+from rich.console import Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
+from rich.text import Text
 
 from ctcr.bench.record.session import Progress
+from ctcr.show.output import Terminal
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 WIDTH = 60
@@ -21,7 +23,7 @@ class Display:
     """A progress bar and a bar for each of the last readings. Shows nothing where standard error is no terminal."""
 
     def __init__(self):
-        console = Console(stderr=True)
+        console = Terminal(stderr=True)
         self._live = Live(console=console, auto_refresh=False) if console.is_terminal else None
         self._next, self._start = 0.0, time.monotonic()
         self._first_done = None
@@ -59,7 +61,7 @@ class Display:
         head.add_row(f"{progress.done} of {progress.total} rows", bar, ends, progress.doing)
         lines, errors = [head], progress.errors_mm
         if not progress.seen:
-            lines.append("[bold red]the tracker does not see the sensor[/bold red]: waiting for it")
+            lines.append(Text("the tracker does not see the sensor: waiting for it", style="bold red"))
         if errors:
             worst = max((e for e in errors if not isnan(e)), default=errors[-1])
             figures = f"now {_mm(errors[-1])}, RMS {_mm(progress.rms_mm)}, worst {_mm(worst)}"

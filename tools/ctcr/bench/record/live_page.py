@@ -2,7 +2,6 @@
 
 import time
 from contextlib import AbstractContextManager
-from html import escape
 from math import isnan
 from pathlib import Path
 
@@ -49,7 +48,7 @@ def page(progress: Progress, title: str, reload_s: int) -> str:
         ]
     doing = progress.doing if progress.seen else f"{progress.doing}: the tracker does not see the sensor"
     sections = [
-        f"<h1>{escape(title)}</h1><p class='lead'>{escape(doing if reload_s else 'ended')}</p>",
+        html_page.paragraph(doing if reload_s else "ended", "lead"),
         html_page.cards(numbers),
         picture(errors[-SHOWN:], len(errors)) if known else "",
     ]

@@ -60,7 +60,7 @@ def request(folder: Path, name: str, message: dict[str, Any]) -> Any:
     except (OSError, ValueError):
         raise InputError(Problem(f"no simulator answers: start `ctcr sim {name}`", str(path))) from None
     if "error" in reply:
-        raise InputError(Problem(reply["error"], name))
+        raise InputError(Problem(line, name) for line in reply["error"].splitlines())
     return reply["reply"]
 
 
