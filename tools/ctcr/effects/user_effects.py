@@ -221,7 +221,7 @@ def _users_code(file: str, hook: str = "") -> Iterator[None]:
     except BaseException as error:  # also sys.exit(), which would look like success, and Ctrl+C in an endless loop
         raise InputError(_fault(error, file, hook)) from error
     if said := printed.getvalue():
-        text = f"prints {shown(said)} to standard output, which carries the results: print(..., file=sys.stderr)"
+        text = f"prints {shown(said)} to standard output, which carries the results: print to sys.stderr"
         raise InputError(Problem(f"{hook} {text}".strip(), file))
 
 
