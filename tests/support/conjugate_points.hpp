@@ -44,8 +44,7 @@ public:
     TubeTips<N> tips;
     Frame<S> frame{};
     const auto arc_length = [](int, double s) noexcept { return s; };
-    const auto record = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f,
-                            const std::array<double, 2>&) noexcept {
+    const auto record = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f) noexcept {
       if constexpr (!std::is_same_v<Watch, NoRecord>)
         watch(s, jacobian(y, f, guess.rotation * f.rotation(), VecN<N>::Zero()).determinant());
     };

@@ -10,6 +10,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   tip_behind_plate,     ///< a tube's tip is behind the front plate
   not_converged,        ///< no equilibrium found; the outputs are the best iterate
   singular,             ///< solved, but about to snap: near a bifurcation derivatives are unbounded
+  unstable,             ///< solved, but the equilibrium found is unstable: no robot rests there
   inaccurate,           ///< solved, but integration errs by more than the asked accuracy in the most steps allowed
   needs_solve,          ///< a control step has spent its evaluations: solve() has to be asked
   not_finite,           ///< an input or a result is NaN or infinite
@@ -27,6 +28,7 @@ constexpr const char* to_string(Status status) noexcept {
     case Status::tip_behind_plate: return "tip behind the plate";
     case Status::not_converged: return "not converged";
     case Status::singular: return "singular: near a bifurcation";
+    case Status::unstable: return "unstable equilibrium";
     case Status::inaccurate: return "inaccurate: integration errs by more than asked";
     case Status::needs_solve: return "needs solve: the control step has spent its evaluations";
     case Status::not_finite: return "not finite";

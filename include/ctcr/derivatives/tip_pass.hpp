@@ -55,8 +55,8 @@ public:
                        : c.curve_start[std::size_t(event - N)] + beta_[std::size_t(event - N)];
     };
     bool reached = false;
-    const auto keep_tip = [&](double, const SegmentTubes<N>& tubes, const RobotState<S, N>& y, const Frame<S>& frame,
-                              const auto&) noexcept {
+    const auto keep_tip = [&](double, const SegmentTubes<N>& tubes, const RobotState<S, N>& y,
+                              const Frame<S>& frame) noexcept {
       if (reached || tubes.present <= tube) return;
       reached = true;
       tip_ = frame;

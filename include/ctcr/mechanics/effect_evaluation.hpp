@@ -43,7 +43,7 @@ struct Window {
 };
 
 struct Ignored {
-  void operator()(int, const auto&) const noexcept {}
+  void operator()(const auto&...) const noexcept {}
 };
 
 /// One integration of the general path, differentiated along a window of variables. The unknowns come first among them:
@@ -55,16 +55,18 @@ public:
   static constexpr int turn = 0, psi = 3, unknowns = N + 2, rows = unknowns + 6;
   using S = typename Window::S;
   using Inputs = RodInputs<N, S, Fx>;
+  using State = EffectState<N, S>;
 
   /// @param in   with derivatives along the window's variables other than the unknowns
-  /// @param met  called as met(breakpoint, state) at each breakpoint of Contacts<N> but the robot tip
-  template <class Met = Ignored>
+  /// @param met   called as met(breakpoint, state) at each breakpoint of Contacts<N> but the robot tip
+  /// @param node  as EffectRod::run() takes it
+  template <class Met = Ignored, class Node = typename EffectRod<N, S, Fx>::NoNode>
   EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, int steps,
-             const Window& window, const Met& met = {}) noexcept
+             const Window& window, const Met& met = {}, const Node& node = {}) noexcept
     : alpha_(in.alpha), tip_psi_(0.0) {
     using Rod = EffectRod<N, S, Fx>;
     for (int k = 0; k < 3; ++k) turn_[std::size_t(k)] = window(0, turn + k);
-    typename Rod::State y = state_at_tip(in, guess, window);
+    State& y = plate_ = state_at_tip(in, guess, window);
     tip_ = frame_ = frame_of<S>(Pose{});
     const auto keep_tip = [&](int id, const Frame<S>& frame, const auto& state, const auto&) noexcept {
       met(id, state);
@@ -73,7 +75,7 @@ public:
       tips.psi[std::size_t(id - 1)] = state.psi(id).v;
       if (id == tube) tip_ = frame, tip_psi_ = state.psi(id);
     };
-    Rod(in).run(events, steps, y, frame_, keep_tip, typename Rod::NoNode{});
+    Rod(in).run(events, steps, y, frame_, keep_tip, node);
     std::array<S, N> torque;
     for (int i = 0; i < N; ++i) {
       const auto t = std::size_t(i);
@@ -90,6 +92,10 @@ public:
   [[nodiscard]] double angle(int i) const noexcept {
     return angle_[std::size_t(i)].v;
   }  ///< base angle, up to a common turn
+  /// State and Bishop frame behind the front plate, seen from the robot tip; angles where the tubes are driven.
+  [[nodiscard]] const State& plate() const noexcept { return plate_; }
+  [[nodiscard]] const Frame<S>& frame() const noexcept { return frame_; }
+  [[nodiscard]] const std::array<S, N>& angles() const noexcept { return angle_; }
   /// T_base_tip of tube 1: its base stands at alpha_1.
   [[nodiscard]] Pose tip_of_robot() const noexcept {
     const Mat3 R = rotation_z(alpha_[0].v - angle_[0].v) * frame_.rotation().transpose();
@@ -143,9 +149,8 @@ private:
     return b;
   }
 
-  typename EffectRod<N, S, Fx>::State state_at_tip(const Inputs& in, const TipGuess<N>& guess,
-                                                   const Window& window) const noexcept {
-    typename EffectRod<N, S, Fx>::State y;
+  State state_at_tip(const Inputs& in, const TipGuess<N>& guess, const Window& window) const noexcept {
+    State y;
     std::array<S, 3> force = in.force;
     in.effects.tip_force(in.gravity, force);
     const std::array<S, 3> n = seen_from_tip(guess.rotation, force), l = seen_from_tip(guess.rotation, in.moment),
@@ -159,6 +164,7 @@ private:
     return y;
   }
 
+  State plate_;
   std::array<S, N> alpha_, angle_;
   std::array<S, 3> turn_;  ///< unknown turn of the tip, base axes
   Frame<S> frame_, tip_;   ///< behind the front plate and at the asked tube's tip, seen from the robot tip

@@ -177,13 +177,14 @@ using Pass = Shooting<
     std::conditional_t<(Col::first_beta_group < Col::groups), TailDual<Col::groups, Col::first_beta_group>, double>,
     Col::loaded, Col::weight, Stepper, Col>;
 
-/// Integrates from the state at the tip to the front plate.
-template <class Stepper, class Col, int N, class S>
+/// Integrates from the state at the tip to the front plate. @param record  as Shooting::run() takes it
+template <class Stepper, class Col, int N, class S, class Record = NoRecord>
 CTCR_INLINE void integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state, Frame<S>& frame,
-                      TubeTips<N>& tips) noexcept {
+                      TubeTips<N>& tips, const Record& record = {}) noexcept {
   using H = typename Pass<N, Stepper, Col>::Length;
   const auto arc_length = [](int event, double s) noexcept { return event_arc_length<Col, N, H>(event, s); };
-  Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, arc_length(2 * N, 0.0), steps, state, frame, tips);
+  Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, arc_length(2 * N, 0.0), steps, state, frame, tips,
+                             record);
 }
 
 /// What follows from state and frame at the front plate; out.axis and out.tips are there already.

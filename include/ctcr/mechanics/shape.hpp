@@ -157,8 +157,7 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
                               Pass::centreline_curvature(c, here.tubes, here.y), point);
     }
   };
-  const auto record = [&](double s, const SegmentTubes<N>& tubes, const State& y, const Frame<double>& f,
-                          const std::array<double, 2>&) noexcept {
+  const auto record = [&](double s, const SegmentTubes<N>& tubes, const State& y, const Frame<double>& f) noexcept {
     fill_down_to(s);
     node = {s, tubes, y, f};
   };

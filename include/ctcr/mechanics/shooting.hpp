@@ -79,7 +79,7 @@ public:
   /// @param y       in: state at the tip; out: at the front plate
   /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
   /// @param tips    tips.keep(tube, frame, angle) at the tip of each tube but the first
-  /// @param record  record(s, tubes, state, frame, u) at both ends of every step
+  /// @param record  record(s, tubes, state, frame) at both ends of every step
   /// Real time: yes (2N segments, `steps` steps each).
   template <class ArcLength, class Tips, class Record = NoRecord>
   static CTCR_INLINE void run(const Coefficients<N, P>& c, const Events<N>& events, const ArcLength& arc_length,
@@ -237,20 +237,16 @@ private:
   static void advance_curved(const Coefficients<N, P>& c, const SegmentTubes<N>& tubes, const H& h, double s, int steps,
                              State& y, Frame<S>& frame, const Record& record) noexcept {
     const H k = steps == 1 ? h : (1.0 / steps) * h;
-    if constexpr (has_tangent_pass && (Loaded || NC > 0)) {
-      for (int i = 0; i < steps; ++i) tangent_step<NC>(c, tubes, k, y, frame);
-    } else {
-      const auto observe = [&] {
-        if constexpr (!std::is_same_v<Record, NoRecord>)
-          record(s, tubes, y, frame, centreline_curvature<NC>(c, tubes, y));
-      };
-      for (int i = 0; i < steps; ++i) {
-        observe();
+    for (int i = 1;; ++i) {
+      record(s, tubes, y, frame);
+      if constexpr (has_tangent_pass && (Loaded || NC > 0))
+        tangent_step<NC>(c, tubes, k, y, frame);
+      else
         direct_step<NC>(c, tubes, k, y, frame);
-        s += value(k);
-      }
-      observe();
+      s += value(k);
+      if (i >= steps) break;
     }
+    record(s, tubes, y, frame);
   }
 
   /// A step of values and tangents together.

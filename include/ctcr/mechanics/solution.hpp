@@ -19,6 +19,9 @@ struct Solution {
   /// Estimated error of the tip position by the steps of integration [m], as found where it was last checked: at a solve,
   /// and again whenever the robot has moved far. Infinity: not checked.
   double integration_error = std::numeric_limits<double>::infinity();
+  /// Whether the equilibrium lies on the branch of the warm start's, which the robot follows if it moves from there without
+  /// a snap. False: that is not known, as after a cold start, a snap, or a motion too far to tell.
+  bool kept_branch = false;
 
   Vec3 position = Vec3::Zero();      ///< tip, base frame [m]
   Mat3 rotation = Mat3::Identity();  ///< R_base_tip: material frame of tube 1 at its tip
@@ -41,6 +44,7 @@ struct Workspace {
   bool warm = false;          ///< whether the guess may be used
   bool knows_joints = false;  ///< whether the change of the guess with the joints is known
   bool knows_load = false;    ///< and with the load
+  bool stable = false;        ///< whether the guess describes a stable equilibrium
   int steps = 1;              ///< integration steps per segment that the guess belongs to
   /// Error of the tip position by these steps [m], and how far the robot has moved since it was found: turns of the tip
   /// and of the tubes [rad], travel as a part of the robot's length.
@@ -49,7 +53,7 @@ struct Workspace {
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 
   void reset() noexcept {
-    warm = knows_joints = knows_load = false;
+    warm = knows_joints = knows_load = stable = false;
     steps = 1;
     integration_error = std::numeric_limits<double>::infinity();
   }

@@ -4,6 +4,7 @@
 
 #include "ctcr/mechanics/defined_outputs.hpp"
 #include "ctcr/mechanics/solution.hpp"
+#include "ctcr/mechanics/stability.hpp"
 #include "ctcr/mechanics/step_count.hpp"
 
 namespace ctcr {
@@ -13,13 +14,22 @@ namespace detail {
 inline constexpr double step_limit = 1.0;
 /// det B_u below which an equilibrium counts as about to snap.
 inline constexpr double singular_det = 1e-2;
+/// Evaluations after which an attempt is given up: where Newton's method converges at all, it does so within them. More
+/// patience finds no more equilibria of random robots, but leaves less to other starts.
+inline constexpr int patience = 25, patience_in_ramp = 8, patience_of_ramp = 100, patience_if_scattered = 12;
 /// Starts from anywhere before a solve is given up.
-inline constexpr int scattered_starts = 16;
+inline constexpr int scattered_starts = 30;
+/// Evaluations kept for the end of a solve: the best guess once more, and the checks of what was found.
+inline constexpr int reserve = 6;
+/// Lever at which turns count as errors of the tip position, as a part of the robot's length.
+inline constexpr double lever = 0.3;
 /// Part of det B_u up to which a Newton step may be the last of a control step [rad]. Ref: Kantorovich's theorem: Newton's
 /// method converges where that ratio is small against the curvature of the residual, which is of the order of 1.
 inline constexpr double last_step = 0.01;
-/// Way of the robot after which the error of its integration is estimated anew [rad], or as a part of its length.
-inline constexpr double checked_range = 0.3;
+/// Part of det B_u up to which an equilibrium may lie beside its prediction and still be on the same branch [rad].
+inline constexpr double same_branch = 0.1;
+/// Way of the robot up to which it keeps the estimated error of integration, and in one solve its stability [rad].
+inline constexpr double checked_range = 0.05;
 
 template <int N>
 inline TipGuess<N> straight_guess(const Joints<N>& q) noexcept {
@@ -29,12 +39,14 @@ inline TipGuess<N> straight_guess(const Joints<N>& q) noexcept {
   return guess;
 }
 
-/// Start number k >= 1 of a sequence that fills the angles at the tubes' tips evenly.
+/// Start number k >= 1 of a sequence that fills the turns of the tip and the angles at the tubes' tips evenly.
 template <int N>
 inline TipGuess<N> scattered_guess(const Joints<N>& q, int k) noexcept {
   constexpr double turn = 6.28318530717958647692;
+  const auto part = [k](int prime) { return std::remainder(k * std::sqrt(prime), 1.0); };  // from -0.5 to 0.5
   TipGuess<N> guess = straight_guess(q);
-  for (int i = 1; i < N; ++i) guess.psi[i] += turn * std::remainder(k * std::sqrt(i * i + 1.0), 1.0);
+  guess.rotation = rotation_matrix(Vec3(part(3), part(7), part(11)) * 5.0) * guess.rotation;
+  for (int i = 1; i < N; ++i) guess.psi[i] += turn * part(i * i + 1);
   return guess;
 }
 
@@ -60,14 +72,15 @@ inline VecN<N + 2> newton_step(const Ev& ev) noexcept {
 }
 
 /// Damped Newton iteration from `guess`. On return `ev` belongs to `guess`.
+/// @param most  evaluations allowed; 1 is taken in any case, and 1 more to return to the best guess
 /// @return evaluations used; ev.residual tells whether it converged
 template <Derivatives D, Loading L, class Stepper, int N, class C>
-inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int steps,
+inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int most, int steps,
                   TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
   int used = 1;
   evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
   if constexpr (L == Loading::none) guess.rotation = ev.rotation;
-  while (!(ev.residual < settings.tolerance) && used < settings.max_iterations) {
+  while (!(ev.residual < settings.tolerance) && used < most) {
     const double before = ev.residual;
     const VecN<N + 2> dx = newton_step<Evaluation<N, L, D>, N>(ev);
     if (!dx.allFinite()) break;
@@ -75,7 +88,7 @@ inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Set
     double scale = size > step_limit ? step_limit / size : 1.0;
     TipGuess<N> next;
     bool accepted = false;
-    for (int halving = 0; halving < 6 && used < settings.max_iterations && !accepted; ++halving, scale *= 0.5) {
+    for (int halving = 0; halving < 6 && used < most && !accepted; ++halving, scale *= 0.5) {
       next = moved<N>(guess, dx, scale);
       evaluate<D, L, Stepper>(c, q, load, next, steps, ev);
       ++used;
@@ -109,32 +122,41 @@ inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weig
 
 /// Unloaded equilibrium from the angles of `guess`; the tip frame follows without iteration.
 template <class Stepper, int N, class C>
-inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, int steps,
+inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, int most, int steps,
                           TipGuess<N>& guess) noexcept {
   if constexpr (has_effects<C>) {
     Evaluation<N, Loading::weight, Derivatives::none> ev;
-    return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, steps, guess,
-                                                               ev);
+    return newton<Derivatives::none, Loading::weight, Stepper>(scaled(c, 0, 1), q, TipLoad{}, settings, most, steps,
+                                                               guess, ev);
   } else {
     Evaluation<N, Loading::none, Derivatives::none> ev;
-    return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, steps, guess, ev);
+    return newton<Derivatives::none, Loading::none, Stepper>(c, q, TipLoad{}, settings, most, steps, guess, ev);
   }
 }
 
-/// Brings the load, or if that fails the precurvature, from nothing to its full size in small steps.
+/// Brings the load, or that and the precurvature, from nothing to its full size: in steps that double where Newton's method
+/// follows and shrink where it does not.
+/// @param most  evaluations after which no further step is begun
 template <Loading L, class Stepper, int N, class C>
-inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int steps,
-                        bool ramp_curvature, TipGuess<N>& guess) noexcept {
-  constexpr int ramp_steps = 16;
+inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int most,
+                        int steps, bool ramp_curvature, TipGuess<N>& guess) noexcept {
   Evaluation<N, L, Derivatives::none> ev;
   int used = 0;
   guess = straight_guess(q);
-  if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, steps, guess);
-  for (int k = 1; k <= ramp_steps; ++k) {
-    const double part = double(k) / ramp_steps;
+  if (!ramp_curvature) used += unloaded_guess<Stepper>(c, q, settings, std::min(most, patience), steps, guess);
+  for (double reached = 0, step = 0.125; reached < 1 && step > 1e-3 && used < most;) {
+    const double part = std::min(reached + step, 1.0);
+    TipGuess<N> next = guess;
     used += newton<Derivatives::none, L, Stepper>(scaled(c, part, ramp_curvature ? part : 1), q,
-                                                  TipLoad{load.force * part, load.moment * part}, settings, steps,
-                                                  guess, ev);
+                                                  TipLoad{load.force * part, load.moment * part}, settings,
+                                                  std::min(most - used, patience_in_ramp), steps, next, ev);
+    if (ev.residual < settings.tolerance) {
+      reached = part;
+      guess = next;
+      step *= 2;
+    } else {
+      step *= 0.25;
+    }
   }
   return used;
 }
@@ -232,6 +254,23 @@ inline double distance(const TipGuess<N>& a, const TipGuess<N>& b) noexcept {
   return std::sqrt(0.5 * (a.rotation - b.rotation).squaredNorm() + (a.psi - b.psi).squaredNorm());
 }
 
+/// Whether an equilibrium lies on the branch along which it was predicted. Ref: Kantorovich's theorem: a prediction that is
+/// nearer to it than a part of det B_u is in the basin of no other, as the curvature of the residual is of the order of 1.
+template <int N>
+inline bool lies_on_branch(const TipGuess<N>& predicted, const TipGuess<N>& found, double det) noexcept {
+  return distance(predicted, found) <= same_branch * std::min(det, 1.0);
+}
+
+/// Way from the last solution to `guess` [rad]: turns of the tip and of the tubes, travel over length, and the turn that the
+/// change of the load would give to tube 1 alone, as inside the robot much can bend while the tip does not turn.
+template <int N, class Fx>
+inline double way_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
+                     const Workspace<N>& ws) noexcept {
+  const double length = reach_of(model.robot(), q);
+  const double bent = 5 * (load.force - ws.load.force).norm() * length + 10 * (load.moment - ws.load.moment).norm();
+  return distance(ws.guess, guess) + (q.beta - ws.q.beta).norm() / length + bent * length / model.robot().tubes[0].EI();
+}
+
 /// Whether a scheme serves to compare (integrators.hpp): its errors are shown as they are, in the steps that it is told.
 template <class Stepper>
 inline constexpr bool is_for_comparison = requires { Stepper::general_equations; };
@@ -248,49 +287,65 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   const auto& c = model.coefficients();
   const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
   const bool refines = takes_more_steps<Stepper>(settings);
-  const TipGuess<N> last = ws.guess;
-  const double travelled = ws.moved + (q.beta - ws.q.beta).norm() / length, error_there = ws.integration_error;
-  const int steps_there = ws.steps;
   int steps = settings.steps;
-  if (refines) steps = std::max({steps, first_steps(c, q.beta, load, settings.max_steps), steps_there});
+  if (refines) steps = std::max({steps, first_steps(c, q.beta, load, settings.max_steps), ws.steps});
   Evaluation<N, L, D> ev;
   TipGuess<N> guess;
-  const auto converged = [&] { return ev.residual < settings.tolerance && ev.det > 0; };
-  const auto attempt = [&] { out.iterations += newton<D, L, Stepper>(c, q, load, settings, steps, guess, ev); };
-  const auto attempt_from = [&](const TipGuess<N>& start) {
-    guess = start;
-    if constexpr (L != Loading::none) out.iterations += unloaded_guess<Stepper>(c, q, settings, steps, guess);
-    attempt();
+  const auto solved = [&] { return ev.residual < settings.tolerance; };
+  const auto way = [&] { return way_of(model, q, load, guess, ws); };
+  const auto left = [&] { return settings.max_iterations - reserve - out.iterations; };
+  bool stable = false;
+  const auto attempt = [&](int most) {
+    out.iterations += newton<D, L, Stepper>(c, q, load, settings, std::min(most, left()), steps, guess, ev);
+    stable = solved() && ev.det > 0;
+    // On its branch an equilibrium stays stable while det B_u does not vanish.
+    if (!stable || is_for_comparison<Stepper> || (ws.stable && way() < checked_range)) return;
+    stable = is_stable<L, Stepper>(c, q, load, guess, 2 * steps);
+    ++out.iterations;
   };
+  const auto unload = [&] {
+    if constexpr (L != Loading::none)
+      out.iterations += unloaded_guess<Stepper>(c, q, settings, std::min(patience, left()), steps, guess);
+  };
+  const auto goes_on = [&] { return !stable && left() > 0; };
   const auto search = [&](bool from_guess) {
-    if (from_guess) attempt();
-    if (!from_guess || !converged()) attempt_from(straight_guess(q));
-    for (const bool ramp_curvature : {false, true}) {
-      if (converged() || (L == Loading::none && !ramp_curvature)) continue;
-      out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, steps, ramp_curvature, guess);
-      attempt();
+    if (from_guess) attempt(patience);
+    if (!from_guess || goes_on()) {
+      guess = straight_guess(q);
+      unload();
+      attempt(patience);
     }
-    if (N > 1 && !converged()) {
-      // A fold, or an unstable equilibrium: those that are stable lie to its sides.
-      const TipGuess<N> found = guess;
-      for (int k = 1; k <= scattered_starts && !converged(); ++k) attempt_from(scattered_guess(q, k));
-      if (!converged()) {
-        guess = found;
-        attempt();
-      }
+    for (const bool ramp_curvature : {false, true}) {
+      if (!goes_on() || (L == Loading::none && !ramp_curvature)) continue;
+      out.iterations += ramped_guess<L, Stepper>(c, q, load, settings, std::min(patience_of_ramp, left()), steps,
+                                                 ramp_curvature, guess);
+      attempt(patience);
+    }
+    if (!goes_on()) return;
+    // A fold, or an unstable equilibrium: those that are stable lie to its sides.
+    const TipGuess<N> found = guess;
+    for (int k = 1; k <= scattered_starts && goes_on(); ++k) {
+      guess = scattered_guess(q, k);
+      if (N > 1 && k % 2 == 1) unload();
+      attempt(patience_if_scattered);
+    }
+    if (!stable) {
+      guess = found;
+      attempt(1);
     }
   };
   if (ws.warm) guess = predicted_guess(ws, q, load);
+  const TipGuess<N> predicted = guess;
   search(ws.warm);
   double error = std::numeric_limits<double>::infinity(), moved = 0;
-  if (refines && converged()) {
-    const double way = travelled + distance(last, guess);
-    if (steps == steps_there && error_there <= allowed && way < checked_range) {
-      error = error_there;
-      moved = way;
-    }
-    while (!(error <= allowed) && converged()) {
-      error = integration_error<L, Stepper>(c, q, load, guess, steps, ev.position);
+  if (refines && stable) {
+    moved = ws.moved + way();
+    if (steps == ws.steps && ws.integration_error <= allowed && moved < checked_range)
+      error = ws.integration_error;
+    else
+      moved = 0;
+    while (!(error <= allowed) && stable) {
+      error = integration_error<L, Stepper>(c, q, load, guess, steps, {ev.rotation, ev.position}, lever * length);
       ++out.iterations;
       if (error <= allowed || steps >= settings.max_steps) break;
       steps = refined_steps(steps, error, allowed, settings.max_steps);
@@ -298,13 +353,16 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     }
   }
   publish(ev, q, load, guess, guess, ws, out);
+  out.kept_branch = ws.stable && stable && lies_on_branch(predicted, guess, ev.det);
   ws.steps = steps;
   ws.moved = moved;
+  ws.stable = stable;
   out.integration_error = ws.integration_error = error;
-  if (!(ev.residual < settings.tolerance)) {
+  if (!solved()) {
     ws.reset();
     return Status::not_converged;
   }
+  if (!stable) return Status::unstable;
   if (ev.det < singular_det) return Status::singular;
   return refines && !(error <= allowed) ? Status::inaccurate : Status::ok;
 }
@@ -314,11 +372,12 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
                       Solution<N>& out, const Settings& settings) noexcept {
   using Ev = Evaluation<N, L, D>;
   constexpr bool jacobian = Ev::Col::jacobian;
-  if (!ws.warm) return Status::needs_solve;
+  if (!ws.warm || !ws.stable) return Status::needs_solve;
   const auto& c = model.coefficients();
   const int steps = std::max(ws.steps, settings.steps);
   Ev ev;
-  TipGuess<N> guess, next = predicted_guess(ws, q, load);
+  const TipGuess<N> predicted = predicted_guess(ws, q, load);
+  TipGuess<N> guess, next = predicted;
   for (bool last = false; !last;) {
     if (out.iterations >= settings.evaluations) return Status::needs_solve;
     guess = next;
@@ -344,10 +403,10 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   double error = ws.integration_error, way = 0;
   if (takes_more_steps<Stepper>(settings)) {
     const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
-    way = ws.moved + distance(ws.guess, next) + (q.beta - ws.q.beta).norm() / length;
+    way = ws.moved + way_of(model, q, load, next, ws);
     if (!(error <= allowed && way < checked_range && steps == ws.steps)) {
       if (!jacobian || out.iterations >= settings.evaluations) return Status::needs_solve;
-      error = integration_error<L, Stepper>(c, q, load, next, steps, tip.position);
+      error = integration_error<L, Stepper>(c, q, load, next, steps, tip, lever * length);
       ++out.iterations;
       if (!(error <= allowed)) return Status::needs_solve;
       way = 0;
@@ -357,6 +416,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   out.position = tip.position;
   out.rotation = tip.rotation;
   out.tube_tips[0] = tip;
+  out.kept_branch = lies_on_branch(predicted, next, ev.det);
   out.integration_error = ws.integration_error = error;
   ws.steps = steps;
   ws.moved = way;
@@ -398,11 +458,12 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
 /// @param load  tip wrench in the base frame [N], [N m]
 /// @param ws    warm start of this thread; updated
 /// @param out   pose, and with D the Jacobian J (6 x 2N) and the compliance C (6 x 6); always defined
-/// @return ok; invalid_robot, joints_out_of_order, tip_behind_plate: input refused, nothing computed; not_finite: the same,
-///         or a result that is no number; not_converged: best iterate; singular: solved, but about to snap; inaccurate:
-///         solved, but max_steps leave a larger error of integration than `settings.accuracy` asks for
-/// Real time: yes; at most about 70 * max_iterations evaluations for each number of steps tried, 1 to 3 from a warm start,
-/// and one more where the robot has moved by more than 0.3 rad since its integration error was last estimated.
+/// @return ok: an equilibrium, stable, to the asked accuracy; invalid_robot, joints_out_of_order, tip_behind_plate: input
+///         refused, nothing computed; not_finite: the same, or a result that is no number; not_converged: best iterate;
+///         singular: solved, but about to snap; unstable: only an unstable equilibrium was found; inaccurate: solved, but
+///         max_steps leave a larger error of integration than `settings.accuracy` asks for
+/// Real time: yes; at most settings.max_iterations evaluations, 1 to 3 from a warm start, and one more where the robot has
+/// moved by more than 0.05 rad since its integration error was last estimated.
 /// Ref: Boyer et al., eqs. (1)-(3); Rucker & Webster 2011 for J and C.
 template <Derivatives D = Derivatives::none, class Stepper = MagnusRk4, int N, class Fx>
 CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
@@ -415,7 +476,7 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 /// The control step: Newton's method from the warm start predicted to the new joints, in at most `settings.evaluations`
 /// evaluations; one is usual. The last Newton step is at most 0.01 det B_u [rad], so what is left is of the order of its
 /// square. Ask for the Jacobian to have the prediction and the corrected pose (without it, the last Newton step is at most
-/// 1e-4 det B_u); tips of the outer tubes are those before that step. Where the robot has moved by more than 0.3 rad since
+/// 1e-4 det B_u); tips of the outer tubes are those before that step. Where the robot has moved by more than 0.05 rad since
 /// the integration error was last estimated, one of the evaluations, in twice as many steps, estimates it.
 /// out.residual is that before the last Newton step.
 /// @return as solve(); needs_solve: no warm start, joints or load moved too far, the robot snaps within this step, or it

@@ -75,6 +75,7 @@ NB_MODULE(_core, m) {
       .value("tip_behind_plate", Status::tip_behind_plate)
       .value("not_converged", Status::not_converged)
       .value("singular", Status::singular)
+      .value("unstable", Status::unstable)
       .value("inaccurate", Status::inaccurate)
       .value("needs_solve", Status::needs_solve)
       .value("not_finite", Status::not_finite)
