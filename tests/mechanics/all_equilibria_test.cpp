@@ -33,8 +33,9 @@ TEST(AllEquilibria, OpposedTubesRestInTwoMirrorImages) {
     ASSERT_EQ(found.size(), snaps ? 2u : 1u) << "case " << k << ", sqrt(c) L " << angle;
     // The plane of the tubes' curvature is a mirror, or holds the only shape.
     const Vec3 normal(std::cos(turn), std::sin(turn), 0);
-    EXPECT_NEAR(normal.dot(found.front().position), -normal.dot(found.back().position), 1e-4 * length);
-    EXPECT_EQ(std::abs(normal.dot(found.front().position)) > 1e-3 * length, snaps);
+    EXPECT_NEAR(normal.dot(found.front().solution.position), -normal.dot(found.back().solution.position),
+                1e-4 * length);
+    EXPECT_EQ(std::abs(normal.dot(found.front().solution.position)) > 1e-3 * length, snaps);
   }
 }
 
@@ -56,17 +57,17 @@ TYPED_TEST(AllEquilibriaOf, HoldTheColdSolveAndTurnWithTheRobot) {
     Solution<N> cold;
     if (solve(model, q, load, ws, cold) == Status::ok) {
       ASSERT_FALSE(found.empty());
-      EXPECT_EQ(found[0].position, cold.position);
+      EXPECT_EQ(found[0].solution.position, cold.position);
     }
     const double turn = uniform(random, -3, 3);
     q.alpha.array() += turn;
     load.force = rotation_z(turn) * load.force;
     const auto turned = all_equilibria(model, q, load, {}, 20);
     ASSERT_EQ(turned.size(), found.size()) << "case " << k;
-    for (const Solution<N>& one : found) {
-      EXPECT_EQ(one.status, Status::ok);
-      const auto is_turned = [&](const Solution<N>& other) {
-        return (rotation_z(turn) * one.position - other.position).norm() < 1e-7;
+    for (const Equilibrium<N>& one : found) {
+      EXPECT_EQ(one.solution.status, Status::ok);
+      const auto is_turned = [&](const Equilibrium<N>& other) {
+        return (rotation_z(turn) * one.solution.position - other.solution.position).norm() < 1e-7;
       };
       EXPECT_EQ(std::ranges::count_if(turned, is_turned), 1) << "case " << k;
     }

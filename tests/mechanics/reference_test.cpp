@@ -34,9 +34,8 @@ Errors errors_of(const Robot<N>& robot, const std::vector<test::Row>& rows, int 
       EXPECT_EQ(solution.status, Status::ok);
       const auto off_by = [&](const Solution<N>& s) { return (s.position - expected.position).norm(); };
       if (off_by(solution) > 1e-3)  // another equilibrium: the reference must be among those where the robot may rest
-        for (const Solution<N>& other :
-             all_equilibria(Model<N>(robot), q, load, {.steps = steps, .accuracy = test::as_told}))
-          if (off_by(other) < off_by(solution)) solution = other;
+        for (const auto& other : all_equilibria(Model<N>(robot), q, load, {.steps = steps, .accuracy = test::as_told}))
+          if (off_by(other.solution) < off_by(solution)) solution = other.solution;
       const Vec6 off = test::difference(expected, solution.pose());
       worst.position = std::max(worst.position, off.head<3>().norm());
       worst.rotation = std::max(worst.rotation, off.tail<3>().norm());

@@ -20,6 +20,12 @@ enum class [[nodiscard]] Status : std::uint8_t {
 /// Whether the outputs solve the model; where it is about to snap they do, too. Real time: yes.
 constexpr bool has_equilibrium(Status status) noexcept { return status == Status::ok || status == Status::singular; }
 
+/// Whether the outputs describe a robot, in equilibrium or not: neither input nor result was refused. Real time: yes.
+constexpr bool was_computed(Status status) noexcept {
+  return has_equilibrium(status) || status == Status::not_converged || status == Status::unstable ||
+         status == Status::inaccurate;
+}
+
 /// Plain-words name of a status. Real time: yes.
 constexpr const char* to_string(Status status) noexcept {
   switch (status) {

@@ -262,13 +262,14 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
   }
   settings.steps = std::max(settings.steps, shape_steps);
   const Status status = solve<Derivatives::none>(model, q, load, ws, out, settings);
-  if (!(has_equilibrium(status) || status == Status::not_converged)) return status;
+  if (!was_computed(status)) return status;
+  const int steps = std::max(ws.steps, settings.steps);
   if constexpr (!Fx::none)
-    detail::fill_shape_with_effects(model, q, load, ws.guess, settings.steps, points);
+    detail::fill_shape_with_effects(model, q, load, ws.guess, steps, points);
   else if (!model.coefficients().gravity.isZero(0.0) || !load.force.isZero(0.0) || !load.moment.isZero(0.0))
-    detail::fill_shape<Loading::weight>(model, q, load, ws.guess, settings.steps, points);
+    detail::fill_shape<Loading::weight>(model, q, load, ws.guess, steps, points);
   else
-    detail::fill_shape<Loading::none>(model, q, load, ws.guess, settings.steps, points);
+    detail::fill_shape<Loading::none>(model, q, load, ws.guess, steps, points);
   return status;
 }
 

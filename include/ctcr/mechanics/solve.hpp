@@ -271,6 +271,14 @@ inline double way_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoa
   return distance(ws.guess, guess) + (q.beta - ws.q.beta).norm() / length + bent * length / model.robot().tubes[0].EI();
 }
 
+/// What Newton's method leaves after a correction that follows another, or a prediction along the tangent [rad]. Each is of
+/// second order in the one before, so their ratio shows the curvature.
+/// @param correction  measured at the tip or at the grasps: a load along the robot makes the one much larger
+inline double newton_remainder(double before, double correction) noexcept {
+  const double ratio = correction < before ? correction / before : 1.0;
+  return correction * ratio * ratio;
+}
+
 /// Whether a scheme serves to compare (integrators.hpp): its errors are shown as they are, in the steps that it is told.
 template <class Stepper>
 inline constexpr bool is_for_comparison = requires { Stepper::general_equations; };
@@ -378,6 +386,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   Ev ev;
   const TipGuess<N> predicted = predicted_guess(ws, q, load);
   TipGuess<N> guess, next = predicted;
+  double before = ws.knows_joints ? distance(ws.guess, predicted) : 0;
   for (bool last = false; !last;) {
     if (out.iterations >= settings.evaluations) return Status::needs_solve;
     guess = next;
@@ -386,8 +395,10 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
     const VecN<N + 2> dx = newton_step<Ev, N>(ev);
     next = moved<N>(guess, dx, 1.0);
     if constexpr (L == Loading::none) next.rotation = ev.rotation;
-    const double most = (jacobian ? last_step : last_step * last_step) * std::min(ev.det, 1.0);
-    last = most > 0 && dx.squaredNorm() < most * most;
+    const double size = dx.norm();
+    last = size < (jacobian ? last_step : last_step * last_step) * std::min(ev.det, 1.0) &&
+           newton_remainder(before, std::max(size, ev.residual)) <= settings.accuracy;
+    before = size;
   }
   // The pose at the end of the Newton step: the tangent is known, so it costs nothing.
   Pose tip{ev.rotation, ev.position};

@@ -1,0 +1,108 @@
+#pragma once
+// Solves of one random case: cold, from near and from far, and a walk of control steps; each answer is judged.
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "robustness/judge.hpp"
+#include "robustness/random_designs.hpp"
+
+namespace ctcr::test {
+
+/// How an attack went.
+struct Tally {
+  std::map<std::string, int> statuses;                  ///< of solves, by start and status
+  std::map<std::string, std::vector<int>> evaluations;  ///< of each solve, by start
+  std::vector<std::string> faults;                      ///< each with its case as text
+  long answers = 0, judged = 0;
+};
+
+/// How an attack goes about it.
+struct Attack {
+  /// Of so many cases one is moved to others and its tips are compared with those in 32 steps, and one is judged by the
+  /// independent model and walks: they take ten and a hundred times as long as a solve.
+  int moved = 4, thorough = 40;
+};
+
+template <int N>
+class Attacker {
+public:
+  Attacker(const Attack& attack, Random& random, Tally& tally) : attack_(attack), random_(random), tally_(tally) {}
+
+  /// @param name  of the class, with seed and number of the case
+  void at(const Case<N>& c, const std::string& name) {
+    name_ = name;
+    thorough_ = number_ % attack_.thorough == 0;
+    moved_ = thorough_ || number_ % attack_.moved == 0;
+    ++number_;
+    const Model<N> model(c.robot);
+    Workspace<N> ws;
+    Solution<N> s;
+    solve_from("cold", model, c, ws, s);
+    if (!moved_ || !has_equilibrium(s.status)) return;
+    solve_from("near", model, neighbour(c, 0.1), ws, s);
+    solve_from("far", model, neighbour(c, 1.5), ws, s);
+    if (thorough_ && s.status == Status::ok) walk(model, ws);
+  }
+
+private:
+  void solve_from(const char* start, const Model<N>& model, const Case<N>& c, Workspace<N>& ws, Solution<N>& s) {
+    (void)solve<Derivatives::compliance>(model, c.q, c.load, ws, s, settings_);
+    ++tally_.statuses[std::string(start) + ", " + to_string(s.status)];
+    tally_.evaluations[start].push_back(s.iterations);
+    last_ = c;
+    judge(start, model, c, ws, s);
+  }
+
+  void walk(const Model<N>& model, Workspace<N>& ws) {
+    Solution<N> s;
+    Case<N> c = last_;
+    VecN<N> turn;
+    for (double& x : turn) x = uniform(random_, -0.05, 0.05);
+    for (int k = 0; k < 20; ++k) {
+      c.q.alpha += turn;
+      const Status status = step<Derivatives::compliance>(model, c.q, c.load, ws, s, settings_);
+      judge("step", model, c, ws, s);
+      if (s.iterations > settings_.evaluations) fault("more evaluations than the budget", "step", c, s);
+      if (status != Status::ok) return;
+    }
+  }
+
+  void judge(const char* start, const Model<N>& model, const Case<N>& c, const Workspace<N>& ws, const Solution<N>& s) {
+    ++tally_.answers;
+    if (!is_defined(s, c)) fault("outputs are not defined", start, c, s);
+    if (s.status != Status::ok || !moved_) return;
+    if (!(length_of(c) > 1e-3)) return;  // a robot inside the plate has no shape to judge
+    std::string wrong = differs_from_32_steps(c, model, ws, s, settings_.accuracy);
+    if (wrong.empty() && thorough_) {
+      ++tally_.judged;
+      wrong = wrong_equilibrium(c, ws, s, settings_.accuracy);
+    }
+    if (!wrong.empty()) fault(wrong, start, c, s);
+  }
+
+  void fault(const std::string& what, const char* start, const Case<N>& c, const Solution<N>& s) {
+    tally_.faults.push_back(name_ + ", " + start + ": " + what + " (" + to_string(s.status) + ", " +
+                            std::to_string(s.iterations) + " evaluations)\n" + text(c));
+  }
+
+  /// The same robot elsewhere: turned by up to `by` [rad], moved and loaded accordingly.
+  Case<N> neighbour(Case<N> c, double by) {
+    const Case<N> other{c.robot, random_joints(c.robot, random_), {}};
+    for (double& x : c.q.alpha) x += uniform(random_, -by, by);
+    c.q.beta += std::min(0.3 * by, 1.0) * uniform(random_, 0, 1) * (other.q.beta - c.q.beta);
+    c.load.force *= 1 + std::min(by, 1.0) * uniform(random_, -1, 0.5);
+    return c;
+  }
+
+  const Attack& attack_;
+  Random& random_;
+  Tally& tally_;
+  const Settings settings_{};
+  std::string name_;
+  int number_ = 0;
+  bool moved_ = false, thorough_ = false;
+  Case<N> last_;
+};
+
+}  // namespace ctcr::test
