@@ -38,6 +38,7 @@ struct Poses {
 /// A robot at K arc lengths. NaN where a tube is not present.
 struct ShapeArrays {
   Status status;
+  double stability;
   Eigen::VectorXd arc_length;            ///< (K) [m]
   RowMajor position, quaternion;         ///< (K, 3) [m]; (K, 4) of the Bishop frame, w first and not negative
   RowMajor force, moment;                ///< (K, 3) internal, of all tubes, base frame [N], [N m]
@@ -52,6 +53,8 @@ public:
   [[nodiscard]] virtual Poses predict(const Configurations& rows, const PredictOptions& options) const = 0;
   /// Shape at the one configuration of `row`, at `points` uniform arc lengths and the breakpoints.
   [[nodiscard]] virtual ShapeArrays shape(const Configurations& row, int points, int steps) const = 0;
+  /// The shapes of all stable equilibria there, that of shape() first.
+  [[nodiscard]] virtual std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const = 0;
 };
 
 /// Defined for N = 1..4.

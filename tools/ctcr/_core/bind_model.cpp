@@ -42,14 +42,22 @@ auto predict(const AnyModel& model, RowMajor beta, RowMajor alpha, std::optional
                     std::move(p.jacobian), std::move(p.compliance), std::move(p.by_parameters));
 }
 
-auto shape(const AnyModel& model, RowMajor beta, RowMajor alpha, std::optional<RowMajor> force,
-           std::optional<RowMajor> moment, int points, int steps) {
-  if (points < 2) throw std::invalid_argument("points must be at least 2");
-  ShapeArrays s = model.shape(configurations(std::move(beta), std::move(alpha), std::move(force), std::move(moment)),
-                              points, steps);
-  return std::tuple(s.status, std::move(s.arc_length), std::move(s.position), std::move(s.quaternion),
+auto arrays_of(ShapeArrays s) {
+  return std::tuple(s.status, s.stability, std::move(s.arc_length), std::move(s.position), std::move(s.quaternion),
                     std::move(s.force), std::move(s.moment), std::move(s.tube_angle), std::move(s.tube_curvature),
                     std::move(s.tube_moment));
+}
+
+auto shapes(const AnyModel& model, RowMajor beta, RowMajor alpha, std::optional<RowMajor> force,
+            std::optional<RowMajor> moment, int points, int steps, bool all) {
+  if (points < 2) throw std::invalid_argument("points must be at least 2");
+  const Configurations row = configurations(std::move(beta), std::move(alpha), std::move(force), std::move(moment));
+  std::vector<decltype(arrays_of(ShapeArrays{}))> found;
+  if (!all)
+    found.push_back(arrays_of(model.shape(row, points, steps)));
+  else
+    for (ShapeArrays& one : model.all_shapes(row, points, steps)) found.push_back(arrays_of(std::move(one)));
+  return found;
 }
 
 }  // namespace
@@ -101,13 +109,16 @@ NB_MODULE(_core, m) {
            "compliance (M, 36), by_parameters (M, 6 * P)), the last three empty without `derivatives`. "
            "`by_parameters`: numbers of parameters of tubes, gravity and, after those of the robot, effects. Releases "
            "the GIL. Raises ValueError where the arrays do not fit.")
-      .def(
-          "shape", &shape, nb::kw_only(), "beta"_a, "alpha"_a, "force"_a.none() = nb::none(),
-          "moment"_a.none() = nb::none(), "points"_a, "steps"_a = 1,
-          "The shape at one configuration, arrays of one row as for predict(), at K arc lengths: `points` uniform "
-          "ones and every breakpoint.\n\n"
-          "Returns (status, arc_length (K,), position (K, 3), quaternion (K, 4), internal force and moment (K, 3), "
-          "tube_angle (N, K), tube_curvature and tube_moment (N, 3K)). Raises ValueError where the arrays do not fit.");
+      .def("shapes", &shapes, nb::kw_only(), "beta"_a, "alpha"_a, "force"_a.none() = nb::none(),
+           "moment"_a.none() = nb::none(), "points"_a, "steps"_a = 1, "all"_a = false,
+           "The shape at one configuration, arrays of one row as for predict(), at K arc lengths: `points` uniform "
+           "ones and every breakpoint. With `all` those of every stable equilibrium that is found, which may be "
+           "none.\n\n"
+           "Returns a list of (status, stability, arc_length (K,), position (K, 3), quaternion (K, 4), internal force "
+           "and "
+           "moment (K, 3), tube_angle (N, K), tube_curvature and tube_moment (N, 3K)). Raises ValueError where the "
+           "arrays "
+           "do not fit.");
   bind_calibration(m);
   bind_identify(m);
   bind_recording(m);

@@ -1,5 +1,6 @@
 #pragma once
 // The model of N tubes behind AnyModel, without and with effects.
+#include <ctcr/mechanics/all_equilibria.hpp>
 #include <ctcr/mechanics/integrators.hpp>
 #include <ctcr/mechanics/shape.hpp>
 #include <ctcr/parallel/batch.hpp>
@@ -87,16 +88,18 @@ void check(const Configurations& rows, const PredictOptions& options, int parame
             "by_parameters holds the indices of parameters of tubes, gravity and effects");
 }
 
-/// The shape of a model at joints after actuation, under the whole load.
+/// The shape of a model at joints after actuation, under the whole load. @param ws  warm start
 template <int N, class Fx>
-ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points, int steps) {
+ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points, int steps,
+                     Workspace<N> ws = {}) {
   std::vector<double> s(std::size_t(points + 2 * N));
   s.resize(shape_arc_lengths(model, q, std::size_t(points), std::span(s)));
   std::vector<ShapePoint<N>> shape_at(s.size());
-  Workspace<N> ws;
   Solution<N> solution;
   const auto count = Eigen::Index(s.size());
-  ShapeArrays out{.status = shape<N>(model, q, load, s, shape_at, ws, solution, Settings{.steps = steps}),
+  const Status status = shape<N>(model, q, load, s, shape_at, ws, solution, Settings{.steps = steps});
+  ShapeArrays out{.status = status,
+                  .stability = solution.stability,
                   .arc_length = Eigen::Map<const Eigen::VectorXd>(s.data(), count),
                   .position = RowMajor(count, 3),
                   .quaternion = RowMajor(count, 4),
@@ -122,6 +125,16 @@ ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoa
   return out;
 }
 
+/// Those of all stable equilibria.
+template <int N, class Fx>
+std::vector<ShapeArrays> all_shapes_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points,
+                                       int steps) {
+  std::vector<ShapeArrays> all;
+  for (const Equilibrium<N>& one : all_equilibria(model, q, load, Settings{.steps = steps}))
+    all.push_back(shape_of(model, q, load, points, steps, one.workspace));
+  return all;
+}
+
 /// The standard model.
 template <int N>
 class ModelOf final : public AnyModel {
@@ -143,6 +156,11 @@ public:
     check<N>(row, {.steps = steps}, 0);
     const Configuration<N> c = configuration<N>(row, 0);
     return shape_of(model_, c.joints, c.load, points, steps);
+  }
+  std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const override {
+    check<N>(row, {.steps = steps}, 0);
+    const Configuration<N> c = configuration<N>(row, 0);
+    return all_shapes_of(model_, c.joints, c.load, points, steps);
   }
 
 private:
@@ -223,15 +241,24 @@ public:
   }
 
   ShapeArrays shape(const Configurations& row, int points, int steps) const override {
-    check<N>(row, {.steps = steps}, 0);
-    Workspace<N> ws;
-    RecordedPrediction<N, Fx> prediction;
-    const Configuration<N> c = configuration<N>(row, 0);
-    (void)ctcr::predict(system_at(0, std::max(steps, shape_steps)), row_of(c), {}, ws, prediction);
-    return shape_of(model_, prediction.q, prediction.load, points, steps);
+    const RecordedPrediction<N, Fx> actuated = actuate(row, steps);
+    return shape_of(model_, actuated.q, actuated.load, points, steps);
+  }
+  std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const override {
+    const RecordedPrediction<N, Fx> actuated = actuate(row, steps);
+    return all_shapes_of(model_, actuated.q, actuated.load, points, steps);
   }
 
 private:
+  /// Joints and load as the effects have them.
+  RecordedPrediction<N, Fx> actuate(const Configurations& row, int steps) const {
+    check<N>(row, {.steps = steps}, 0);
+    Workspace<N> ws;
+    RecordedPrediction<N, Fx> prediction;
+    (void)ctcr::predict(system_at(0, std::max(steps, shape_steps)), row_of(configuration<N>(row, 0)), {}, ws,
+                        prediction);
+    return prediction;
+  }
   /// Motor angles are the joints, and the reading is the pose of the tube's tip.
   [[nodiscard]] System<N, Fx> system_at(int tube, int steps) const {
     return {{}, model_, PoseSensor{{}, tube}, Settings{.steps = steps}};

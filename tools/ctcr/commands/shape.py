@@ -27,15 +27,17 @@ class Numbers(click.ParamType):
 @click.option("--alpha", type=Numbers(), help="Base angles [rad], innermost tube first.")
 @click.option("--alpha-deg", type=Numbers(), help="The same in degrees.")
 @click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
+@click.option("--all", "every", is_flag=True, help="List all stable equilibria: the robot may rest in several.")
 @click.option("-o", "--output", "picture", metavar="FILE.png", help="Draw the robot.")
 @options.steps
 @options.json
-def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) -> None:
+def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps, out) -> None:
     """Solve the shape of a robot at given joints.
 
     The joints are one value a tube. Shows the pose of the tip, the ends of the tubes and the stability. The JSON
     holds samples of the backbone [m] in the base frame. Effects that depend on how the joints were reached are left
-    out.
+    out. Strongly curved tubes that are opposed may rest in several shapes: --all lists those that can be found, and
+    draws the others as dashed lines. In which of them the robot is depends on how it got there.
 
     Example: ctcr shape robot.yaml --beta-mm -330,-240,-165 --alpha-deg 50,-40,-60 -o robot.png
     """
@@ -56,14 +58,16 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
-    shape = model.shape(beta, alpha, force, points=SAMPLES)
+    solve = model.all_shapes if every else lambda *where, **how: [model.shape(*where, **how)]
+    shape, *others = shapes = solve(beta, alpha, force, points=SAMPLES)
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
     rotation = matrix_from_quaternion(shape.quaternion)
     if picture:
         from ctcr.show.pictures import draw_robot
 
         title = f"beta = {_listed(1e3 * beta, 1)} mm\nalpha = {_listed(np.degrees(alpha), 0)} deg"
-        draw_robot(picture, loaded, shape.arc_length, shape.position, rotation, ends, force, title)
+        backbones = [other.position for other in others]
+        draw_robot(picture, loaded, shape.arc_length, shape.position, rotation, ends, force, title, backbones)
     tips = np.column_stack([np.interp(ends, shape.arc_length, axis) for axis in shape.position.T])
     out.write_json(
         {
@@ -75,8 +79,9 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
             },
             "tubes": [{"tip_arc_length_m": s, "tip_position_m": x} for s, x in zip(ends, tips, strict=True)],
             "stability": tip.stability[0],
-            "samples": {"arc_length_m": shape.arc_length, "position_m": shape.position},
+            "samples": _samples(shape),
         }
+        | ({"other_equilibria": [{"stability": x.stability, "samples": _samples(x)} for x in others]} if every else {})
     )
     out.console.print(f"{loaded.name}, base frame", style="bold")
     rows = [
@@ -87,12 +92,39 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, picture, steps, out) 
     out.say("tip direction  " + _listed(rotation[-1][:, 2], 5))
     out.say("tip quaternion " + _listed(tip.quaternion[0], 5) + "  (w, x, y, z)")
     out.say(f"stability      {tip.stability[0]:.3g}  (0: about to snap)")
+    if every:
+        _list(shapes, out)
     if picture:
         out.say(f"picture: {picture}")
     if acting := effect_model.of_the_poses(used):
         out.say(f"With the effects {', '.join(acting)}")
     if with_history:
         out.say(f"Left out, as it depends on how the joints were reached: {', '.join(with_history)}")
+
+
+def _list(shapes, out) -> None:
+    """The tips of all equilibria, the one that is described first."""
+    import numpy as np
+
+    if len(shapes) == 1:
+        out.say("No other stable equilibrium was found")
+        return
+    tips = np.array([shape.position[-1] for shape in shapes])
+    rows = [
+        [
+            str(number),
+            *(f"{1e3 * x:.3f}" for x in tip),
+            f"{1e3 * np.linalg.norm(tip - tips[0]):.2f}",
+            f"{one.stability:.3g}",
+        ]
+        for number, (tip, one) in enumerate(zip(tips, shapes, strict=True), start=1)
+    ]
+    heads = ["", "x [mm]", "y [mm]", "z [mm]", "from the first [mm]", "stability"]
+    out.table("Tips of the stable equilibria", heads, rows)
+
+
+def _samples(shape) -> dict:
+    return {"arc_length_m": shape.arc_length, "position_m": shape.position}
 
 
 def _joints(name: str, given: dict, n_tubes: int):

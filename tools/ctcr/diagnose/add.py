@@ -98,7 +98,7 @@ def add(
         isolated = outliers.isolated(readings, fit, held_out)
         judged = held_out & ~isolated if held_out.any() else everything
         stages = [_stage(name, residual, judged) for name, residual in errors.items()]
-        about_outliers = [sentence(text) for text in outliers.messages(readings, fit, isolated)]
+        about_outliers = [sentence(text) for text in outliers.messages(stage.robot, readings, fit, isolated)]
         if held_out.any():
             fit = stage(fitted, fitted, everything, [now | values_of(fit)])
         progress.advance(1)

@@ -8,6 +8,8 @@ from scipy.stats import binom
 
 from ctcr import settings
 from ctcr.arrays import Integers, Mask
+from ctcr.audit import snaps
+from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
@@ -34,13 +36,22 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     return found if np.sum(found) <= settings.MOST_ISOLATED * np.sum(rows[read]) else np.zeros_like(found)
 
 
-def messages(measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:
-    """One for each isolated outlier, without the full stop."""
-    return [
-        f"Reading {measurements.row[k]} is {1e3 * np.linalg.norm(fit.residual[k, :3]):.2g} mm off, and its neighbours "
-        "are not: an outlier of the tracker, or a snap to another equilibrium. The errors are without it"
-        for k in np.flatnonzero(isolated)
-    ]
+def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:
+    """One for each isolated outlier of a fit to a robot, without the full stop: whether it is a snap."""
+    said = []
+    for k in np.flatnonzero(isolated):
+        far = np.linalg.norm(fit.residual[k, :3])
+        text = f"Reading {measurements.row[k]} is {1e3 * far:.2g} mm off, and its neighbours are not: "
+        others = np.linalg.norm(snaps.other_tips(fit.apply(robot), measurements, k) - measurements.position[k], axis=1)
+        expected = settings.SURPRISE * fit.inflation[0] * np.sqrt(fit.expected_square[k, 0])
+        if len(others) and others.min() < max(expected, 0.1 * far):
+            text += f"a snap: another stable equilibrium of the robot is {1e3 * others.min():.2g} mm from it"
+        elif len(others):
+            text += f"an outlier of the tracker: the nearest other equilibrium is {1e3 * others.min():.2g} mm from it"
+        else:
+            text += "an outlier of the tracker, as the robot has no other stable equilibrium there"
+        said.append(text + ". The errors are without it")
+    return said
 
 
 def clustered(measurements: Measurements, fit: Any) -> Mask:

@@ -247,5 +247,5 @@ def _diagnose(
         residual=residual,
         varying=varying,
         verdict=verdict,
-        notices=outliers.messages(engine.measurements, with_effects, isolated),
+        notices=outliers.messages(robot, engine.measurements, with_effects, isolated),
     )

@@ -50,6 +50,7 @@ class Shape:
     about their z axis, the tangent. Where curvatures jump the values are those of the base side.
     """
 
+    stability: float  # 1 without interaction between tubes, 0 where the robot snaps
     arc_length: Array  # (K,) [m], from the front plate
     position: Array  # (K, 3) [m], base frame
     quaternion: Array  # (K, 4), w first and not negative
@@ -167,20 +168,41 @@ class Model:
 
         Integrated finely with the default integrator, whatever `steps`. Raises ValueError where there is no solution.
         """
+        [shape] = self._shapes(beta, alpha, force, moment, points, every=False)
+        return shape
+
+    def all_shapes(
+        self,
+        beta: ArrayLike,
+        alpha: ArrayLike,
+        force: ArrayLike | None = None,
+        moment: ArrayLike | None = None,
+        *,
+        points: int = 200,
+    ) -> list[Shape]:
+        """The shapes in which the robot may rest at one configuration, as `shape`: that one first, then those of the
+        other stable equilibria that starts scattered over all angles reach. Empty where none is found."""
+        return self._shapes(beta, alpha, force, moment, points, every=True)
+
+    def _shapes(self, beta, alpha, force, moment, points: int, *, every: bool) -> list[Shape]:
         n = self.robot.n_tubes
-        status, arc_length, position, quaternion, force, moment, angle, curvature, tube_moment = self._core.shape(
+        found = self._core.shapes(
             beta=_array("beta", beta, n)[None],
             alpha=_array("alpha", alpha, n)[None],
             force=None if force is None else _array("force", force, 3)[None],
             moment=None if moment is None else _array("moment", moment, 3)[None],
             points=points,
             steps=self.steps,
+            all=every,
         )
-        if status not in (_core.Status.ok, _core.Status.singular):
-            raise ValueError(f"no shape at these joints: {_core.status_text(status)}")
-        by_tube = (n, len(arc_length), 3)
-        curvature, tube_moment = curvature.reshape(by_tube), tube_moment.reshape(by_tube)
-        return Shape(arc_length, position, quaternion, force, moment, angle, curvature, tube_moment)
+        shapes = []
+        for status, stability, arc_length, *along_the_robot, curvature, tube_moment in found:
+            if status not in (_core.Status.ok, _core.Status.singular):
+                raise ValueError(f"no shape at these joints: {_core.status_text(status)}")
+            by_tube = (n, len(arc_length), 3)
+            tubes = curvature.reshape(by_tube), tube_moment.reshape(by_tube)
+            shapes.append(Shape(stability, arc_length, *along_the_robot, *tubes))
+        return shapes
 
 
 def _acting(robot: Robot, integrator: str) -> dict[str, Any]:

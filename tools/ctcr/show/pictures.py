@@ -1,5 +1,6 @@
 """A picture of the robot: the tubes as they lie in space, true to scale."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from ctcr.show.wording import visible
 TUBE_COLOURS = ("#e8871e", "#3f8fc4", "#6b7a8f", "#3d4757")  # innermost first; apart for colour-blind eyes too
 AXIS_COLOURS = ("#c0392b", "#27934b", "#2255aa")
 FORCE_COLOUR = "#a3127a"
+OTHER_COLOUR = "#27313d"
 _SIDES = 20  # facets around a tube
 
 
@@ -29,12 +31,13 @@ def draw_robot(
     tube_ends: Array,
     force: Array | None = None,
     title: str = "",
+    others: Sequence[Array] = (),
 ) -> None:
     """Writes a PNG.
 
     The backbone in the base frame: `arc_length` (P,) from the front plate [m], `position` (P, 3) [m], `rotation`
     (P, 3, 3), z along the tangent. `tube_ends` (N,): arc length of the tips [m], innermost first. `force` (3,) at the
-    tip [N], base frame.
+    tip [N], base frame. `others`, each (P, 3) [m]: backbones of other equilibria, as dashed lines numbered from 2 on.
     """
     figure = Figure(figsize=(8, 8), dpi=200, facecolor="white")
     axes = figure.add_axes((0.10, 0.02, 0.88, 0.94), projection="3d", computed_zorder=False)
@@ -42,12 +45,16 @@ def draw_robot(
     frames = np.tile(np.eye(4), (len(centre), 1, 1))
     frames[:, :3, :3], frames[:, :3, 3] = rotation, centre
     reach = max(np.ptp(centre, axis=0).max(), 20.0)
-    lamp = _stage(axes, centre, 0.24 * reach)
+    lamp = _stage(axes, np.concatenate([centre, *(1e3 * np.asarray(other) for other in others)]), 0.24 * reach)
     _draw_plate(axes, 0.09 * reach)
     _draw_shadow(axes, centre)
     _draw_triad(axes, np.eye(4), 0.16 * reach, zorder=3, labels=True)
     _draw_tubes(axes, robot, 1e3 * arc_length, frames, 1e3 * tube_ends, lamp)
     _draw_triad(axes, frames[-1], 0.09 * reach, zorder=5)
+    for number, other in enumerate(others, start=2):
+        line = 1e3 * np.asarray(other)
+        axes.plot(*line.T, color=OTHER_COLOUR, linestyle=(0, (4, 2)), linewidth=1.6, zorder=6)
+        axes.text(*line[-1], f" {number}", color=OTHER_COLOUR, fontsize=11, fontweight="bold", zorder=6)
     if force is not None and np.linalg.norm(force) > 0:
         _draw_force(axes, centre[-1], force, 0.22 * reach)
     _explain(figure, robot, 1e3 * tube_ends, title)

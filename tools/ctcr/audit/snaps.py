@@ -1,0 +1,28 @@
+"""Snaps: readings of a robot that rests in another stable equilibrium than the one that the model predicts."""
+
+import numpy as np
+
+from ctcr.arrays import Array
+from ctcr.frames import base_to_tracker
+from ctcr.model.effect_model import of_the_path, of_the_poses
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+
+def other_tips(robot: Robot, measurements: Measurements, index: int) -> Array:
+    """Where else the tip of the sensor's tube may rest (E, 3) [m], tracker frame, in the reading `index` of the table.
+
+    Effects that depend on how the joints were reached are left out, as every equilibrium has a history of its own.
+    """
+    path = of_the_path(robot) if robot.effects else []
+    used = robot.with_effects({name: given for name, given in of_the_poses(robot).items() if name not in path})
+    beta, alpha = (q[0] for q in robot.joints_of_table(*(m[[index]] for m in (measurements.beta, measurements.alpha))))
+    tube = robot.tracker.sensor_on_tube - 1
+    end = robot.tubes[tube].length + beta[tube]
+    tips = [
+        [np.interp(end, shape.arc_length, axis) for axis in shape.position.T]
+        for shape in Model(used).all_shapes(beta, alpha, measurements.force[index])[1:]
+    ]
+    position = np.reshape(tips, (len(tips), 3))
+    return base_to_tracker(robot.tracker, position, np.tile([1.0, 0, 0, 0], (len(tips), 1)))[0]
