@@ -17,6 +17,24 @@ struct Tally {
   long answers = 0, judged = 0;
 };
 
+/// Evaluations of a solve by its start, as rows of a markdown table: mean, percentiles and worst.
+inline std::string evaluations_table(const Tally& tally, const std::string& name) {
+  std::string table;
+  for (auto [start, counts] : tally.evaluations) {
+    std::ranges::sort(counts);
+    const std::size_t size = counts.size();
+    double sum = 0;
+    for (int count : counts) sum += count;
+    char row[160];
+    const auto percentile = [&](double share) { return counts[std::min(size - 1, std::size_t(share * double(size)))]; };
+    std::snprintf(row, sizeof row, "| %s | %s | %zu | %.1f | %d | %d | %d | %d | %d |\n", name.c_str(), start.c_str(),
+                  size, sum / double(size), percentile(0.5), percentile(0.9), percentile(0.99), percentile(0.999),
+                  counts.back());
+    table += row;
+  }
+  return table;
+}
+
 /// How an attack goes about it.
 struct Attack {
   /// Of so many cases one is moved to others and its tips are compared with those in 32 steps, and one is judged by the

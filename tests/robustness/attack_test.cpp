@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <iostream>
+
 namespace ctcr {
 namespace attack_test {
 
@@ -30,6 +32,7 @@ TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
   constexpr int N = TypeParam::N;
   const test::Tally tally = attack<N>("sane", 12000, [](test::Random& random) { return test::sane_case<N>(random); });
   EXPECT_GT(tally.judged, 0);
+  std::cout << test::evaluations_table(tally, "N = " + std::to_string(N));
   for (const auto& [start, evaluations] : tally.evaluations) EXPECT_LE(std::ranges::max(evaluations), 300) << start;
 }
 

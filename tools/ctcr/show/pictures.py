@@ -53,6 +53,7 @@ def draw_robot(
     _draw_triad(axes, frames[-1], 0.09 * reach, zorder=5)
     for number, other in enumerate(others, start=2):
         line = 1e3 * np.asarray(other)
+        _draw_shadow(axes, line)
         axes.plot(*line.T, color=OTHER_COLOUR, linestyle=(0, (4, 2)), linewidth=1.6, zorder=6)
         axes.text(*line[-1], f" {number}", color=OTHER_COLOUR, fontsize=11, fontweight="bold", zorder=6)
     if force is not None and np.linalg.norm(force) > 0:
