@@ -1,16 +1,17 @@
 // Whatever the robot, the joints and the load: outputs are defined, and an invalid robot is never `ok`.
+#include "support/defined_outputs.hpp"
+
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <limits>
 
 #include "support/laws.hpp"
+#include "support/robot_text.hpp"
 
 namespace ctcr {
 namespace defined_outputs_test {
 
-using test::chance;
-using test::uniform;
+using test::chance, test::is_defined, test::uniform;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
 constexpr double garbage_numbers[] = {nan,    infinity, -infinity, 0,    -0.0, 1e300, -1e300, 1e-300,
@@ -46,42 +47,10 @@ test::Case<N> random_case(double flush, test::Random& random) {
   return c;
 }
 
-/// A case as text to paste.
+/// A case as text to paste, below the status.
 template <int N>
 std::string text(const test::Case<N>& c, Status status) {
-  char line[512];
-  const auto vector = [&](const char* name, const Vec3& v) {
-    std::snprintf(line, sizeof line, " %s %.17g %.17g %.17g", name, v[0], v[1], v[2]);
-    return std::string(line);
-  };
-  std::string all = std::string(to_string(status)) + "\n" + vector("grav", c.robot.gravity) + "\n";
-  for (int i = 0; i < N; ++i) {
-    const Tube& t = c.robot.tubes[std::size_t(i)];
-    std::snprintf(line, sizeof line,
-                  " tube E=%.17g nu=%.17g rho=%.17g id=%.17g od=%.17g l=%.17g lc=%.17g k=%.17g beta=%.17g alpha=%.17g",
-                  t.youngs_modulus, t.poisson_ratio, t.density, t.inner_diameter, t.outer_diameter, t.length,
-                  t.curved_length, t.curvature, c.q.beta[i], c.q.alpha[i]);
-    all += line;
-    if (t.bending_stiffness != 0) all += " EI=" + std::to_string(t.bending_stiffness);
-    all += "\n";
-  }
-  return all + vector("force", c.load.force) + vector(" moment", c.load.moment) + "\n";
-}
-
-bool is_pose(const Mat3& R, const Vec3& p, double reach) {
-  return R.allFinite() && p.allFinite() && (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-12 &&
-         R.determinant() > 0 && p.stableNorm() <= reach;
-}
-
-template <int N>
-bool is_defined(const Solution<N>& s, const test::Case<N>& c) {
-  const double length = c.robot.tubes[0].length + c.q.beta[0];
-  const double reach = length > 0 ? length * (1 + 1e-12) + N * 1e-6 : 1e-6 * N;
-  bool tips = is_pose(s.rotation, s.position, reach) && s.iterations >= 0;
-  for (const Pose& tip : s.tube_tips) tips = tips && is_pose(tip.rotation, tip.position, reach);
-  const bool solved = has_equilibrium(s.status);
-  return tips && s.jacobian.allFinite() && s.compliance.allFinite() && std::isfinite(s.stability) && s.residual >= 0 &&
-         (std::isfinite(s.residual) || !solved);
+  return std::string(to_string(status)) + "\n" + test::text(c);
 }
 
 template <int N>

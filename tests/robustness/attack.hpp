@@ -6,6 +6,7 @@
 
 #include "robustness/judge.hpp"
 #include "robustness/random_designs.hpp"
+#include "support/robot_text.hpp"
 
 namespace ctcr::test {
 
@@ -59,8 +60,9 @@ public:
     solve_from("cold", model, c, ws, s);
     if (!moved_ || !has_equilibrium(s.status)) return;
     solve_from("near", model, neighbour(c, 0.1), ws, s);
-    solve_from("far", model, neighbour(c, 1.5), ws, s);
-    if (thorough_ && s.status == Status::ok) walk(model, ws);
+    const Case<N> far = neighbour(c, 1.5);
+    solve_from("far", model, far, ws, s);
+    if (thorough_ && s.status == Status::ok) walk(model, far, ws);
   }
 
 private:
@@ -68,13 +70,11 @@ private:
     (void)solve<Derivatives::compliance>(model, c.q, c.load, ws, s, settings_);
     ++tally_.statuses[std::string(start) + ", " + to_string(s.status)];
     tally_.evaluations[start].push_back(s.iterations);
-    last_ = c;
     judge(start, model, c, ws, s);
   }
 
-  void walk(const Model<N>& model, Workspace<N>& ws) {
+  void walk(const Model<N>& model, Case<N> c, Workspace<N>& ws) {
     Solution<N> s;
-    Case<N> c = last_;
     VecN<N> turn;
     for (double& x : turn) x = uniform(random_, -0.05, 0.05);
     for (int k = 0; k < 20; ++k) {
@@ -120,7 +120,6 @@ private:
   std::string name_;
   int number_ = 0;
   bool moved_ = false, thorough_ = false;
-  Case<N> last_;
 };
 
 }  // namespace ctcr::test

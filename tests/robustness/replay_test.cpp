@@ -30,6 +30,17 @@ Status replay(const char* name) {
   return solve<Derivatives::compliance>(Model<N>(c.robot), c.q, c.load, ws, s);
 }
 
+TEST(Replay, ReadsWhatIsWritten) {
+  test::Random random(3);
+  for (int k = 0; k < 100; ++k) {
+    const test::Case<3> c = test::garbage_case<3>(random);
+    test::Case<3> back;
+    std::istringstream in(test::text(c));
+    ASSERT_TRUE(test::read(in, back)) << test::text(c);
+    EXPECT_EQ(test::text(back), test::text(c));
+  }
+}
+
 TEST(Replay, ARobotWhoseErrorOfIntegrationWasLarge) { EXPECT_EQ(replay<1>("n1"), Status::ok); }
 
 TEST(Replay, ColdSolvesThatFoundAnUnstableEquilibrium) {

@@ -271,9 +271,9 @@ inline double way_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoa
   return distance(ws.guess, guess) + (q.beta - ws.q.beta).norm() / length + bent * length / model.robot().tubes[0].EI();
 }
 
-/// What Newton's method leaves after a correction that follows another, or a prediction along the tangent [rad]. Each is of
-/// second order in the one before, so their ratio shows the curvature.
-/// @param correction  measured at the tip or at the grasps: a load along the robot makes the one much larger
+/// Estimate of the error that Newton's method leaves after a correction [rad]. A correction is of second order in the change
+/// before it, be that a correction too or a prediction along the tangent, so their ratio measures the curvature.
+/// @param correction  norm of the change of the guess or of the residual, the larger: a load along the robot sets them apart
 inline double newton_remainder(double before, double correction) noexcept {
   const double ratio = correction < before ? correction / before : 1.0;
   return correction * ratio * ratio;

@@ -76,7 +76,8 @@ def said(robot, table, predicted):
     square = np.full((1, 2), 3 * 3.5e-5**2)
     fit = SimpleNamespace(apply=lambda _: robot, residual=residual, expected_square=square, inflation=np.ones(2))
     (message,) = messages(robot, table, fit, np.ones(1, bool))
-    assert message.startswith("Reading 2 is ") and message.endswith("The errors are without it")
+    size = 1e3 * np.linalg.norm(residual[0, :3])
+    assert message.startswith(f"Reading 2 is {size:.2g} mm off") and message.endswith("The errors are without it")
     return message
 
 

@@ -39,9 +39,8 @@ class Straight:
     def shape(self, beta, alpha, force=None, moment=None, *, points=200):
         length = np.linspace(0, self.lengths[0] + beta[0], points)
         position = np.outer(length, [0, 0, 1])
-        return types.SimpleNamespace(
-            arc_length=length, position=position, quaternion=np.tile([1.0, 0, 0, 0], (points, 1))
-        )
+        nothing = np.zeros((points, 3))
+        return model.Shape(1.0, length, position, np.tile([1.0, 0, 0, 0], (points, 1)), *5 * [nothing])
 
 
 @pytest.fixture(autouse=True)

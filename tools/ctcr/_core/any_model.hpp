@@ -51,10 +51,10 @@ public:
   virtual ~AnyModel() = default;
   /// @throws std::invalid_argument unless the arrays and options fit together
   [[nodiscard]] virtual Poses predict(const Configurations& rows, const PredictOptions& options) const = 0;
-  /// Shape at the one configuration of `row`, at `points` uniform arc lengths and the breakpoints.
-  [[nodiscard]] virtual ShapeArrays shape(const Configurations& row, int points, int steps) const = 0;
-  /// The shapes of all stable equilibria there, that of shape() first.
-  [[nodiscard]] virtual std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const = 0;
+  /// Shape at the one configuration of `row`, at `points` uniform arc lengths and the breakpoints; with `all` those of
+  /// all stable equilibria there, that one first.
+  [[nodiscard]] virtual std::vector<ShapeArrays> shapes(const Configurations& row, int points, int steps,
+                                                        bool all) const = 0;
 };
 
 /// Defined for N = 1..4.

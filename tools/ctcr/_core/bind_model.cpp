@@ -53,10 +53,7 @@ auto shapes(const AnyModel& model, RowMajor beta, RowMajor alpha, std::optional<
   if (points < 2) throw std::invalid_argument("points must be at least 2");
   const Configurations row = configurations(std::move(beta), std::move(alpha), std::move(force), std::move(moment));
   std::vector<decltype(arrays_of(ShapeArrays{}))> found;
-  if (!all)
-    found.push_back(arrays_of(model.shape(row, points, steps)));
-  else
-    for (ShapeArrays& one : model.all_shapes(row, points, steps)) found.push_back(arrays_of(std::move(one)));
+  for (ShapeArrays& one : model.shapes(row, points, steps, all)) found.push_back(arrays_of(std::move(one)));
   return found;
 }
 
@@ -115,10 +112,8 @@ NB_MODULE(_core, m) {
            "ones and every breakpoint. With `all` those of every stable equilibrium that is found, which may be "
            "none.\n\n"
            "Returns a list of (status, stability, arc_length (K,), position (K, 3), quaternion (K, 4), internal force "
-           "and "
-           "moment (K, 3), tube_angle (N, K), tube_curvature and tube_moment (N, 3K)). Raises ValueError where the "
-           "arrays "
-           "do not fit.");
+           "and moment (K, 3), tube_angle (N, K), tube_curvature and tube_moment (N, 3K)). Raises ValueError where "
+           "the arrays do not fit.");
   bind_calibration(m);
   bind_identify(m);
   bind_recording(m);

@@ -125,14 +125,15 @@ ShapeArrays shape_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoa
   return out;
 }
 
-/// Those of all stable equilibria.
+/// That shape, or with `all` those of all stable equilibria.
 template <int N, class Fx>
-std::vector<ShapeArrays> all_shapes_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points,
-                                       int steps) {
-  std::vector<ShapeArrays> all;
+std::vector<ShapeArrays> shapes_of(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, int points,
+                                   int steps, bool all) {
+  if (!all) return {shape_of(model, q, load, points, steps)};
+  std::vector<ShapeArrays> found;
   for (const Equilibrium<N>& one : all_equilibria(model, q, load, Settings{.steps = steps}))
-    all.push_back(shape_of(model, q, load, points, steps, one.workspace));
-  return all;
+    found.push_back(shape_of(model, q, load, points, steps, one.workspace));
+  return found;
 }
 
 /// The standard model.
@@ -152,15 +153,10 @@ public:
     }
     throw std::invalid_argument("no such integrator");
   }
-  ShapeArrays shape(const Configurations& row, int points, int steps) const override {
+  std::vector<ShapeArrays> shapes(const Configurations& row, int points, int steps, bool all) const override {
     check<N>(row, {.steps = steps}, 0);
     const Configuration<N> c = configuration<N>(row, 0);
-    return shape_of(model_, c.joints, c.load, points, steps);
-  }
-  std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const override {
-    check<N>(row, {.steps = steps}, 0);
-    const Configuration<N> c = configuration<N>(row, 0);
-    return all_shapes_of(model_, c.joints, c.load, points, steps);
+    return shapes_of(model_, c.joints, c.load, points, steps, all);
   }
 
 private:
@@ -240,25 +236,16 @@ public:
     return out;
   }
 
-  ShapeArrays shape(const Configurations& row, int points, int steps) const override {
-    const RecordedPrediction<N, Fx> actuated = actuate(row, steps);
-    return shape_of(model_, actuated.q, actuated.load, points, steps);
-  }
-  std::vector<ShapeArrays> all_shapes(const Configurations& row, int points, int steps) const override {
-    const RecordedPrediction<N, Fx> actuated = actuate(row, steps);
-    return all_shapes_of(model_, actuated.q, actuated.load, points, steps);
-  }
-
-private:
-  /// Joints and load as the effects have them.
-  RecordedPrediction<N, Fx> actuate(const Configurations& row, int steps) const {
+  std::vector<ShapeArrays> shapes(const Configurations& row, int points, int steps, bool all) const override {
     check<N>(row, {.steps = steps}, 0);
     Workspace<N> ws;
     RecordedPrediction<N, Fx> prediction;
-    (void)ctcr::predict(system_at(0, std::max(steps, shape_steps)), row_of(configuration<N>(row, 0)), {}, ws,
-                        prediction);
-    return prediction;
+    const Configuration<N> c = configuration<N>(row, 0);
+    (void)ctcr::predict(system_at(0, std::max(steps, shape_steps)), row_of(c), {}, ws, prediction);
+    return shapes_of(model_, prediction.q, prediction.load, points, steps, all);
   }
+
+private:
   /// Motor angles are the joints, and the reading is the pose of the tube's tip.
   [[nodiscard]] System<N, Fx> system_at(int tube, int steps) const {
     return {{}, model_, PoseSensor{{}, tube}, Settings{.steps = steps}};

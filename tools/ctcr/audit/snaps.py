@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr.arrays import Array
 from ctcr.frames import base_to_tracker
-from ctcr.model.effect_model import of_the_path, of_the_poses
+from ctcr.model.effect_model import without_the_path
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -15,14 +15,9 @@ def other_tips(robot: Robot, measurements: Measurements, index: int) -> Array:
 
     Effects that depend on how the joints were reached are left out, as every equilibrium has a history of its own.
     """
-    path = of_the_path(robot) if robot.effects else []
-    used = robot.with_effects({name: given for name, given in of_the_poses(robot).items() if name not in path})
     beta, alpha = (q[0] for q in robot.joints_of_table(*(m[[index]] for m in (measurements.beta, measurements.alpha))))
     tube = robot.tracker.sensor_on_tube - 1
     end = robot.tubes[tube].length + beta[tube]
-    tips = [
-        [np.interp(end, shape.arc_length, axis) for axis in shape.position.T]
-        for shape in Model(used).all_shapes(beta, alpha, measurements.force[index])[1:]
-    ]
-    position = np.reshape(tips, (len(tips), 3))
-    return base_to_tracker(robot.tracker, position, np.tile([1.0, 0, 0, 0], (len(tips), 1)))[0]
+    others = Model(without_the_path(robot)).all_shapes(beta, alpha, measurements.force[index])[1:]
+    position = np.reshape([shape.position_at(end) for shape in others], (-1, 3))
+    return base_to_tracker(robot.tracker, position, np.tile([1.0, 0, 0, 0], (len(others), 1)))[0]

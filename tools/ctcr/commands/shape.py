@@ -52,14 +52,13 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps
     beta = _joints("beta", {"beta": (beta, 1.0), "beta-mm": (beta_mm, 1e-3)}, loaded.n_tubes)
     alpha = _joints("alpha", {"alpha": (alpha, 1.0), "alpha-deg": (alpha_deg, np.pi / 180)}, loaded.n_tubes)
     force = _finite("force", force, 3)
-    with_history = effect_model.of_the_path(loaded) if loaded.effects else []
-    used = loaded.with_effects({name: given for name, given in loaded.effects.items() if name not in with_history})
+    used = effect_model.without_the_path(loaded)
     model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
     if tip.status[0] != 0:
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
-    solve = model.all_shapes if every else lambda *where, **how: [model.shape(*where, **how)]
-    shape, *others = shapes = solve(beta, alpha, force, points=SAMPLES)
+    here = {"beta": beta, "alpha": alpha, "force": force, "points": SAMPLES}
+    shape, *others = shapes = model.all_shapes(**here) if every else [model.shape(**here)]
     ends = np.array([tube.length for tube in loaded.tubes]) + beta
     rotation = matrix_from_quaternion(shape.quaternion)
     if picture:
@@ -68,7 +67,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps
         title = f"beta = {_listed(1e3 * beta, 1)} mm\nalpha = {_listed(np.degrees(alpha), 0)} deg"
         backbones = [other.position for other in others]
         draw_robot(picture, loaded, shape.arc_length, shape.position, rotation, ends, force, title, backbones)
-    tips = np.column_stack([np.interp(ends, shape.arc_length, axis) for axis in shape.position.T])
+    tips = shape.position_at(ends)
     out.write_json(
         {
             "robot": loaded.name,
@@ -98,7 +97,7 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps
         out.say(f"picture: {picture}")
     if acting := effect_model.of_the_poses(used):
         out.say(f"With the effects {', '.join(acting)}")
-    if with_history:
+    if with_history := [name for name in loaded.effects if name not in used.effects]:
         out.say(f"Left out, as it depends on how the joints were reached: {', '.join(with_history)}")
 
 

@@ -38,13 +38,13 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
 
 def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:
     """One for each isolated outlier of a fit to a robot, without the full stop: whether it is a snap."""
-    said = []
+    fitted, said = fit.apply(robot), []
     for k in np.flatnonzero(isolated):
         far = np.linalg.norm(fit.residual[k, :3])
         text = f"Reading {measurements.row[k]} is {1e3 * far:.2g} mm off, and its neighbours are not: "
-        others = np.linalg.norm(snaps.other_tips(fit.apply(robot), measurements, k) - measurements.position[k], axis=1)
+        others = np.linalg.norm(snaps.other_tips(fitted, measurements, k) - measurements.position[k], axis=1)
         expected = settings.SURPRISE * fit.inflation[0] * np.sqrt(fit.expected_square[k, 0])
-        if len(others) and others.min() < max(expected, 0.1 * far):
+        if len(others) and others.min() < max(expected, settings.SNAP_ERROR * far):
             text += f"a snap: another stable equilibrium of the robot is {1e3 * others.min():.2g} mm from it"
         elif len(others):
             text += f"an outlier of the tracker: the nearest other equilibrium is {1e3 * others.min():.2g} mm from it"

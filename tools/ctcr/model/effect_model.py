@@ -45,3 +45,9 @@ def of_the_path(robot: Robot) -> list[str]:
     known = catalogue.catalogue(robot.n_tubes)
     without = {effect.id for effect in known.values() if not effect.needs & {"order", "time"}}
     return [identity for identity in of_the_poses(robot) if identity not in without]
+
+
+def without_the_path(robot: Robot) -> Robot:
+    """The robot without those effects: what a `Model` can solve, configuration by configuration."""
+    path = of_the_path(robot) if robot.effects else []
+    return robot.with_effects({identity: given for identity, given in robot.effects.items() if identity not in path})

@@ -60,6 +60,10 @@ class Shape:
     tube_curvature: Array  # (N, K, 3) [1/m], bending x, y and twist z, in the tube's own frame
     tube_moment: Array  # (N, K, 3) [N m], in the tube's own frame
 
+    def position_at(self, arc_length: ArrayLike) -> Array:
+        """Positions (..., 3) [m] in the base frame at arc lengths (...) [m], linear between the K places."""
+        return np.stack([np.interp(arc_length, self.arc_length, axis) for axis in self.position.T], axis=-1)
+
     def tube_quaternion(self, tube: int) -> Array:
         """Material frame of a tube (0: innermost) at each place (K, 4); NaN where it is not there."""
         half = self.tube_angle[tube] / 2

@@ -45,14 +45,14 @@ def draw_robot(
     frames = np.tile(np.eye(4), (len(centre), 1, 1))
     frames[:, :3, :3], frames[:, :3, 3] = rotation, centre
     reach = max(np.ptp(centre, axis=0).max(), 20.0)
-    lamp = _stage(axes, np.concatenate([centre, *(1e3 * np.asarray(other) for other in others)]), 0.24 * reach)
+    dashed = [1e3 * other for other in others]
+    lamp = _stage(axes, np.concatenate([centre, *dashed]), 0.24 * reach)
     _draw_plate(axes, 0.09 * reach)
     _draw_shadow(axes, centre)
     _draw_triad(axes, np.eye(4), 0.16 * reach, zorder=3, labels=True)
     _draw_tubes(axes, robot, 1e3 * arc_length, frames, 1e3 * tube_ends, lamp)
     _draw_triad(axes, frames[-1], 0.09 * reach, zorder=5)
-    for number, other in enumerate(others, start=2):
-        line = 1e3 * np.asarray(other)
+    for number, line in enumerate(dashed, start=2):
         _draw_shadow(axes, line)
         axes.plot(*line.T, color=OTHER_COLOUR, linestyle=(0, (4, 2)), linewidth=1.6, zorder=6)
         axes.text(*line[-1], f" {number}", color=OTHER_COLOUR, fontsize=11, fontweight="bold", zorder=6)
