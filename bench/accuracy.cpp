@@ -113,8 +113,10 @@ void study_method(const char* name, int count, const Method& method) {
 }
 
 void study_methods(int count) {
-  print_header("One step per segment against 64: tip over length, J and C against differences of the fine model",
-               {"method", "load", "designs", "tip mean", "max", "J mean", "max", "C mean", "max", "left out"});
+  print_header(
+      "Steps as the default takes them, one per segment for the others, against 64: tip over length, J and C against "
+      "differences of the fine model",
+      {"method", "load", "designs", "tip mean", "max", "J mean", "max", "C mean", "max", "left out"});
   study_method("default", count, Ours<ctcr::MagnusRk4>{});
   study_method("SSPRK3", count, Ours<ctcr::SspRk3>{});
   study_method("RK4", count, Ours<ctcr::ClassicalRk4>{});

@@ -35,10 +35,11 @@ TYPED_TEST(Accuracy, IsKept) {
     if (solve<Derivatives::jacobian>(model, c.q, c.load, ws, found, settings) != Status::ok) continue;
     const double allowed = settings.accuracy * (c.robot.tubes[0].length + c.q.beta[0]);
     EXPECT_LE(found.integration_error, allowed);
-    refined += ws.steps > 1;
+    refined += ws.steps.times > 1;
     fine.begin_at(ws.guess);
-    (void)solve<Derivatives::none>(model, c.q, c.load, fine, exact,
-                                   {.tolerance = 1e-9, .steps = 4 * ws.steps, .accuracy = test::as_told});
+    (void)solve<Derivatives::none>(
+        model, c.q, c.load, fine, exact,
+        {.tolerance = 1e-9, .steps = 4 * ws.steps.times * ws.steps.largest_share(), .accuracy = test::as_told});
     EXPECT_LT((exact.position - found.position).norm(), 3 * allowed + 1e-9) << "case " << n;
   }
   EXPECT_GT(refined, 0);

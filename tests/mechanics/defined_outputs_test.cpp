@@ -3,38 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
+#include "support/garbage.hpp"
 #include "support/laws.hpp"
 #include "support/robot_text.hpp"
 
 namespace ctcr {
 namespace defined_outputs_test {
 
-using test::chance, test::is_defined, test::uniform;
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-constexpr double garbage_numbers[] = {nan,    infinity, -infinity, 0,    -0.0, 1e300, -1e300, 1e-300,
-                                      5e-324, 1e150,    1e15,      -1e9, -1,   1,     1e6};
-
-/// A number left as it is, or with a probability spoilt.
-void spoil(double& x, double probability, test::Random& random) {
-  if (!chance(random, probability)) return;
-  switch (int(uniform(random, 0, 4))) {
-    case 0: x = -x; break;
-    case 1: x *= std::pow(10, uniform(random, -6, 6)); break;
-    default: x = garbage_numbers[std::size_t(uniform(random, 0, std::size(garbage_numbers)))];
-  }
-}
-
-template <int N>
-void spoil(Robot<N>& robot, double probability, test::Random& random) {
-  for (Tube& t : robot.tubes)
-    for (double* x : {&t.youngs_modulus, &t.poisson_ratio, &t.density, &t.inner_diameter, &t.outer_diameter, &t.length,
-                      &t.curved_length, &t.curvature, &t.bending_stiffness})
-      spoil(*x, probability, random);
-  for (double& x : robot.gravity) spoil(x, probability, random);
-}
+using test::chance, test::is_defined, test::spoil_each, test::uniform;
 
 template <int N>
 test::Case<N> random_case(double flush, test::Random& random) {
@@ -110,7 +86,9 @@ TYPED_TEST(DefinedOutputs, OfGarbageRobots) {
   test::Random random(100 + N);
   for (int n = 0; n < test::cases(3000) && !this->HasFailure(); ++n) {
     test::Case<N> c = random_case<N>(0.3, random);
-    spoil(c.robot, n % 2 == 0 ? 0.1 / N : 0.02 / N, random);
+    const double p = n % 2 == 0 ? 0.1 / N : 0.02 / N;
+    test::spoil_tubes(c.robot, p, random);
+    spoil_each(c.robot.gravity, p, random);
     expect_defined_by_all(c, n, random);
   }
 }
@@ -121,10 +99,10 @@ TYPED_TEST(DefinedOutputs, OfGarbageJointsAndLoads) {
   for (int n = 0; n < test::cases(3000) && !this->HasFailure(); ++n) {
     test::Case<N> c = random_case<N>(0.3, random);
     const double p = n % 2 == 0 ? 0.1 / N : 0;
-    for (double& x : c.q.beta) spoil(x, p, random);
-    for (double& x : c.q.alpha) spoil(x, 2 * p, random);
-    for (double& x : c.load.force) spoil(x, p, random);
-    for (double& x : c.load.moment) spoil(x, p, random);
+    spoil_each(c.q.beta, p, random);
+    spoil_each(c.q.alpha, 2 * p, random);
+    spoil_each(c.load.force, p, random);
+    spoil_each(c.load.moment, p, random);
     expect_defined_by_all(c, n, random);
   }
 }

@@ -26,9 +26,9 @@ bool finite(const Solution<3>& s) {
 void expect_refused(const Joints<3>& q, const TipLoad& load, Status expected) {
   const Model<3> model(robot);
   for (const bool warm : {false, true}) {
-    Workspace<3> ws;
-    Solution<3> s;
-    const Solution<3> before = test::solved<all>(robot, good, weight);
+    Workspace<3> ws, other;
+    Solution<3> s, before;
+    EXPECT_EQ(solve<all>(model, good, weight, other, before), Status::ok);
     if (warm) (void)solve<all>(model, good, weight, ws, s);
     EXPECT_EQ(solve<all>(model, q, load, ws, s), expected);
     EXPECT_EQ(s.status, expected);

@@ -81,7 +81,7 @@ TEST(Neighbours, TheSolvedRobotIsFoundAtOnce) {
   Solution<3> solution;
   ASSERT_EQ(solve(model, q, load, ws, solution), Status::ok);
   const Neighbour<3> same(model.coefficients(), q);
-  const Neighbours<3, Loading::force> around(same, load.force, solution, ws.guess, 0, 1);
+  const Neighbours<3, Loading::force> around(same, load.force, solution, ws.guess, 0, ws.steps);
   for (const NeighbourTip& tip : around.solve({same, same, same, same})) {
     EXPECT_TRUE(tip.solved);
     EXPECT_EQ(tip.evaluations, 1);

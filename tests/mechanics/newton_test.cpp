@@ -65,7 +65,7 @@ public:
     }
     for (int i = 1; i < N; ++i) guess.psi[i] += off[turns + i - 1];
     Ev ev;
-    evaluate<K::D, K::L, MagnusRk4>(coefficients_, c_.q, c_.load, guess, 1, ev);
+    evaluate<K::D, K::L, MagnusRk4>(coefficients_, c_.q, c_.load, guess, Steps<N>(1), ev);
     Shot shot;
     for (int j = 0; j < turns; ++j) shot.residual[j] = axis_[j].dot(ev.turn);
     for (int i = 1; i < N; ++i) shot.residual[turns + i - 1] = ev.angle_error[i];

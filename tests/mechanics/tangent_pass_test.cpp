@@ -44,8 +44,8 @@ void expect_pass_equals_direct(unsigned seed) {
     for (int i = 1; i < N; ++i) guess.psi[i] = uniform(random, -3, 3);
     const int steps = 1 + n % 3;
     Evaluation<N, L, D> separate, direct;
-    evaluate<D, L, MagnusRk4>(make_coefficients(robot), q, load, guess, steps, separate);
-    evaluate<D, L, DirectMagnusRk4>(make_coefficients(robot), q, load, guess, steps, direct);
+    evaluate<D, L, MagnusRk4>(make_coefficients(robot), q, load, guess, Steps<N>(steps), separate);
+    evaluate<D, L, DirectMagnusRk4>(make_coefficients(robot), q, load, guess, Steps<N>(steps), direct);
     expect_equal(direct, separate);
     if (testing::Test::HasFailure()) FAIL() << "case " << n << " seed " << seed;
   }

@@ -14,6 +14,7 @@ namespace ctcr::test {
 struct Tally {
   std::map<std::string, int> statuses;                  ///< of solves, by start and status
   std::map<std::string, std::vector<int>> evaluations;  ///< of each solve, by start
+  std::vector<double> asymmetry;                        ///< of the compliances that have to be symmetric, relative
   std::vector<std::string> faults;                      ///< each with its case as text
   long answers = 0, judged = 0;
 };
@@ -34,6 +35,14 @@ inline std::string evaluations_table(const Tally& tally, const std::string& name
     table += row;
   }
   return table;
+}
+
+/// Asymmetry of a compliance, relative. Lengths are in lengths of the robot.
+inline double asymmetry_of(const Mat6& compliance, double length) {
+  Vec6 scale;
+  scale << Vec3::Constant(1 / length), Vec3::Ones();
+  const Mat6 C = scale.asDiagonal() * compliance * scale.asDiagonal();
+  return (C - C.transpose()).norm() / C.norm();
 }
 
 /// How an attack goes about it.
@@ -91,6 +100,7 @@ private:
     if (!is_defined(s, c)) fault("outputs are not defined", start, c, s);
     if (s.status != Status::ok || !moved_) return;
     if (!(length_of(c) > 1e-3)) return;  // a robot inside the plate has no shape to judge
+    if (c.load.moment.isZero(0.0)) tally_.asymmetry.push_back(asymmetry_of(s.compliance, length_of(c)));
     std::string wrong = differs_from_32_steps(c, model, ws, s, settings_.accuracy);
     if (wrong.empty() && thorough_) {
       ++tally_.judged;

@@ -32,6 +32,10 @@ TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
   constexpr int N = TypeParam::N;
   const test::Tally tally = attack<N>("sane", 12000, [](test::Random& random) { return test::sane_case<N>(random); });
   EXPECT_GT(tally.judged, 0);
+  std::vector<double> asymmetry = tally.asymmetry;
+  std::ranges::sort(asymmetry);
+  std::cout << "asymmetry of C, N = " << N << ": median " << asymmetry[asymmetry.size() / 2] << ", 99 % "
+            << asymmetry[asymmetry.size() * 99 / 100] << ", worst " << asymmetry.back() << "\n";
   std::cout << test::evaluations_table(tally, "N = " + std::to_string(N));
   for (const auto& [start, evaluations] : tally.evaluations) EXPECT_LE(std::ranges::max(evaluations), 300) << start;
 }

@@ -97,7 +97,7 @@ TEST(Judge, FindsAnUnstableEquilibrium) {
   Workspace<2> ws;
   Evaluation<2, Loading::none, Derivatives::none> ev;
   const TipGuess<2> straight = detail::straight_guess(c.q);
-  evaluate<Derivatives::none, Loading::none, MagnusRk4>(model.coefficients(), c.q, c.load, straight, 16, ev);
+  evaluate<Derivatives::none, Loading::none, MagnusRk4>(model.coefficients(), c.q, c.load, straight, Steps<2>(16), ev);
   ASSERT_LT(ev.residual, 1e-3);
   ws.guess = straight;
   Solution<2> s;

@@ -1,8 +1,8 @@
 #pragma once
 // Robots, joints and loads of three kinds: such as people build, harder than that, and what cannot exist.
 #include <cmath>
-#include <limits>
 
+#include "support/garbage.hpp"
 #include "support/laws.hpp"
 
 namespace ctcr::test {
@@ -53,35 +53,15 @@ Case<N> wide_case(Random& random) {
   return c;
 }
 
-/// A number left as it is, or with a probability spoilt.
-inline void spoil(double& x, double probability, Random& random) {
-  constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-  constexpr double garbage[] = {nan,    infinity, -infinity, 0,    -0.0, 1e300, -1e300,
-                                1e-300, 5e-324,   1e150,     1e15, -1e9, -1,    1};
-  if (!chance(random, probability)) return;
-  switch (int(uniform(random, 0, 4))) {
-    case 0: x = -x; break;
-    case 1: x *= std::pow(10, uniform(random, -6, 6)); break;
-    default: x = garbage[std::size_t(uniform(random, 0, std::size(garbage)))];
-  }
-}
-
 /// Numbers that nobody should give: of the robot, the joints, the load, or of all.
 template <int N>
 Case<N> garbage_case(Random& random) {
   Case<N> c = sane_case<N>(random);
   const double probability = std::pow(10, uniform(random, -2, -0.3));
-  if (chance(random, 0.6))
-    for (Tube& t : c.robot.tubes)
-      for (double* x : {&t.youngs_modulus, &t.poisson_ratio, &t.density, &t.inner_diameter, &t.outer_diameter,
-                        &t.length, &t.curved_length, &t.curvature, &t.bending_stiffness})
-        spoil(*x, probability, random);
+  if (chance(random, 0.6)) spoil_tubes(c.robot, probability, random);
   if (chance(random, 0.6)) {
-    for (double& x : c.robot.gravity) spoil(x, probability, random);
-    for (VecN<N>* joints : {&c.q.beta, &c.q.alpha})
-      for (double& x : *joints) spoil(x, probability, random);
-    for (Vec3* load : {&c.load.force, &c.load.moment})
-      for (double& x : *load) spoil(x, probability, random);
+    for (Vec3* vector : {&c.robot.gravity, &c.load.force, &c.load.moment}) spoil_each(*vector, probability, random);
+    for (VecN<N>* joints : {&c.q.beta, &c.q.alpha}) spoil_each(*joints, probability, random);
   }
   return c;
 }

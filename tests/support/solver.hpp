@@ -8,7 +8,7 @@
 
 #define CTCR_TEST_EVALUATION(kind, D, L, Stepper, N)                                                                   \
   kind void evaluate<Derivatives::D, Loading::L, Stepper, N>(const Coefficients<N>&, const Joints<N>&, const TipLoad&, \
-                                                             const TipGuess<N>&, int,                                  \
+                                                             const TipGuess<N>&, const Steps<N>&,                      \
                                                              Evaluation<N, Loading::L, Derivatives::D>&) noexcept;
 #define CTCR_TEST_LOADED_EVALUATIONS(kind, D, Stepper, N) \
   CTCR_TEST_EVALUATION(kind, D, force, Stepper, N)        \

@@ -11,6 +11,8 @@ import click
 from ctcr import commands
 from ctcr.show.wording import visible
 
+STOPPED = 130  # exit code after Ctrl+C: 128 + SIGINT, as shells have it
+
 
 class LazyGroup(click.Group):
     """Finds its subcommands in `ctcr.commands`: a new file there is a new command; `options` is what they share."""
@@ -41,7 +43,10 @@ def cli() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs the command line and exits: 0 when it did what was asked, 1 with what was wrong on standard error."""
+    """Runs the command line and exits with 0 when it did what was asked.
+
+    Else standard error says what was wrong: 2 where the command line is wrong, 130 after Ctrl+C, else 1.
+    """
     # Before numpy loads: its matrices are too small for threads, which only wait for each other. The core has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if sys.stdout:
@@ -59,8 +64,10 @@ def run(arguments: list[str] | None = None) -> int:
         usage = io.StringIO()
         error.show(usage)
         click.echo("\n".join(map(visible, usage.getvalue().split("\n"))), err=True, nl=False)
+        return error.exit_code
     except click.Abort:
         _say("stopped")
+        return STOPPED
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:

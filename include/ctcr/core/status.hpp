@@ -13,7 +13,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   unstable,             ///< solved, but the equilibrium found is unstable: no robot rests there
   inaccurate,           ///< solved, but integration errs by more than the asked accuracy in the most steps allowed
   needs_solve,          ///< a control step has spent its evaluations: solve() has to be asked
-  not_finite,           ///< an input or a result is NaN or infinite
+  not_finite,           ///< an input or a result is NaN, infinite or too large to compute with
   invalid_robot,        ///< the robot cannot exist, see check_robot(); nothing is computed
 };
 

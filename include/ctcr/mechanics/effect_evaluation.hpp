@@ -61,7 +61,7 @@ public:
   /// @param met   called as met(breakpoint, state) at each breakpoint of Contacts<N> but the robot tip
   /// @param node  as EffectRod::run() takes it
   template <class Met = Ignored, class Node = typename EffectRod<N, S, Fx>::NoNode>
-  EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, int steps,
+  EffectPass(const Inputs& in, const Events<N>& events, const TipGuess<N>& guess, int tube, const Steps<N>& steps,
              const Window& window, const Met& met = {}, const Node& node = {}) noexcept
     : alpha_(in.alpha), tip_psi_(0.0) {
     using Rod = EffectRod<N, S, Fx>;
@@ -198,7 +198,7 @@ CTCR_INLINE RodInputs<N, S, Fx> constant_inputs(const EffectCoefficients<N, Fx>&
 /// changes the rod, this is the evaluation of the standard model. Real time: yes.
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 CTCR_NOINLINE inline void evaluate(const EffectCoefficients<N, Fx>& c, const Joints<N>& q, const TipLoad& load,
-                                   const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {
+                                   const TipGuess<N>& guess, const Steps<N>& steps, Evaluation<N, L, D>& out) noexcept {
   static_assert(L == Loading::weight, "the general path has the general equations");
   if (!c.on_rod) return evaluate<D, L, Stepper>(c.plain, q, load, guess, steps, out);
   using Col = Columns<N, L, D>;

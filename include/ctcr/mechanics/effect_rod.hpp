@@ -8,6 +8,7 @@
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/moment_sharing.hpp"
 #include "ctcr/mechanics/steppers.hpp"
+#include "ctcr/mechanics/steps.hpp"
 
 namespace ctcr {
 
@@ -29,9 +30,9 @@ public:
   /// @param met    called as met(breakpoint, frame, state, moments) at each breakpoint of Contacts<N> but the robot tip;
   ///               moments() are those of the tubes on its far and on its near side, Bishop axes
   /// @param node   called as node(s, section, state, frame, rod) at both ends of every step
-  /// Real time: yes (2N segments, `steps` steps each).
+  /// Real time: yes (2N segments).
   template <class Met, class Node>
-  void run(const Events<N>& events, int steps, State& y, Frame<S>& frame, const Met& met,
+  void run(const Events<N>& events, const Steps<N>& steps, State& y, Frame<S>& frame, const Met& met,
            const Node& node) const noexcept {
     Section section;
     frame = frame_of<S>(Pose{});
@@ -57,8 +58,9 @@ public:
       const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
       const S next = last ? S(0.0) : event_position(events.id[e + 1]);
       set_friction_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, section);
-      const S h = (1.0 / steps) * (next - here);
-      for (int i = 0; i < steps; ++i) {
+      const int count = steps.after(id);
+      const S h = (1.0 / count) * (next - here);
+      for (int i = 0; i < count; ++i) {
         if constexpr (!std::is_same_v<Node, NoNode>) node(here + double(i) * h, section, y, frame, *this);
         step(section, h, y, frame);
       }

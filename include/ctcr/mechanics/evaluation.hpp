@@ -179,8 +179,8 @@ using Pass = Shooting<
 
 /// Integrates from the state at the tip to the front plate. @param record  as Shooting::run() takes it
 template <class Stepper, class Col, int N, class S, class Record = NoRecord>
-CTCR_INLINE void integrate(const Coefficients<N>& c, const Joints<N>& q, int steps, RobotState<S, N>& state, Frame<S>& frame,
-                      TubeTips<N>& tips, const Record& record = {}) noexcept {
+CTCR_INLINE void integrate(const Coefficients<N>& c, const Joints<N>& q, const Steps<N>& steps, RobotState<S, N>& state,
+                      Frame<S>& frame, TubeTips<N>& tips, const Record& record = {}) noexcept {
   using H = typename Pass<N, Stepper, Col>::Length;
   const auto arc_length = [](int event, double s) noexcept { return event_arc_length<Col, N, H>(event, s); };
   Pass<N, Stepper, Col>::run(c, sort_events(c, q.beta), arc_length, arc_length(2 * N, 0.0), steps, state, frame, tips,
@@ -301,11 +301,11 @@ CTCR_INLINE void assemble(const Joints<N>& q, const TipLoad& load, const TipGues
 }  // namespace detail
 
 /// Integrates once from the guess and eliminates the unknowns.
-/// @param q, load  base frame, must be valid (check_joints)   @param steps  integration steps per segment
+/// @param q, load  base frame, must be valid (check_joints)
 /// Real time: yes. Never inlined: it is large and called from many places.
 template <Derivatives D, Loading L, class Stepper, int N>
 CTCR_NOINLINE inline void evaluate(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load,
-                                   const TipGuess<N>& guess, int steps, Evaluation<N, L, D>& out) noexcept {
+                                   const TipGuess<N>& guess, const Steps<N>& steps, Evaluation<N, L, D>& out) noexcept {
   using Col = Columns<N, L, D>;
   detail::turn_axes<L>(load, out.axis);
   using S = Dual<Col::groups>;

@@ -51,10 +51,10 @@ public:
   static constexpr double least_det = 0.1;   ///< det B_u below which a solution is not trusted
 
   /// @param found, guess  solution and unknowns of the solved robot   @param force  [N]
-  /// @param tube          whose tip is wanted   @param steps  integration steps per segment
+  /// @param tube          whose tip is wanted
   /// Real time: yes, three integrations of four robots.
   Neighbours(const Neighbour<N>& solved, const Vec3& force, const Solution<N>& found, const TipGuess<N>& guess,
-             int tube, int steps) noexcept
+             int tube, const Steps<N>& steps) noexcept
     : force_(force), tube_(tube), steps_(steps), det_(found.stability) {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) start_.rotation[std::size_t(i)][std::size_t(j)] = found.rotation(i, j);
@@ -247,7 +247,8 @@ private:
   }
 
   Vec3 force_;
-  int tube_, steps_;
+  int tube_;
+  Steps<N> steps_;
   double det_;
   Unknowns start_;
   Gain gain_;

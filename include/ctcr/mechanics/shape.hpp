@@ -122,7 +122,7 @@ inline std::size_t fill_beyond_tip(double tip, const BaseView& base, std::span<S
 /// Shape of the equilibrium that `guess` describes, at the arc lengths already set in `points`.
 template <Loading L, int N>
 inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad& load, const TipGuess<N>& guess,
-                       int steps, std::span<ShapePoint<N>> points) noexcept {
+                       const Steps<N>& steps, std::span<ShapePoint<N>> points) noexcept {
   using Col = Columns<N, L, Derivatives::none>;
   using Pass = Shooting<N, double, double, double, Col::loaded, Col::weight, MagnusRk4, Col>;
   using State = RobotState<double, N>;
@@ -170,7 +170,8 @@ inline void fill_shape(const Model<N>& model, const Joints<N>& q, const TipLoad&
 /// The same for a robot with effects.
 template <int N, class Fx>
 inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
-                                    const TipGuess<N>& guess, int steps, std::span<ShapePoint<N>> points) noexcept {
+                                    const TipGuess<N>& guess, const Steps<N>& steps,
+                                    std::span<ShapePoint<N>> points) noexcept {
   using Equilibrium = RodInEquilibrium<N, Fx>;
   using Rod = typename Equilibrium::Rod;
   using State = typename Rod::State;
@@ -263,7 +264,8 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
   settings.steps = std::max(settings.steps, shape_steps);
   const Status status = solve<Derivatives::none>(model, q, load, ws, out, settings);
   if (!was_computed(status)) return status;
-  const int steps = std::max(ws.steps, settings.steps);
+  Steps<N> steps = ws.steps;
+  steps.times = std::max(steps.times, settings.steps);
   if constexpr (!Fx::none)
     detail::fill_shape_with_effects(model, q, load, ws.guess, steps, points);
   else if (!model.coefficients().gravity.isZero(0.0) || !load.force.isZero(0.0) || !load.moment.isZero(0.0))

@@ -5,6 +5,7 @@
 // and a turned load. Newton's method walks through equilibria only, and derivatives by base angles cost nothing.
 #include "ctcr/mechanics/events.hpp"
 #include "ctcr/mechanics/steppers.hpp"
+#include "ctcr/mechanics/steps.hpp"
 #include "ctcr/mechanics/tangent_pass.hpp"
 
 namespace ctcr {
@@ -75,15 +76,14 @@ public:
   /// Integrates from the tip to s = 0.
   /// @param arc_length  H arc_length(event, s): arc length of an event with its derivatives [m]
   /// @param plate   0 with its derivatives [m]
-  /// @param steps   integration steps per segment, >= 1
   /// @param y       in: state at the tip; out: at the front plate
   /// @param frame   out: Bishop frame at the front plate as seen from the tip frame
   /// @param tips    tips.keep(tube, frame, angle) at the tip of each tube but the first
   /// @param record  record(s, tubes, state, frame) at both ends of every step
-  /// Real time: yes (2N segments, `steps` steps each).
+  /// Real time: yes (2N segments).
   template <class ArcLength, class Tips, class Record = NoRecord>
   static CTCR_INLINE void run(const Coefficients<N, P>& c, const Events<N>& events, const ArcLength& arc_length,
-                        const H& plate, int steps, State& y, Frame<S>& frame, Tips& tips,
+                        const H& plate, const Steps<N>& steps, State& y, Frame<S>& frame, Tips& tips,
                         const Record& record = {}) noexcept {
     SegmentTubes<N> tubes;
     set_identity(frame);
@@ -100,7 +100,7 @@ public:
       const bool at_plate = e + 1 == 2 * N || !(events.s[e + 1] > 0);
       const H next = !at_plate ? arc_length(events.id[e + 1], events.s[e + 1]) : tubes.present == N ? plate : H{};
       tubes.near = tubes.present + (at_plate ? Col::jacobian : events.id[e + 1] < N);
-      advance(c, tubes, next - here, events.s[e], steps, y, frame, record);
+      advance(c, tubes, next - here, events.s[e], steps.after(id), y, frame, record);
       here = next;
     }
   }

@@ -45,7 +45,7 @@ struct Workspace {
   bool knows_joints = false;  ///< whether the change of the guess with the joints is known
   bool knows_load = false;    ///< and with the load
   bool stable = false;        ///< whether the guess describes a stable equilibrium
-  int steps = 1;              ///< integration steps per segment that the guess belongs to
+  Steps<N> steps;             ///< integration steps that the guess belongs to
   /// Error of the tip position by these steps [m], and how far the robot has moved since it was found: turns of the tip
   /// and of the tubes [rad], travel as a part of the robot's length.
   double integration_error = std::numeric_limits<double>::infinity(), moved = 0;
@@ -54,7 +54,7 @@ struct Workspace {
 
   void reset() noexcept {
     warm = knows_joints = knows_load = stable = false;
-    steps = 1;
+    steps = {};
     integration_error = std::numeric_limits<double>::infinity();
   }
   /// Lets the next solve begin at a guess, whatever was solved before.

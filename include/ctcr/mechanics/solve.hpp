@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "ctcr/mechanics/defined_outputs.hpp"
+#include "ctcr/mechanics/integration_error.hpp"
 #include "ctcr/mechanics/solution.hpp"
 #include "ctcr/mechanics/stability.hpp"
-#include "ctcr/mechanics/step_count.hpp"
 
 namespace ctcr {
 namespace detail {
@@ -75,8 +75,8 @@ inline VecN<N + 2> newton_step(const Ev& ev) noexcept {
 /// @param most  evaluations allowed; 1 is taken in any case, and 1 more to return to the best guess
 /// @return evaluations used; ev.residual tells whether it converged
 template <Derivatives D, Loading L, class Stepper, int N, class C>
-inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int most, int steps,
-                  TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
+inline int newton(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int most,
+                  const Steps<N>& steps, TipGuess<N>& guess, Evaluation<N, L, D>& ev) noexcept {
   int used = 1;
   evaluate<D, L, Stepper>(c, q, load, guess, steps, ev);
   if constexpr (L == Loading::none) guess.rotation = ev.rotation;
@@ -122,7 +122,7 @@ inline EffectCoefficients<N, Fx> scaled(EffectCoefficients<N, Fx> c, double weig
 
 /// Unloaded equilibrium from the angles of `guess`; the tip frame follows without iteration.
 template <class Stepper, int N, class C>
-inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, int most, int steps,
+inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settings, int most, const Steps<N>& steps,
                           TipGuess<N>& guess) noexcept {
   if constexpr (has_effects<C>) {
     Evaluation<N, Loading::weight, Derivatives::none> ev;
@@ -139,7 +139,7 @@ inline int unloaded_guess(const C& c, const Joints<N>& q, const Settings& settin
 /// @param most  evaluations after which no further step is begun
 template <Loading L, class Stepper, int N, class C>
 inline int ramped_guess(const C& c, const Joints<N>& q, const TipLoad& load, const Settings& settings, int most,
-                        int steps, bool ramp_curvature, TipGuess<N>& guess) noexcept {
+                        const Steps<N>& steps, bool ramp_curvature, TipGuess<N>& guess) noexcept {
   Evaluation<N, L, Derivatives::none> ev;
   int used = 0;
   guess = straight_guess(q);
@@ -289,14 +289,25 @@ inline bool takes_more_steps(const Settings& settings) noexcept {
   return !is_for_comparison<Stepper> && settings.accuracy < std::numeric_limits<double>::infinity();
 }
 
+/// Steps in which a solve begins, or a control step integrates.
+template <Loading L, class Stepper, int N, class C>
+inline Steps<N> steps_of(const C& c, const VecN<N>& beta, const TipLoad& load, const Workspace<N>& ws,
+                         const Settings& settings) noexcept {
+  if (!takes_more_steps<Stepper>(settings)) return settings.steps;
+  const int times = std::max(settings.steps, ws.steps.times);
+  if constexpr (has_effects<C>)
+    return steps_for<true>(c.plain, beta, load, times, settings.max_steps);
+  else
+    return steps_for < L != Loading::none > (c, beta, load, times, settings.max_steps);
+}
+
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
 inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, Workspace<N>& ws,
                        Solution<N>& out, const Settings& settings) noexcept {
   const auto& c = model.coefficients();
   const double length = reach_of(model.robot(), q), allowed = settings.accuracy * length;
   const bool refines = takes_more_steps<Stepper>(settings);
-  int steps = settings.steps;
-  if (refines) steps = std::max({steps, first_steps(c, q.beta, load, settings.max_steps), ws.steps});
+  Steps<N> steps = steps_of<L, Stepper>(c, q.beta, load, ws, settings);
   Evaluation<N, L, D> ev;
   TipGuess<N> guess;
   const auto solved = [&] { return ev.residual < settings.tolerance; };
@@ -308,7 +319,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     stable = solved() && ev.det > 0;
     // On its branch an equilibrium stays stable while det B_u does not vanish.
     if (!stable || is_for_comparison<Stepper> || (ws.stable && way() < checked_range)) return;
-    stable = is_stable<L, Stepper>(c, q, load, guess, 2 * steps);
+    stable = is_stable<L, Stepper>(c, q, load, guess, steps.doubled());
     ++out.iterations;
   };
   const auto unload = [&] {
@@ -347,6 +358,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   search(ws.warm);
   double error = std::numeric_limits<double>::infinity(), moved = 0;
   if (refines && stable) {
+    const int most = settings.max_steps / steps.largest_share();
     moved = ws.moved + way();
     if (steps == ws.steps && ws.integration_error <= allowed && moved < checked_range)
       error = ws.integration_error;
@@ -355,8 +367,8 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     while (!(error <= allowed) && stable) {
       error = integration_error<L, Stepper>(c, q, load, guess, steps, {ev.rotation, ev.position}, lever * length);
       ++out.iterations;
-      if (error <= allowed || steps >= settings.max_steps) break;
-      steps = refined_steps(steps, error, allowed, settings.max_steps);
+      if (error <= allowed || steps.times >= most) break;
+      steps.times = refined(steps.times, error, allowed, most);
       search(true);
     }
   }
@@ -382,7 +394,7 @@ inline Status step_as(const Model<N, Fx>& model, const Joints<N>& q, const TipLo
   constexpr bool jacobian = Ev::Col::jacobian;
   if (!ws.warm || !ws.stable) return Status::needs_solve;
   const auto& c = model.coefficients();
-  const int steps = std::max(ws.steps, settings.steps);
+  const Steps<N> steps = steps_of<L, Stepper>(c, q.beta, load, ws, settings);
   Ev ev;
   const TipGuess<N> predicted = predicted_guess(ws, q, load);
   TipGuess<N> guess, next = predicted;

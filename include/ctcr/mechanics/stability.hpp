@@ -99,10 +99,10 @@ inline std::array<S, N> angles_at(double s, const Joints<N>& q, const Psi& psi, 
   return angle;
 }
 
-/// Whether the equilibrium that a guess describes is stable. One integration in `steps` steps a segment. Real time: yes.
+/// Whether the equilibrium that a guess describes is stable. One integration. Real time: yes.
 template <Loading L, class Stepper, int N>
 CTCR_NOINLINE bool is_stable(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load,
-                             const TipGuess<N>& guess, int steps) noexcept {
+                             const TipGuess<N>& guess, const Steps<N>& steps) noexcept {
   using Col = Columns<N, L, Derivatives::none>;
   if constexpr (Col::unknowns > 0) {
     using S = Dual<Col::groups>;
@@ -129,7 +129,7 @@ CTCR_NOINLINE bool is_stable(const Coefficients<N>& c, const Joints<N>& q, const
 /// The same for a robot with effects.
 template <Loading L, class Stepper, int N, class Fx>
 CTCR_NOINLINE bool is_stable(const EffectCoefficients<N, Fx>& c, const Joints<N>& q, const TipLoad& load,
-                             const TipGuess<N>& guess, int steps) noexcept {
+                             const TipGuess<N>& guess, const Steps<N>& steps) noexcept {
   if (!c.on_rod) return is_stable<L, Stepper>(c.plain, q, load, guess, steps);
   using Window = detail::Window<lane_groups(N + 2)>;
   using Pass = EffectPass<N, Fx, Window::groups>;

@@ -142,8 +142,8 @@ private:
     Workspace<N> ws = ws_;
     Solution<N> solution;
     Settings same = settings_;  // as many steps as the nominal one, so that errors of integration cancel
-    same.steps = ws.steps;
-    same.accuracy = std::numeric_limits<double>::infinity();
+    same.steps = ws.steps.times;
+    same.accuracy = 1;  // never more
     const Status status = ctcr::solve(system.model, q, load_, ws, solution, same);
     evaluations += solution.iterations;
     if (status == Status::ok)

@@ -328,8 +328,10 @@ def moved_runs(readings) -> tuple:
 def test_run_frames(robot, readings):
     """Runs that do not share a frame are detected, and fitted with a frame for each."""
     moved, shift, turn = moved_runs(readings)
-    plain = outcome(robot, moved)
+    plain = outcome(robot, moved, frame_per_run=False)
     assert "The runs do not share one frame" in said(plain)
+    found = outcome(robot, moved)
+    assert found.fit.frames and "The runs do not share a frame" in said(found) and "--one-frame" in said(found)
     framed = outcome(robot, moved, ["actuation.home_rotation.*", "tubes.*.curvature"], frame_per_run=True)
     assert framed.stages[-1].rms_mm < 0.5 < 10 < plain.stages[-1].rms_mm
     found = framed.fit.frames
@@ -368,7 +370,7 @@ def test_given_sd(robot, readings):
 
 def test_malformed_sd(capsys):
     """A malformed width is one sentence."""
-    assert cli.run(["calibrate", "fit", str(ROBOT), str(TABLE), "--sd", "tubes.1.length"]) == 1
+    assert cli.run(["calibrate", "fit", str(ROBOT), str(TABLE), "--sd", "tubes.1.length"]) == 2
     assert "'tubes.1.length' is not NAME=SD" in capsys.readouterr().err
 
 

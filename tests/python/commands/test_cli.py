@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -104,13 +105,14 @@ def test_predict(run, tmp_path, table, monkeypatch, frame, chunk):
             np.testing.assert_allclose([float(x) for x in added], [*position[i], *quaternion[i]], atol=1e-9)
 
 
-def test_predict_over_its_table(run, table):
-    """The table may be its own output; rows without a solution are listed as JSON."""
-    code, out, err = run("predict", ROBOT, table, "-o", table, "--json", "-")
+def test_unsolved_rows(run, table, tmp_path):
+    """predict lists rows without a solution as JSON."""
+    predicted = tmp_path / "predicted.csv"
+    code, out, err = run("predict", ROBOT, table, "-o", predicted, "--json", "-")
     summary = json.loads(out)
     assert code == 0 and summary["solved"] == 48 and "48 of 50" in err
     assert summary["unsolved"] == [{"row": 11, "status": "not converged"}, {"row": 40, "status": "not converged"}]
-    assert "pred_qz" in table.read_text()
+    assert "pred_qz" in predicted.read_text()
 
 
 JOINTS_SI = ["--beta", "-0.33,-0.24,-0.165", "--alpha", "1.5707963267948966,0,-0.5235987755982988"]
@@ -184,14 +186,11 @@ def test_faulty_robot(run, tmp_path):
     "arguments, message",
     [
         (["info", "absent.yaml"], "absent.yaml: cannot read it: no such file or directory"),
-        (["info"], "Missing argument 'ROBOT'"),
-        (["nonsense"], "No such command 'nonsense'"),
         (["predict", ROBOT, ROBOT, "-o", "x.csv"], "alpha1_rad"),
         (["shape", ROBOT], "give either --beta or --beta-mm"),
         (["shape", ROBOT, "--beta", "-300,-200,-100", "--alpha", "0,0,0"], "--beta: -300 m: is this mm?"),
         (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "0,0"], "--alpha: needs 3 finite numbers"),
         (["shape", ROBOT, "--beta", "-.3,-.2,nan", "--alpha", "0,0,0"], "--beta: needs 3 finite numbers"),
-        (["shape", ROBOT, "--beta", "a,b", "--alpha", "0,0,0"], "is not a list of numbers"),
         (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "3.1,0,0"], "no shape at these joints: not converged"),
     ],
 )
@@ -199,6 +198,41 @@ def test_errors(run, arguments, message):
     """One sentence and exit code 1."""
     code, out, err = run(*arguments)
     assert code == 1 and message in err and "Traceback" not in err and out == ""
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["info"], "Missing argument 'ROBOT'"),
+        (["nonsense"], "No such command 'nonsense'"),
+        (["compare", "r.yaml", "t.csv", "--json", "./r.yaml"], "r.yaml is also that of '--json'"),
+        (["shape", ROBOT, "--beta", "a,b", "--alpha", "0,0,0"], "is not a list of numbers"),
+        (["compare", "r.yaml", "t.csv", "--json", "a", "--report", "a"], "a is also that of '--json'"),
+        (["predict", "r.yaml", "t.csv", "-o", "t.csv"], "t.csv is also that of"),
+    ],
+)
+def test_usage(run, arguments, message):
+    """Exit code 2 where the command line is wrong, also where it would write a file that it reads or writes already."""
+    code, out, err = run(*arguments)
+    assert code == 2 and message in err and out == ""
+
+
+def test_interrupt(run, monkeypatch):
+    """Exit code 130 after Ctrl+C, as shells have it."""
+
+    def interrupted(path):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(robot_file, "load", interrupted)
+    code, out, err = run("info", ROBOT)
+    assert code == 130 and out == "" and err.endswith("Error: stopped\n")
+
+
+def test_pipe(run, tmp_path):
+    """A pipe as an input is refused and not waited for."""
+    os.mkfifo(tmp_path / "pipe")
+    code, _, err = run("info", tmp_path / "pipe")
+    assert code == 1 and "is a pipe or a device" in err
 
 
 def test_unexpected_error(run, monkeypatch):

@@ -220,7 +220,6 @@ def test_faults_of_a_diagnosis(text, message, run, tmp_path):
     [
         (["-o", "x.yaml"], "name an effect"),
         (["softening"], "give -o"),
-        (["softening", "-o", ROBOT], "is the input"),
         (["soften", "-o", "x.yaml"], "did you mean softening?"),
         (["softening", "-o", "x.yaml", "--set", "friction=0.1"], "not among the effects to add"),
         (["softening", "-o", "x.yaml", "--fit", "none.csv"], "no such file"),
@@ -234,6 +233,13 @@ def test_faults_of_add(arguments, message, run, table, tmp_path, monkeypatch):
     code, _, err = run("add", ROBOT, *(table if word == "PLAN" else word for word in arguments))
     assert code == 1 and message in err
     assert ROBOT.read_bytes() == before and not (tmp_path / "x.yaml").exists()
+
+
+def test_output_is_input(run):
+    """The robot file is changed with --in-place alone."""
+    before = ROBOT.read_bytes()
+    code, _, err = run("add", ROBOT, "softening", "-o", ROBOT)
+    assert code == 2 and "or --in-place to change it" in err and ROBOT.read_bytes() == before
 
 
 def test_remove_absent_effect(run, tmp_path):

@@ -10,7 +10,7 @@ from ctcr.compare.offsets import find_run_offsets
 from ctcr.compare.sample import take_sample
 from ctcr.compare.visits import find_revisits, find_stops
 from ctcr.errors import InputError, Problem
-from ctcr.fit.result import Fit
+from ctcr.fit.result import Fit, rms
 from ctcr.fit.run_frames import error_with_frames
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
@@ -78,6 +78,14 @@ def notices(after: Robot, readings: Measurements, fit: Fit, frame_per_run: bool)
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
     return said if frame_per_run else said + (_one_frame(after, readings, fit) or _run_frames(after, readings, fit))
+
+
+def may_share_no_frame(after: Robot, readings: Measurements, fit: Fit) -> bool:
+    """Whether a fit with one frame, and with more than it, leaves so large an error that its runs may not share one."""
+    kinds = {name.startswith("tracker.") for name in fit.names}
+    large = 1e3 * rms(fit.residual[:, :3]) > settings.FRAMES_BEYOND * fit.expected_mm()
+    several = len(kinds) == 2 and len(np.unique(readings.run)) > 1
+    return several and large and not _one_frame(after, readings, fit)
 
 
 def sentence(text: str) -> str:

@@ -1,7 +1,7 @@
 """The joint fit as `ctcr calibrate fit` runs it: the fit, its error on held-out readings, how far two halves agree."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
 from pathlib import Path
@@ -21,6 +21,7 @@ from ctcr.model.fields import Fitted
 from ctcr.model.noise import Noise, noise_of_readings
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
+from ctcr.show import wording
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
 
@@ -108,24 +109,45 @@ class Calibration:
 
 
 def calibrate(
-    robot: Robot,
-    readings: Measurements,
-    free: Sequence[str],
-    *,
-    frame_per_run: bool = False,
-    hold_out: int | None = None,
-    halves: bool = True,
-    noise: str = "auto",
-    sd: Mapping[str, float] | None = None,
+    robot: Robot, readings: Measurements, free: Sequence[str], *, frame_per_run: bool | None = None, **options: Any
 ) -> Calibration:
     """Fits the parameters named in `free`.
 
+    `frame_per_run`: a tracker frame for each run, in place of that of the parameters; None: where the runs do not share
+    one frame and held-out readings are met better.
+    `hold_out`: runs that are held out; None: a quarter, each in turn. `halves`: whether the fits of two halves are
+    compared.
     `noise`: "jitter", "field" (with the smooth error that the tracker's accuracy figure allows), or "auto": the smaller
     one that explains the residual, the second also where it nearly does; else that with the smaller held-out error.
     `sd`: prior standard deviations by name, in the units of the robot file, that come before its `uncertainty`.
     Raises InputError where the input cannot be used: nothing measured, a frame that is metres off, a name that does
     not exist, a prior of zero width, too few rows.
     """
+    one = _calibrate(robot, readings, free, frame_per_run=bool(frame_per_run), **options)
+    if frame_per_run is not None or not checks.may_share_no_frame(one.after, one.readings, one.fit):
+        return one
+    framed = _calibrate(robot, readings, free, frame_per_run=True, **options)
+    before, after = (c.held_out.error.rms_mm if c.held_out else c.stages[-1].rms_mm for c in (one, framed))
+    if not after < settings.FRAMES_LEAVE * before:
+        return one
+    error = "the error of held-out readings" if one.held_out else "the error"
+    text = f"The runs do not share a frame: with one for each {error} falls from {wording.mm(before)} to "
+    text += f"{wording.mm(after)}; --one-frame fits one for all."
+    return replace(framed, notices=[text, *framed.notices])
+
+
+def _calibrate(
+    robot: Robot,
+    readings: Measurements,
+    free: Sequence[str],
+    *,
+    frame_per_run: bool,
+    hold_out: int | None = None,
+    halves: bool = True,
+    noise: str = "auto",
+    sd: Mapping[str, float] | None = None,
+) -> Calibration:
+    """As `calibrate`, with one frame or with a frame for each run."""
     robot, readings, notices = sensor_roll.usable(robot, readings)
     names = sensor_roll.with_roll(list(free), robot)
     lever = checks.start(robot, readings)

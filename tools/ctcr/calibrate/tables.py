@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ctcr.arrays import Array, Integers
-from ctcr.errors import InputError, Problem, did_you_mean, file_faults, shown
+from ctcr.errors import InputError, Problem, did_you_mean, open_input, shown
 from ctcr.table.csv_table import Faults, header_names
 
 MAX_BYTES = 16 << 20
@@ -96,7 +96,7 @@ def read(path: str | Path, columns: Sequence[Column]) -> Table:
 
 def _lines(path: str | Path) -> list[list[str]]:
     """The fields of each line, the header first."""
-    with file_faults(path, "read"), open(path, "rb") as file:
+    with open_input(path) as file:
         content = file.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
         text = f"is over {MAX_BYTES >> 20} MB: this is not a table of a calibration procedure"

@@ -9,8 +9,13 @@ from ctcr.errors import InputError, Problem
 @click.command(name="add")
 @options.robot
 @click.argument("names", nargs=-1, metavar="[EFFECT..]")
-@click.option("--diagnosis", metavar="FILE.json", help="Add the effects that `ctcr diagnose --json FILE.json` found.")
-@click.option("--fit", "measurements", metavar="MEASUREMENTS", help="Fit the effects to this table.")
+@click.option(
+    "--diagnosis",
+    type=options.read,
+    metavar="FILE.json",
+    help="Add the effects that `ctcr diagnose --json FILE.json` found.",
+)
+@click.option("--fit", "measurements", type=options.read, metavar="MEASUREMENTS", help="Fit the effects to this table.")
 @click.option(
     "--set",
     "given",

@@ -72,7 +72,7 @@ def _run(procedure: str, table: str, robot, target, in_place, out, **chosen) -> 
 
 
 @command.command(name="rotation-offset")
-@click.argument("table")
+@click.argument("table", type=options.read)
 @click.option("--ratio", type=float, help="Turns of a tube per turn of its motor; default: as in ROBOT.")
 @_live
 @options.setting("--step-deg", click.FloatRange(1, 90), 20.0, "With --live: angle between rows.")
@@ -104,7 +104,7 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
 
 
 @command.command(name="registration")
-@click.argument("points")
+@click.argument("points", type=options.read)
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
 @click.option("--cad", metavar="CAD.csv", help="With --live: names and coordinates of the points, columns as POINTS.")
@@ -133,7 +133,7 @@ def registration(points, robot, placement_sd_mm, live, bench, readings, folder, 
 
 
 @command.command(name="home")
-@click.argument("table")
+@click.argument("table", type=options.read)
 @click.option("--pitch-mm", type=float, help="Translation of a tube per turn of its motor; default: as in ROBOT.")
 @_length("--distance-sd-mm", 1.0, "Standard deviation of a distance measured by hand.")
 @_length("--flush-sd-mm", 0.2, "Standard deviation of bringing a tip flush with the plate.")
@@ -153,7 +153,7 @@ def home(table: str, distance_sd_mm, flush_sd_mm, length_sd_mm, **others) -> Non
 
 
 @command.command(name="cantilever")
-@click.argument("table")
+@click.argument("table", type=options.read)
 @_tube
 @_length("--inner-mm", None, "Inner diameter; default: as in ROBOT.")
 @_length("--outer-mm", None, "Outer diameter; default: as in ROBOT.")
@@ -175,7 +175,7 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
 
 
 @command.command(name="curvature")
-@click.argument("table")
+@click.argument("table", type=options.read)
 @_tube
 @click.option("--mm-per-px", "scale_mm", type=click.FloatRange(min=0, min_open=True), help="Scale of the picture.")
 @_length("--scale-sd-percent", 0.0, "Standard deviation of the scale.")
@@ -209,7 +209,11 @@ def curvature(table: str, **others) -> None:
     metavar="NAME=SD",
     help="Prior standard deviation of a parameter, in the unit of the robot file, or inf. May be repeated.",
 )
-@click.option("--frame-per-run", is_flag=True, help="Fit a tracker frame for every run.")
+@click.option(
+    "--frame-per-run/--one-frame",
+    default=None,
+    help="Fit a tracker frame for every run, or one for all; default: for every run where they do not share one.",
+)
 @click.option(
     "--hold-out",
     type=click.IntRange(min=0),

@@ -7,7 +7,9 @@ from ctcr.commands import options
 
 @click.command(name="export")
 @click.argument("folder")
-@click.option("-o", "--output", "target", required=True, metavar="FILE.mcap", help="The file to write.")
+@click.option(
+    "-o", "--output", "target", type=options.written, required=True, metavar="FILE.mcap", help="The file to write."
+)
 def command(folder, target) -> None:
     """Write a recording as MCAP.
 

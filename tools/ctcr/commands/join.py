@@ -7,8 +7,10 @@ from ctcr.commands import options
 
 @click.command(name="join")
 @options.robot
-@click.argument("tables", nargs=-1, required=True, metavar="MEASUREMENTS...")
-@click.option("-o", "--output", "target", required=True, metavar="TABLE", help="The table to write.")
+@click.argument("tables", nargs=-1, type=options.read, required=True, metavar="MEASUREMENTS...")
+@click.option(
+    "-o", "--output", "target", type=options.written, required=True, metavar="TABLE", help="The table to write."
+)
 def command(robot, tables, target) -> None:
     """Join the tables of one session.
 

@@ -3,6 +3,7 @@
 Each option exists once, as a decorator. Heavy imports are late: `ctcr --help` loads this file.
 """
 
+import os
 from functools import cached_property, wraps
 from importlib import import_module
 
@@ -14,8 +15,28 @@ def setting(name: str, kind, default, text: str, **more):
     return click.option(name, type=kind, default=default, show_default=True, help=text, **more)
 
 
-robot = click.argument("robot")
-measurements = click.argument("measurements")
+class File(click.ParamType):
+    """A file that a command reads or writes. What one option writes, no other reads or writes."""
+
+    name = "file"
+
+    def __init__(self, written: bool):
+        self.written = written
+
+    def convert(self, value, param, ctx):
+        path = os.path.realpath(value)
+        if ctx and value != "-" and (os.path.isfile(path) or not os.path.exists(path)):  # not /dev/null
+            first, written = ctx.meta.setdefault("ctcr.files", {}).setdefault(path, (param, self.written))
+            if first is not param and (written or self.written):
+                named, other = (one.get_error_hint(ctx) for one in (param, first))
+                or_else = ", or --in-place to change it" if "in_place" in (p.name for p in ctx.command.params) else ""
+                self.fail(f"{value} is also that of {other}: give another to {named}{or_else}.", param, ctx)
+        return value
+
+
+read, written = File(written=False), File(written=True)
+robot = click.argument("robot", type=read)
+measurements = click.argument("measurements", type=read)
 folder_name = click.option(
     "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
 )
@@ -58,7 +79,7 @@ def folder(function):
 
 def new_robot(function):
     """-o and --in-place, as `target` and `in_place`: the robot file to write."""
-    target = click.option("-o", "--output", "target", metavar="NEW", help="Write the changed robot file.")
+    target = click.option("-o", "--output", "target", type=written, metavar="NEW", help="Write the changed robot file.")
     return target(click.option("--in-place", is_flag=True, help="Change the robot file itself.")(function))
 
 
@@ -73,6 +94,7 @@ def _load_effects(context, parameter, files) -> None:
 effects = click.option(
     "--effects",
     multiple=True,
+    type=read,
     metavar="FILE.py",
     is_eager=True,
     expose_value=False,
@@ -158,6 +180,8 @@ def _gives_output(*options):
     return decorate
 
 
-_json = click.option("--json", "json_target", metavar="FILE", help="Write the result as JSON; - for standard output.")
-_report = click.option("--report", metavar="FILE.html", help="Write one self-contained HTML page.")
+_json = click.option(
+    "--json", "json_target", type=written, metavar="FILE", help="Write the result as JSON; - for standard output."
+)
+_report = click.option("--report", type=written, metavar="FILE.html", help="Write one self-contained HTML page.")
 json, outputs = _gives_output(_json), _gives_output(_json, _report)

@@ -15,8 +15,10 @@ POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_
 
 @click.command(name="predict")
 @options.robot
-@click.argument("table")
-@click.option("-o", "--output", "target", required=True, metavar="FILE", help="The table to write.")
+@click.argument("table", type=options.read)
+@click.option(
+    "-o", "--output", "target", type=options.written, required=True, metavar="FILE", help="The table to write."
+)
 @options.setting(
     "--frame", click.Choice(["tracker", "base"]), "tracker", "Frame of the predicted poses; tracker: as measured ones."
 )

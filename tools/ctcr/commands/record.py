@@ -7,7 +7,7 @@ from ctcr.commands import options
 
 @click.command(name="record")
 @options.robot
-@click.argument("plan")
+@click.argument("plan", type=options.read)
 @click.option(
     "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
 )
@@ -25,7 +25,12 @@ from ctcr.commands import options
 @options.setting("--approach-deg", click.FloatRange(0), 5.0, "Length of the approach [deg].")
 @options.setting("--patience", click.FloatRange(0.1), 30.0, "How long the tracker may lose the sensor [s].")
 @options.effects
-@click.option("--page", metavar="FILE.html", help="Show progress and error on a page that the browser reloads.")
+@click.option(
+    "--page",
+    type=options.written,
+    metavar="FILE.html",
+    help="Show progress and error on a page that the browser reloads.",
+)
 @options.folder
 @options.json
 def command(robot, plan, target, bench_path, dwell, readings, speed, patience, page, folder, out, **approach) -> None:

@@ -8,7 +8,13 @@ from ctcr.commands import options
 @click.command(name="reproduce")
 @click.option("--quick", is_flag=True, help="Fewer designs, configurations and repetitions: under a minute.")
 @click.option(
-    "--report", "target", metavar="FILE.html", default="reproduction.html", show_default=True, help="The page."
+    "--report",
+    "target",
+    type=options.written,
+    metavar="FILE.html",
+    default="reproduction.html",
+    show_default=True,
+    help="The page.",
 )
 @options.json
 def command(quick: bool, target: str, out) -> None:

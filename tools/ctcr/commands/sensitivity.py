@@ -15,7 +15,12 @@ from ctcr.commands import options
 @options.setting("--force", click.FloatRange(0), 0.3, "Open loop: largest tip force [N].")
 @options.setting("--points", click.IntRange(2, 101), 5, "Closed loop: values over each range.")
 @options.seed
-@click.option("--resume", metavar="FILE", help="Keep the progress in FILE, and resume from it after an interruption.")
+@click.option(
+    "--resume",
+    type=options.written,
+    metavar="FILE",
+    help="Keep the progress in FILE, and resume from it after an interruption.",
+)
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a dask.distributed cluster that does the work.")
 @options.outputs
 def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume, dask, out) -> None:

@@ -28,7 +28,7 @@ class Numbers(click.ParamType):
 @click.option("--alpha-deg", type=Numbers(), help="The same in degrees.")
 @click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("--all", "every", is_flag=True, help="List all stable equilibria: the robot may rest in several.")
-@click.option("-o", "--output", "picture", metavar="FILE.png", help="Draw the robot.")
+@click.option("-o", "--output", "picture", type=options.written, metavar="FILE.png", help="Draw the robot.")
 @options.steps
 @options.json
 def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps, out) -> None:

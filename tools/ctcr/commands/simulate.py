@@ -7,12 +7,14 @@ from ctcr.commands import options
 
 @click.command(name="simulate")
 @options.robot
-@click.argument("plan")
+@click.argument("plan", type=options.read)
 @options.hide
 @options.noise
 @options.seed
 @options.effects
-@click.option("-o", "--output", "target", required=True, metavar="MEASUREMENTS", help="The table to write.")
+@click.option(
+    "-o", "--output", "target", type=options.written, required=True, metavar="MEASUREMENTS", help="The table to write."
+)
 def command(robot, plan, hidden, noise, seed, target) -> None:
     """Simulate the measurements of a plan.
 

@@ -7,7 +7,7 @@ from ctcr.commands import options
 
 @click.command(name="track")
 @options.robot
-@click.argument("scenario")
+@click.argument("scenario", type=options.read)
 @click.option("--plant", metavar="ROBOT2", help="The robot that is controlled, where it differs from ROBOT.")
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
 @click.option("--bench", "bench_path", metavar="BENCH.yaml", help="The devices and their limits.")

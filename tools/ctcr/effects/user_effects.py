@@ -28,13 +28,15 @@ amplitudes an effect must change nothing. Hooks, any of them; M rows in the orde
     reading(position, rotation, rows, values) -> position, rotation
         pose that the tracker reads for the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
 
-Standard output carries the results of a command: neither the file nor a hook prints there.
+Standard output carries the results of a command: neither the file nor a hook prints there. One call may take a minute.
 """
 
 import importlib.util
 import io
 import re
+import signal
 import sys
+import threading
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -56,6 +58,7 @@ from ctcr.table.measurements import Measurements
 
 HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
 ACTS_ON = dict(zip(HOOKS, ("joints", "tip", "rod", "reading", "rod", "rod"), strict=True))  # where each hook acts
+HOOK_SECONDS = 60  # that the file, or one call of a hook, may take; a hundred thousand rows take less than one
 TEXTS = ("title", "physics", "signature", "measure", "reference")  # of an effect
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
@@ -208,6 +211,29 @@ def _module(path: Path) -> ModuleType:
     return module
 
 
+class _TooLong(BaseException):
+    """The user's code runs on."""
+
+
+@contextmanager
+def _time_limit() -> Iterator[None]:
+    """Raises _TooLong after HOOK_SECONDS. Only the main thread has signals; commands run the user's code there."""
+
+    def stop(*_) -> None:
+        raise _TooLong
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, HOOK_SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
 @contextmanager
 def _users_code(file: str, hook: str = "") -> Iterator[None]:
     """Runs code of the user's file, which must neither end the program nor print among its results.
@@ -216,9 +242,11 @@ def _users_code(file: str, hook: str = "") -> Iterator[None]:
     """
     printed = io.StringIO()
     try:
-        with redirect_stdout(printed):
+        with _time_limit(), redirect_stdout(printed):
             yield
-    except BaseException as error:  # also sys.exit(), which would look like success, and Ctrl+C in an endless loop
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # also sys.exit(), which would look like success
         raise InputError(_fault(error, file, hook)) from error
     if said := printed.getvalue():
         text = f"prints {shown(said)} to standard output, which carries the results: print to sys.stderr"
@@ -280,8 +308,8 @@ def _fault(error: BaseException, file: str, hook: str) -> Problem:
     match error:
         case SystemExit():
             text = "ends the program with sys.exit(): raise an error that says what is wrong"
-        case KeyboardInterrupt():
-            text = "was interrupted"
+        case _TooLong():
+            text = f"takes longer than {HOOK_SECONDS} s: is there a loop without end?"
         case _:
             reason = " ".join(str(getattr(error, "msg", None) or error).split()) or "no reason given"
             text = f"{'fails: ' if hook else ''}{reason} ({type(error).__name__})"

@@ -4,9 +4,11 @@ The ledger, `history`, holds an entry a change: its date, command and measuremen
 field, and the error before and after. Old values are never lost.
 """
 
+import fcntl
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from datetime import date
 from functools import reduce
@@ -16,11 +18,11 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr.errors import InputError, Problem, open_input
 from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
-from ctcr.robot.yaml_document import FieldPath
+from ctcr.robot.yaml_document import FieldPath, YamlDocument
 from ctcr.show.output import atomic_writer
 
 _RECORDED = {"home_translation_mm": "recorded_home_translation_mm", "home_rotation_deg": "recorded_home_rotation_deg"}
@@ -77,14 +79,28 @@ def write(
     except InputError as error:
         found = [Problem(f"the new value {p.message}", str(target), field=p.field) for p in error.problems]
         raise InputError(found, error.omitted) from None
-    with atomic_writer(target) as file:
+    with _unchanged(source) if source and in_place else nullcontext(), atomic_writer(target) as file:
         file.write(text)
     return updated
 
 
+@contextmanager
+def _unchanged(source: YamlDocument) -> Iterator[None]:
+    """Holds the file of a robot, so that of two commands that change it neither loses what the other wrote.
+
+    Raises InputError where it is no longer as it was read.
+    """
+    with open_input(source.file) as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        replaced = not os.path.samestat(os.fstat(file.fileno()), os.stat(source.file))
+        if replaced or file.read().decode("utf-8-sig") != source.text:
+            raise InputError(Problem("has changed since it was read: run the command again", source.file))
+        yield
+
+
 def sha256(path: str | Path) -> str:
     """The fingerprint of a file, in hexadecimal."""
-    with file_faults(path, "read"), open(path, "rb") as file:
+    with open_input(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr.errors import InputError, Problem, open_input
 
 FieldPath = tuple[str | int, ...]
 MAX_BYTES = 1 << 20  # a description is a few kB: a larger file is something else, often a table
@@ -36,7 +36,7 @@ class YamlDocument:
 
 def load(path: str | Path) -> YamlDocument:
     """The document of a file. Raises InputError where it cannot be read or is no YAML."""
-    with file_faults(path, "read"), open(path, "rb") as file:
+    with open_input(path) as file:
         content = file.read(MAX_BYTES + 1)
     return parse(content, str(path))
 

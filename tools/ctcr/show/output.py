@@ -2,6 +2,7 @@
 
 import json
 import os
+import stat
 import sys
 import tempfile
 import time
@@ -44,7 +45,9 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
             handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
             with open(handle, **mode) as file:
                 yield file
-            os.chmod(temporary, _usual_permissions())
+                file.flush()
+                os.fsync(file.fileno())
+            os.chmod(temporary, _permissions(target))
             os.replace(temporary, target)
             temporary = None
     finally:
@@ -97,7 +100,8 @@ class Terminal(Console):
 
 def console(json_target: str | None = None) -> Terminal:
     """A terminal for human readers; it leaves standard output alone when that carries JSON."""
-    return Terminal(stderr=json_target == "-", soft_wrap=True)
+    wraps = (sys.stderr if json_target == "-" else sys.stdout).isatty()  # a file or a pipe gets lines as they are
+    return Terminal(stderr=json_target == "-", soft_wrap=not wraps)
 
 
 def table(
@@ -146,8 +150,10 @@ class Progress(AbstractContextManager):
         self._bar.start()
 
 
-def _usual_permissions() -> int:
-    """Permissions of a new file by the umask; those of temporary files are private."""
+def _permissions(target: Path) -> int:
+    """Permissions of a file that is replaced, or of a new one by the umask; those of temporary files are private."""
+    if target.exists():
+        return stat.S_IMODE(target.stat().st_mode)
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask

@@ -3,6 +3,7 @@
 Rows are numbered as a spreadsheet shows them: the header is row 1. An empty field reads as NaN.
 """
 
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -12,9 +13,10 @@ from typing import BinaryIO
 import numpy as np
 
 from ctcr.arrays import Array, Integers, Mask
-from ctcr.errors import InputError, Problem, file_faults, shown
+from ctcr.errors import InputError, Problem, open_input, shown
 
 BLOCK_BYTES = 4 << 20
+BYTES_PER_NUMBER = 32  # of memory: the table, and what comparisons and fits make of it
 MAX_HEADER_BYTES = 1 << 16
 SHOWN_PER_KIND = 3  # rows shown of each kind of fault; the others are counted
 SHOWN = 20  # faults shown of a table
@@ -102,13 +104,19 @@ def read_columns(path: str | Path, columns: Sequence[str]) -> Array:
 
 def open_table(path: str | Path) -> NumberTable:
     """Reads the header and counts the rows. Raises InputError where the file is no table of text."""
-    with file_faults(path, "read"), open(path, "rb") as file:
+    with open_input(path) as file:
         columns = header_names(file.readline(MAX_HEADER_BYTES), str(path))
         start = file.tell()
         end = _end_of_content(file, start)
         n_rows = _count_lines(file, start, end)
     if n_rows == 0:
         raise InputError(Problem("has no rows below the header", str(path)))
+    needed, present = BYTES_PER_NUMBER * n_rows * len(columns), os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > present:
+        said = (
+            f"has {n_rows} rows: {needed / 1e9:.0f} GB of memory are needed, {present / 1e9:.0f} GB are there: split it"
+        )
+        raise InputError(Problem(said, str(path)))
     return NumberTable(Path(path), columns, n_rows, start, end)
 
 
