@@ -1,9 +1,10 @@
 """Logs with the habits of different laboratories hold, once imported, what was written into them."""
 
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
-from ctcr.frames import conjugate, product, quaternion_from_rotation_vector
+from ctcr.frames import conjugate
 from lab_logs import text
 from scipy.spatial.transform import Rotation
 
@@ -22,7 +23,6 @@ def test_matlab(truth, log, imported, same):
     np.testing.assert_allclose(table.t, truth.t, atol=1e-9)
     for name in ("t", "beta", "alpha", "position", "quaternion", "run"):
         assert len(getattr(table, name)) == 24
-    from dataclasses import replace
 
     fields = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
     same(replace(table, **{name: getattr(table, name)[kept] for name in fields}), kept, run=True)
@@ -154,4 +154,3 @@ def test_mirror_is_a_reflection(truth):
         expected = m @ truth.rotation.as_matrix() @ m
         np.testing.assert_allclose(Rotation.from_quat(np.roll(turned.quaternion, -1, axis=1)).as_matrix(), expected)
         np.testing.assert_allclose(turned.position, truth.position @ m)
-    _ = product, quaternion_from_rotation_vector

@@ -118,8 +118,8 @@ def _hint(beta: Array, choices: Choices) -> str:
     if (beta >= 0).all() and choices.translation is None:
         return (
             "beta is where a tube is grasped: 0 at the front plate, negative behind it. Positive columns are often"
-            " travel from flush tips (--translation from-flush --robot ROBOT), travel from home (--translation from-home"
-            " --robot ROBOT) or distances behind the plate (--flip beta): docs/formats.md draws them"
+            " travel from flush tips (--translation from-flush --robot ROBOT) or from home (--translation from-home"
+            " --robot ROBOT), or distances behind the plate (--flip beta): docs/formats.md draws them"
         )
     if beta.shape[1] > 1 and np.mean(beta[:, 0] > beta[:, -1]) > 0.5:
         return "beta grows from inner to outer tubes: if the log has the outermost first, --order outermost-first"

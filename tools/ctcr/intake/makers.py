@@ -4,6 +4,7 @@ Both say themselves what each column holds. Neither holds joints.
 """
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,19 +22,19 @@ _NDI |= {"rz": "rz", "state": "seen"}
 Rows = list[tuple[int, list[str]]]
 
 
-def read(path: Path, rows: Rows) -> Log | None:
-    """The log, where a maker's program wrote it."""
+def reader_of(rows: Rows) -> Callable[[Path, Rows], Log] | None:
+    """What reads the rows of a file, where a maker's program wrote it."""
     first = next((fields for _, fields in rows if any(fields)), [])
     if first and first[0].strip().strip('"') == "Format Version":
-        return _motive(path, rows, first)
-    if len(first) > 3 and first[0].strip() == "Tools" and re.match(r"Port\b", first[1].strip()):
-        return _ndi(path, rows, first)
-    return None
+        return _motive
+    is_ndi = len(first) > 3 and first[0].strip() == "Tools" and re.match(r"Port\b", first[1].strip())
+    return _ndi if is_ndi else None
 
 
-def _ndi(path: Path, rows: Rows, header: list[str]) -> Log:
+def _ndi(path: Path, rows: Rows) -> Log:
     """A group of columns a tool: its port and name, Frame, State, rotation, translation; then its single markers."""
-    header = [name.strip() for name in header]
+    above = next(i for i, (_, fields) in enumerate(rows) if any(fields))
+    header = [name.strip() for name in rows[above][1]]
     names, meanings, marker, single = [], {}, "", False
     for i, name in enumerate(header):
         if name.startswith("Port"):
@@ -44,7 +45,7 @@ def _ndi(path: Path, rows: Rows, header: list[str]) -> Log:
         names.append(label)
         meanings[label] = known
         single = single or name == "Markers"
-    data = [(number, fields) for number, fields in rows[1:] if any(fields) and fields != header]
+    data = [(number, fields) for number, fields in rows[above + 1 :] if any(fields)]
     return _log(path, "NDI ToolBox", names, data, meanings, "ZYX", [])
 
 
@@ -57,8 +58,9 @@ def _ndi_meaning(name: str, marker: str) -> Meaning | None:
     return Meaning(role, unit, marker) if role else None
 
 
-def _motive(path: Path, rows: Rows, first: list[str]) -> Log:
+def _motive(path: Path, rows: Rows) -> Log:
     """Rows of types, names and properties above the row of axes, which begins with Frame."""
+    first = rows[0][1]
     about = dict(zip(first[::2], first[1::2], strict=False))
     at = next((i for i, (_, fields) in enumerate(rows) if fields and fields[0].strip() == "Frame"), None)
     length = named(about.get("Length Units", "Meters"))

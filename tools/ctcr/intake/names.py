@@ -51,6 +51,21 @@ _MATRIX = {"r", "rot", "m", "t", "h", "tf", "mat", "matrix", "g", "rotation", "t
 _NOISE = {"field", "pose", "pos", "position", "positions", "data", "log", "msg", "joint", "joints", "tube", "tubes"}
 _NOISE |= {"motor", "axis", "value", "values", "tracker", "coordinate", "coord", "p", "translation", "header", "of"}
 _NOISE |= {"vector", "xyz"} | _ROTATION
+_ELSE = {
+    "vel",
+    "velocity",
+    "speed",
+    "rate",
+    "acc",
+    "acceleration",
+    "current",
+    "voltage",
+    "torque",
+    "temperature",
+    "temp",
+}
+_ELSE |= {"error", "err", "std", "sd", "var", "variance", "cov", "covariance", "rms", "residual", "quality", "counts"}
+_SHORT = {"a", "b", "d", "l", "s"}  # of joints where nothing else is said
 
 
 @dataclass(frozen=True)
@@ -76,6 +91,8 @@ def meaning(name: str) -> Meaning | None:
     words = _words(text)
     rank = 100 * bool(_COMMANDED & set(words))
     words = [word for word in words if word not in _COMMANDED | _MEASURED]
+    if set(words) & _ELSE:
+        return None
     if not words:  # a name such as [s] is all unit
         return Meaning("t", unit, rank=rank) if unit and unit.quantity == "time" else None
     found = _matrix(words) or _pose(words) or _joint(words) or _other(words)
@@ -158,6 +175,8 @@ def _joint(words: list[str]) -> Found:
     if not numbers and not set(kinds[kind]) & _STRONG:
         return None
     others = [word for word in rest if word not in kinds[kind] and word not in _NOISE]
+    if others and set(kinds[kind]) <= _SHORT:
+        return None
     return kind, numbers[0] if numbers else 1, others  # tube 0 is settled with all names
 
 

@@ -12,15 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ctcr.arrays import Integers
 from ctcr.errors import InputError, Problem
 from ctcr.intake import makers
 from ctcr.intake.log import Log
-from ctcr.intake.names import Meaning
 from ctcr.intake.units import named
 from ctcr.show.wording import listed
 from ctcr.table.csv_table import Faults
 
 SAMPLE_LINES = 400
+HEAD_LINES = 2000  # among which the table begins
 WHITESPACE = " "
 _DELIMITERS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", WHITESPACE: "spaces"}  # in this order
 _NUMBER = re.compile(r"[-+−]?(\d+[.,]?\d*|[.,]\d+)([eEdD][-+]?\d+)?|[-+]?(nan|inf)", re.IGNORECASE)
@@ -35,30 +36,40 @@ def read(path: Path, content: bytes) -> Log:
     text, notes = _decoded(path, content)
     lines = text.split("\n")
     delimiter = _delimiter(lines)
-    rows = _split(path, text, delimiter)
-    if log := makers.read(path, rows):
-        return log
-    start = _first_data(rows)
+    head = _split(path, lines[:HEAD_LINES], delimiter)
+    if maker := makers.reader_of(head):
+        return maker(path, _split(path, lines, delimiter))
+    start = _first_data(head)
     if start is None:
         raise InputError(Problem("holds no rows of numbers: is this a log?", str(path)))
-    count = _usual_count(rows, start)
-    names, meanings, header = _names(rows, start, count)
-    notes += [f"line 1 to {rows[start][0] - 1}: no table; passed over"] * (header is None and rows[start][0] > 1)
-    kept = _data(path, rows[start:], len(names), header, notes)
-    columns = list(zip(*(fields for _, fields in kept), strict=True))
-    decimal_comma = _has_decimal_comma(kept)
-    numbers = np.array([number for number, _ in kept], dtype=np.int64)
-    used = [i for i, name in enumerate(names) if name or any(columns[i])]  # an empty column without a name is none
-    return Log(
-        path,
-        f"text, separated by {_DELIMITERS[delimiter]}" + ", decimal commas" * decimal_comma,
-        tuple(_distinct([names[i] or f"#{i + 1}" for i in used])),
-        tuple(list(columns[i]) for i in used),
-        numbers,
-        decimal_comma,
-        meanings,
-        notes=notes,
+    count = _usual_count(head, start)
+    names, header = _names(head, start, count)
+    notes += [f"line 1 to {head[start][0] - 1}: no table; passed over"] * (header is None and head[start][0] > 1)
+    first, sample = head[start][0], [fields for _, fields in head[start : start + SAMPLE_LINES]]
+    columns, numbers = _regular(lines, first, delimiter, len(names)) or _irregular(
+        path, _split(path, lines, delimiter)[start:], len(names), header, notes
     )
+    decimal_comma = _has_decimal_comma(sample)
+    used = [i for i, name in enumerate(names) if name or any(columns[i])]  # an empty column without a name is none
+    kind = f"text, separated by {_DELIMITERS[delimiter]}" + ", decimal commas" * decimal_comma
+    labels = tuple(_distinct([names[i] or f"#{i + 1}" for i in used]))
+    return Log(path, kind, labels, tuple(columns[i] for i in used), numbers, decimal_comma, notes=notes)
+
+
+def _regular(lines: list[str], first: int, delimiter: str, count: int) -> tuple[list[list[str]], Integers] | None:
+    """The columns of lines without quotes, comments or gaps from line `first` on, fast; None for all others."""
+    last = len(lines)
+    while last > first and not lines[last - 1].strip():
+        last -= 1
+    body = lines[first - 1 : last]
+    odd = delimiter == WHITESPACE or any(line.count(delimiter) != count - 1 or line[:1] in "#%" for line in body)
+    if odd or (first > 1 and lines[first - 2] in body):
+        return None
+    whole = delimiter.join(body)
+    if '"' in whole:
+        return None
+    fields = whole.split(delimiter)
+    return [fields[i::count] for i in range(count)], np.arange(first, last + 1)
 
 
 def _decoded(path: Path, content: bytes) -> tuple[str, list[str]]:
@@ -100,10 +111,10 @@ def _fields(line: str, delimiter: str) -> list[str]:
     return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
 
 
-def _split(path: Path, text: str, delimiter: str) -> Rows:
+def _split(path: Path, lines: list[str], delimiter: str) -> Rows:
     if delimiter == WHITESPACE:
-        return [(i, line.split()) for i, line in enumerate(text.split("\n"), start=1)]
-    reader = csv.reader(io.StringIO(text), delimiter=delimiter, skipinitialspace=True)
+        return [(i, line.split()) for i, line in enumerate(lines, start=1)]
+    reader = csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter, skipinitialspace=True)
     try:
         return [(reader.line_num, fields) for fields in reader]
     except csv.Error as error:
@@ -121,7 +132,7 @@ def _looks_like_data(fields: list[str]) -> bool:
 
 def _first_data(rows: Rows) -> int | None:
     """The index of the first row of numbers that the next one follows with as many fields."""
-    following = [i for i, (_, fields) in enumerate(rows[: 10 * SAMPLE_LINES]) if _looks_like_data(fields)]
+    following = [i for i, (_, fields) in enumerate(rows) if _looks_like_data(fields)]
     for i in following:
         after = next((fields for _, fields in rows[i + 1 :] if any(fields)), None)
         alike = after is None or abs(len(after) - len(rows[i][1])) <= 1 and _looks_like_data(after)
@@ -135,7 +146,7 @@ def _usual_count(rows: Rows, start: int) -> int:
     return Counter(len(fields) for _, fields in rows[start : start + SAMPLE_LINES] if fields).most_common(1)[0][0]
 
 
-def _names(rows: Rows, start: int, count: int) -> tuple[list[str], dict[str, Meaning | None], list[str] | None]:
+def _names(rows: Rows, start: int, count: int) -> tuple[list[str], list[str] | None]:
     """Names of the `count` columns, and the row that held them; a row of units below them is joined to them."""
     above = [fields for _, fields in rows[:start] if any(field.strip() for field in fields)]
     units: list[str] = []
@@ -143,7 +154,7 @@ def _names(rows: Rows, start: int, count: int) -> tuple[list[str], dict[str, Mea
         units = [field.strip(" []()") for field in above.pop()]
     header = above[-1] if above and abs(len(above[-1]) - count) <= 1 and count > 1 else None
     if header is None:
-        return [f"#{i}" for i in range(1, count + 1)], {}, None
+        return [f"#{i}" for i in range(1, count + 1)], None
     names = [field.strip().strip("'\"").strip() for field in header]
     names[0] = names[0].lstrip("#%").strip()
     if len(names) == count + 1 and not names[0]:  # the sign of the comment stood alone
@@ -152,7 +163,7 @@ def _names(rows: Rows, start: int, count: int) -> tuple[list[str], dict[str, Mea
         last_empty = all(not fields[-1].strip() for _, fields in rows[start:] if len(fields) == count)
         names = [*names, ""] if last_empty else ["", *names]
     names = [f"{name} [{unit}]" if unit and named(unit) else name for name, unit in _padded(names, units)]
-    return names[: max(count, len([n for n in names if n]))], {}, header
+    return names[: max(count, len([n for n in names if n]))], header
 
 
 def _padded(names: list[str], units: list[str]) -> list[tuple[str, str]]:
@@ -165,8 +176,10 @@ def _are_units(fields: list[str]) -> bool:
     return bool(filled) and sum(named(field) is not None for field in filled) >= len(filled) / 2
 
 
-def _data(path: Path, rows: Rows, count: int, header: list[str] | None, notes: list[str]) -> Rows:
-    """The rows of the table with `count` fields each."""
+def _irregular(
+    path: Path, rows: Rows, count: int, header: list[str] | None, notes: list[str]
+) -> tuple[list[list[str]], Integers]:
+    """The columns of rows among which some do not belong to the table of `count` columns, and their lines."""
     faults, kept = Faults(str(path)), []
     passed: dict[str, list[int]] = {}
     for i, (number, fields) in enumerate(rows):
@@ -189,11 +202,12 @@ def _data(path: Path, rows: Rows, count: int, header: list[str] | None, notes: l
             faults.add(number, None, f"has {len(fields)} fields: the table has {count}", "fields")
     faults.raise_any()
     notes += [f"row {listed(numbers)}: {why}; left out" for why, numbers in passed.items()]
-    return kept
+    columns = [list(column) for column in zip(*(fields for _, fields in kept), strict=True)]
+    return columns, np.array([number for number, _ in kept], dtype=np.int64)
 
 
-def _has_decimal_comma(rows: Rows) -> bool:
-    fields = [field.strip() for _, row in rows[:SAMPLE_LINES] for field in row]
+def _has_decimal_comma(rows: list[list[str]]) -> bool:
+    fields = [field.strip() for row in rows for field in row]
     commas = sum(_COMMA_NUMBER.fullmatch(field) is not None for field in fields)
     return commas > 0 and not any(_POINT_NUMBER.fullmatch(field) for field in fields)
 
