@@ -65,7 +65,7 @@ _ELSE = {
     "temp",
 }
 _ELSE |= {"error", "err", "std", "sd", "var", "variance", "cov", "covariance", "rms", "residual", "quality", "counts"}
-_SHORT = {"a", "b", "d", "l", "s"}  # of joints where nothing else is said
+_SHORT = {"a", "b", "d", "l", "s"}  # joints where the name says nothing else
 
 
 @dataclass(frozen=True)
