@@ -5,10 +5,7 @@ from click.testing import CliRunner
 from ctcr.cli import cli
 from ctcr.robot import robot_file
 
-TUBES = (
-    "length_mm=420,outer_diameter_mm=0.88,inner_diameter_mm=0.65,curved_length_mm=60,radius_mm=80",
-    "length_mm=300",
-)
+CURVED = "length_mm=420,outer_diameter_mm=0.88,inner_diameter_mm=0.65,curved_length_mm=60,radius_mm=80"
 
 
 @pytest.mark.parametrize("tubes", [1, 2, 3, 4])

@@ -91,8 +91,8 @@ def text(robot: NewRobot) -> str:
     flush = "" if robot.home_mm else ": here all tips flush with the front plate"
     gravity = "null" if robot.gravity is None else _list(robot.gravity)
     return (
-        f"# A robot for ctcr.{robot.note} docs/formats.md draws frames, angles and signs and lists all fields;\n"
-        "# `ctcr info` shows what follows from them and what looks wrong. null: not known.\n"
+        f"# A robot for ctcr.{robot.note} null: not known.\n"
+        "# docs/formats.md draws frames, angles and signs and lists all fields; `ctcr info` shows what follows.\n"
         f"name: {_quoted(robot.name)}\n"
         f"gravity: {gravity}  # m/s^2, base frame (z along the insertion); null: the tubes' weight is left out\n"
         "\n"
