@@ -62,6 +62,16 @@ def test_identity_and_states(truth, log, imported):
     assert "2 rows (5, 10)" in said
 
 
+def test_names_of_quaternions(truth, log, imported, same):
+    """Letters, numbers and words for the four columns, in any order of theirs."""
+    by_letter = dict(zip("wxyz", truth.quaternion.T, strict=True))
+    for w, x, y, z in (["qw", "qx", "qy", "qz"], ["q0", "qx", "qy", "qz"], ["quat_w", "quat_x", "quat_y", "quat_z"]):
+        turned = [by_letter[letter] for letter in "xyzw"]
+        names = [*NAMES, x, y, z, w]
+        table, _ = imported(log(text(names, [truth.t, truth.beta, truth.alpha, truth.position, *turned])))
+        same(table)
+
+
 def test_constant_rotation(truth, log, imported):
     """A rotation that never changes was not measured."""
     names = [*NAMES, "qw", "qx", "qy", "qz"]

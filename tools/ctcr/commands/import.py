@@ -74,8 +74,7 @@ def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, *
 
     LOG is text (any delimiter, decimal commas, header lines, units in names), a MATLAB .mat file, an export of NDI
     ToolBox or OptiTrack Motive, an MCAP file of ctcr export, or a table of measurements itself. What each column was
-    taken for is shown, and every row without a pose or left out is named. docs/formats.md draws frames, angles and
-    signs and lists all columns.
+    taken for is shown, and every row without a pose or left out is named.
 
     Example: ctcr import log.csv -o measurements.csv --robot robot.yaml --translation from-flush --unit alpha=deg
     """

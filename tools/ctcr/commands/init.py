@@ -30,8 +30,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     """Write a new robot file.
 
     It needs dimensions and precurvature of the tubes; all else gets a default that a comment in the file explains.
-    Asks for what no option says: without --tube and --example, for everything. docs/formats.md draws frames, angles
-    and signs and lists all fields.
+    Without --tube and --example it asks.
 
     Example: ctcr init -o robot.yaml --tube length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,radius_mm=100
     """

@@ -209,6 +209,8 @@ def _settled(roles: dict[str, list[_Candidate]]) -> dict[str, list[_Candidate]]:
         made |= {f"{target}{axis}": roles[f"o{axis}"] for axis in "wxyz" if f"o{axis}" in roles}
     elif "ow" in roles:
         made["qw"] = roles["ow"]
+    if "qw" not in made and "q0" in roles and "qx" in made:  # as NDI names them
+        made["qw"] = roles["q0"]
     for first in (0, 1):
         if not set(QUATERNION) & set(made) and all(f"q{i}" in roles for i in range(first, first + 4)):
             made |= {role: roles[f"q{i}"] for i, role in enumerate(QUATERNION, start=first)}
