@@ -18,8 +18,9 @@ RAD_UP_TO, DEG_FROM = 1.01 * 2 * np.pi, 4 * np.pi  # between them, angles withou
 class Columns:
     """Gives numbers by role; collects faults of fields, notes, and the units of all that was read."""
 
-    def __init__(self, log: Log, mapping: Mapping, choices: Choices):
+    def __init__(self, log: Log, mapping: Mapping, choices: Choices, beside: bool = False):
         self.log, self.mapping, self.choices = log, mapping, choices
+        self.beside = beside  # whether another log has a part: a choice of units may concern that one
         self.faults, self.notes = Faults(str(log.path)), [*log.notes, *mapping.notes]
         self.units: dict[str, tuple[Unit, str]] = {}  # of each role, and how it is known
 
@@ -38,7 +39,8 @@ class Columns:
 
     def name(self, role: str) -> str:
         """The column of a role, for errors."""
-        return f"{self.mapping.used[role].name} ({role})" if self.has(role) else role
+        column = self.mapping.used[role].name if self.has(role) else role
+        return column if column.startswith(role) else f"{column} ({role})"
 
     def si(self, group: str, roles: list[str], guess) -> Array:
         """The columns (M, roles) of a group in SI units; `guess(largest size)` is the unit where none is stated."""

@@ -41,11 +41,12 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     """
     n_tubes = robot.n_tubes if robot else None
     of_poses = choices if joints is None else together.of_poses(choices, log)
-    columns = Columns(log, mapping.of(log, of_poses, n_tubes if joints is None else 0), of_poses)
+    beside = joints is not None
+    columns = Columns(log, mapping.of(log, of_poses, 0 if beside else n_tubes), of_poses, beside)
     moving = columns
     if joints is not None:
         of_joints = together.of_joints(choices, joints)
-        moving = Columns(joints, mapping.of(joints, of_joints, n_tubes, poses=False), of_joints)
+        moving = Columns(joints, mapping.of(joints, of_joints, n_tubes, poses=False), of_joints, beside)
     _check_joints(moving)
     moved = motion.of(moving, robot)
     pose = sensor.of(columns)
@@ -88,6 +89,8 @@ def _check_joints(columns: Columns) -> None:
         text = "no column looks like a joint: name them with --column beta1=NAME, --column alpha1=NAME, ..."
         if log.meanings:
             text = f"an export of {log.kind} holds no joints: give their log with --joints FILE"
+        elif all(name.startswith("#") for name in log.names):
+            text = "it has no header: name its columns in their order, such as --columns t,beta1..beta2,alpha1..alpha2"
         raise InputError(Problem(f"{text} (not used: {unused})", str(log.path)))
     if missing:
         still = "0mm where it never moves" if missing[0].startswith("beta") else "0deg where it never turns"

@@ -266,7 +266,8 @@ def _take(made: Mapping, prefix: str, roles: dict[str, list[_Candidate]], choice
         if any(character == "0" for character in name[-2:]):
             made.guessed_order = True
         else:
-            picker.say("quaternions are numbered from 1: say their order with --quaternion wxyz or xyzw", name)
+            text = "four columns are numbered from 1. A quaternion: say its order with --quaternion wxyz or xyzw. "
+            picker.say(f"{text}Joints: name them, such as --column beta1={name}", name)
 
 
 def _check(log: Log, made: Mapping, n_tubes: int | None, faults: list[Problem]) -> None:

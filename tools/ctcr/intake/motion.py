@@ -47,6 +47,7 @@ def times(columns: Columns) -> tuple[Array, float]:
     if not columns.has("t"):
         return np.full(len(columns.log), np.nan), 0.0
     used, asked = columns.mapping.used["t"], columns.choices.units.get("t")
+    asked = None if columns.beside and used.unit else asked
     unit = units.parsed(asked, "time", "--unit t") if asked else used.unit
     read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
     columns.units["t"] = read.unit, "values" if read.guessed else "option" if asked else used.how

@@ -9,8 +9,8 @@ from ctcr.intake.mapping import EULER, GRID, SEQUENCE, TRANSLATION
 from ctcr.intake.sensor import MATRIX
 from ctcr.table import measurements
 
-_HOW = {"format": "stated", "name": "guessed from the name", "option": "option"}
-_UNIT_HOW = {"values": "unit guessed from the values", "option": "unit by option"}
+_HOW = {"format": "stated", "name": "guessed: name", "option": "option"}
+_UNIT_HOW = {"values": "guessed: unit", "option": "unit: option"}
 _OURS = {name.partition("_")[0]: name for name in measurements.column_names(9)}
 
 
@@ -49,7 +49,10 @@ def _becomes(role: str) -> str:
 
 
 def resolved(choices: Choices, sources: Sequence[Columns]) -> Choices:
-    """The choices with the columns and units that were found: the next log decides nothing by its numbers."""
+    """The choices with the columns and units that were found: the next log decides nothing by its numbers.
+
+    The unit of times is kept where all logs have the same.
+    """
     columns = {role: used.name for source in sources for role, used in source.mapping.used.items()}
     units = dict(choices.units)
     for source in sources:
@@ -57,5 +60,7 @@ def resolved(choices: Choices, sources: Sequence[Columns]) -> Choices:
             key = "position" if role == MATRIX else role
             if not key.startswith("ref_"):
                 units.setdefault(key, unit.text)
+    if len({source.units["t"][0] for source in sources if "t" in source.units}) > 1 and "t" not in choices.units:
+        units.pop("t")
     settled = {"order": None, "sensor": None, "relative_to": None}  # the columns say it
     return replace(choices, columns=columns, units=grouped(units), **settled)

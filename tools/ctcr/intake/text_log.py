@@ -201,6 +201,8 @@ def _irregular(
         else:
             faults.add(number, None, f"has {len(fields)} fields: the table has {count}", "fields")
     faults.raise_any()
+    if not kept:
+        raise InputError(Problem("has no whole row below its header", str(path)))
     notes += [f"row {listed(numbers)}: {why}; left out" for why, numbers in passed.items()]
     columns = [list(column) for column in zip(*(fields for _, fields in kept), strict=True)]
     return columns, np.array([number for number, _ in kept], dtype=np.int64)
