@@ -116,6 +116,26 @@ def test_forces(truth, log, imported, same):
     same(table, force=True, orientation=False)
 
 
+def test_weights(truth, log, imported, refused, run, tmp_path):
+    """Grams hung at the tip pull along gravity."""
+    names = ["t", "beta1", "beta2", "alpha1", "alpha2", "Load (g)", "x", "y", "z"]
+    grams = np.arange(24.0)
+    path, robot = log(text(names, [truth.t, truth.beta, truth.alpha, grams, truth.position])), tmp_path / "robot.yaml"
+    assert "--robot" in refused(path)
+    assert run("init", "-o", robot, "--example", 2, "--gravity", "-y")[0] == 0
+    table, _ = imported(path, "--robot", robot)
+    np.testing.assert_allclose(table.force, np.outer(grams, [0, -9.80665e-3, 0]), atol=1e-12)
+
+
+def test_seconds_and_nanoseconds(truth, log, imported):
+    """Stamps of ROS in two columns."""
+    names = ["stamp.secs", "stamp.nsecs", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
+    whole = 1_790_000_000_900_000_000 + np.round(1e9 * truth.t).astype(int)
+    parts = [[str(v // 10**9) for v in whole], [str(v % 10**9) for v in whole]]
+    table, _ = imported(log(text(names, [*parts, truth.beta, truth.alpha, truth.position])))
+    np.testing.assert_allclose(table.t, truth.t - truth.t[0], atol=2e-9)
+
+
 def test_mends_of_our_own_table(truth, log, imported, same):
     """Each mend of a convention undoes it on a table of our own format."""
     names = "t_s,run,beta1_m,beta2_m,alpha1_rad,alpha2_rad,fx_N,fy_N,fz_N,x_m,y_m,z_m,qw,qx,qy,qz".split(",")

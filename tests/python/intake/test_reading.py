@@ -124,6 +124,17 @@ def test_mapping_for_the_next_log(truth, log, imported, same, tmp_path):
     np.testing.assert_allclose(table.alpha, np.rad2deg(truth.alpha) / 100, atol=1e-9)
 
 
+def test_mapping_of_markers_and_of_two_logs(truth, log, imported, same, tmp_path):
+    """Which marker in which frame, and which log has the joints, are kept too; so is a unit that only one log needs."""
+    kept, base = tmp_path / "lab.yaml", np.tile([0.1, 0.2, 0.3, 1.0, 0, 0, 0], (24, 1))
+    names = ["time_s", *(f"{m}_{c}" for m in ("a", "b") for c in ("x", "y", "z", "qw", "qx", "qy", "qz"))]
+    poses = log(text(names, [truth.t, truth.position + [0.1, 0.2, 0.3], truth.quaternion, base]))
+    joints = log(text(["time", *NAMES[1:5]], [1e3 * truth.t, truth.beta, truth.alpha]), "joints.csv")
+    said = ["--joints", joints, "--sensor", "a", "--relative-to", "b", "--unit", "t=ms", "--save-mapping", kept]
+    same(imported(poses, *said)[0])
+    same(imported(poses, "--joints", joints, "--mapping", kept)[0])
+
+
 def test_mapping_survives_its_file(tmp_path):
     """Every choice, with names of columns that YAML would read otherwise, comes back as it was."""
     path = tmp_path / "lab.yaml"
@@ -221,6 +232,9 @@ def test_json(log, lines, run, tmp_path):
         ("Rotation W", "ow", 0, None),
         ("pitch (deg)", "ry", 0, "deg"),
         ("r12", "m12", 0, None),
+        ("x2", "x", 0, None),
+        ("rot_i", "alpha", -3, None),
+        ("nsecs", "nsec", 0, "ns"),
         ("TubeOneRotDeg", "alpha", 1, "deg"),
     ],
 )

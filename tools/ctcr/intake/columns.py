@@ -47,8 +47,9 @@ class Columns:
         raw = {role: self.values(role) for role in roles}
         silent = [role for role in roles if self._stated(role, group) is None]
         largest = max((np.nanmax(np.abs(raw[role]), initial=0.0) for role in silent), default=0.0)
+        guessed = (guess(float(largest)), "values") if silent else None
         for role in roles:
-            self.units[role] = self._stated(role, group) or (guess(float(largest)), "values")
+            self.units[role] = self._stated(role, group) or guessed
         return np.column_stack([raw[role] * self.units[role][0].size for role in roles])
 
     def _stated(self, role: str, group: str) -> tuple[Unit, str] | None:

@@ -14,6 +14,7 @@ TIP_WORDS = {"tip", "sensor", "probe", "ee", "effector", "end", "tool", "distal"
 POSITION, QUATERNION, EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("rx", "ry", "rz")
 SEQUENCE = tuple(f"m{i}" for i in range(1, 17))  # a 4 x 4 matrix as one list
 GRID = tuple(f"m{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+MOVING = ("beta", "alpha", "run", "fx", "fy", "fz", "weight")  # what a log of poses alone lacks
 TRANSLATION = ("m14", "m24", "m34")
 
 
@@ -59,13 +60,13 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
     candidates = []
     for i, name in enumerate(log.names):
         found = log.meanings[name] if name in log.meanings else names.meaning(name)
-        if i not in taken and found and not (n_tubes == 0 and found.role in ("beta", "alpha", "run", "fx", "fy", "fz")):
+        if i not in taken and found and not (n_tubes == 0 and found.role in MOVING):
             candidates.append(_Candidate(i, name, found))
     how = "format" if log.meanings else "name"
     picker = _Picker(log, how, faults)
     joints, n = _joints(candidates, explicit, choices, n_tubes, picker)
     made = Mapping(joints | explicit, n, [])
-    for role in ("t", "run", "fx", "fy", "fz"):
+    for role in ("t", "nsec", "run", "fx", "fy", "fz", "weight"):
         same = [one for one in candidates if one.meaning.role == role]
         if role not in made.used and same:
             made.used[role] = picker.best(role, same)

@@ -39,7 +39,9 @@ def of(columns: Columns, robot: Robot | None) -> Motion:
     t, zero = times(columns)
     beta = _joints(columns, "beta", length_unit)
     alpha = _joints(columns, "alpha", lambda size: _sure_angle_unit(columns, size))
-    return Motion(t, zero, _runs(columns), _from_home(columns, beta, robot), alpha, _force(columns), columns.log.rows)
+    return Motion(
+        t, zero, _runs(columns), _from_home(columns, beta, robot), alpha, _force(columns, robot), columns.log.rows
+    )
 
 
 def times(columns: Columns) -> tuple[Array, float]:
@@ -50,10 +52,20 @@ def times(columns: Columns) -> tuple[Array, float]:
     asked = None if columns.beside and used.unit else asked
     unit = units.parsed(asked, "time", "--unit t") if asked else used.unit
     read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
+    if columns.has("nsec"):
+        read = _with_parts(columns, read)
     columns.units["t"] = read.unit, "values" if read.guessed else "option" if asked else used.how
     if read.start:
         columns.notes.append(f"t_s = 0 is {read.start}")
     return read.seconds, read.zero
+
+
+def _with_parts(columns: Columns, read: fields.Times) -> fields.Times:
+    """Times whose second is in one column, and the nanoseconds after it in another."""
+    parts = 1e-9 * columns.values("nsec")
+    columns.units["nsec"] = named("ns"), "name"
+    first = float(parts[0]) if read.start else 0.0  # a stamp counts from the first row
+    return replace(read, seconds=read.seconds + parts - first, zero=read.zero + first)
 
 
 def complete(columns: Columns, motion: Motion) -> Mask:
@@ -139,11 +151,23 @@ def _runs(columns: Columns) -> Array:
     return run
 
 
-def _force(columns: Columns) -> Array:
+def _weight(columns: Columns, robot: Robot | None) -> Array:
+    """Forces (M, 3) [N] of a weight hung at the tip."""
+    down = np.zeros(3) if robot is None else robot.gravity_vector
+    if not down.any():
+        name = columns.mapping.used["weight"].name
+        text = "a weight needs the direction of gravity: give --robot ROBOT, whose gravity is known"
+        raise InputError(Problem(f"{text}, or --ignore {name}", str(columns.log.path), field=name))
+    return columns.si("force", ["weight"], lambda _: named("N")) * down / np.linalg.norm(down)
+
+
+def _force(columns: Columns, robot: Robot | None) -> Array:
     """Forces (M, 3) [N]; axes that the log lacks are zero."""
     roles, flip = [role for role in FORCE if columns.has(role)], columns.choices.flip
     force = np.zeros((len(columns.log), 3))
+    if columns.has("weight"):
+        force += _weight(columns, robot)
     if roles:
-        force[:, [FORCE.index(role) for role in roles]] = columns.si("force", roles, lambda _: named("N"))
+        force[:, [FORCE.index(role) for role in roles]] += columns.si("force", roles, lambda _: named("N"))
     signs = [-1.0 if (role in flip) != ("force" in flip) else 1.0 for role in FORCE]
     return force * signs + 0.0

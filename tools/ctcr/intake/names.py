@@ -12,7 +12,7 @@ _GREEK = {"α": "alpha", "β": "beta", "θ": "theta", "φ": "phi", "ψ": "psi", 
 _TIME = {"t", "time", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "secs", "clock", "times"}
 _RUN = {"run", "trial", "path", "experiment", "trajectory", "traj", "sequence", "runs", "trials"}
 _BETA = {"beta", "b", "d", "trans", "translation", "translations", "translational", "linear", "lin", "ins", "insertion"}
-_BETA |= {"ext", "extension", "slide", "rho", "l", "s", "advance", "displacement", "disp", "stroke", "betas"}
+_BETA |= {"tr", "ext", "extension", "slide", "rho", "l", "s", "advance", "displacement", "disp", "stroke", "betas"}
 _ALPHA = {"alpha", "a", "theta", "rot", "rotation", "rotations", "rotational", "roll", "psi", "phi", "angle", "ang"}
 _ALPHA |= {"alphas", "thetas", "angles"}
 _STRONG = {"beta", "alpha", "insertion", "translation", "extension", "betas", "alphas"}  # without a number: of one tube
@@ -21,6 +21,10 @@ _WORDS = {
     "two": 2,
     "three": 3,
     "four": 4,
+    "i": INNER,
+    "in": INNER,
+    "o": OUTER,
+    "out": OUTER,
     "inner": INNER,
     "innermost": INNER,
     "middle": MIDDLE,
@@ -45,7 +49,9 @@ _COMMANDED = {
 _COMMANDED |= {"sp", "nominal", "planned", "pred", "predicted", "model", "sim"}
 _MEASURED = {"meas", "measured", "actual", "act", "fb", "feedback", "enc", "encoder", "real"}
 _ROTATION = {"rot", "rotation", "orientation", "ori", "orient", "quat", "quaternion", "q", "euler", "attitude"}
-_FORCE = {"f", "force", "load", "weight"}
+_FORCE = {"f", "force", "load"}
+_WEIGHT = {"weight", "mass", "load", "payload"}  # hung at the tip
+_PARTS = {"nsec", "nsecs", "nanosec", "nanosecs"}  # of the second that another column counts, as ROS writes stamps
 _EULER = {"roll": "rx", "pitch": "ry", "yaw": "rz"}
 _MATRIX = {"r", "rot", "m", "t", "h", "tf", "mat", "matrix", "g", "rotation", "transform", "pose"}
 _NOISE = {"field", "pose", "pos", "position", "positions", "data", "log", "msg", "joint", "joints", "tube", "tubes"}
@@ -91,6 +97,9 @@ def meaning(name: str) -> Meaning | None:
     words = _words(text)
     rank = 100 * bool(_COMMANDED & set(words))
     words = [word for word in words if word not in _COMMANDED | _MEASURED]
+    last = re.findall(r"[a-z]+", name.lower())[-1:]
+    if last and last[0] in _PARTS:
+        return Meaning("nsec", named("ns"), rank=rank)
     if set(words) & _ELSE:
         return None
     if not words:  # a name such as [s] is all unit
@@ -107,7 +116,8 @@ def meaning(name: str) -> Meaning | None:
 
 def quantity(role: str) -> str | None:
     """The quantity of a role: time, length, angle, force; None for numbers without a unit."""
-    kinds = {"t": "time", "beta": "length", "alpha": "angle", "f": "force", "r": "angle", "o": "angle"}
+    kinds = {"t": "time", "nsec": "time", "beta": "length", "alpha": "angle", "weight": "force"}
+    kinds |= {"f": "force", "r": "angle", "o": "angle"}
     if role in ("x", "y", "z"):
         return "length"
     return kinds.get(role.rstrip("0123456789")) or (kinds.get(role[0]) if role[1:] in ("x", "y", "z") else None)
@@ -149,6 +159,8 @@ def _matrix(words: list[str]) -> Found:
 
 def _pose(words: list[str]) -> Found:
     *rest, last = words
+    if last.isdigit() and rest and re.fullmatch(r"[tp]?[xyz]|q[xyzw]", rest[-1]):  # x1 is the first marker's
+        *rest, last = *rest[:-1], last, rest[-1]
     if last in _EULER:
         return _EULER[last], 0, rest
     if re.fullmatch(r"[tp][xyz]|[fqr][xyz]|qw", last):
@@ -181,7 +193,7 @@ def _joint(words: list[str]) -> Found:
 
 
 def _other(words: list[str]) -> Found:
-    for role, known in (("t", _TIME), ("run", _RUN), ("seen", _SEEN)):
+    for role, known in (("t", _TIME), ("run", _RUN), ("seen", _SEEN), ("weight", _WEIGHT)):
         if set(words) & known:
             return role, 0, [word for word in words if word not in known and not word.isdigit()]
     return None

@@ -11,6 +11,7 @@ from ctcr.table import measurements
 
 _HOW = {"format": "stated", "name": "guessed: name", "option": "option"}
 _UNIT_HOW = {"values": "guessed: unit", "option": "unit: option"}
+_OTHER = {"seen": "whether the pose counts", "nsec": "t_s (below 1 s)", "weight": "fx_N..fz_N"}
 _OURS = {name.partition("_")[0]: name for name in measurements.column_names(9)}
 
 
@@ -30,15 +31,16 @@ def rows(columns: Columns) -> list[Row]:
     for role, used in sorted(columns.mapping.used.items(), key=lambda item: item[1].column):
         unit, known = columns.units.get(role) or columns.units.get(MATRIX if role in TRANSLATION else "", (None, ""))
         how = "our format" if used.how == "name" and used.name == _OURS.get(role) else _HOW[used.how]
-        said = [how, _UNIT_HOW.get(known, "") if known != used.how else ""]
-        shown.append(Row(used.name, unit.text if unit else "", _becomes(role), "; ".join(filter(None, said))))
+        also = _UNIT_HOW.get(known, "") if known != used.how else ""
+        said = f"{how}, unit" if how == _HOW["name"] and known == "values" else f"{how}, {also}".strip(", ")
+        shown.append(Row(used.name, unit.text if unit else "", _becomes(role), said))
     return shown
 
 
 def _becomes(role: str) -> str:
     plain = role.removeprefix("ref_")
-    if plain == "seen":
-        name = "whether the pose counts"
+    if plain in _OTHER:
+        name = _OTHER[plain]
     elif plain in EULER or plain in GRID:
         name = "qw..qz"
     elif plain in SEQUENCE or plain in TRANSLATION:

@@ -9,9 +9,8 @@ from ctcr.errors import InputError, Problem
 from ctcr.intake.choices import Choices
 from ctcr.intake.columns import Columns
 from ctcr.intake.log import Log
+from ctcr.intake.mapping import MOVING
 from ctcr.intake.motion import Motion, complete, row_ranges
-
-_MOVING = ("beta", "alpha", "run", "fx", "fy", "fz")
 
 
 def of_poses(choices: Choices, log: Log) -> Choices:
@@ -21,16 +20,16 @@ def of_poses(choices: Choices, log: Log) -> Choices:
 
 def of_joints(choices: Choices, log: Log) -> Choices:
     """The choices that concern the log of the joints."""
-    columns = {r: n for r, n in choices.columns.items() if _moves(r) or r == "t" and _of(log, r, n)}
+    columns = {r: n for r, n in choices.columns.items() if _moves(r) or r in ("t", "nsec") and _of(log, r, n)}
     return replace(choices, columns=columns, sensor=None, relative_to=None)
 
 
 def _moves(role: str) -> bool:
-    return role.rstrip("123456789") in _MOVING
+    return role.rstrip("123456789") in MOVING
 
 
 def _of(log: Log, role: str, name: str) -> bool:
-    return role != "t" or name in log.names
+    return role not in ("t", "nsec") or name in log.names
 
 
 def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) -> Motion:

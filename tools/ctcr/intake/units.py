@@ -33,7 +33,7 @@ _ALSO = {
     "s": "sec secs second seconds",
     "ms": "msec msecs millisecond milliseconds millis",
     "us": "usec microsecond microseconds µs μs",
-    "ns": "nsec nanosecond nanoseconds",
+    "ns": "nsec nsecs nanosec nanosecond nanoseconds",
     "min": "minutes",
     "m": "meter meters metre metres",
     "cm": "centimeter centimeters centimetre centimetres",
@@ -44,6 +44,7 @@ _ALSO = {
     "rev": "revs revolution revolutions turn turns",
     "N": "n newton newtons",
     "mN": "mn millinewton millinewtons",
+    "gf": "g gram grams",
     CLOCK: "iso datetime",
 }
 _NAMED = {unit: unit for unit in _SIZES} | {other: unit for unit, others in _ALSO.items() for other in others.split()}
