@@ -155,6 +155,7 @@ def test_mends_of_our_own_table(truth, log, imported, same):
         "--flip force": {"force": -truth.force},
         "--order outermost-first": {"beta": truth.beta[:, ::-1], "alpha": truth.alpha[:, ::-1]},
         "--offset alpha2=90deg": {"alpha": truth.alpha - quarter},
+        "--offset alpha2@1=90deg": {"alpha": truth.alpha - np.outer(truth.run == 1, quarter)},
         "--mirror y": {"position": flipped, "quaternion": truth.quaternion * [1, -1, 1, -1]},
     }
     for options, columns in wrong.items():

@@ -177,6 +177,8 @@ def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
         (["--column", "beta1=bta1"], "did you mean beta1"),
         (["--column", "beta9x=beta1"], "is not known"),
         (["--offset", "alpha2=90"], "has no unit"),
+        (["--offset", "alpha2@7=90deg"], "no alpha2 in a run 7"),
+        (["--flip", "alpha3"], "there are 2 tubes"),
         (["--euler", "ZY"], "sequence of axes"),
         (["--sensor", "tip"], "fits none"),
         (["--translation", "from-flush"], "--robot"),

@@ -60,7 +60,7 @@ def _list_option(name: str, field: str, metavar: str, text: str):
 @click.option("--home-mm", callback=_numbers, metavar="B1,B2,..", help="beta at home or at flush tips; else of ROBOT.")
 @click.option("--order", metavar="ORDER", help="Numbers of the tubes: innermost-first (default) or outermost-first.")
 @_list_option("--flip", "flip", "NAME", "Change the sign of alpha2, alpha, beta or force.")
-@_pair_option("--offset", "offsets", "JOINT=VALUE", "Add to a joint or to t, such as alpha2=90deg.")
+@_pair_option("--offset", "offsets", "JOINT=VALUE", "Add to a joint or to t: alpha2=90deg; alpha2@7: in run 7.")
 @_pair_option("--constant", "constants", "JOINT=VALUE", "A joint that never moves and is not logged: beta3=0mm.")
 @click.option("--sensor", metavar="MARKER", help="Which of several markers is at the tip (a part of its name).")
 @click.option("--relative-to", metavar="MARKER", help="Give the sensor's pose in the frame of this marker.")

@@ -31,7 +31,7 @@ class Choices:
     home_mm     beta of each tube at home, or at flush tips
     euler       sequence of rotation axes as in scipy: ZYX turns about moving axes (R = Rz Ry Rx), zyx about fixed ones
     flip        joints, force or groups whose sign changes
-    offsets     joints or t -> what is added to it, with its unit
+    offsets     joints, joints of one run (alpha2@7) or t -> what is added to it, with its unit
     constants   joints that the log lacks -> their value, with its unit
     mirror      an axis of a left-handed tracker frame
     """
@@ -89,7 +89,12 @@ class Choices:
                 re.compile(rf"{joints.pattern}|force|f[xyz]"),
                 "a joint such as alpha2, alpha or force",
             ),
-            ("offset", self.offsets, re.compile(rf"{joints.pattern}|t"), "a joint such as alpha2, or t"),
+            (
+                "offset",
+                self.offsets,
+                re.compile(rf"{joints.pattern}(@\d+)?|t"),
+                "alpha2, alpha2@7 in run 7 alone, or t",
+            ),
             ("constant", self.constants, re.compile(r"(?:beta|alpha)[1-9]"), "a joint such as beta3"),
         ):
             for name in names:

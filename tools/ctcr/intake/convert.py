@@ -1,5 +1,6 @@
 """A log, or a log of poses and one of joints, as a table of measurements."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -82,7 +83,12 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
 
 def _check_joints(columns: Columns) -> None:
     log, used, choices = columns.log, columns.mapping.used, columns.choices
-    wanted = [f"{kind}{i}" for i in range(1, columns.mapping.n_tubes + 1) for kind in ("beta", "alpha")]
+    n = columns.mapping.n_tubes
+    named = [*choices.flip, *choices.units, *choices.offsets, *choices.constants]
+    high = [name for name in named if (found := re.match(r"(?:beta|alpha)(\d)", name)) and int(found[1]) > n > 0]
+    if high:
+        raise InputError(Problem(f"there are {n} tubes: no {join(high)}", str(log.path)))
+    wanted = [f"{kind}{i}" for i in range(1, n + 1) for kind in ("beta", "alpha")]
     missing = [role for role in wanted if role not in used and role not in choices.constants]
     unused = listed(columns.unused, 30)
     if len(missing) == len(wanted):

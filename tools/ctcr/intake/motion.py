@@ -37,11 +37,11 @@ class Motion:
 def of(columns: Columns, robot: Robot | None) -> Motion:
     """The motion that a log holds."""
     t, zero = times(columns)
-    beta = _joints(columns, "beta", length_unit)
+    beta = _from_home(columns, _joints(columns, "beta", length_unit), robot)
     alpha = _joints(columns, "alpha", lambda size: _sure_angle_unit(columns, size))
-    return Motion(
-        t, zero, _runs(columns), _from_home(columns, beta, robot), alpha, _force(columns, robot), columns.log.rows
-    )
+    run = _runs(columns)
+    _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
+    return Motion(t, zero, run, beta, alpha, _force(columns, robot), columns.log.rows)
 
 
 def times(columns: Columns) -> tuple[Array, float]:
@@ -140,6 +140,19 @@ def _home(choices: Choices, robot: Robot | None, n: int) -> Array:
     if choices.translation == "from-home":
         return 1e-3 * np.array(robot.actuation.home_translation_mm)
     return -np.array([tube.length for tube in robot.tubes])  # all tips at the plate
+
+
+def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None:
+    """Adds the offsets that concern one run alone."""
+    for key, text in columns.choices.offsets.items():
+        joint, at, number = key.partition("@")
+        if not at:
+            continue
+        rows, kind = run == float(number), joint.rstrip("123456789")
+        tubes = slice(int(joint[-1]) - 1, int(joint[-1])) if joint != kind else slice(None)
+        if not rows.any() or not joints[kind][:, tubes].size:
+            raise InputError(Problem(f"there is no {joint} in a run {number}", field=f"--offset {key}"))
+        joints[kind][rows, tubes] += units.value(text, "length" if kind == "beta" else "angle", f"--offset {key}")
 
 
 def _runs(columns: Columns) -> Array:
