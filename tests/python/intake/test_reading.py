@@ -204,6 +204,13 @@ def test_no_log(log, refused, content, words):
     assert words in refused(log(content))
 
 
+def test_options_without_effect(log, lines, imported):
+    """A mend of what the log lacks is said to do nothing."""
+    _, said = imported(log("\n".join(lines)), "--flip", "force", "--invert-quaternion", "--mirror", "x")
+    assert "--flip force has no effect" in said and "--invert-quaternion has no effect" in said
+    assert "--mirror has" not in said
+
+
 def test_inputs_are_kept(log, lines, run, tmp_path):
     """An output never overwrites an input, by whatever name."""
     path = log("\n".join(lines))

@@ -13,6 +13,7 @@ from ctcr.intake.choices import Choices
 from ctcr.intake.columns import Columns
 from ctcr.intake.log import Log
 from ctcr.intake.motion import Motion
+from ctcr.intake.poses import Pose
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join, listed
 from ctcr.table import measurements
@@ -76,9 +77,28 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
         moved.rows,
         warnings=list(_doubts(columns, moved)),
     )
+    columns.notes += [
+        f"{option} has no effect here: there is no {what}" for option, what in _idle(columns, moving, pose)
+    ]
     if not columns.has("t"):
         columns.notes.append("no column of times: effects of speed and delay cannot be found")
     return Imported(table, moved.beta.shape[1], [columns] if joints is None else [columns, moving])
+
+
+def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tuple[str, str]]:
+    """Options that concern what the log lacks."""
+    choices, turned = columns.choices, pose is not None and pose.quaternion is not None
+    forces = any(moving.has(role) for role in (*motion.FORCE, "weight"))
+    for option, said, there, what in (
+        ("--flip force", "force" in choices.flip, forces, "force"),
+        ("--quaternion", choices.quaternion is not None, columns.has("qw"), "quaternion"),
+        ("--invert-quaternion", choices.invert_quaternion, turned, "rotation"),
+        ("--euler", choices.euler is not None, columns.has("rx"), "angle"),
+        ("--mirror", choices.mirror is not None, pose is not None, "position"),
+        ("--offset t", "t" in choices.offsets, columns.has("t"), "time"),
+    ):
+        if said and not there:
+            yield option, what
 
 
 def _check_joints(columns: Columns) -> None:

@@ -4,18 +4,27 @@ from dataclasses import dataclass, field
 
 from ctcr.errors import InputError, Problem
 from ctcr.intake import names
+from ctcr.intake.bodies import (
+    EULER,
+    GRID,
+    POSITION,
+    QUATERNION,
+    SEQUENCE,
+    TRANSLATION,
+    Candidate,
+    Roles,
+    has_position,
+    merged,
+    settled,
+)
 from ctcr.intake.choices import Choices
 from ctcr.intake.log import Log
-from ctcr.intake.names import INNER, MIDDLE, OUTER, Meaning
+from ctcr.intake.names import INNER, MIDDLE, OUTER
 from ctcr.intake.units import Unit
 from ctcr.show.wording import join, listed
 
 TIP_WORDS = {"tip", "sensor", "probe", "ee", "effector", "end", "tool", "distal"}
-POSITION, QUATERNION, EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("rx", "ry", "rz")
-SEQUENCE = tuple(f"m{i}" for i in range(1, 17))  # a 4 x 4 matrix as one list
-GRID = tuple(f"m{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 MOVING = ("beta", "alpha", "run", "fx", "fy", "fz", "weight")  # what a log of poses alone lacks
-TRANSLATION = ("m14", "m24", "m34")
 
 
 @dataclass(frozen=True)
@@ -34,18 +43,8 @@ class Mapping:
 
     used: dict[str, Used]
     n_tubes: int
-    markers: list[str]
-    sensor: str = ""
-    reference: str = ""
     guessed_order: bool = False  # of a quaternion
     notes: list[str] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class _Candidate:
-    column: int
-    name: str
-    meaning: Meaning
 
 
 def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> Mapping:
@@ -61,11 +60,11 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
     for i, name in enumerate(log.names):
         found = log.meanings[name] if name in log.meanings else names.meaning(name)
         if i not in taken and found and not (n_tubes == 0 and found.role in MOVING):
-            candidates.append(_Candidate(i, name, found))
+            candidates.append(Candidate(i, name, found))
     how = "format" if log.meanings else "name"
     picker = _Picker(log, how, faults)
     joints, n = _joints(candidates, explicit, choices, n_tubes, picker)
-    made = Mapping(joints | explicit, n, [])
+    made = Mapping(joints | explicit, n)
     for role in ("t", "nsec", "run", "fx", "fy", "fz", "weight"):
         same = [one for one in candidates if one.meaning.role == role]
         if role not in made.used and same:
@@ -84,7 +83,7 @@ class _Picker:
     def __init__(self, log: Log, how: str, faults: list[Problem]):
         self.log, self.how, self.faults = log, how, faults
 
-    def best(self, role: str, candidates: list[_Candidate]) -> Used:
+    def best(self, role: str, candidates: list[Candidate]) -> Used:
         ordered = sorted(candidates, key=lambda one: one.meaning.rank)
         first = ordered[0]
         equal = [one.name for one in ordered if one.meaning.rank == first.meaning.rank]
@@ -130,7 +129,7 @@ def _joints(candidates, explicit, choices: Choices, n_tubes: int | None, picker)
     found = max([*counted, *known, len(words)], default=0)
     n = n_tubes or found
     place = {INNER: 1, MIDDLE: 2, OUTER: n}
-    groups: dict[str, list[_Candidate]] = {}
+    groups: dict[str, list[Candidate]] = {}
     for one in joints:
         number = one.meaning.tube
         tube = place[number] if number < 0 else number + zero_based
@@ -143,84 +142,37 @@ def _joints(candidates, explicit, choices: Choices, n_tubes: int | None, picker)
     return made, found if n_tubes is None else n
 
 
-def _poses(made: Mapping, candidates: list[_Candidate], choices: Choices, picker: _Picker) -> None:
+def _poses(made: Mapping, candidates: list[Candidate], choices: Choices, picker: _Picker) -> None:
     """Columns of the sensor and, where it is asked for, of the reference marker."""
-    bodies: dict[str, dict[str, list[_Candidate]]] = {}
+    bodies: dict[str, Roles] = {}
     for one in candidates:
         role = one.meaning.role
         if role in POSITION + QUATERNION + EULER or role[0] in "omq" or role == "seen":
             bodies.setdefault(one.meaning.marker, {}).setdefault(role, []).append(one)
-    bodies = _merged(bodies)
-    placed = {name: _settled(roles) for name, roles in bodies.items() if _has_position(roles)}
-    made.markers = list(placed)
+    bodies = merged(bodies)
+    placed = {name: settled(roles) for name, roles in bodies.items() if has_position(roles)}
     given = {role for role in made.used if role in (*POSITION, *SEQUENCE, *TRANSLATION)}
     if given and choices.sensor is None:  # the user named its position: a single orientation may still be guessed
-        settled = [_settled(roles) for roles in bodies.values()]
-        turned = [roles for roles in settled if any(set(roles) >= set(kind) for kind in (QUATERNION, EULER, GRID))]
+        complete = [settled(roles) for roles in bodies.values()]
+        turned = [roles for roles in complete if any(set(roles) >= set(kind) for kind in (QUATERNION, EULER, GRID))]
         if len(turned) == 1:
             _take(made, "", turned[0], choices, picker)
         placed = placed if choices.relative_to else {}
     sensor = None if given and choices.sensor is None else _sensor(placed, choices.sensor, picker)
     if sensor is not None:
-        made.sensor = sensor
         _take(made, "", placed[sensor], choices, picker)
         if "seen" not in made.used and "seen" in bodies.get("", {}):
             made.used["seen"] = picker.best("seen", bodies[""]["seen"])
+    reference = None
     if choices.relative_to is not None:
         reference = _named(placed, choices.relative_to, "--relative-to", picker)
         if reference is not None:
-            made.reference = reference
             _take(made, "ref_", placed[reference], choices, picker)
     if sensor is not None and len(placed) > 1:
-        others = [name for name in placed if name not in (sensor, made.reference)]
+        others = [name for name in placed if name not in (sensor, reference)]
         if others:
-            hint = "" if made.reference else "; --relative-to NAME gives the sensor in the frame of one of them"
+            hint = "" if reference else "; --relative-to NAME gives the sensor in the frame of one of them"
             made.notes.append(f"other markers: {listed([name or '(no name)' for name in others])}{hint}")
-
-
-def _merged(bodies):
-    """Positions and orientations under different names are one body where there is one of each."""
-    placed = [name for name, roles in bodies.items() if _has_position(roles)]
-    turned = [name for name, roles in bodies.items() if name not in placed and any(r[0] in "oqrm" for r in roles)]
-    if len(placed) == 1 and len(turned) == 1:
-        return {placed[0]: bodies[turned[0]] | bodies[placed[0]]}
-    return bodies
-
-
-def _has_position(roles) -> bool:
-    return set(roles) >= set(POSITION) or _matrix_roles(roles) is not None
-
-
-def _matrix_roles(roles) -> dict[str, str] | None:
-    """Roles of a complete matrix: role as named -> role."""
-    for first in (1, 0):
-        if all(f"m{i}" in roles for i in range(first, first + 16)):
-            return {f"m{i + first - 1}": f"m{i}" for i in range(1, 17)}
-        place = {f"m{i + first}{j + first}": f"m{i + 1}{j + 1}" for i in range(3) for j in range(4)}
-        if all(name in roles for name in place):
-            return place
-    return None
-
-
-def _settled(roles: dict[str, list[_Candidate]]) -> dict[str, list[_Candidate]]:
-    """The roles of one body, with orientations told apart by which there are."""
-    made = {role: roles[role] for role in (*POSITION, *QUATERNION, *EULER, "seen") if role in roles}
-    if "ox" in roles:
-        target = "q" if "ow" in roles or "qw" in roles else "r"
-        made |= {f"{target}{axis}": roles[f"o{axis}"] for axis in "wxyz" if f"o{axis}" in roles}
-    elif "ow" in roles:
-        made["qw"] = roles["ow"]
-    if "qw" not in made and "q0" in roles and "qx" in made:  # as NDI names them
-        made["qw"] = roles["q0"]
-    for first in (0, 1):
-        if not set(QUATERNION) & set(made) and all(f"q{i}" in roles for i in range(first, first + 4)):
-            made |= {role: roles[f"q{i}"] for i, role in enumerate(QUATERNION, start=first)}
-            made["numbered"] = roles[f"q{first}"]
-    if matrix := _matrix_roles(roles):
-        made |= {role: roles[name] for name, role in matrix.items()}
-    elif all(f"m{i}{j}" in roles for i in (1, 2, 3) for j in (1, 2, 3)):
-        made |= {role: roles[role] for role in GRID}
-    return made
 
 
 def _sensor(placed, asked: str | None, picker: _Picker) -> str | None:
@@ -250,7 +202,7 @@ def _named(placed, asked: str, option: str, picker: _Picker) -> str | None:
     return None
 
 
-def _take(made: Mapping, prefix: str, roles: dict[str, list[_Candidate]], choices: Choices, picker: _Picker) -> None:
+def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _Picker) -> None:
     """Gives one body's columns their roles; one orientation is enough."""
     matrix = [role for role in roles if role[0] == "m"]
     quaternion = set(roles) >= set(QUATERNION)

@@ -6,8 +6,8 @@ from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem
 from ctcr.frames import conjugate
 from ctcr.intake import fields, poses, units
+from ctcr.intake.bodies import EULER, GRID, POSITION, QUATERNION, SEQUENCE, TRANSLATION
 from ctcr.intake.columns import Columns, angle_unit, length_unit
-from ctcr.intake.mapping import EULER, GRID, POSITION, QUATERNION, SEQUENCE, TRANSLATION
 from ctcr.intake.motion import row_ranges
 from ctcr.intake.poses import Pose
 

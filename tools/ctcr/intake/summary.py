@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ctcr.intake.bodies import EULER, GRID, SEQUENCE, TRANSLATION
 from ctcr.intake.choices import Choices, grouped
 from ctcr.intake.columns import Columns
-from ctcr.intake.mapping import EULER, GRID, SEQUENCE, TRANSLATION
 from ctcr.intake.sensor import MATRIX
 from ctcr.table import measurements
 
