@@ -111,6 +111,11 @@ def test_mat(truth, tmp_path, imported, same, refused):
     table, said = imported(path, "--unit", "alpha=rad")
     same(table)
     assert "MATLAB" in said
+    vectors = {"t": truth.t, "beta": truth.beta, "alpha": truth.alpha, "tip_pos": truth.position.T}
+    savemat(path, vectors | {"quat": truth.rotation.as_quat(), "force": truth.force})
+    table, _ = imported(path, "--quaternion", "xyzw")
+    same(table, force=True)
+    assert "--quaternion" in refused(path)
     path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
     assert "-v7" in refused(path)
     path.write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))

@@ -183,6 +183,7 @@ def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
         (["--sensor", "tip"], "fits none"),
         (["--translation", "from-flush"], "--robot"),
         (["--home-mm", "1,2,3", "--translation", "from-home"], "needs 2"),
+        (["--home-mm", "1,2"], "needs --translation"),
         (["--unit", "alpha"], "NAME=VALUE"),
     ],
 )
@@ -202,6 +203,13 @@ def test_faulty_options(log, lines, refused, options, words):
 )
 def test_no_log(log, refused, content, words):
     assert words in refused(log(content))
+
+
+def test_time_in_doubt(truth, log, imported):
+    """Times without a unit that would make a log very slow are a question; with a unit they are none."""
+    path = log(text(NAMES, [25.0 * np.arange(24), truth.beta, truth.alpha, truth.position]))
+    assert "if these are ms, say --unit t=ms" in imported(path)[1]
+    assert "Doubt" not in imported(path, "--unit", "t=ms")[1]
 
 
 def test_options_without_effect(log, lines, imported):

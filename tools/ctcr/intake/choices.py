@@ -110,6 +110,8 @@ class Choices:
         ):
             if value is not None and value not in known:
                 yield option, f"{value} is not known: {', '.join(known)}"
+        if self.home_mm is not None and self.translation in (None, "beta"):
+            yield "home-mm", "needs --translation from-home or from-flush: what does the log measure from there?"
         if self.euler is not None and not re.fullmatch(r"(?!.*(.)\1)([XYZ]{3}|[xyz]{3})", self.euler):
             yield "euler", f"{self.euler} is no sequence of axes: such as ZYX (moving axes) or zyx (fixed axes)"
 

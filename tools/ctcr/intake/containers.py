@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from collections import Counter
 from collections.abc import Iterator
 from importlib import import_module
@@ -16,6 +17,8 @@ from ctcr.errors import InputError, Problem
 from ctcr.intake.log import Log
 
 MAT5, HDF5, MCAP = b"MATLAB 5.0", b"MATLAB 7.3", b"\x89MCAP0\r\n"
+_VECTORS = {"pos", "position", "positions", "p", "xyz", "tip", "sensor", "force", "f", "translation", "x"}
+_TURNS = {"rpy", "euler", "angles", "angle", "rot", "rotation", "orientation", "joint", "joints", "tube", "tubes"}
 _OURS = ("/joints", "/measurements")
 
 
@@ -58,7 +61,7 @@ def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _columns(name: str, array: Any, length: int) -> Iterator[tuple[str, list[str] | Array]]:
-    """One column, or the columns 1, 2, ... of a matrix; matrices along the third axis are read row by row."""
+    """One column, or those of a matrix: 1, 2, ..., or x, y, z of vectors; matrices along the third axis by rows."""
     if array.ndim == 3 and array.shape[2] == length and array.shape[0] in (3, 4):
         for i, row in enumerate(array, start=1):
             for j, values in enumerate(row, start=1):
@@ -72,9 +75,11 @@ def _columns(name: str, array: Any, length: int) -> Iterator[tuple[str, list[str
         yield name, array
     else:
         matrix = array if array.shape[0] == length else array.T
-        single = matrix.shape[1] == 1
-        for i in range(matrix.shape[1]):
-            yield (name if single else f"{name}_{i + 1}"), matrix[:, i]
+        words = set(re.findall(r"[a-z]+", name.lower()))
+        vector = matrix.shape[1] == 3 and words & _VECTORS and not words & _TURNS
+        labels = list("xyz") if vector else range(1, matrix.shape[1] + 1)
+        for label, column in zip(labels, matrix.T, strict=True):
+            yield (name if matrix.shape[1] == 1 else f"{name}_{label}"), column
 
 
 def read_mcap(path: Path, content: bytes) -> Log:

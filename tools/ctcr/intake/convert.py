@@ -20,7 +20,7 @@ from ctcr.table import measurements
 from ctcr.table.csv_table import Faults
 from ctcr.table.measurements import Measurements
 
-SLOW_S = 5.0  # between readings, where no unit of time is stated: perhaps milliseconds
+SLOW_S = 1.0  # between readings, where no unit of time is stated: perhaps milliseconds
 
 
 @dataclass
