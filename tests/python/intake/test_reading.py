@@ -142,6 +142,7 @@ def test_mapping_survives_its_file(tmp_path):
         columns={"beta1": 'a "quoted" \\ name: #1', "y": "no", "t": "1e3", "x": "tab\there", "z": " é𝛼"},
         units={"alpha": "0.1deg"},
         home_mm=[-1.5, -2.0],
+        translation="from-home",
         missing=["null", "~"],
         flip=["alpha2"],
         invert_quaternion=True,
