@@ -261,7 +261,7 @@ def test_names(name, role, tube, unit):
     assert (found.role, found.tube, found.unit and found.unit.text) == (role, tube, unit)
 
 
-@pytest.mark.parametrize("name", ["index", "Unnamed: 0", "temperature", "current_1_A", "alpha1_vel", "", "#3"])
+@pytest.mark.parametrize("name", ["index", "Unnamed: 0", "current_1_A", "alpha1_vel", "", "#3", "rot_360"])
 def test_names_of_nothing(name):
     assert meaning(name) is None
 

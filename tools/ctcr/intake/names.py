@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from ctcr.intake.units import Unit, named
 
+LARGEST = 9  # number of a tube: a larger one counts something else
 INNER, MIDDLE, OUTER = -3, -2, -1  # numbers of tubes that a name gives as a word
 
 _GREEK = {"α": "alpha", "β": "beta", "θ": "theta", "φ": "phi", "ψ": "psi", "ρ": "rho"}
@@ -181,7 +182,7 @@ def _joint(words: list[str]) -> Found:
     numbers = [int(word) for word in words if word.isdigit()] + [_WORDS[word] for word in words if word in _WORDS]
     rest = [word for word in words if not word.isdigit() and word not in _WORDS]
     kinds = {"beta": [w for w in rest if w in _BETA], "alpha": [w for w in rest if w in _ALPHA]}
-    if bool(kinds["beta"]) == bool(kinds["alpha"]) or len(numbers) > 1:
+    if bool(kinds["beta"]) == bool(kinds["alpha"]) or len(numbers) > 1 or max(numbers, default=0) > LARGEST:
         return None
     kind = "beta" if kinds["beta"] else "alpha"
     if not numbers and not set(kinds[kind]) & _STRONG:
