@@ -19,11 +19,11 @@ from pathlib import Path
 GROWTH = 0.03
 BASELINE = Path(__file__).with_name("instructions.json")
 REQUIRED = {  # instructions per step that must not be exceeded (3 tubes, AVX2)
-    "unloaded": 2000,
+    "unloaded": 2150,
     "unloaded_jacobian": 4500,
-    "loaded": 7000,
-    "loaded_jacobian": 12500,
-    "loaded_jacobian_compliance": 15000,
+    "loaded": 8050,
+    "loaded_jacobian": 13350,
+    "loaded_jacobian_compliance": 16500,
 }
 CASES = [*REQUIRED, *(f"step/{case}" for case in REQUIRED), "effects"]
 RIVALS = {case: f"rival/{case}" for case in REQUIRED} | {"effects": "rival/loaded_jacobian_compliance"}

@@ -1,4 +1,4 @@
-"""Feeds the two parsers with mutated files: whatever comes in, nothing but an InputError may come out.
+"""Feeds the parsers with mutated files: whatever comes in, nothing but an InputError may come out.
 
 python tests/fuzz/fuzz_parsers.py --seconds 10 [--seed 1]
 """
@@ -16,6 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from ctcr.errors import InputError
+from ctcr.intake.choices import Choices
+from ctcr.intake.convert import convert
+from ctcr.intake.reading import read
 from ctcr.model import parameters
 from ctcr.robot import robot_file
 from ctcr.table import csv_table, measurements
@@ -25,6 +28,12 @@ TABLE = b"""t_s,run,beta1_m,beta2_m,alpha1_rad,alpha2_rad,fx_N,fy_N,fz_N,x_m,y_m
 0,0,-0.3,-0.2,0.5,-2.25,0,-0,0,-0.06,-0.11,0.06,1,0,0,0
 0.5,0,-0.31,-0.2,.5e0,-2.5,0,0.1,0,,,,,,,
 ,1,-0.32,-0.21,1E-3,+2.75,0,0,0,-0.06,-0.11,0.06,0.5,-0.5,0.5,-0.5
+"""
+LOG = b"""Session 3;;
+Index;Time [ms];Run;Ext1 [mm];Ext2 [mm];Rot1 [deg];Rot2 [deg];X;Y;Z;q0;qx;qy;qz;State
+1;0;a;-124,4;-100,3;107,8;178,4;-128,7;-7,4;22,6;0,487;-0,027;0,237;0,839;OK
+2;25;a;-124,4;-100,3;105,2;175,2;MISSING;;;;;;;MISSING
+3;50;b;-124,5;-100,3;105,2;175,2;-124,4;-8,0;21,5;0,493;-0,026;0,230;0,838;OK
 """
 TOKENS = [
     *(b"", b" ", b"\n", b"\r\n", b"\r", b",", b",,", b";", b"\t", b"\0", b'"', b"'", b"#", b":", b"- ", b"? "),
@@ -98,7 +107,18 @@ def read_table(content: bytes) -> None:
         assert (np.isnan(norms) | (np.abs(norms - 1) < 1e-12)).all()
 
 
-PARSERS: list[tuple[Callable[[bytes], None], bytes]] = [(read_robot, ROBOT), (read_table, TABLE)]
+def read_log(content: bytes) -> None:
+    """Imports, and checks that the table says which rows of the log it holds."""
+    with tempfile.NamedTemporaryFile(suffix=".csv") as file:
+        file.write(content)
+        file.flush()
+        log = read(file.name)
+        table = convert(log, Choices()).table
+    assert len(table) == len(table.row) > 0 and set(table.row) <= set(log.rows)
+    assert np.isfinite(table.beta).all() and np.isfinite(table.alpha).all() and np.isfinite(table.force).all()
+
+
+PARSERS: list[tuple[Callable[[bytes], None], bytes]] = [(read_robot, ROBOT), (read_table, TABLE), (read_log, LOG)]
 
 
 def fuzz(parser: Callable[[bytes], None], seed_file: bytes, source: random.Random, seconds: float) -> tuple[int, int]:

@@ -12,6 +12,8 @@ from ctcr import commands
 from ctcr.show.wording import visible
 
 STOPPED = 130  # exit code after Ctrl+C: 128 + SIGINT, as shells have it
+FORMATS = "docs/formats.md draws frames, angles and signs and lists every field and column."
+FILES = {"robot", "measurements", "table", "tables", "log", "example"}  # arguments and options that name such files
 
 
 class LazyGroup(click.Group):
@@ -23,7 +25,12 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.list_commands(ctx):
             return None
-        return import_module(f"ctcr.commands.{cmd_name}").command
+        command = import_module(f"ctcr.commands.{cmd_name}").command
+        of_group = command.commands.values() if isinstance(command, click.Group) else ()
+        for one in (command, *of_group):
+            if FILES & {parameter.name for parameter in one.params}:
+                one.epilog = FORMATS
+        return command
 
 
 def _version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:

@@ -285,6 +285,13 @@ def test_options_meet_the_function(command):
     inspect.signature(function).bind(**dict.fromkeys(given))
 
 
+def test_help_points_to_the_formats(run):
+    """Commands that read a robot or a table, those of groups too, say where their files are described."""
+    for words in (["compare"], ["import"], ["init"], ["calibrate", "fit"]):
+        assert "docs/formats.md" in run(*words, "--help")[1]
+    assert (ROOT / "docs" / "formats.md").exists()
+
+
 @pytest.mark.parametrize(
     ("path", "command"), [pytest.param(path, found, id=" ".join(path)) for path, found in commands()]
 )

@@ -22,7 +22,7 @@ def fuzzer():
 
 def test_a_planted_bug_of_the_table_is_found(fuzzer, monkeypatch):
     """A check that does not survive an empty field."""
-    monkeypatch.setattr(measurements, "_check", lambda name, block, *_: [int(value) for value in block.ravel()])
+    monkeypatch.setattr(measurements, "check", lambda name, block, *_: [int(value) for value in block.ravel()])
     with pytest.raises(AssertionError, match="read_table let out ValueError"):
         fuzzer.fuzz(fuzzer.read_table, fuzzer.TABLE, random.Random(1), ENOUGH_S)
 

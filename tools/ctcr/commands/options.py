@@ -24,9 +24,9 @@ class File(click.ParamType):
         self.written = written
 
     def convert(self, value, param, ctx):
-        path = os.path.realpath(value)
-        if ctx and value != "-" and (os.path.isfile(path) or not os.path.exists(path)):  # not /dev/null
-            first, written = ctx.meta.setdefault("ctcr.files", {}).setdefault(path, (param, self.written))
+        if ctx and value != "-" and (os.path.isfile(value) or not os.path.exists(value)):  # not /dev/null
+            same = (os.stat(value).st_dev, os.stat(value).st_ino) if os.path.exists(value) else os.path.realpath(value)
+            first, written = ctx.meta.setdefault("ctcr.files", {}).setdefault(same, (param, self.written))
             if first is not param and (written or self.written):
                 named, other = (one.get_error_hint(ctx) for one in (param, first))
                 or_else = ", or --in-place to change it" if "in_place" in (p.name for p in ctx.command.params) else ""

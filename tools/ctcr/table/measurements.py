@@ -91,7 +91,7 @@ def load(path: str | Path, n_tubes: int) -> Measurements:
         for rows, numbers, size in table.blocks(faults):
             for name, columns in groups.items():
                 data[name][rows - 2] = numbers[:, columns]
-                _check(name, numbers[:, columns], rows, [table.columns[i] for i in columns], faults)
+                check(name, numbers[:, columns], rows, [table.columns[i] for i in columns], faults)
             progress.advance(size)
     faults.raise_any()
     return _measurements(data, table)
@@ -154,8 +154,8 @@ def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tub
             yield from ((column, f"this column is missing: {reason}") for column in absent)
 
 
-def _check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults) -> None:
-    """Faults in the values (rows, columns) of one group."""
+def check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults) -> None:
+    """Faults in the values (rows, columns) of one group of `group_columns`; `columns` are their names in messages."""
     quantity = QUANTITIES.get(name)
     needs = f": needs a number in {quantity.unit}" if quantity else ""
     for column, values in zip(columns, block.T, strict=True):

@@ -1,0 +1,177 @@
+"""Logs with the habits of different laboratories hold, once imported, what was written into them."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+from ctcr.frames import conjugate
+from lab_logs import text
+from scipy.spatial.transform import Rotation
+
+
+def test_matlab(truth, log, imported, same):
+    """Milliseconds, degrees, millimetres of travel from flush tips, numbered quaternions, NaN, an index column."""
+    names = ["", "Time_ms", "Trial", "Ext1_mm", "Ext2_mm", "Rot1_deg", "Rot2_deg", "X_mm", "Y_mm", "Z_mm"]
+    names += ["q0", "q1", "q2", "q3"]
+    poses = np.hstack([1e3 * truth.position, truth.quaternion])
+    poses[5] = np.nan
+    joints = [1e3 * truth.travel, np.rad2deg(truth.alpha)]
+    content = text(names, [np.arange(24), 1e3 * truth.t, truth.run, *joints, poses])
+    table, said = imported(log(content), "--translation", "from-flush", "--home-mm", "-300,-200")
+    kept = np.delete(np.arange(24), 5)
+    assert np.isnan(table.positions[5]).all() and np.isnan(table.quaternions[5]).all()
+    np.testing.assert_allclose(table.t, truth.t, atol=1e-9)
+    for name in ("t", "beta", "alpha", "position", "quaternion", "run"):
+        assert len(getattr(table, name)) == 24
+
+    fields = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+    same(replace(table, **{name: getattr(table, name)[kept] for name in fields}), kept, run=True)
+    assert "1 row (7)" in said and "taken as w, x, y, z" in said
+
+
+def test_labview(truth, log, imported, same):
+    """Semicolons, decimal commas, a BOM, status lines, a row of units, the outermost tube first, a comma at the end."""
+    head = "Messung 12;;;\nDate;27.11.2026;;\n\n"
+    names = ["Time", "Tube 1 trans", "Tube 2 trans", "Tube 1 rot", "Tube 2 rot", "Px", "Py", "Pz", "Comment"]
+    units = ["[s]", "[mm]", "[mm]", "[°]", "[°]", "[mm]", "[mm]", "[mm]", ""]
+    columns = [truth.t, 1e3 * truth.beta[:, ::-1], np.rad2deg(truth.alpha[:, ::-1]), 1e3 * truth.position, ["ok"] * 24]
+    body = text(names, columns, ";", ",").split("\n")
+    content = head + "\n".join([body[0] + ";", ";".join(units) + ";", *(line + ";" for line in body[1:-1])]) + "\n"
+    table, said = imported(log(content, encoding="utf-8-sig"), "--order", "outermost-first")
+    same(table, orientation=False)
+    assert "decimal commas" in said and "Comment" in said
+
+
+def test_ros(truth, log, imported, same):
+    """Nanoseconds since 1970 with all digits, poses of tip and base side by side, the scalar of quaternions last."""
+    stamp = 1_790_000_000_123_456_789
+    base = Rotation.from_euler("xyz", [0.3, -0.2, 0.9])
+    turned = base * truth.rotation
+    places = base.apply(truth.position) + [1.0, 2.0, 0.5]
+    names = ["%time", "field.joints.beta1", "field.joints.beta2", "field.joints.alpha1", "field.joints.alpha2"]
+    names += [f"field.{marker}.pose.position.{axis}" for marker in ("tip", "base") for axis in "xyz"]
+    names += [f"field.{marker}.pose.orientation.{axis}" for marker in ("tip", "base") for axis in "xyzw"]
+    fixed = [np.tile([1.0, 2.0, 0.5], (24, 1)), np.tile(base.as_quat(), (24, 1))]
+    times = [str(stamp + round(1e9 * t)) for t in truth.t]
+    content = text(names, [times, truth.beta, truth.alpha, places, fixed[0], turned.as_quat(), fixed[1]])
+    table, said = imported(log(content), "--relative-to", "base")
+    same(table)
+    assert str(stamp + round(1e9 * truth.t[0])) in said
+    alone, said = imported(log(content))
+    np.testing.assert_allclose(alone.position, places, atol=1e-9)
+    assert "--relative-to" in said
+
+
+def test_matrices(truth, log, imported, same):
+    """Spaces, no header, 4 x 4 matrices by rows or by columns, roles by their order."""
+    matrices = np.zeros((24, 4, 4))
+    matrices[:, :3, :3], matrices[:, :3, 3] = truth.rotation.as_matrix(), 1e3 * truth.position
+    matrices[:, 3, 3] = 1
+    for block in (matrices, np.swapaxes(matrices, 1, 2)):
+        content = text([], [truth.t, truth.beta, truth.alpha, block.reshape(24, 16)], " ")
+        roles = "t,beta1..beta2,alpha1..alpha2,m1..m16"
+        table, _ = imported(log(content, "log.txt"), "--columns", roles, "--unit", "alpha=rad")
+        same(table)
+
+
+def test_named_matrices(truth, log, imported, same):
+    names = ["t", "b1", "b2", "a1", "a2", *(f"T{i}{j}" for i in range(4) for j in range(4))]
+    matrices = np.tile(np.eye(4), (24, 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = truth.rotation.as_matrix(), truth.position
+    table, _ = imported(log(text(names, [truth.t, truth.beta, truth.alpha, matrices.reshape(24, 16)], "\t")))
+    same(table)
+
+
+def test_euler_angles(truth, log, imported, refused, same):
+    """Each sequence means what it means in scipy; without one there is no guess."""
+    names = ["time", "beta_1", "beta_2", "alpha_1", "alpha_2", "x", "y", "z", "rx", "ry", "rz"]
+    for sequence in ("ZYX", "xyz", "YXZ"):
+        angles = truth.rotation.as_euler(sequence, degrees=True)
+        ordered = angles[:, [sequence.lower().index(axis) for axis in "xyz"]]
+        path = log(text(names, [truth.t, truth.beta, truth.alpha, truth.position, ordered]))
+        table, _ = imported(path, "--euler", sequence)
+        same(table)
+    assert "--euler ZYX" in refused(path)
+    table, _ = imported(path, "--ignore", "rx,ry,rz")
+    assert table.quaternion is None
+
+
+def test_clocks(truth, log, imported, same):
+    """ISO times, dates of MATLAB, and a clock that passes midnight."""
+    start = datetime(2026, 11, 27, 23, 59, 59, 900_000)
+    moments = [start + timedelta(seconds=float(t)) for t in truth.t]
+    forms = [moment.isoformat() for moment in moments], [m.strftime("%d-%b-%Y %H:%M:%S.%f") for m in moments]
+    for times in (*forms, [moment.strftime("%H:%M:%S.%f") for moment in moments]):
+        names = ["Timestamp", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
+        table, said = imported(log(text(names, [list(times), truth.beta, truth.alpha, truth.position])))
+        same(table, orientation=False)
+        assert f"t_s = 0 is {times[0]}" in said
+
+
+def test_forces(truth, log, imported, same):
+    """Millinewtons of the reaction."""
+    names = ["t", "beta1", "beta2", "alpha1", "alpha2", "Fx [mN]", "Fy [mN]", "Fz [mN]", "x", "y", "z"]
+    content = text(names, [truth.t, truth.beta, truth.alpha, -1e3 * truth.force, truth.position])
+    table, _ = imported(log(content), "--flip", "force")
+    same(table, force=True, orientation=False)
+
+
+def test_weights(truth, log, imported, refused, run, tmp_path):
+    """Grams hung at the tip pull along gravity."""
+    names = ["t", "beta1", "beta2", "alpha1", "alpha2", "Load (g)", "x", "y", "z"]
+    grams = np.arange(24.0)
+    path, robot = log(text(names, [truth.t, truth.beta, truth.alpha, grams, truth.position])), tmp_path / "robot.yaml"
+    assert "--robot" in refused(path)
+    assert run("init", "-o", robot, "--example", 2, "--gravity", "-y")[0] == 0
+    table, _ = imported(path, "--robot", robot)
+    np.testing.assert_allclose(table.force, np.outer(grams, [0, -9.80665e-3, 0]), atol=1e-12)
+
+
+def test_seconds_and_nanoseconds(truth, log, imported):
+    """Stamps of ROS in two columns."""
+    names = ["stamp.secs", "stamp.nsecs", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
+    whole = 1_790_000_000_900_000_000 + np.round(1e9 * truth.t).astype(int)
+    parts = [[str(v // 10**9) for v in whole], [str(v % 10**9) for v in whole]]
+    table, _ = imported(log(text(names, [*parts, truth.beta, truth.alpha, truth.position])))
+    np.testing.assert_allclose(table.t, truth.t - truth.t[0], atol=2e-9)
+
+
+def test_mends_of_our_own_table(truth, log, imported, same):
+    """Each mend of a convention undoes it on a table of our own format."""
+    names = "t_s,run,beta1_m,beta2_m,alpha1_rad,alpha2_rad,fx_N,fy_N,fz_N,x_m,y_m,z_m,qw,qx,qy,qz".split(",")
+    right = {"t": truth.t, "run": truth.run, "beta": truth.beta, "alpha": truth.alpha, "force": truth.force}
+    right |= {"position": truth.position, "quaternion": truth.quaternion}
+    one, flipped = np.array([1.0, -1.0]), truth.position * [1, -1, 1]
+    quarter = np.array([0.0, np.pi / 2])
+    wrong = {
+        "--flip alpha2": {"alpha": truth.alpha * one},
+        "--flip alpha": {"alpha": -truth.alpha},
+        "--unit alpha=deg": {"alpha": np.rad2deg(truth.alpha)},
+        "--unit alpha1=deg": {"alpha": np.column_stack([np.rad2deg(truth.alpha[:, 0]), truth.alpha[:, 1]])},
+        "--unit position=mm": {"position": 1e3 * truth.position},
+        "--unit t=ms": {"t": 1e3 * truth.t},
+        "--quaternion xyzw": {"quaternion": np.roll(truth.quaternion, -1, axis=1)},
+        "--invert-quaternion": {"quaternion": conjugate(truth.quaternion)},
+        "--flip force": {"force": -truth.force},
+        "--order outermost-first": {"beta": truth.beta[:, ::-1], "alpha": truth.alpha[:, ::-1]},
+        "--offset alpha2=90deg": {"alpha": truth.alpha - quarter},
+        "--offset alpha2@1=90deg": {"alpha": truth.alpha - np.outer(truth.run == 1, quarter)},
+        "--mirror y": {"position": flipped, "quaternion": truth.quaternion * [1, -1, 1, -1]},
+    }
+    for options, columns in wrong.items():
+        table, said = imported(log(text(names, (right | columns).values())), *options.split())
+        same(table, force=True, run=True)
+        np.testing.assert_allclose(table.t, truth.t, atol=1e-9)
+        assert "our format" in said
+
+
+def test_mirror_is_a_reflection(truth):
+    """The rotation of the mirrored frame is M R M."""
+    from ctcr.intake.poses import Pose, mirrored
+
+    for k, axis in enumerate("xyz"):
+        turned = mirrored(Pose(truth.position, truth.quaternion), axis)
+        m = np.diag(np.where(np.arange(3) == k, -1.0, 1.0))
+        expected = m @ truth.rotation.as_matrix() @ m
+        np.testing.assert_allclose(Rotation.from_quat(np.roll(turned.quaternion, -1, axis=1)).as_matrix(), expected)
+        np.testing.assert_allclose(turned.position, truth.position @ m)

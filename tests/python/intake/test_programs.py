@@ -1,0 +1,151 @@
+"""Exports of other programs: NDI ToolBox, OptiTrack Motive, MATLAB, MCAP; poses and joints in two logs."""
+
+import json
+
+import numpy as np
+import pytest
+from ctcr.table import measurements
+from lab_logs import text
+from scipy.io import savemat
+
+JOINTS = ["t", "run", "beta1", "beta2", "alpha1", "alpha2"]
+NDI_MISSING = ["-3.697314E28"] * 7
+
+
+@pytest.fixture
+def joints(truth, log):
+    """The log of the joints beside a tracker's, whose rows also lie before and after it."""
+    t = np.concatenate([[truth.t[0] - 1], truth.t, [truth.t[-1] + 1]])
+    columns = [truth.run[[0, *range(24), 23]], truth.beta[[0, *range(24), 23]], truth.alpha[[0, *range(24), 23]]]
+    return log(text(JOINTS, [t, *columns]), "joints.csv")
+
+
+def ndi(truth, rotation: str) -> str:
+    """Two tools; the second is the one at the tip, which is not seen in the fourth row."""
+    group = {"quaternion": ["Q0", "Qx", "Qy", "Qz"], "euler": ["Rz", "Ry", "Rx"]}[rotation]
+    marks = ["State", "Tx", "Ty", "Tz"]
+    head = ["Tools"]
+    for port in ("Port 0x01: Reference  s/n:1", "Port 0x02: Tip  s/n:2"):
+        head += [port, "Frame", "Time [sec]", "Face", "State", *group, "Tx", "Ty", "Tz", "Error", "Markers", *marks]
+    turn = truth.quaternion if rotation == "quaternion" else truth.rotation.as_euler("ZYX", degrees=True)
+    lines = [",".join(head)]
+    for i, (t, place) in enumerate(zip(truth.t, 1e3 * truth.position, strict=True)):
+        still = ["1", "0", "0", "0"] if rotation == "quaternion" else ["0", "0", "0"]
+        pose = [*(f"{v:.12g}" for v in (*turn[i], *place)), "0.1"]
+        pose = pose if i != 3 else [*NDI_MISSING[: len(pose) - 1], "0"]
+        state = "OK" if i != 3 else "Partially Out Of Volume"
+        row = ["2", "Port 0x01", str(i), f"{t}", "0", "OK", *still, "1", "2", "3", "0.1", "1", "OK", "1", "2", "3"]
+        row += ["Port 0x02", str(i), f"{t}", "0", state, *pose, "1", "OK", "7", "8", "9"]
+        lines.append(",".join(row))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("rotation", ["quaternion", "euler"])
+def test_ndi_toolbox(truth, log, joints, imported, rotation):
+    table, said = imported(log(ndi(truth, rotation)), "--joints", joints, "--sensor", "tip")
+    seen = np.arange(24) != 3
+    np.testing.assert_allclose(table.position[seen], truth.position[seen], atol=1e-9)
+    cosine = np.abs(np.sum(table.quaternion * truth.quaternion, axis=1))
+    np.testing.assert_allclose(cosine[seen], 1, atol=1e-9)
+    assert np.isnan(table.position[3]).all() and np.isnan(table.quaternion[3]).all()
+    np.testing.assert_allclose(table.beta, truth.beta, atol=1e-9)
+    np.testing.assert_allclose(table.alpha, truth.alpha, atol=1e-9)
+    np.testing.assert_array_equal(table.run, truth.run)
+    assert "NDI ToolBox" in said and "1 row (5)" in said
+
+
+def test_ndi_needs_joints_and_a_tool(truth, log, joints, refused):
+    path = log(ndi(truth, "quaternion"))
+    assert "holds no joints: give their log with --joints" in refused(path, "--sensor", "tip")
+    assert "Reference s/n:1" in (error := refused(path, "--joints", joints, "--sensor", "0x0")) and "--sensor" in error
+
+
+@pytest.mark.parametrize("length", [("Meters", 1.0), ("Millimeters", 1e3)])
+def test_motive(truth, log, joints, imported, length):
+    """Header rows of types, names and properties; solved markers of the body are no bodies; empty where not seen."""
+    unit, factor = length
+    head = f"Format Version,1.23,Take Name,take,Capture Frame Rate,120.0,Rotation Type,Quaternion,Length Units,{unit}\n"
+    head += "\n" + ",".join(["", "Type", *["Rigid Body"] * 8, *["Rigid Body Marker"] * 3]) + "\n"
+    head += ",".join(["", "Name", *["Tip"] * 8, *["Tip:Marker1"] * 3]) + "\n"
+    head += ",".join(["", "ID", *["A1"] * 11]) + "\n"
+    head += ",".join(["", "", *["Rotation"] * 4, *["Position"] * 3, "Mean Marker Error", *["Position"] * 3]) + "\n"
+    names = ["Frame", "Time (Seconds)", *"XYZWXYZ", "", *"XYZ"]
+    poses = np.hstack(
+        [truth.rotation.as_quat(), factor * truth.position, np.zeros((24, 1)), factor * truth.position + 1]
+    )
+    rows = text(names, [np.arange(24), truth.t, poses]).split("\n")
+    rows[8] = ",".join([*rows[8].split(",")[:2], *[""] * 11])
+    table, said = imported(log(head + "\n".join(rows)), "--joints", joints)
+    seen = np.arange(24) != 7
+    np.testing.assert_allclose(table.position[seen], truth.position[seen], atol=1e-9)
+    np.testing.assert_allclose(np.abs(np.sum(table.quaternion * truth.quaternion, axis=1))[seen], 1, atol=1e-9)
+    assert np.isnan(table.position[7]).all()
+    np.testing.assert_allclose(table.beta, truth.beta, atol=1e-9)
+    assert "OptiTrack Motive" in said
+
+
+def test_joints_between_their_rows(truth, log, imported, refused):
+    """Joints move in straight lines between the rows of their log; poses outside its times are dropped."""
+    t = np.array([0.0, 1.0, 3.0])
+    beta, alpha = np.array([[-0.3, -0.2], [-0.2, -0.1], [-0.2, -0.1]]), np.array([[0.0, 1.0], [1.0, 1.0], [-1.0, 1.0]])
+    joint_log = log(text(["t", *JOINTS[2:]], [t, beta, alpha]), "joints.csv")
+    times = np.array([-0.5, 0.25, 1.0, 2.0, 3.5])
+    poses = log(text(["t", "x", "y", "z"], [times, truth.position[:5]]))
+    table, said = imported(poses, "--joints", joint_log)
+    np.testing.assert_allclose(table.beta, [[-0.275, -0.175], [-0.2, -0.1], [-0.2, -0.1]])
+    np.testing.assert_allclose(table.alpha[:, 0], [0.25, 1.0, 0.0], atol=1e-12)
+    assert "2 rows (2, 6)" in said
+    moved, _ = imported(poses, "--joints", joint_log, "--offset", "t=0.5s")
+    np.testing.assert_allclose(moved.alpha[:, 0], [0.0, 0.75, 0.5, -0.5], atol=1e-12)
+    late = log(text(["t", "x", "y", "z"], [times + 100, truth.position[:5]]))
+    assert "--offset t=" in refused(late, "--joints", joint_log)
+
+
+def test_mat(truth, tmp_path, imported, same, refused):
+    """A structure of matrices, of other variables too; 4 x 4 matrices along the third axis."""
+    path = tmp_path / "log.mat"
+    matrices = np.tile(np.eye(4), (24, 1, 1))
+    matrices[:, :3, :3], matrices[:, :3, 3] = truth.rotation.as_matrix(), truth.position
+    data = {"time": truth.t, "beta": 1e3 * truth.beta, "alpha": truth.alpha, "T": np.moveaxis(matrices, 0, 2)}
+    savemat(path, {"log": data, "gain": 3.0, "notes": "first try"})
+    table, said = imported(path, "--unit", "alpha=rad")
+    same(table)
+    assert "MATLAB" in said
+    vectors = {"t": truth.t, "beta": truth.beta, "alpha": truth.alpha, "tip_pos": truth.position.T}
+    savemat(path, vectors | {"quat": truth.rotation.as_quat(), "force": truth.force})
+    table, _ = imported(path, "--quaternion", "xyzw")
+    same(table, force=True)
+    assert "--quaternion" in refused(path)
+    path.write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
+    assert "-v7" in refused(path)
+    path.write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
+    assert "damaged" in refused(path) or "no arrays" in refused(path)
+
+
+def test_mcap(truth, tmp_path, imported, same):
+    """Our own export: joints and measurements on two channels, null for what was not measured."""
+    writer_of = pytest.importorskip("mcap.writer", reason="mcap is not installed").Writer
+    path = tmp_path / "recording.mcap"
+    groups = measurements.group_columns(2)
+    channels = {
+        "/joints": ("t", "run", "beta", "alpha"),
+        "/measurements": ("t", "run", "force", "position", "quaternion"),
+    }
+    with open(path, "wb") as file:
+        writer = writer_of(file)
+        writer.start()
+        for topic, names in {**channels, "/reference": ("t",)}.items():
+            channel = writer.register_channel(topic, "json", 0)
+            values = np.column_stack([getattr(truth, name) for name in names])
+            keys = [column for name in names for column in groups[name]]
+            for row in values:
+                message = dict(zip(keys, row.tolist(), strict=True))
+                if "x_m" in message and row[0] == truth.t[2]:
+                    message |= dict.fromkeys(groups["position"] + groups["quaternion"])
+                time = round(1e9 * row[0])
+                writer.add_message(channel, time, json.dumps(message).encode(), time)
+        writer.finish()
+    table, said = imported(path)
+    assert np.isnan(table.position[2]).all() and "/reference" in said
+    table.position[2], table.quaternion[2] = truth.position[2], truth.quaternion[2]
+    same(table, run=True, force=True)

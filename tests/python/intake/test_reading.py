@@ -1,0 +1,274 @@
+"""What is tolerated, what is said, what is refused."""
+
+import json
+
+import lab_logs
+import numpy as np
+import pytest
+from ctcr.intake import choices
+from ctcr.intake.names import meaning
+from lab_logs import text
+
+NAMES = ["t", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
+
+
+@pytest.fixture
+def lines(truth):
+    """The header and 24 rows of a plain log."""
+    return text(NAMES, [truth.t, truth.beta, truth.alpha, truth.position]).split("\n")[:-1]
+
+
+def test_tolerated(log, lines, imported, same):
+    """Blank lines, comments, a header repeated, a last row cut off: passed over, and said with their rows."""
+    messy = ["# robot 3", "", *lines[:5], "", "# pause", lines[0], *lines[5:], lines[-1][:20]]
+    table, said = imported(log("\r\n".join(messy)))
+    same(table, orientation=False)
+    for words in ("row 9: a comment", "row 10: the header again", f"row {len(messy)}: cut off"):
+        assert words in said
+
+
+def test_faults_at_once(log, lines, refused):
+    """Rows that do not fit are faults with their numbers, all of a kind at once."""
+    short = [*lines]
+    short[3], short[7] = "1,2,3", lines[7] + ",9,9"
+    error = refused(log("\n".join(short)))
+    assert "row 4: has 3 fields" in error and "row 8: has 10 fields" in error
+    words = [*lines]
+    words[4] = words[4].replace(words[4].split(",")[1], "oops", 1)
+    words[6] = ",".join([*words[6].split(",")[:5], "what", *words[6].split(",")[6:]])
+    error = refused(log("\n".join(words)))
+    assert "row 5, beta1: 'oops' is not a number" in error and "row 7, x: 'what'" in error and "--missing" in error
+
+
+def test_missing(truth, log, lines, imported):
+    """Words and numbers for missing: the pose is left empty; without joints the row is dropped; both are said."""
+    for word in ("MISSING", "NaN", "", "-3.697314E28", "0", "none", "1e30", "gone"):
+        changed = [*lines]
+        changed[5] = ",".join([*lines[5].split(",")[:5], word, word, word])
+        changed[9] = ",".join([lines[9].split(",")[0], "NaN", *lines[9].split(",")[2:]])
+        table, said = imported(log("\n".join(changed)), "--missing", "gone")
+        assert np.isnan(table.position[4]).all() and np.isfinite(table.position).all(axis=1).sum() == 22
+        assert len(table) == 23 and "1 row (10): dropped" in said and "1 row (6): the pose is left empty" in said
+
+
+def test_identity_and_states(truth, log, imported):
+    """The identity at the origin is no reading; nor is one that a column of states calls invalid."""
+    names = [*NAMES, "qw", "qx", "qy", "qz", "visible"]
+    poses = np.hstack([truth.position, truth.quaternion])
+    poses[3] = [0, 0, 0, 1, 0, 0, 0]
+    visible = [str(int(i != 8)) for i in range(24)]
+    table, said = imported(log(text(names, [truth.t, truth.beta, truth.alpha, poses, visible])))
+    assert np.flatnonzero(np.isnan(table.position[:, 0])).tolist() == [3, 8]
+    assert "2 rows (5, 10)" in said
+
+
+def test_names_of_quaternions(truth, log, imported, same):
+    """Letters, numbers and words for the four columns, in any order of theirs."""
+    by_letter = dict(zip("wxyz", truth.quaternion.T, strict=True))
+    for w, x, y, z in (["qw", "qx", "qy", "qz"], ["q0", "qx", "qy", "qz"], ["quat_w", "quat_x", "quat_y", "quat_z"]):
+        turned = [by_letter[letter] for letter in "xyzw"]
+        names = [*NAMES, x, y, z, w]
+        table, _ = imported(log(text(names, [truth.t, truth.beta, truth.alpha, truth.position, *turned])))
+        same(table)
+
+
+def test_constant_rotation(truth, log, imported):
+    """A rotation that never changes was not measured."""
+    names = [*NAMES, "qw", "qx", "qy", "qz"]
+    still = np.tile([1.0, 0, 0, 0], (24, 1))
+    table, said = imported(log(text(names, [truth.t, truth.beta, truth.alpha, truth.position, still])))
+    assert table.quaternion is None and "never changes" in said
+
+
+def test_two_columns_for_one_thing(truth, log, refused, imported, same):
+    """Measured joints go before commanded ones; a real doubt is a question."""
+    both = ["t", "beta1_cmd", "beta2_cmd", *NAMES[1:]]
+    path = log(text(both, [truth.t, truth.beta + 1, truth.beta, truth.alpha, truth.position]))
+    table, said = imported(path)
+    same(table, orientation=False)
+    assert "beta1_cmd" in said
+    twice = ["t", "left_beta1", "right_beta1", *NAMES[2:]]
+    path = log(text(twice, [truth.t, truth.beta[:, :1], truth.beta, truth.alpha, truth.position]))
+    assert "--column beta1=" in refused(path)
+    table, _ = imported(path, "--column", "beta1=left_beta1")
+    same(table, orientation=False)
+
+
+def test_travel_is_asked_for(truth, log, refused):
+    """Positive translations are not guessed: the error names what they may be."""
+    error = refused(log(text(NAMES, [truth.t, truth.travel, truth.alpha, truth.position])))
+    assert "from-flush" in error and "--flip beta" in error and "row 2" in error
+
+
+def test_constant_joint(truth, log, imported, refused):
+    """A joint that never moves may be left out of a log, once that is said."""
+    names = ["t", "beta1", "alpha1", "alpha2", "x", "y", "z"]
+    path = log(text(names, [truth.t, truth.beta[:, 0], truth.alpha, truth.position]))
+    assert "--constant beta2=0mm" in refused(path)
+    table, _ = imported(path, "--constant", "beta2=-12mm")
+    np.testing.assert_allclose(table.beta[:, 1], -0.012)
+
+
+def test_mapping_for_the_next_log(truth, log, imported, same, tmp_path):
+    """What was said and guessed of one log reads the next, whose numbers would be guessed otherwise."""
+    names = ["Time_ms", "Ext1", "Ext2", "Rot1", "Rot2", "X", "Y", "Z"]
+    first = [1e3 * truth.t, 1e3 * truth.travel, np.rad2deg(truth.alpha), 1e3 * truth.position]
+    kept = tmp_path / "lab.yaml"
+    home = ["--translation", "from-flush", "--home-mm", "-300,-200"]
+    imported(log(text(names, first)), *home, "--save-mapping", kept)
+    small = [1e3 * truth.t, 1e3 * truth.travel, np.rad2deg(truth.alpha) / 100, 1e3 * truth.position]
+    table, said = imported(log(text(names, small)), "--mapping", kept)
+    np.testing.assert_allclose(table.alpha, truth.alpha / 100, atol=1e-9)
+    assert "option" in said and "guessed" not in said
+    table, _ = imported(log(text(names, small)), "--mapping", kept, "--unit", "alpha=rad")
+    np.testing.assert_allclose(table.alpha, np.rad2deg(truth.alpha) / 100, atol=1e-9)
+
+
+def test_mapping_of_markers_and_of_two_logs(truth, log, imported, same, tmp_path):
+    """Which marker in which frame, and which log has the joints, are kept too; so is a unit that only one log needs."""
+    kept, base = tmp_path / "lab.yaml", np.tile([0.1, 0.2, 0.3, 1.0, 0, 0, 0], (24, 1))
+    names = ["time_s", *(f"{m}_{c}" for m in ("a", "b") for c in ("x", "y", "z", "qw", "qx", "qy", "qz"))]
+    poses = log(text(names, [truth.t, truth.position + [0.1, 0.2, 0.3], truth.quaternion, base]))
+    joints = log(text(["time", *NAMES[1:5]], [1e3 * truth.t, truth.beta, truth.alpha]), "joints.csv")
+    said = ["--joints", joints, "--sensor", "a", "--relative-to", "b", "--unit", "t=ms", "--save-mapping", kept]
+    same(imported(poses, *said)[0])
+    same(imported(poses, "--joints", joints, "--mapping", kept)[0])
+
+
+def test_mapping_survives_its_file(tmp_path):
+    """Every choice, with names of columns that YAML would read otherwise, comes back as it was."""
+    path = tmp_path / "lab.yaml"
+    given = choices.Choices(
+        columns={"beta1": 'a "quoted" \\ name: #1', "y": "no", "t": "1e3", "x": "tab\there", "z": " é𝛼"},
+        units={"alpha": "0.1deg"},
+        home_mm=[-1.5, -2.0],
+        translation="from-home",
+        missing=["null", "~"],
+        flip=["alpha2"],
+        invert_quaternion=True,
+        euler="ZYX",
+        offsets={"alpha1": "90deg"},
+    )
+    choices.save(given, path)
+    assert choices.load(path) == given
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("colums:\n  t: Time", "did you mean columns"),
+        ("columns: 3", "needs names with values"),
+        ("columns:\n  gamma1: x", "gamma1"),
+        ("euler: ZZX", "sequence"),
+        ("- 1", "does not map columns"),
+    ],
+)
+def test_faulty_mapping(log, lines, refused, tmp_path, content, words):
+    path = tmp_path / "lab.yaml"
+    path.write_text(content)
+    assert words in refused(log("\n".join(lines)), "--mapping", path)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--unit", "alpha=mm"], "no unit of angle"),
+        (["--unit", "gamma=mm"], "gamma"),
+        (["--flip", "x"], "--mirror x"),
+        (["--column", "beta1=bta1"], "did you mean beta1"),
+        (["--column", "beta9x=beta1"], "is not known"),
+        (["--offset", "alpha2=90"], "has no unit"),
+        (["--offset", "alpha2@7=90deg"], "no alpha2 in a run 7"),
+        (["--flip", "alpha3"], "there are 2 tubes"),
+        (["--euler", "ZY"], "sequence of axes"),
+        (["--sensor", "tip"], "fits none"),
+        (["--translation", "from-flush"], "--robot"),
+        (["--home-mm", "1,2,3", "--translation", "from-home"], "needs 2"),
+        (["--home-mm", "1,2"], "needs --translation"),
+        (["--unit", "alpha"], "NAME=VALUE"),
+    ],
+)
+def test_faulty_options(log, lines, refused, options, words):
+    assert words in refused(log("\n".join(lines)), *options)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"PK\3\4", "spreadsheet"),
+        (b"\x00\x01\x02" * 50, "neither text"),
+        (b"hello\nworld\n", "no rows of numbers"),
+        (b"a,b,c\n1,2,3\n4,5,6\n", "looks like a joint"),
+    ],
+)
+def test_no_log(log, refused, content, words):
+    assert words in refused(log(content))
+
+
+def test_time_in_doubt(truth, log, imported):
+    """Times without a unit that would make a log very slow are a question; with a unit they are none."""
+    path = log(text(NAMES, [25.0 * np.arange(24), truth.beta, truth.alpha, truth.position]))
+    assert "if these are ms, say --unit t=ms" in imported(path)[1]
+    assert "Doubt" not in imported(path, "--unit", "t=ms")[1]
+
+
+def test_options_without_effect(log, lines, imported):
+    """A mend of what the log lacks is said to do nothing."""
+    _, said = imported(log("\n".join(lines)), "--flip", "force", "--invert-quaternion", "--mirror", "x")
+    assert "--flip force has no effect" in said and "--invert-quaternion has no effect" in said
+    assert "--mirror has" not in said
+
+
+def test_inputs_are_kept(log, lines, run, tmp_path):
+    """An output never overwrites an input, by whatever name."""
+    path = log("\n".join(lines))
+    before = path.read_bytes()
+    (tmp_path / "link.csv").symlink_to(path)
+    for target in (path, tmp_path / "link.csv"):
+        code, _, err = run("import", path, "-o", target)
+        assert code == 2 and "is also that of" in err and path.read_bytes() == before
+
+
+def test_json(log, lines, run, tmp_path):
+    code, out, _ = run("import", log("\n".join(lines)), "-o", tmp_path / "out.csv", "--json", "-")
+    data = json.loads(out)
+    assert code == 0 and data["rows"] == 24 and data["tubes"] == 2
+    assert {row["column"]: row["becomes"] for row in data["logs"][0]["columns"]}["beta1"] == "beta1_m"
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "tube", "unit"),
+    [
+        ("tube2_rot [deg]", "alpha", 2, "deg"),
+        ("Trans 1 / mm", "beta", 1, "mm"),
+        ("θ₁ (°)", "alpha", 1, "deg"),
+        ("innerTrans_mm", "beta", -3, "mm"),
+        ("Timestamp (ms)", "t", 0, "ms"),
+        ("force_x_N", "fx", 0, "N"),
+        ("Tip Tx", "x", 0, None),
+        ("Rotation W", "ow", 0, None),
+        ("pitch (deg)", "ry", 0, "deg"),
+        ("r12", "m12", 0, None),
+        ("x2", "x", 0, None),
+        ("rot_i", "alpha", -3, None),
+        ("nsecs", "nsec", 0, "ns"),
+        ("TubeOneRotDeg", "alpha", 1, "deg"),
+    ],
+)
+def test_names(name, role, tube, unit):
+    found = meaning(name)
+    assert (found.role, found.tube, found.unit and found.unit.text) == (role, tube, unit)
+
+
+@pytest.mark.parametrize("name", ["index", "Unnamed: 0", "current_1_A", "alpha1_vel", "", "#3", "rot_360"])
+def test_names_of_nothing(name):
+    assert meaning(name) is None
+
+
+def test_zero_based(log, imported, same, truth):
+    """Tubes counted from 0."""
+    names = ["t", "d0", "d1", "theta0", "theta1", "x", "y", "z"]
+    table, _ = imported(log(text(names, [truth.t, truth.beta, truth.alpha, truth.position])))
+    same(table, orientation=False)
+    assert lab_logs.ROWS == len(table)

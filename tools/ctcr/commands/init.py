@@ -1,0 +1,105 @@
+"""`ctcr init`: a new robot file."""
+
+import os
+
+import click
+
+DIRECTIONS = {"unknown": None, "-x": 0, "-y": 1, "-z": 2, "+x": 0, "+y": 1, "+z": 2}
+
+
+@click.command(name="init")
+@click.option("-o", "--output", "target", required=True, metavar="ROBOT", help="The robot file to write.")
+@click.option("--name", help="Name of the robot.")
+@click.option(
+    "--tube",
+    "tubes",
+    multiple=True,
+    metavar="FIELD=VALUE,...",
+    help="A tube, the innermost first: length_mm, outer_diameter_mm, inner_diameter_mm, curved_length_mm, radius_mm or "
+    "curvature_per_m, youngs_modulus_GPa (60), poisson_ratio (0.3), density_kg_m3 (6450).",
+)
+@click.option("--example", type=click.IntRange(1, 4), metavar="N", help="Invented numbers for N tubes, to replace.")
+@click.option(
+    "--gravity",
+    type=click.Choice(list(DIRECTIONS)),
+    help="Where weights fall in the base frame, whose z is along the insertion; unknown (default): no weight.",
+)
+@click.option("--sensor-on-tube", type=click.IntRange(1, 4), help="The tube with the sensor; default 1, innermost.")
+@click.option("--home-mm", metavar="B1,B2,..", help="beta of each tube at home; default: flush tips.")
+def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> None:
+    """Write a new robot file.
+
+    It needs dimensions and precurvature of the tubes; all else gets a default that a comment in the file explains.
+    Without --tube and --example it asks.
+
+    Example: ctcr init -o robot.yaml --tube length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,radius_mm=100
+    """
+    from ctcr.commands import options
+    from ctcr.errors import InputError, Problem
+    from ctcr.robot import new_file, robot_file
+    from ctcr.show.output import write_text
+
+    if os.path.exists(target):
+        raise InputError(Problem("exists already: give another name, or remove it", target))
+    if tubes and example:
+        raise click.UsageError("--tube and --example exclude each other")
+    if tubes:
+        robot = new_file.NewRobot([new_file.tube_of(tube, f"--tube {i}") for i, tube in enumerate(tubes, start=1)])
+    elif example:
+        robot = new_file.example(example)
+    else:
+        robot, gravity = _asked(new_file, gravity)
+        sensor_on_tube = sensor_on_tube or (_ask_sensor(len(robot.tubes)) if len(robot.tubes) > 1 else 1)
+    robot.name = name or robot.name
+    robot.sensor_on_tube = sensor_on_tube or 1
+    robot.gravity = _vector(gravity or "unknown")
+    robot.home_mm = _numbers(home_mm)
+    text = new_file.text(robot)
+    loaded = robot_file.parse(text.encode(), target)
+    write_text(text, target)
+    out = options.Output()
+    out.say(
+        f"{target}: {loaded.n_tubes} tube{'s' * (loaded.n_tubes > 1)}; comments in it say which values are defaults"
+    )
+    out.say(*(f"Doubt: {doubt}" for doubt in robot_file.warnings(loaded) if doubt.field != "gravity"))
+    out.say(f"Next: ctcr import LOG -o measurements.csv --robot {target}")
+
+
+def _asked(new_file, gravity):
+    """A robot by questions, and the direction of gravity."""
+    robot = new_file.NewRobot([], click.prompt("Name", default="my robot"))
+    count = click.prompt("Number of tubes", type=click.IntRange(1, 4))
+    for i in range(1, count + 1):
+        click.echo(f"Tube {i}{' (innermost)' if i == 1 else ''}, lengths from the grasped end to the tip")
+        length = _ask("  length [mm]")
+        outer = _ask("  outer diameter [mm]")
+        inner = _ask("  inner diameter [mm]")
+        radius = click.prompt("  radius of the precurved part [mm], 0 for a straight tube", type=float)
+        curved = _ask("  length of the precurved part [mm]") if radius else 0.0
+        modulus = click.prompt("  Young's modulus [GPa]", type=float, default=new_file.NITINOL_GPA)
+        tube = new_file.NewTube(length, outer, inner, curved, new_file.curvature(radius), modulus)
+        robot.tubes.append(tube)
+    if gravity is None:
+        text = "Where weights fall in the base frame (z along the insertion)"
+        gravity = click.prompt(text, type=click.Choice(list(DIRECTIONS)), default="unknown")
+    return robot, gravity
+
+
+def _ask(text: str) -> float:
+    return click.prompt(text, type=click.FloatRange(min=0))
+
+
+def _ask_sensor(count: int) -> int:
+    return click.prompt("Tube that carries the sensor (1: the innermost)", type=click.IntRange(1, count), default=1)
+
+
+def _vector(direction: str) -> list[float] | None:
+    axis = DIRECTIONS[direction]
+    return None if axis is None else [(-9.80665 if direction[0] == "-" else 9.80665) * (i == axis) for i in range(3)]
+
+
+def _numbers(text: str | None) -> list[float]:
+    try:
+        return [float(number) for number in text.split(",")] if text else []
+    except ValueError:
+        raise click.BadParameter(f"{text}: write numbers in mm, separated by commas") from None

@@ -1,0 +1,1 @@
+"""Logs of other laboratories and other programs, turned into tables of measurements."""

@@ -1,0 +1,169 @@
+"""A log, or a log of poses and one of joints, as a table of measurements."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctcr.arrays import Array
+from ctcr.errors import InputError, Problem
+from ctcr.intake import mapping, motion, sensor, together, units
+from ctcr.intake.choices import Choices
+from ctcr.intake.columns import Columns
+from ctcr.intake.log import Log
+from ctcr.intake.motion import Motion
+from ctcr.intake.poses import Pose
+from ctcr.robot.description import Robot
+from ctcr.show.wording import join, listed
+from ctcr.table import measurements
+from ctcr.table.csv_table import Faults
+from ctcr.table.measurements import Measurements
+
+SLOW_S = 1.0  # between readings, where no unit of time is stated: perhaps milliseconds
+
+
+@dataclass
+class Imported:
+    """The table, and the columns that it came from; those of a log of joints apart."""
+
+    table: Measurements
+    n_tubes: int
+    sources: list[Columns]
+
+    @property
+    def notes(self) -> list[str]:
+        return [note for source in self.sources for note in source.notes]
+
+
+def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log | None = None) -> Imported:
+    """The table of a log; of its poses with the motion of `joints` at their times, where that is another log.
+
+    Raises InputError with all faults of one kind: of the columns, then of single fields, then of values.
+    """
+    n_tubes = robot.n_tubes if robot else None
+    of_poses = choices if joints is None else together.of_poses(choices, log)
+    beside = joints is not None
+    columns = Columns(log, mapping.of(log, of_poses, 0 if beside else n_tubes), of_poses, beside)
+    moving = columns
+    if joints is not None:
+        of_joints = together.of_joints(choices, joints)
+        moving = Columns(joints, mapping.of(joints, of_joints, n_tubes, poses=False), of_joints, beside)
+    _check_joints(moving)
+    moved = motion.of(moving, robot)
+    pose = sensor.of(columns)
+    t, zero = motion.times(columns) if joints is not None else (moved.t, moved.zero)
+    shift = units.parsed(choices.offsets["t"], "time", "--offset t").size if "t" in choices.offsets else 0.0
+    columns.faults.raise_any()
+    moving.faults.raise_any()
+    if joints is not None:
+        moved = together.at(columns, moving, moved, t, zero + shift)
+    else:
+        moved.t = moved.t + shift
+    kept = motion.complete(moving if joints is None else columns, moved)
+    moved = moved.only(kept)
+    if not len(moved.rows):
+        raise InputError(Problem("has no row with all joints", str(moving.log.path)))
+    position, quaternion = (None, None) if pose is None else (pose.position, pose.quaternion)
+    _check_values(columns, moving, moved, pose and position[kept], None if quaternion is None else quaternion[kept])
+    table = Measurements(
+        moved.t,
+        moved.run.astype(np.int64),
+        moved.beta,
+        moved.alpha,
+        moved.force,
+        None if position is None else position[kept],
+        None if quaternion is None else quaternion[kept],
+        moved.rows,
+        warnings=list(_doubts(columns, moved)),
+    )
+    columns.notes += [
+        f"{option} has no effect here: there is no {what}" for option, what in _idle(columns, moving, pose)
+    ]
+    if not columns.has("t"):
+        columns.notes.append("no column of times: effects of speed and delay cannot be found")
+    return Imported(table, moved.beta.shape[1], [columns] if joints is None else [columns, moving])
+
+
+def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tuple[str, str]]:
+    """Options that concern what the log lacks."""
+    choices, turned = columns.choices, pose is not None and pose.quaternion is not None
+    forces = any(moving.has(role) for role in (*motion.FORCE, "weight"))
+    for option, said, there, what in (
+        ("--flip force", "force" in choices.flip, forces, "force"),
+        ("--quaternion", choices.quaternion is not None, columns.has("qw"), "quaternion"),
+        ("--invert-quaternion", choices.invert_quaternion, turned, "rotation"),
+        ("--euler", choices.euler is not None, columns.has("rx"), "angle"),
+        ("--mirror", choices.mirror is not None, pose is not None, "position"),
+        ("--offset t", "t" in choices.offsets, columns.has("t"), "time"),
+    ):
+        if said and not there:
+            yield option, what
+
+
+def _check_joints(columns: Columns) -> None:
+    log, used, choices = columns.log, columns.mapping.used, columns.choices
+    n = columns.mapping.n_tubes
+    named = [*choices.flip, *choices.units, *choices.offsets, *choices.constants]
+    high = [name for name in named if (found := re.match(r"(?:beta|alpha)(\d)", name)) and int(found[1]) > n > 0]
+    if high:
+        raise InputError(Problem(f"there are {n} tubes: no {join(high)}", str(log.path)))
+    wanted = [f"{kind}{i}" for i in range(1, n + 1) for kind in ("beta", "alpha")]
+    missing = [role for role in wanted if role not in used and role not in choices.constants]
+    unused = listed(columns.unused, 30)
+    if len(missing) == len(wanted):
+        text = "no column looks like a joint: name them with --column beta1=NAME, --column alpha1=NAME, ..."
+        if log.meanings:
+            text = f"an export of {log.kind} holds no joints: give their log with --joints FILE"
+        elif all(name.startswith("#") for name in log.names):
+            text = "it has no header: name its columns in their order, such as --columns t,beta1..beta2,alpha1..alpha2"
+        raise InputError(Problem(f"{text} (not used: {unused})", str(log.path)))
+    if missing:
+        still = "0mm where it never moves" if missing[0].startswith("beta") else "0deg where it never turns"
+        text = (
+            f"no column looks like {join(missing)}: give --column {missing[0]}=NAME, or --constant {missing[0]}={still}"
+        )
+        raise InputError(Problem(f"{text} (not used: {unused})", str(log.path)))
+
+
+def _check_values(columns: Columns, moving: Columns, moved: Motion, position, quaternion) -> None:
+    """The checks of the table's format, with the rows and columns of the log."""
+    faults, n = Faults(str(columns.log.path)), moved.beta.shape[1]
+    values = vars(moved) | {"position": position, "quaternion": quaternion}
+    for group, names in measurements.group_columns(n).items():
+        if values[group] is None:
+            continue
+        roles = [name.partition("_")[0] for name in names]
+        source = columns if group in ("position", "quaternion") else moving
+        block = values[group].reshape(len(moved.rows), -1)
+        measurements.check(group, block, moved.rows, [source.name(role) for role in roles], faults)
+    if faults.total:
+        found, hint = faults.problems(), _hint(moved.beta, columns.choices)
+        raise InputError([*found, *([Problem(hint)] if hint else [])], faults.total - len(found))
+
+
+def _hint(beta: Array, choices: Choices) -> str:
+    """What joints that cannot be are probably."""
+    if (beta >= 0).all() and choices.translation is None:
+        return (
+            "beta is where a tube is grasped: 0 at the front plate, negative behind it. Positive columns are often"
+            " travel from flush tips (--translation from-flush --robot ROBOT) or from home (--translation from-home"
+            " --robot ROBOT), or distances behind the plate (--flip beta): docs/formats.md draws them"
+        )
+    if beta.shape[1] > 1 and np.mean(beta[:, 0] > beta[:, -1]) > 0.5:
+        return "beta grows from inner to outer tubes: if the log has the outermost first, --order outermost-first"
+    return ""
+
+
+def _doubts(columns: Columns, moved: Motion) -> Iterator[Problem]:
+    """Times that look wrong."""
+    steps = np.diff(moved.t)[moved.run[1:] == moved.run[:-1]]
+    steps = steps[np.isfinite(steps)]
+    if not len(steps) or "t" not in columns.units:
+        return
+    name, file = columns.name("t"), str(columns.log.path)
+    if back := int((steps <= 0).sum()):
+        yield Problem(f"{back} rows do not come after the row before them", file, field=name)
+    unit, how = columns.units["t"]
+    if how == "values" and not unit.is_clock and (step := float(np.median(steps))) >= SLOW_S:
+        yield Problem(f"{step:g} s pass between rows: if these are ms, say --unit t=ms", file, field=name)

@@ -1,0 +1,38 @@
+"""A log as its file holds it: named columns of text or numbers, with the row of the file that each value came from."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ctcr.arrays import Array, Integers
+from ctcr.errors import InputError, Problem, suggestion
+from ctcr.intake.names import Meaning
+
+
+@dataclass(frozen=True)
+class Log:
+    """M rows. What a format says about its columns itself (`meanings`) goes before what their names suggest."""
+
+    path: Path
+    kind: str  # of file, as people call it
+    names: tuple[str, ...]
+    values: tuple[list[str] | Array, ...]  # a column each, (M,)
+    rows: Integers  # (M,) row of the file, from 1
+    decimal_comma: bool = False
+    meanings: dict[str, Meaning | None] = field(default_factory=dict)  # by column
+    euler: str | None = None  # sequence of the Euler angles
+    notes: list[str] = field(default_factory=list)  # what was left out or assumed on reading
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def index(self, name: str, where: str) -> int:
+        """The position of a column, by its name or as #3. Raises InputError that names the option `where`."""
+        if name in self.names:
+            return self.names.index(name)
+        if name.startswith("#") and name[1:].isdigit() and 1 <= int(name[1:]) <= len(self.names):
+            return int(name[1:]) - 1
+        loose = [i for i, known in enumerate(self.names) if known.strip().lower() == name.strip().lower()]
+        if len(loose) == 1:
+            return loose[0]
+        hint = suggestion(name, self.names, f"it has {', '.join(self.names[:12])}{' ...' * (len(self.names) > 12)}")
+        raise InputError(Problem(f"the log has no column {name}: {hint}", str(self.path), field=where))

@@ -1,0 +1,186 @@
+"""How the robot moved by a log: times, runs, joints and known forces."""
+
+from dataclasses import dataclass, replace
+from dataclasses import fields as fields_of
+
+import numpy as np
+
+from ctcr.arrays import Array, Integers, Mask
+from ctcr.errors import InputError, Problem
+from ctcr.intake import fields, units
+from ctcr.intake.choices import Choices
+from ctcr.intake.columns import DEG_FROM, RAD_UP_TO, Columns, angle_unit, length_unit
+from ctcr.intake.units import Unit, named
+from ctcr.robot.description import Robot
+from ctcr.show.wording import listed
+
+FORCE = ("fx", "fy", "fz")
+
+
+@dataclass
+class Motion:
+    """M rows of a log with N tubes; NaN where a field was missing."""
+
+    t: Array  # (M,) [s]
+    zero: float  # the time of the log's clock at t = 0 [s]
+    run: Array  # (M,)
+    beta: Array  # (M, N) [m]
+    alpha: Array  # (M, N) [rad]
+    force: Array  # (M, 3) [N]
+    rows: Integers  # (M,) of the file
+
+    def only(self, kept: Mask) -> "Motion":
+        arrays = {one.name: getattr(self, one.name)[kept] for one in fields_of(self) if one.name != "zero"}
+        return replace(self, **arrays)
+
+
+def of(columns: Columns, robot: Robot | None) -> Motion:
+    """The motion that a log holds."""
+    t, zero = times(columns)
+    beta = _from_home(columns, _joints(columns, "beta", length_unit), robot)
+    alpha = _joints(columns, "alpha", lambda size: _sure_angle_unit(columns, size))
+    run = _runs(columns)
+    _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
+    return Motion(t, zero, run, beta, alpha, _force(columns, robot), columns.log.rows)
+
+
+def times(columns: Columns) -> tuple[Array, float]:
+    """Times (M,) [s], NaN without a column of them, and what the log's clock showed at zero [s]."""
+    if not columns.has("t"):
+        return np.full(len(columns.log), np.nan), 0.0
+    used, asked = columns.mapping.used["t"], columns.choices.units.get("t")
+    asked = None if columns.beside and used.unit else asked
+    unit = units.parsed(asked, "time", "--unit t") if asked else used.unit
+    read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
+    if columns.has("nsec"):
+        read = _with_parts(columns, read)
+    columns.units["t"] = read.unit, "values" if read.guessed else "option" if asked else used.how
+    if read.start:
+        columns.notes.append(f"t_s = 0 is {read.start}")
+    return read.seconds, read.zero
+
+
+def _with_parts(columns: Columns, read: fields.Times) -> fields.Times:
+    """Times whose second is in one column, and the nanoseconds after it in another."""
+    parts = 1e-9 * columns.values("nsec")
+    columns.units["nsec"] = named("ns"), "name"
+    first = float(parts[0]) if read.start else 0.0  # a stamp counts from the first row
+    return replace(read, seconds=read.seconds + parts - first, zero=read.zero + first)
+
+
+def complete(columns: Columns, motion: Motion) -> Mask:
+    """Rows that have a run, all joints and a force. The others are noted with their numbers."""
+    kept = np.ones(len(motion.rows), dtype=bool)
+    joints = np.column_stack([motion.beta, motion.alpha])
+    for name, values in (("joints", joints), ("force", motion.force), ("run", motion.run[:, None])):
+        lacking = kept & ~np.isfinite(values).all(axis=1)
+        if lacking.any():
+            columns.notes.append(f"without {name}, {row_ranges(motion.rows[lacking])}: dropped")
+        kept &= ~lacking
+    return kept
+
+
+def row_ranges(rows: Integers) -> str:
+    """Numbers of rows as ranges: 8 rows (3 to 9, 12)."""
+    starts = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) > 1)
+    ends = np.append(starts[1:] - 1, len(rows) - 1)
+    ranges = [f"{rows[a]}" if a == b else f"{rows[a]} to {rows[b]}" for a, b in zip(starts, ends, strict=True)]
+    return f"{len(rows)} row{'s' * (len(rows) != 1)} ({listed(ranges)})"
+
+
+def _joints(columns: Columns, kind: str, guess) -> Array:
+    """One kind of joint (M, N) in SI units with its signs and offsets."""
+    choices = columns.choices
+    roles = [f"{kind}{i}" for i in range(1, columns.mapping.n_tubes + 1)]
+    logged = [role for role in roles if columns.has(role)]
+    values = dict(zip(logged, columns.si(kind, logged, guess).T, strict=True)) if logged else {}
+    quantity = "length" if kind == "beta" else "angle"
+    for role in roles:
+        if role not in values:
+            constant = units.value(choices.constants[role], quantity, f"--constant {role}")
+            values[role] = np.full(len(columns.log), constant)
+            continue
+        if (role in choices.flip) != (kind in choices.flip):
+            values[role] = -values[role]
+        for key in (role, kind):
+            if key in choices.offsets:
+                values[role] = values[role] + units.value(choices.offsets[key], quantity, f"--offset {key}")
+    return np.column_stack([values[role] for role in roles]) + 0.0  # no negative zeros
+
+
+def _sure_angle_unit(columns: Columns, size: float) -> Unit:
+    if RAD_UP_TO < size < DEG_FROM:
+        text = f"angles up to {size:.3g} may be rad or deg: say it with --unit alpha=deg or --unit alpha=rad"
+        columns.faults.add(1, None, text)
+    return angle_unit(size)
+
+
+def _from_home(columns: Columns, beta: Array, robot: Robot | None) -> Array:
+    """beta of translations that are travel from somewhere."""
+    choices, n = columns.choices, columns.mapping.n_tubes
+    if choices.translation in (None, "beta"):
+        return beta
+    home = _home(choices, robot, n)
+    columns.notes.append(f"beta is travel + home; home is {', '.join(f'{1e3 * h:g}' for h in home)} mm")
+    moves = [f"beta{i}" not in choices.constants for i in range(1, n + 1)]
+    return beta + np.where(moves, home, 0.0)
+
+
+def _home(choices: Choices, robot: Robot | None, n: int) -> Array:
+    """beta [m] (N,) where the travel is zero."""
+    if choices.home_mm is not None:
+        if len(choices.home_mm) != n:
+            raise InputError(Problem(f"has {len(choices.home_mm)} values: needs {n}, one a tube", field="--home-mm"))
+        return 1e-3 * np.array(choices.home_mm)
+    if robot is None:
+        text = (
+            "travel becomes beta by the lengths or homes of the tubes: give --robot ROBOT, or beta at home, --home-mm"
+        )
+        raise InputError(Problem(text, field=f"--translation {choices.translation}"))
+    if choices.translation == "from-home":
+        return 1e-3 * np.array(robot.actuation.home_translation_mm)
+    return -np.array([tube.length for tube in robot.tubes])  # all tips at the plate
+
+
+def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None:
+    """Adds the offsets that concern one run alone."""
+    for key, text in columns.choices.offsets.items():
+        joint, at, number = key.partition("@")
+        if not at:
+            continue
+        rows, kind = run == float(number), joint.rstrip("123456789")
+        tubes = slice(int(joint[-1]) - 1, int(joint[-1])) if joint != kind else slice(None)
+        if not rows.any() or not joints[kind][:, tubes].size:
+            raise InputError(Problem(f"there is no {joint} in a run {number}", field=f"--offset {key}"))
+        joints[kind][rows, tubes] += units.value(text, "length" if kind == "beta" else "angle", f"--offset {key}")
+
+
+def _runs(columns: Columns) -> Array:
+    if not columns.has("run"):
+        return np.zeros(len(columns.log))
+    run, texts = fields.labels(columns.log, columns.mapping.used["run"].column, columns.faults)
+    if texts:
+        columns.notes.append("runs: " + listed([f"{i} = {text or '(empty)'}" for i, text in enumerate(texts)]))
+    return run
+
+
+def _weight(columns: Columns, robot: Robot | None) -> Array:
+    """Forces (M, 3) [N] of a weight hung at the tip."""
+    down = np.zeros(3) if robot is None else robot.gravity_vector
+    if not down.any():
+        name = columns.mapping.used["weight"].name
+        text = "a weight needs the direction of gravity: give --robot ROBOT, whose gravity is known"
+        raise InputError(Problem(f"{text}, or --ignore {name}", str(columns.log.path), field=name))
+    return columns.si("force", ["weight"], lambda _: named("N")) * down / np.linalg.norm(down)
+
+
+def _force(columns: Columns, robot: Robot | None) -> Array:
+    """Forces (M, 3) [N]; axes that the log lacks are zero."""
+    roles, flip = [role for role in FORCE if columns.has(role)], columns.choices.flip
+    force = np.zeros((len(columns.log), 3))
+    if columns.has("weight"):
+        force += _weight(columns, robot)
+    if roles:
+        force[:, [FORCE.index(role) for role in roles]] += columns.si("force", roles, lambda _: named("N"))
+    signs = [-1.0 if (role in flip) != ("force" in flip) else 1.0 for role in FORCE]
+    return force * signs + 0.0

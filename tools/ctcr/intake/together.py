@@ -1,0 +1,71 @@
+"""Poses of one log and joints of another, by the clock that both share."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ctcr.arrays import Array
+from ctcr.errors import InputError, Problem
+from ctcr.intake.choices import Choices
+from ctcr.intake.columns import Columns
+from ctcr.intake.log import Log
+from ctcr.intake.mapping import MOVING
+from ctcr.intake.motion import Motion, complete, row_ranges
+
+
+def of_poses(choices: Choices, log: Log) -> Choices:
+    """The choices that concern the log of the poses."""
+    return replace(choices, columns={r: n for r, n in choices.columns.items() if not _moves(r) and _of(log, r, n)})
+
+
+def of_joints(choices: Choices, log: Log) -> Choices:
+    """The choices that concern the log of the joints."""
+    columns = {r: n for r, n in choices.columns.items() if _moves(r) or r in ("t", "nsec") and _of(log, r, n)}
+    return replace(choices, columns=columns, sensor=None, relative_to=None)
+
+
+def _moves(role: str) -> bool:
+    return role.rstrip("123456789") in MOVING
+
+
+def _of(log: Log, role: str, name: str) -> bool:
+    return role not in ("t", "nsec") or name in log.names
+
+
+def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) -> Motion:
+    """The motion of a log of joints in each row of a log of poses.
+
+    By their times [s], between which joints move in straight lines; row by row where neither log has times. `zero` is
+    what the poses' clock shows at their t = 0, by the clock of the joints. Raises InputError where times do not meet.
+    """
+    rows, file = columns.log.rows, str(moving.log.path)
+    timed = [np.isfinite(times).any() for times in (t, moved.t)]
+    if not any(timed):
+        if len(rows) != len(moved.rows):
+            text = f"has {len(moved.rows)} rows, the log of the poses {len(rows)}, and neither has times"
+            raise InputError(Problem(text, file))
+        return replace(moved, rows=rows)
+    if not all(timed):
+        raise InputError(Problem("only one of the two logs has times: give --column t=NAME", file))
+    known = moved.only(complete(moving, moved) & np.isfinite(moved.t))
+    if (np.diff(known.t) < 0).any():
+        raise InputError(
+            Problem("its times run backwards: joints cannot be found by time", file, field=moving.name("t"))
+        )
+    clock = t + (zero - moved.zero)  # of the poses, by the clock of the joints
+    inside = (clock >= known.t[0]) & (clock <= known.t[-1])
+    if not inside.any():
+        span = f"{known.t[0]:g} to {known.t[-1]:g} s, those of the poses {np.nanmin(clock):g} to {np.nanmax(clock):g} s"
+        text = f"its times are {span}: say what to add to those of the poses, such as --offset t=12.5s"
+        raise InputError(Problem(text, file, field=moving.name("t")))
+    before = np.clip(np.searchsorted(known.t, clock, side="right") - 1, 0, None)
+
+    def between(values: Array) -> Array:
+        return np.column_stack([np.where(inside, np.interp(clock, known.t, one), np.nan) for one in values.T])
+
+    step = float(np.median(np.diff(known.t))) if len(known.t) > 1 else 0.0
+    columns.notes.append(f"joints of {moving.log.path.name} are interpolated between its rows, {step:.3g} s apart")
+    if not inside.all():
+        columns.notes.append(f"outside the times of {moving.log.path.name}: {row_ranges(rows[~inside])}")
+    run = np.where(inside, known.run[before], np.nan)
+    return Motion(t, zero, run, between(known.beta), between(known.alpha), between(known.force), rows)

@@ -1,0 +1,97 @@
+"""Units that logs use, and how texts name them."""
+
+import re
+from dataclasses import dataclass
+from math import pi
+
+from ctcr.errors import InputError, Problem
+
+SI = {"time": "s", "length": "m", "angle": "rad", "force": "N"}
+CLOCK = "clock"  # the unit of times such as 2026-05-04T10:15:30.25 and 10:15:30.25
+_GRAM_FORCE = 9.80665e-3
+
+_SIZES = {  # unit -> (quantity, size in SI units)
+    "s": ("time", 1.0),
+    "ms": ("time", 1e-3),
+    "us": ("time", 1e-6),
+    "ns": ("time", 1e-9),
+    "min": ("time", 60.0),
+    "m": ("length", 1.0),
+    "cm": ("length", 1e-2),
+    "mm": ("length", 1e-3),
+    "um": ("length", 1e-6),
+    "rad": ("angle", 1.0),
+    "mrad": ("angle", 1e-3),
+    "deg": ("angle", pi / 180),
+    "rev": ("angle", 2 * pi),
+    "N": ("force", 1.0),
+    "mN": ("force", 1e-3),
+    "gf": ("force", _GRAM_FORCE),
+    CLOCK: ("time", 1.0),
+}
+_ALSO = {
+    "s": "sec secs second seconds",
+    "ms": "msec msecs millisecond milliseconds millis",
+    "us": "usec microsecond microseconds µs μs",
+    "ns": "nsec nsecs nanosec nanosecond nanoseconds",
+    "min": "minutes",
+    "m": "meter meters metre metres",
+    "cm": "centimeter centimeters centimetre centimetres",
+    "mm": "millimeter millimeters millimetre millimetres",
+    "um": "micrometer micrometers micron microns µm μm",
+    "rad": "radian radians rads",
+    "deg": "degree degrees degs °",
+    "rev": "revs revolution revolutions turn turns",
+    "N": "n newton newtons",
+    "mN": "mn millinewton millinewtons",
+    "gf": "g gram grams",
+    CLOCK: "iso datetime",
+}
+_NAMED = {unit: unit for unit in _SIZES} | {other: unit for unit, others in _ALSO.items() for other in others.split()}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """`text` as a user writes it, such as mm or 0.0025mm; `size` in the SI unit of the quantity."""
+
+    text: str
+    quantity: str  # time, length, angle, force
+    size: float
+
+    @property
+    def is_clock(self) -> bool:
+        return self.text == CLOCK
+
+
+def named(text: str) -> Unit | None:
+    """The unit of a name such as mm, Millimeters or deg; None where it is none."""
+    text = text.strip()
+    unit = _NAMED.get(text) or _NAMED.get(text.lower())
+    return Unit(unit, *_SIZES[unit]) if unit else None
+
+
+def parsed(text: str, quantity: str, where: str) -> Unit:
+    """The unit of an option, which may begin with a number: 0.0025mm is one count of an encoder.
+
+    Raises InputError that names the option `where` and the units of the quantity.
+    """
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)?\s*(\S*?)\s*", text)
+    unit = named(found[2]) if found else None
+    try:
+        factor = float(found[1] or 1) if found else 0.0
+    except ValueError:
+        factor = 0.0
+    if unit is None or unit.quantity != quantity or factor == 0:
+        units = ", ".join(name for name, (kind, _) in _SIZES.items() if kind == quantity)
+        raise InputError(Problem(f"{text} is no unit of {quantity}: give one of {units}", field=where))
+    return Unit(unit.text if found[1] is None else text.strip(), quantity, factor * unit.size)
+
+
+def value(text: str, quantity: str, where: str) -> float:
+    """A quantity of an option, such as 90deg or -12mm, in SI units; a bare 0 needs no unit."""
+    try:
+        if float(text) == 0:
+            return 0.0
+    except ValueError:
+        return parsed(text, quantity, where).size
+    raise InputError(Problem(f"{text} has no unit: write {text}{'mm' if quantity == 'length' else 'deg'}", field=where))

@@ -1,0 +1,157 @@
+"""A new robot file: what must be known of a robot, defaults for the rest, and comments that say which is which."""
+
+from dataclasses import dataclass, field
+from math import isfinite
+
+from ctcr.errors import InputError, Problem, suggestion
+
+NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY = 60.0, 0.3, 6450.0
+
+
+@dataclass
+class NewTube:
+    """Fields as in the file. Either the radius or the curvature of the precurved part; a straight tube has neither."""
+
+    length_mm: float
+    outer_diameter_mm: float
+    inner_diameter_mm: float
+    curved_length_mm: float = 0.0
+    curvature_per_m: float = 0.0
+    youngs_modulus_GPa: float = NITINOL_GPA
+    poisson_ratio: float = NITINOL_POISSON
+    density_kg_m3: float = NITINOL_DENSITY
+
+
+@dataclass
+class NewRobot:
+    """`gravity` [m/s^2] in the base frame, None where it is not known; `home_mm` is beta at home, else flush tips."""
+
+    tubes: list[NewTube]
+    name: str = "my robot"
+    gravity: list[float] | None = None
+    sensor_on_tube: int = 1
+    note: str = ""
+    home_mm: list[float] = field(default_factory=list)
+
+
+_EXAMPLES = (  # innermost first; the fourth is a straight sheath
+    NewTube(420.0, 0.88, 0.65, 60.0, 12.0),
+    NewTube(300.0, 1.30, 1.00, 60.0, 8.0),
+    NewTube(200.0, 1.80, 1.45, 50.0, 5.0),
+    NewTube(110.0, 2.40, 2.00),
+)
+
+
+def example(n_tubes: int) -> NewRobot:
+    """A robot of 1 to 4 tubes with invented, plausible numbers."""
+    name = f"example of {n_tubes} tube{'s' * (n_tubes > 1)}"
+    return NewRobot(list(_EXAMPLES[:n_tubes]), name, note=" Its numbers are invented: replace them.")
+
+
+def tube_of(given: str, where: str) -> NewTube:
+    """A tube of a text such as length_mm=420,outer_diameter_mm=0.88,...; radius_mm may stand for curvature_per_m.
+
+    Raises InputError with all that is wrong with it.
+    """
+    known = [*NewTube.__dataclass_fields__, "radius_mm"]
+    values, faults = {}, []
+    for part in given.split(","):
+        name, _, text = (piece.strip() for piece in part.partition("="))
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if name not in known:
+            faults.append(f"{name} is no field of a tube: {suggestion(name, known, ', '.join(known))}")
+        elif not isfinite(value):
+            faults.append(f"{name}: {text or 'nothing'} is not a number")
+        values[name] = value
+    radius = values.pop("radius_mm", None)
+    if radius is not None and "curvature_per_m" in values:
+        faults.append("radius_mm and curvature_per_m say the same: give one")
+    elif radius is not None:
+        values["curvature_per_m"] = curvature(radius)
+    faults += [
+        f"{name} is missing" for name in ("length_mm", "outer_diameter_mm", "inner_diameter_mm") if name not in values
+    ]
+    if faults:
+        raise InputError([Problem(text, field=where) for text in faults])
+    return NewTube(**values)
+
+
+def curvature(radius_mm: float) -> float:
+    """Curvature [1/m] of a radius [mm]; 0 for a straight tube, whose radius is written as 0."""
+    return 1e3 / radius_mm if radius_mm else 0.0
+
+
+def text(robot: NewRobot) -> str:
+    """The file, with comments."""
+    n = len(robot.tubes)
+    home = robot.home_mm or [-tube.length_mm for tube in robot.tubes]
+    flush = "" if robot.home_mm else ": here all tips flush with the front plate"
+    gravity = "null" if robot.gravity is None else _list(robot.gravity)
+    return (
+        f"# A robot for ctcr.{robot.note} null: not known.\n"
+        "# docs/formats.md draws frames, angles and signs and lists all fields; `ctcr info` shows what follows.\n"
+        f"name: {_quoted(robot.name)}\n"
+        f"gravity: {gravity}  # m/s^2, base frame (z along the insertion); null: the tubes' weight is left out\n"
+        "\n"
+        "# The innermost tube first. Lengths from the grasped end to the tip; the precurved part ends at the tip.\n"
+        f"tubes:\n{''.join(_tube(tube) for tube in robot.tubes)}"
+        "\n"
+        "# The transmission: joint = ratio * motor angle + home. Needed on a bench alone, but for the homes, which\n"
+        "# `ctcr import --translation from-home` adds to travel.\n"
+        "actuation:\n"
+        "  translation_mm_per_rev: null  # of a turn of the motor\n"
+        "  rotation_rev_per_rev: null\n"
+        f"  home_translation_mm: {_list(home)}  # beta at home{flush}\n"
+        f"  home_rotation_deg: {_list([0.0] * n)}  # alpha at home\n"
+        "\n"
+        "# The sensor, and the base frame as the tracker sees it: x_tracker = R x_base + position.\n"
+        "tracker:\n"
+        f"  sensor_on_tube: {robot.sensor_on_tube}  # 1: the innermost\n"
+        "  rate_Hz: null\n"
+        "  jitter_mm: 0.1  # default; standard deviation of one reading per axis, of a sensor at rest. Fits need it\n"
+        "  jitter_deg: 0.1  # default\n"
+        "  accuracy_95_mm: null  # 95 % figures of the maker; null: no smooth error of the tracker is assumed\n"
+        "  accuracy_95_deg: null\n"
+        "  position_mm: [0.0, 0.0, 0.0]  # default: both frames agree; `ctcr calibrate registration` measures it\n"
+        "  rotation_vector_rad: [0.0, 0.0, 0.0]\n"
+        "  sensor_roll: unknown  # about the tip's axis; known: its x axis is that of the tip\n"
+        "\n"
+        "# How far the true values may be from those above: one standard deviation. All defaults.\n"
+        "uncertainty:\n"
+        "  tracker_frame_mm: 5.0\n"
+        "  tracker_frame_deg: 3.0\n"
+        "  rotation_offset_deg: 5.0\n"
+        "  translation_offset_mm: 1.0\n"
+        "  length_mm: 1.0\n"
+        "  curved_length_mm: 2.5\n"
+        "  curvature_percent: 10.0\n"
+        "  youngs_modulus_percent: 20.0\n"
+    )
+
+
+def _tube(tube: NewTube) -> str:
+    radius = f"radius {1e3 / abs(tube.curvature_per_m):.4g} mm" if tube.curvature_per_m else "straight"
+    material = (tube.youngs_modulus_GPa, tube.poisson_ratio, tube.density_kg_m3)
+    default = "  # nitinol" if material == (NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY) else ""
+    return (
+        f"  - length_mm: {tube.length_mm:.10g}\n"
+        f"    curved_length_mm: {tube.curved_length_mm:.10g}\n"
+        f"    curvature_per_m: {tube.curvature_per_m:.8g}  # {radius}\n"
+        f"    inner_diameter_mm: {tube.inner_diameter_mm:.10g}\n"
+        f"    outer_diameter_mm: {tube.outer_diameter_mm:.10g}\n"
+        f"    youngs_modulus_GPa: {tube.youngs_modulus_GPa:.10g}{default}\n"
+        f"    poisson_ratio: {tube.poisson_ratio:.10g}\n"
+        f"    density_kg_m3: {tube.density_kg_m3:.10g}\n"
+    )
+
+
+def _list(values: list[float]) -> str:
+    return f"[{', '.join(f'{value:.10g}' for value in values)}]"
+
+
+def _quoted(name: str) -> str:
+    escaped = "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in name)
+    return f'"{escaped}"'
