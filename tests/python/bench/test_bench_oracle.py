@@ -74,5 +74,5 @@ def test_broken_oracles(robot, capfd):
     for silent in ("true", "echo nonsense"):
         with pytest.raises(InputError, match="the oracle does not answer"):
             SimulatedRobot(robot, "none", oracle=Oracle(silent.split(), robot))
-    assert cli.run(["sim", "bench", str(ROBOT), "--oracle", "true", "--hide", "friction.coefficient=0.01"]) == 1
+    assert cli.run(["sim", "bench", str(ROBOT), "--oracle", "true", "--hide", "friction.coefficient=0.01"]) == 2
     assert "let the --oracle hide it itself" in capfd.readouterr().err

@@ -128,7 +128,7 @@ def test_picture(tmp_path, recwarn):
 DOORS = {
     r"\brich\.console import .*\bConsole\b": {"show/output.py"},
     r"\bclick\.s?echo\(": {"cli.py"},
-    r"\bclick\.(prompt|confirm)\(": {"bench/devices/person.py"},
+    r"\bclick\.(prompt|confirm)\(": {"bench/devices/person.py", "commands/init.py"},
     r"(?<![\w.])print\(|\bstd(out|err)\.write\(": {"show/output.py"},  # its JSON
     r"\bmarkup=|\bfrom_markup\(": {"show/output.py"},
     r"\bfrom html import\b|\bimport html\b": {"show/html_page.py"},

@@ -4,11 +4,15 @@ import os
 
 import click
 
+from ctcr.commands import options
+
 DIRECTIONS = {"unknown": None, "-x": 0, "-y": 1, "-z": 2, "+x": 0, "+y": 1, "+z": 2}
 
 
 @click.command(name="init")
-@click.option("-o", "--output", "target", required=True, metavar="ROBOT", help="The robot file to write.")
+@click.option(
+    "-o", "--output", "target", type=options.written, required=True, metavar="ROBOT", help="The robot file to write."
+)
 @click.option("--name", help="Name of the robot.")
 @click.option(
     "--tube",
@@ -34,7 +38,6 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
 
     Example: ctcr init -o robot.yaml --tube length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,radius_mm=100
     """
-    from ctcr.commands import options
     from ctcr.errors import InputError, Problem
     from ctcr.robot import new_file, robot_file
     from ctcr.show.output import write_text
@@ -70,7 +73,7 @@ def _asked(new_file, gravity):
     robot = new_file.NewRobot([], click.prompt("Name", default="my robot"))
     count = click.prompt("Number of tubes", type=click.IntRange(1, 4))
     for i in range(1, count + 1):
-        click.echo(f"Tube {i}{' (innermost)' if i == 1 else ''}, lengths from the grasped end to the tip")
+        options.Output().say(f"Tube {i}{' (innermost)' if i == 1 else ''}, lengths from the grasped end to the tip")
         length = _ask("  length [mm]")
         outer = _ask("  outer diameter [mm]")
         inner = _ask("  inner diameter [mm]")
