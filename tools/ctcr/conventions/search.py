@@ -1,0 +1,159 @@
+"""The search: every hypothesis is predicted, the likely ones are calibrated, the clearest is applied, and again."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ctcr import settings
+from ctcr.conventions import tips
+from ctcr.conventions.alignment import aligned
+from ctcr.conventions.calibrated import Calibrated, calibrated
+from ctcr.conventions.finding import Finding
+from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, with_frame
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+
+@dataclass(frozen=True)
+class Case:
+    """A robot and readings as they stand after the conventions found so far, with their calibration."""
+
+    robot: Robot
+    readings: Measurements
+    fit: Calibrated
+    changes: tuple[Change, ...] = ()  # that made these readings of those of the table
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A hypothesis, and the case that it makes."""
+
+    hypothesis: Hypothesis
+    case: Case
+
+
+def corrected(robot: Robot, readings: Measurements) -> tuple[Case, list[Finding]]:
+    """The case after all clear findings, one at a time, and these."""
+    case, found = Case(robot, readings, calibrated(robot, readings)), []
+    while len(found) < settings.MOST_CONVENTIONS and (better := _clearest(case)):
+        found.append(_finding(case, better))
+        case = better.case
+    return case, found
+
+
+def _clearest(case: Case) -> Tried | None:
+    """The hypothesis that leaves far less error than the table as it is and than every other one; None without any."""
+    before = case.fit
+    if before.typical < settings.CONVENTION_AT_FLOOR * max(before.floor, settings.CONVENTION_FINEST):
+        return None
+    tried = [Tried(one, _applied(case, one)) for one in _likely(case)]
+    tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one, case)]
+    if not tried:
+        return None
+    least = min(one.case.fit.typical for one in tried)
+    alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
+    return min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
+
+
+def _is_clear(before: Calibrated, after: Calibrated) -> bool:
+    return (
+        after.solved.mean() > settings.CONVENTION_SOLVED and after.typical < settings.CONVENTION_CLEAR * before.typical
+    )
+
+
+def _likely(case: Case) -> Iterator[Hypothesis]:
+    """The hypotheses that leave the least error before any calibration: in the file's frame, and in the best one."""
+    every, few = hypotheses(case.robot, case.readings), case.readings.rows(slice(None, None, settings.CONVENTION_EVERY))
+    rough = np.array([_rough(one.robot(case.robot), one.change(few)) for one in every])
+    given = settings.CONVENTION_ROUGH * np.array(_rough(case.robot, few))
+    chosen = np.unique(np.argsort(rough, axis=0, kind="stable")[: settings.CONVENTION_LIKELY])
+    return (every[i] for i in chosen if np.isfinite(rough[i]).all() and (rough[i] <= given).any())
+
+
+def _rough(robot: Robot, readings: Measurements) -> tuple[float, float]:
+    """Median error [m] in the frame of the robot, and in the one that fits best."""
+    predicted = tips.predicted(robot, readings)
+    solved = np.isfinite(predicted).all(axis=1)
+    if solved.mean() < settings.CONVENTION_SOLVED:
+        return np.inf, np.inf
+    here = tips.errors(robot, readings, predicted)
+    return float(np.nanmedian(here)), float(np.nanmedian(aligned(predicted, readings.position)[2]))
+
+
+def _applied(case: Case, hypothesis: Hypothesis) -> Case:
+    robot, readings = hypothesis.robot(case.robot), hypothesis.change(case.readings)
+    if hypothesis.registers:
+        rotation, origin, _ = aligned(tips.predicted(robot, readings), readings.position)
+        robot = with_frame(robot, rotation, origin)
+    fit = calibrated(robot, readings, free_frame=hypothesis.registers)
+    return Case(robot, readings, fit, (*case.changes, hypothesis.change))
+
+
+def _is_jump(tried: Tried, case: Case) -> bool:
+    """Whether a home or a frame moved so far that no data sheet is so wrong."""
+    uncertainty, jump = case.robot.uncertainty, settings.CONVENTION_JUMP
+    if tried.hypothesis.offset:
+        kind = tried.hypothesis.offset[0]
+        sd = (
+            np.deg2rad(uncertainty.rotation_offset_deg) if kind == "alpha" else 1e-3 * uncertainty.translation_offset_mm
+        )
+        far = min(jump * sd, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if kind == "alpha" else jump * sd
+        return abs(offset_of(tried)) > far
+    if tried.hypothesis.registers:
+        old, new = case.robot.tracker, tried.case.fit.robot.tracker
+        moved = 1e3 * np.linalg.norm(new.position - old.position)
+        turned = np.degrees(Rotation.from_matrix(new.rotation @ old.rotation.T).magnitude())
+        return moved > jump * uncertainty.tracker_frame_mm or turned > jump * uncertainty.tracker_frame_deg
+    return True
+
+
+def offset_of(tried: Tried) -> float:
+    """The offset of a home that fits best, SI: that of the hypothesis and what calibration adds to it."""
+    kind, tube, size = tried.hypothesis.offset
+    home, factor = ("home_rotation_deg", np.pi / 180) if kind == "alpha" else ("home_translation_mm", 1e-3)
+    old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
+    return size + factor * (new - old)
+
+
+def _finding(case: Case, tried: Tried) -> Finding:
+    one, text, fix = tried.hypothesis, tried.hypothesis.text, tried.hypothesis.fix
+    if one.offset:
+        text, fix = _offset_in_words(tried)
+    if one.frame or one.registers:
+        fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
+    errors = (case.fit.rms_mm, tried.case.fit.rms_mm)
+    return Finding(one.kind, text, one.columns, fix, rms_mm=errors)
+
+
+def _offset_in_words(tried: Tried) -> tuple[str, str]:
+    kind, tube, _ = tried.hypothesis.offset
+    robot, size = tried.case.robot, offset_of(tried)
+    key, unit, size = (
+        ("home_rotation_deg", "deg", np.degrees(size)) if kind == "alpha" else ("home_translation_mm", "mm", 1e3 * size)
+    )
+    right = 90.0 * round(size / 90)
+    near = 3 * robot.uncertainty.rotation_offset_deg
+    size = right if kind == "alpha" and right and abs(size - right) < near else float(round(size))
+    old = list(getattr(robot.actuation, key))
+    recorded = getattr(robot.actuation, f"recorded_{key}") or old
+    new = [home + size * (i == tube) for i, home in enumerate(old)]
+    name = tried.hypothesis.columns[0]
+    text = f"{name} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
+    fix = f"set actuation.{key} to {numbers(new)} and actuation.recorded_{key} to {numbers(recorded)}"
+    return text, fix
+
+
+def _frame_in_words(robot: Robot) -> str:
+    tracker = robot.tracker
+    position, rotation = numbers(tracker.position_mm, 3), numbers(tracker.rotation_vector_rad, 5)
+    return (
+        f"set tracker.position_mm to {position} and tracker.rotation_vector_rad to {rotation}, "
+        "or measure it: ctcr calibrate registration -o NEW.yaml"
+    )
+
+
+def numbers(values, digits: int = 6) -> str:
+    """A list as a robot file holds it."""
+    return "[" + ", ".join(f"{round(float(value), digits) + 0.0:.10g}" for value in values) + "]"
