@@ -49,7 +49,10 @@ def calibrated(robot: Robot, readings: Measurements, *, free_frame: bool = False
     """
     names, mean, sd, low, high = _priors(robot)
     if free_frame:
-        sd = np.where([name.startswith("tracker.") for name in names], np.inf, sd)
+        sd, low, high = (
+            np.where([name.startswith("tracker.") for name in names], wide, given)
+            for wide, given in ((np.inf, sd), (-np.inf, low), (np.inf, high))
+        )
     table = recording.recording_of(robot, readings, names)
     values, floor = mean.copy(), np.sqrt(3) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
     damping, found = settings.CONVENTION_DAMPING, None
@@ -91,12 +94,23 @@ def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:
 
 
 def _priors(robot: Robot) -> tuple[list[str], Array, Array, Array, Array]:
-    """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly."""
+    """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly.
+
+    Beyond CONVENTION_JUMP lies no data sheet, but another convention.
+    """
     found = []
     for name in parameters.expand(parameters.STANDARD, robot):
         try:
             found.append((name, *(float(part[0]) for part in parameters.priors(robot, [name]))))
         except InputError:  # known exactly
             continue
-    names, mean, sd, low, high = zip(*found, strict=True)
-    return list(names), np.array(mean), settings.CONVENTION_WIDER * np.array(sd), np.array(low), np.array(high)
+    names = [name for name, *_ in found]
+    mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
+    far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
+    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, mean - far), np.minimum(high, mean + far)
+
+
+def jump(name: str, sd: float) -> float:
+    """How far a parameter with this standard deviation moves at most by an error of the data sheet, SI."""
+    far = settings.CONVENTION_JUMP * sd
+    return min(far, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if "rotation" in name else far

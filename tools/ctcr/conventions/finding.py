@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
 from ctcr.show.wording import short
@@ -32,7 +33,8 @@ class Finding:
     def sentence(self) -> str:
         """All of it for people."""
         (before, after), unit = (self.rms_deg, "deg") if self.rms_deg else (self.rms_mm, "mm")
-        return f"{self.text}: {short(before)} -> {short(after)} {unit}; {self.fix}."
+        given = short(before) if isfinite(before) else "without solution"
+        return f"{self.text}: {given} -> {short(after)} {unit}; {self.fix}."
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

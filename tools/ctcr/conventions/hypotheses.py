@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from itertools import chain, combinations, permutations
+from itertools import chain, combinations
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -90,7 +90,8 @@ def _signs(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
             flip = " ".join(f"--flip {name}" for name in joints(kind, tubes))
             sign = np.ones(n)
             sign[list(tubes)] = -1.0
-            text, fix = f"{named(kind, tubes, n)} {verb} the other way", f"ctcr import {flip} negates the columns"
+            text = f"{named(kind, tubes, n)} {verb} the other way"
+            fix = f"ctcr import {flip}, or reverse the sign of the ratio in the controller"
             names = joints(kind, tubes)
             yield Hypothesis("joint_sign", text, names, fix, changed(kind, lambda q, s=sign: q * s), doubts=len(tubes))
             if (home := homes[kind] * (sign < 0)).any():
@@ -130,7 +131,7 @@ def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     n = robot.n_tubes
     for kind in ("alpha", "beta"):
         for unit, factor in OTHER_UNITS[kind]:
-            for tubes in _some(n):
+            for tubes in (some for some in _some(n) if len(some) in (1, n)):
                 names, scale = joints(kind, tubes), np.ones(n)
                 scale[list(tubes)] = factor
                 verb, given = ("are", "rad") if len(tubes) > 1 else ("is", "rad")
@@ -143,9 +144,8 @@ def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     n = robot.n_tubes
     own = tuple(range(n))
-    for order in permutations(own):
-        if order == own:
-            continue
+    exchanged = {tuple(b if i == a else a if i == b else i for i in own) for a, b in combinations(own, 2)}
+    for order in sorted(exchanged | {own[::-1]} - {own}):
         reverse = order == own[::-1]
         numbers = ", ".join(str(i + 1) for i in order)
         for groups in (("beta", "alpha"), ("alpha",), ("beta",)):

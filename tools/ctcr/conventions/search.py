@@ -4,14 +4,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
-from ctcr.conventions.calibrated import Calibrated, calibrated
+from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, with_frame
+from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -49,7 +49,7 @@ def _clearest(case: Case) -> Tried | None:
     if before.typical < settings.CONVENTION_AT_FLOOR * max(before.floor, settings.CONVENTION_FINEST):
         return None
     tried = [Tried(one, _applied(case, one)) for one in _likely(case)]
-    tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one, case)]
+    tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one)]
     if not tried:
         return None
     least = min(one.case.fit.typical for one in tried)
@@ -91,22 +91,14 @@ def _applied(case: Case, hypothesis: Hypothesis) -> Case:
     return Case(robot, readings, fit, (*case.changes, hypothesis.change))
 
 
-def _is_jump(tried: Tried, case: Case) -> bool:
-    """Whether a home or a frame moved so far that no data sheet is so wrong."""
-    uncertainty, jump = case.robot.uncertainty, settings.CONVENTION_JUMP
-    if tried.hypothesis.offset:
-        kind = tried.hypothesis.offset[0]
-        sd = (
-            np.deg2rad(uncertainty.rotation_offset_deg) if kind == "alpha" else 1e-3 * uncertainty.translation_offset_mm
-        )
-        far = min(jump * sd, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if kind == "alpha" else jump * sd
-        return abs(offset_of(tried)) > far
-    if tried.hypothesis.registers:
-        old, new = case.robot.tracker, tried.case.fit.robot.tracker
-        moved = 1e3 * np.linalg.norm(new.position - old.position)
-        turned = np.degrees(Rotation.from_matrix(new.rotation @ old.rotation.T).magnitude())
-        return moved > jump * uncertainty.tracker_frame_mm or turned > jump * uncertainty.tracker_frame_deg
-    return True
+def _is_jump(tried: Tried) -> bool:
+    """Whether an offset, where it is one, moves a home farther than calibration would."""
+    if not tried.hypothesis.offset:
+        return True
+    kind, tube, _ = tried.hypothesis.offset
+    name = f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
+    [sd] = parameters.priors(tried.case.robot, [name])[1]
+    return abs(offset_of(tried)) > jump(name, sd)
 
 
 def offset_of(tried: Tried) -> float:
