@@ -225,21 +225,22 @@ CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )
 CONVENTION_WIDER = 5.0  # factor on the stated standard deviations: data sheets err by more than they say
-CONVENTION_ITERATIONS = 12  # of the fit of a hypothesis
+CONVENTION_ITERATIONS = 10  # of the fit of a hypothesis
+CONVENTION_PATIENCE = 4  # of these iterations, after which a fit must be below the error that it is to beat
 CONVENTION_DAMPING, CONVENTION_MOST_DAMPING = 1e-4, 1e6  # Levenberg-Marquardt: at first, and where the fit gives up
 CONVENTION_SETTLED = 0.1  # [log posterior] that a step gains at least
 CONVENTION_UNSOLVED = 1.0  # [m] error of a reading that the model cannot solve: as large as a robot
 CONVENTION_FINEST = 1e-6  # [m] smallest error that counts, where the tracker states no jitter
-CONVENTION_EVERY = 3  # of these readings, every third in a first look at each hypothesis
+CONVENTION_EVERY = 2  # of these readings, every second in a first look at each hypothesis
 CONVENTION_ROUGH = 1.5  # error at this first look over that of the table as it is, above which none is looked at again
-CONVENTION_LIKELY = 6  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
+CONVENTION_LIKELY = 5  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
 CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
 CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which no hypothesis can gain anything
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
 CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that
 CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts so far off finds nothing
-CONVENTION_OFFSET_STEP_DEG = 15  # of the home rotations that are tried: calibration finds what lies between
+CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between
 CONVENTION_SHIFTS_MM = (20, 40, 80)  # of home translations
 CONVENTION_RUNS = 0.9  # quantile of the typical errors of the other runs, which a run homed elsewhere exceeds
 CONVENTION_SCAN = {"alpha": 3.15, "beta": 0.05}  # [rad], [m] offsets of a run that are looked for: all, and a large one

@@ -15,11 +15,10 @@ from ctcr.commands import options
 def command(robot: str, measurements: str, threads: int, anyway: bool, out) -> None:
     """Find the physical effect that a model lacks.
 
-    Stops where the table or the robot file follows a wrong convention, as `ctcr compare` finds them: no effect explains
-    it. Else calibrates ROBOT to the poses in MEASUREMENTS first. Then fits every effect of the catalogue (`ctcr effects`)
-    together with the calibration, accepts one at a time, and checks the result on held-out runs. The verdict also
-    says when nothing is missing, when the data cannot tell effects apart, and when no effect of the catalogue
-    explains the error.
+    Stops where the table or the robot file follows a wrong convention, as `ctcr compare` finds them. Else calibrates
+    ROBOT to the poses in MEASUREMENTS first. Then fits every effect of the catalogue (`ctcr effects`) together with
+    the calibration, accepts one at a time, and checks the result on held-out runs. The verdict also says when nothing
+    is missing, when the data cannot tell effects apart, and when no effect of the catalogue explains the error.
 
     Example: ctcr diagnose robot.yaml measurements.csv --json diagnosis.json --report diagnosis.html
     """

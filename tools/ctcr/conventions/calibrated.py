@@ -41,22 +41,24 @@ class Calibrated:
         return 1e3 * float(np.sqrt(np.mean(self.error[self.solved] ** 2))) if self.solved.any() else np.inf
 
 
-def calibrated(robot: Robot, readings: Measurements, *, free_frame: bool = False) -> Calibrated:
+def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None, to_beat: float = np.inf) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
-    Data sheets err by more than they say: the stated standard deviations are widened. A free frame has none.
-    Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere.
+    Data sheets err by more than they say: the stated standard deviations are widened, and infinite where the name of a
+    parameter begins with `free`.
+    Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
+    gives up where it does not soon fall below an error `to_beat` [m].
     """
     names, mean, sd, low, high = _priors(robot)
-    if free_frame:
+    if free:
         sd, low, high = (
-            np.where([name.startswith("tracker.") for name in names], wide, given)
+            np.where([name.startswith(free) for name in names], wide, given)
             for wide, given in ((np.inf, sd), (-np.inf, low), (np.inf, high))
         )
     table = recording.recording_of(robot, readings, names)
     values, floor = mean.copy(), np.sqrt(3) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
     damping, found = settings.CONVENTION_DAMPING, None
-    for _ in range(settings.CONVENTION_ITERATIONS):
+    for iteration in range(settings.CONVENTION_ITERATIONS):
         if found is None:
             residual, jacobian, _ = table.residual(values, True)
             residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
@@ -65,6 +67,8 @@ def calibrated(robot: Robot, readings: Measurements, *, free_frame: bool = False
             if not solved.any():
                 break
             size = max(float(np.median(error[solved])), floor, settings.CONVENTION_FINEST)
+            if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
+                break
             found = _cost(error, solved, size, (values - mean) / sd)
         weight = 1 / (size**2 + error[solved] ** 2)
         a = jacobian[solved] * np.sqrt(3 * weight)[:, None, None]
@@ -111,6 +115,6 @@ def _priors(robot: Robot) -> tuple[list[str], Array, Array, Array, Array]:
 
 
 def jump(name: str, sd: float) -> float:
-    """How far a parameter with this standard deviation moves at most by an error of the data sheet, SI."""
+    """How far a parameter with this standard deviation is off at most by an error of the data sheet, SI."""
     far = settings.CONVENTION_JUMP * sd
     return min(far, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if "rotation" in name else far

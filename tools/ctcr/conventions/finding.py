@@ -19,6 +19,8 @@ class Finding:
     runs: Sequence[int] = ()  # empty: all
     rms_mm: tuple[float, float] = (0.0, 0.0)  # error of calibrated positions, as given and corrected
     rms_deg: tuple[float, float] | None = None  # of orientations, where these decide
+    rows: Sequence[int] = ()  # of the table, where only some are wrong
+    rivals: Sequence["Finding"] = ()  # of another kind, which explain the readings as well
 
     @property
     def clarity(self) -> float:
@@ -30,11 +32,22 @@ class Finding:
         return replace(self, rms_mm=(before_mm, after_mm))
 
     @property
+    def what(self) -> str:
+        """Its text, and what may be wrong instead."""
+        others = "".join(f", or {rival.text}" for rival in self.rivals)
+        return f"{self.text}{others} (these readings do not tell)" if others else self.text
+
+    @property
+    def remedy(self) -> str:
+        """Its fix, and that of what may be wrong instead."""
+        return "; or ".join(one.fix for one in (self, *self.rivals))
+
+    @property
     def sentence(self) -> str:
         """All of it for people."""
         (before, after), unit = (self.rms_deg, "deg") if self.rms_deg else (self.rms_mm, "mm")
         given = short(before) if isfinite(before) else "without solution"
-        return f"{self.text}: {given} -> {short(after)} {unit}; {self.fix}."
+        return f"{self.what}: {given} -> {short(after)} {unit}; {self.remedy}."
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -42,4 +55,8 @@ class Finding:
         for name in ("rms_mm", "rms_deg"):
             if errors := getattr(self, name):
                 found[name] = dict(zip(("before", "after"), errors, strict=True))
-        return found | {"fix": self.fix, "text": self.text}
+        if self.rows:
+            found["rows"] = list(self.rows)
+        if self.rivals:
+            found["rivals"] = [{"kind": one.kind, "columns": list(one.columns), "fix": one.fix} for one in self.rivals]
+        return found | {"fix": self.remedy, "text": self.what}

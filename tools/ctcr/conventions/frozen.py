@@ -46,7 +46,8 @@ def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | 
     text = f"the tracker repeated its last pose while the joints moved, in {_spans(where)}"
     fix = "leave the pose fields of these rows empty"
     columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
-    return Finding("frozen", text, columns, fix, runs=tuple(map(int, np.unique(readings.run[frozen])))), frozen
+    runs = np.unique(readings.run[frozen]).tolist()
+    return Finding("frozen", text, columns, fix, runs=runs, rows=where.tolist()), frozen
 
 
 def _spans(rows: Integers) -> str:

@@ -38,6 +38,16 @@ class Hypothesis:
     offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
 
+    @property
+    def frees(self) -> str | None:
+        """How the names of the parameters begin of which nothing is known by it."""
+        if self.registers:
+            return "tracker."
+        if self.offset:
+            kind, tube, _ = self.offset
+            return f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
+        return None
+
     def robot(self, robot: Robot) -> Robot:
         return with_frame(robot, *self.frame) if self.frame else robot
 
@@ -116,7 +126,8 @@ def _zeros(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 
 
 def _offsets(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
-    turns = np.deg2rad(np.arange(-165, 181, settings.CONVENTION_OFFSET_STEP_DEG))
+    step = settings.CONVENTION_OFFSET_STEP_DEG
+    turns = np.deg2rad(np.arange(step - 180, 181, step))
     shifts = 1e-3 * np.outer((1, -1), settings.CONVENTION_SHIFTS_MM).ravel()
     for kind, sizes in (("alpha", turns[turns != 0]), ("beta", shifts)):
         for i in range(robot.n_tubes):
@@ -175,8 +186,7 @@ def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
         sign = np.ones(3)
         sign[axis] = -1.0
         text = f"the tracker frame of the table is left-handed: {name} is mirrored"
-        fix = f"negate {name}_m, and the two other vector components of the quaternion if it is mirrored too"
-        yield Hypothesis("mirrored", text, (POSE[axis],), fix, changed("position", lambda p, s=sign: p * s))
+        yield Hypothesis("mirrored", text, (POSE[axis],), "", changed("position", lambda p, s=sign: p * s))
 
 
 def _frames(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

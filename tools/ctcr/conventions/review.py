@@ -28,6 +28,8 @@ def review(robot: Robot, readings: Measurements) -> Review:
     located = np.isfinite(readings.positions).all(axis=1) & ~frozen.repeated(readings)
     if not located.any():
         return Review([], robot, readings)
+    robot = robot.model_copy()
+    robot._source = None  # copies of a robot copy the text of its file too
     few = np.flatnonzero(located)
     case, found = search.corrected(robot, readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)]))
     changes = [*case.changes]
@@ -75,12 +77,13 @@ def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change])
     if finding.kind != "mirrored":
         return finding
     [column] = finding.columns
-    axis = "xyz".index(column[0])
-    fix = f"negate {column}"
+    axis, fix, rivals = "xyz".index(column[0]), f"negate {column}", finding.rivals
     if orientation.mirrored(case.fit, case.readings, axis):
         changes.append(changed("quaternion", lambda q: orientation.mirror(q, axis)))
         fix += " and " + " and ".join(f"q{name}" for name in "xyz" if name != column[0])
-    return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame and register it")
+    elif case.readings.oriented.any():
+        rivals = ()  # joints that count the other way would mirror the orientations too
+    return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)
 
 
 def _of_every_run(readings: Measurements, located: Mask) -> Integers:

@@ -1,7 +1,7 @@
 """The search: every hypothesis is predicted, the likely ones are calibrated, the clearest is applied, and again."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, with_frame
-from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -32,6 +31,7 @@ class Tried:
 
     hypothesis: Hypothesis
     case: Case
+    rivals: Sequence[Hypothesis] = ()  # of another kind, which explain the readings as well
 
 
 def corrected(robot: Robot, readings: Measurements) -> tuple[Case, list[Finding]]:
@@ -54,7 +54,9 @@ def _clearest(case: Case) -> Tried | None:
         return None
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    return min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
+    best = min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
+    rivals = [one.hypothesis for one in alike if one.hypothesis.kind != best.hypothesis.kind]
+    return replace(best, rivals=[one for one in rivals if not one.offset and not one.registers])
 
 
 def _is_clear(before: Calibrated, after: Calibrated) -> bool:
@@ -87,7 +89,7 @@ def _applied(case: Case, hypothesis: Hypothesis) -> Case:
     if hypothesis.registers:
         rotation, origin, _ = aligned(tips.predicted(robot, readings), readings.position)
         robot = with_frame(robot, rotation, origin)
-    fit = calibrated(robot, readings, free_frame=hypothesis.registers)
+    fit = calibrated(robot, readings, free=hypothesis.frees, to_beat=case.fit.typical)
     return Case(robot, readings, fit, (*case.changes, hypothesis.change))
 
 
@@ -95,10 +97,9 @@ def _is_jump(tried: Tried) -> bool:
     """Whether an offset, where it is one, moves a home farther than calibration would."""
     if not tried.hypothesis.offset:
         return True
-    kind, tube, _ = tried.hypothesis.offset
-    name = f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
-    [sd] = parameters.priors(tried.case.robot, [name])[1]
-    return abs(offset_of(tried)) > jump(name, sd)
+    uncertainty, name = tried.case.robot.uncertainty, tried.hypothesis.frees
+    sd = {"alpha": np.deg2rad(uncertainty.rotation_offset_deg), "beta": 1e-3 * uncertainty.translation_offset_mm}
+    return abs(offset_of(tried)) > jump(name, sd[tried.hypothesis.offset[0]])
 
 
 def offset_of(tried: Tried) -> float:
@@ -116,7 +117,8 @@ def _finding(case: Case, tried: Tried) -> Finding:
     if one.frame or one.registers:
         fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
     errors = (case.fit.rms_mm, tried.case.fit.rms_mm)
-    return Finding(one.kind, text, one.columns, fix, rms_mm=errors)
+    rivals = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in tried.rivals]
+    return Finding(one.kind, text, one.columns, fix, rms_mm=errors, rivals=rivals)
 
 
 def _offset_in_words(tried: Tried) -> tuple[str, str]:
