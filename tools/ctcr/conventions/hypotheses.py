@@ -131,11 +131,15 @@ def _offsets(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     shifts = 1e-3 * np.outer((1, -1), settings.CONVENTION_SHIFTS_MM).ravel()
     for kind, sizes in (("alpha", turns[turns != 0]), ("beta", shifts)):
         for i in range(robot.n_tubes):
-            for size in sizes:
-                move = size * (np.arange(robot.n_tubes) == i)
-                names = joints(kind, (i,))
-                change = changed(kind, lambda q, d=move: q + d)
-                yield Hypothesis("joint_offset", "", names, "", change, offset=(kind, i, float(size)), doubts=2)
+            any_offset = Hypothesis("joint_offset", "", joints(kind, (i,)), "", offset=(kind, i, 0.0), doubts=2)
+            yield from (offset_by(any_offset, float(size), robot.n_tubes) for size in sizes)
+
+
+def offset_by(hypothesis: Hypothesis, size: float, n_tubes: int) -> Hypothesis:
+    """An offset of the same joint by another size, SI."""
+    kind, tube, _ = hypothesis.offset
+    move = size * (np.arange(n_tubes) == tube)
+    return replace(hypothesis, offset=(kind, tube, size), change=changed(kind, lambda q: q + move))
 
 
 def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

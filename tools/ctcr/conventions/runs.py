@@ -37,6 +37,9 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
         return None
     if second < settings.CONVENTION_ALIKE * after or _typical(_moved(like.robot, mine), like) < after:
         return None
+    of_others = [_scan(like, readings.rows(readings.run == run), kind, tube)[3] for run in np.delete(runs, worst)]
+    if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
+        return None  # the others would take offsets too: something else acts
     run = int(runs[worst])
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)
     [name] = joints(kind, (tube,))

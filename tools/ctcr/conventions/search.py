@@ -10,7 +10,7 @@ from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
-from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, with_frame
+from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -55,6 +55,9 @@ def _clearest(case: Case) -> Tried | None:
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
     best = min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
+    if best.hypothesis.offset:
+        exact = offset_by(best.hypothesis, offset_of(best), case.robot.n_tubes)
+        best = Tried(exact, _applied(case, exact))
     rivals = [one.hypothesis for one in alike if one.hypothesis.kind != best.hypothesis.kind]
     return replace(best, rivals=[one for one in rivals if not one.offset and not one.registers])
 
@@ -103,11 +106,17 @@ def _is_jump(tried: Tried) -> bool:
 
 
 def offset_of(tried: Tried) -> float:
-    """The offset of a home that fits best, SI: that of the hypothesis and what calibration adds to it."""
+    """The offset of a home that fits best, SI: that of the hypothesis and what calibration adds to it.
+
+    A right angle is taken for one, where the fit is as near to it as homes are known.
+    """
     kind, tube, size = tried.hypothesis.offset
     home, factor = ("home_rotation_deg", np.pi / 180) if kind == "alpha" else ("home_translation_mm", 1e-3)
     old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
-    return size + factor * (new - old)
+    size += factor * (new - old)
+    right = np.pi / 2 * round(size / (np.pi / 2))
+    near = 3 * np.deg2rad(tried.case.robot.uncertainty.rotation_offset_deg)
+    return right if kind == "alpha" and right and abs(size - right) < near else size
 
 
 def _finding(case: Case, tried: Tried) -> Finding:
@@ -122,18 +131,15 @@ def _finding(case: Case, tried: Tried) -> Finding:
 
 
 def _offset_in_words(tried: Tried) -> tuple[str, str]:
-    kind, tube, _ = tried.hypothesis.offset
-    robot, size = tried.case.robot, offset_of(tried)
-    key, unit, size = (
-        ("home_rotation_deg", "deg", np.degrees(size)) if kind == "alpha" else ("home_translation_mm", "mm", 1e3 * size)
+    kind, tube, size = tried.hypothesis.offset
+    robot, name = tried.case.robot, tried.hypothesis.columns[0]
+    key, unit, factor = (
+        ("home_rotation_deg", "deg", 180 / np.pi) if kind == "alpha" else ("home_translation_mm", "mm", 1e3)
     )
-    right = 90.0 * round(size / 90)
-    near = 3 * robot.uncertainty.rotation_offset_deg
-    size = right if kind == "alpha" and right and abs(size - right) < near else float(round(size))
+    size = float(round(factor * size))
     old = list(getattr(robot.actuation, key))
     recorded = getattr(robot.actuation, f"recorded_{key}") or old
     new = [home + size * (i == tube) for i, home in enumerate(old)]
-    name = tried.hypothesis.columns[0]
     text = f"{name} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
     fix = f"set actuation.{key} to {numbers(new)} and actuation.recorded_{key} to {numbers(recorded)}"
     return text, fix
