@@ -248,4 +248,4 @@ CONVENTION_SCAN_POINTS, CONVENTION_SCANS = 25, 3  # of a grid, and of grids, eac
 MOST_CONVENTIONS = 4  # findings of a kind that are looked for, one after another
 JOINT_SPEED, JOINT_SPEED_FACTOR = 0.2, 7.0  # [rad/s] usual speed of joints, and factor of one standard deviation
 CONVENTION_ODDS = 3.0  # [log odds] from which another unit of time is clear
-CONVENTION_RUN_ROWS, CONVENTION_ALL_RUNS = 20, 1200  # readings of a run on which it is judged, and of all runs
+CONVENTION_RUN_ROWS, CONVENTION_MOST_RUNS = 20, 60  # readings of a run on which it is judged, and runs: to save time

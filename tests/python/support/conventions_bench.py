@@ -1,4 +1,4 @@
-"""Sessions of random robots for the tests of conventions: what the tracker reads, before anything is written wrongly."""
+"""Sessions of random robots for the tests of conventions: what the tracker reads, written as it should be."""
 
 import numpy as np
 from ctcr.model import simulation

@@ -87,10 +87,11 @@ def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change])
 
 
 def _of_every_run(readings: Measurements, located: Mask) -> Integers:
-    """Rows of all runs, at most CONVENTION_RUN_ROWS of each, and few in all."""
-    rows = [np.flatnonzero(located & (readings.run == run)) for run in np.unique(readings.run[located])]
-    most = max(1, min(settings.CONVENTION_RUN_ROWS, settings.CONVENTION_ALL_RUNS // len(rows)))
-    return np.concatenate([of_run[evenly(len(of_run), most)] for of_run in rows])
+    """Rows of all runs, or of many runs some, at most CONVENTION_RUN_ROWS of each."""
+    runs = np.unique(readings.run[located])
+    runs = runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)]
+    rows = [np.flatnonzero(located & (readings.run == run)) for run in runs]
+    return np.concatenate([of_run[evenly(len(of_run), settings.CONVENTION_RUN_ROWS)] for of_run in rows])
 
 
 def _with_rows(fit: Calibrated, error: Array, rows: Mask) -> float:

@@ -22,20 +22,20 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     runs = np.unique(readings.run)
     if len(runs) < settings.FEWEST_RUNS:
         return None
-    of_run = np.array([_log_error(fit, readings.run == run) for run in runs])
+    clear, of_run = settings.CONVENTION_CLEAR, np.array([_log_error(fit, readings.run == run) for run in runs])
     worst = int(np.nanargmax(of_run))
-    others = readings.run != runs[worst]
-    like = calibrated(fit.robot, readings.rows(others))
     usual = np.exp(np.quantile(np.delete(of_run, worst), settings.CONVENTION_RUNS))
-    mine = readings.rows(~others)
-    before = _typical(tips.errors(like.robot, mine), like)
-    if before * settings.CONVENTION_CLEAR < usual:
+    if clear * np.exp(of_run[worst]) < usual:
         return None
+    others = readings.run != runs[worst]
+    like, mine = calibrated(fit.robot, readings.rows(others)), readings.rows(~others)
+    before = _typical(tips.errors(like.robot, mine), like)
     scanned = sorted(_scan(like, mine, kind, tube) for kind in ("beta", "alpha") for tube in range(fit.robot.n_tubes))
     (after, kind, tube, offset), second = scanned[0], scanned[1][0] if len(scanned) > 1 else np.inf
-    if after > settings.CONVENTION_CLEAR * before or after > settings.CONVENTION_ALIKE * usual:
+    if after > clear * before or clear * after > usual:
         return None
-    if second < settings.CONVENTION_ALIKE * after or _typical(_moved(like.robot, mine), like) < after:
+    moved = _typical(_moved(like.robot, mine), like)  # the whole frame instead of a joint
+    if second < settings.CONVENTION_ALIKE * after or settings.CONVENTION_ALIKE * moved < after:
         return None
     of_others = [_scan(like, readings.rows(readings.run == run), kind, tube)[3] for run in np.delete(runs, worst)]
     if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
