@@ -50,6 +50,12 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     return options[1] < options[0]
 
 
+def error_deg(robot: Robot, readings: Measurements) -> float:
+    """RMS error of the orientations; NaN where none was measured."""
+    some = readings.rows(readings.oriented)
+    return _error_deg(_predicted(robot, some), some.quaternions, robot.tracker.roll_known) if len(some) else np.nan
+
+
 def mirror(quaternion: Array, axis: int) -> Array:
     """Rotations (..., 4) seen in a mirror across the plane normal to an axis: that component of the vector stays."""
     sign = np.array([1.0, -1.0, -1.0, -1.0])

@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
-from ctcr.conventions import tips
+from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
@@ -35,17 +35,20 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     if after > clear * before or clear * after > usual:
         return None
     moved = _typical(_moved(like.robot, mine), like)  # the whole frame instead of a joint
-    if second < settings.CONVENTION_ALIKE * after or settings.CONVENTION_ALIKE * moved < after:
+    if second < settings.CONVENTION_ALIKE * after or moved < after:
         return None
     of_others = [_scan(like, readings.rows(readings.run == run), kind, tube)[3] for run in np.delete(runs, worst)]
     if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
         return None  # the others would take offsets too: something else acts
+    move = offset * (np.arange(fit.robot.n_tubes) == tube)
+    turned = orientation.error_deg(like.robot, mine)
+    if orientation.error_deg(like.robot, changed(kind, lambda q: q + move)(mine)) > settings.CONVENTION_ALIKE * turned:
+        return None  # the orientations deny it
     run = int(runs[worst])
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)
     [name] = joints(kind, (tube,))
     text = f"run {run} was homed elsewhere: {name} stands {short(abs(size))} {unit} off"
     fix = f"add {size:+.{digits}f} {unit} to {name} in the rows of run {run}, or leave this run out"
-    move = offset * (np.arange(fit.robot.n_tubes) == tube)
 
     def change(m: Measurements) -> Measurements:
         return changed(kind, lambda q: q + np.where((m.run == run)[:, None], move, 0.0))(m)
