@@ -54,4 +54,5 @@ def _spans(rows: Integers) -> str:
     """Rows as spans: rows 100 to 120, 200."""
     ends = np.flatnonzero(np.diff(rows) > 1)
     spans = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
-    return f"rows {listed([str(a) if a == b else f'{a} to {b}' for a, b in spans])}"
+    word = "row" if len(rows) == 1 else "rows"
+    return f"{word} {listed([str(a) if a == b else f'{a} to {b}' for a, b in spans])}"

@@ -31,7 +31,9 @@ def review(robot: Robot, readings: Measurements) -> Review:
     robot = robot.model_copy()
     robot._source = None  # copies of a robot copy the text of its file too
     few = np.flatnonzero(located)
-    case, found = search.corrected(robot, readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)]))
+    of_runs = _of_every_run(readings, located)
+    sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
+    case, found = search.corrected(robot, sample, readings.rows(of_runs))
     changes = [*case.changes]
 
     # Orientations are judged where positions are right.
@@ -41,7 +43,7 @@ def review(robot: Robot, readings: Measurements) -> Review:
     right = _applied(readings, [*changes, change])
 
     # Runs need some readings of each, which a large table has.
-    fit, of_runs = case.fit, right.rows(_of_every_run(right, located))
+    fit, of_runs = case.fit, right.rows(of_runs)
     if len(of_runs) != len(case.readings):
         fit = calibrated(case.robot, of_runs)
     for _ in range(settings.MOST_CONVENTIONS):

@@ -14,6 +14,8 @@ from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_b
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
+FRAME = 6  # numbers of a frame
+
 
 @dataclass(frozen=True)
 class Case:
@@ -34,10 +36,17 @@ class Tried:
     rivals: Sequence[Hypothesis] = ()  # of another kind, which explain the readings as well
 
 
-def corrected(robot: Robot, readings: Measurements) -> tuple[Case, list[Finding]]:
-    """The case after all clear findings, one at a time, and these."""
+def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding]]:
+    """The case after all clear findings, one at a time, and these.
+
+    `readings` are a sample of the table, `of_runs` some of each run. Where a frame for each run explains more than a
+    hypothesis on joints, loads or positions does, the runs are not one session, and it is not clear.
+    """
     case, found = Case(robot, readings, calibrated(robot, readings)), []
     while len(found) < settings.MOST_CONVENTIONS and (better := _clearest(case)):
+        whole = better.hypothesis.frame or better.hypothesis.registers
+        if not whole and _with_run_frames(case, of_runs) < better.case.fit.typical:
+            break
         found.append(_finding(case, better))
         case = better.case
     return case, found
@@ -60,6 +69,19 @@ def _clearest(case: Case) -> Tried | None:
         best = Tried(exact, _applied(case, exact))
     rivals = [one.hypothesis for one in alike if one.hypothesis.kind != best.hypothesis.kind]
     return replace(best, rivals=[one for one in rivals if not one.offset and not one.registers])
+
+
+def _with_run_frames(case: Case, of_runs: Measurements) -> float:
+    """Typical error [m] of a case in which each run has the frame that fits it best."""
+    for change in case.changes:
+        of_runs = change(of_runs)
+    positions, error = tips.predicted(case.fit.robot, of_runs), np.full(len(of_runs), np.nan)
+    for run in np.unique(of_runs.run):
+        rows = of_runs.run == run
+        freedom = 3 * np.sum(rows) - FRAME
+        left = aligned(positions[rows], of_runs.position[rows])[2]
+        error[rows] = left * np.sqrt(3 * np.sum(rows) / freedom) if freedom > 0 else np.inf
+    return Calibrated(case.robot, error, case.fit.floor).typical
 
 
 def _is_clear(before: Calibrated, after: Calibrated) -> bool:
