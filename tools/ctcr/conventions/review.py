@@ -79,11 +79,11 @@ def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change])
     if finding.kind != "mirrored":
         return finding
     [column] = finding.columns
-    axis, fix, rivals = "xyz".index(column[0]), f"negate {column}", finding.rivals
+    axis, fix, rivals = "xyz".index(column[0]), f"ctcr import --mirror {column[0]}", finding.rivals
     if orientation.mirrored(case.fit, case.readings, axis):
         changes.append(changed("quaternion", lambda q: orientation.mirror(q, axis)))
-        fix += " and " + " and ".join(f"q{name}" for name in "xyz" if name != column[0])
     elif case.readings.oriented.any():
+        fix = f"negate {column}"
         rivals = ()  # joints that count the other way would mirror the orientations too
     return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)
 

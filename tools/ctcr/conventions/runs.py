@@ -48,7 +48,7 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)
     [name] = joints(kind, (tube,))
     text = f"run {run} was homed elsewhere: {name} stands {short(abs(size))} {unit} off"
-    fix = f"add {size:+.{digits}f} {unit} to {name} in the rows of run {run}, or leave this run out"
+    fix = f"ctcr import --offset {name}@{run}={size:.{digits}f}{unit}, or leave this run out"
 
     def change(m: Measurements) -> Measurements:
         return changed(kind, lambda q: q + np.where((m.run == run)[:, None], move, 0.0))(m)

@@ -164,9 +164,7 @@ def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tub
             yield from ((column, f"this column is missing: {reason}") for column in absent)
 
 
-def check(
-    name: str, block: Array, rows: Integers, columns: list[str], faults: Faults, plausible: bool = True
-) -> None:
+def check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults, plausible: bool = True) -> None:
     """Faults in the values (rows, columns) of one group of `group_columns`; `columns` are their names in messages.
 
     `plausible`: whether values that can only be in another unit or of another sign are faults.
