@@ -225,6 +225,7 @@ CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )
 CONVENTION_WIDER = 5.0  # factor on the stated standard deviations: data sheets err by more than they say
+CONVENTION_ANYWHERE = 1.0  # [m] standard deviation and bound of a position of which nothing is known
 CONVENTION_ITERATIONS = 10  # of the fit of a hypothesis
 CONVENTION_PATIENCE = 4  # of these iterations, after which a fit must be below the error that it is to beat
 CONVENTION_DAMPING, CONVENTION_MOST_DAMPING = 1e-4, 1e6  # Levenberg-Marquardt: at first, and where the fit gives up
@@ -235,7 +236,7 @@ CONVENTION_EVERY = 2  # of these readings, every second in a first look at each 
 CONVENTION_ROUGH = 1.5  # error at this first look over that of the table as it is, above which none is looked at again
 CONVENTION_LIKELY = 5  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
 CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
-CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which no hypothesis can gain anything
+CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which it is noise
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
 CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that

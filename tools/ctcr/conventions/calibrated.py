@@ -44,17 +44,17 @@ class Calibrated:
 def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None, to_beat: float = np.inf) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
-    Data sheets err by more than they say: the stated standard deviations are widened, and infinite where the name of a
-    parameter begins with `free`.
+    Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
+    name begins with `free` say nothing.
     Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
     gives up where it does not soon fall below an error `to_beat` [m].
     """
     names, mean, sd, low, high = _priors(robot)
     if free:
-        sd, low, high = (
-            np.where([name.startswith(free) for name in names], wide, given)
-            for wide, given in ((np.inf, sd), (-np.inf, low), (np.inf, high))
-        )
+        chosen = np.array([name.startswith(free) for name in names])
+        anywhere = np.array([np.pi if "rotation" in name else settings.CONVENTION_ANYWHERE for name in names])
+        sd = np.where(chosen, anywhere, sd)
+        low, high = np.where(chosen, mean - anywhere, low), np.where(chosen, mean + anywhere, high)
     table = recording.recording_of(robot, readings, names)
     values, floor = mean.copy(), np.sqrt(3) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
     damping, found = settings.CONVENTION_DAMPING, None

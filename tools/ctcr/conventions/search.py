@@ -55,7 +55,7 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
 def _clearest(case: Case) -> Tried | None:
     """The hypothesis that leaves far less error than the table as it is and than every other one; None without any."""
     before = case.fit
-    if before.typical < settings.CONVENTION_AT_FLOOR * max(before.floor, settings.CONVENTION_FINEST):
+    if _is_noise(before):
         return None
     tried = [Tried(one, _applied(case, one)) for one in _likely(case)]
     tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one)]
@@ -82,6 +82,10 @@ def _with_run_frames(case: Case, of_runs: Measurements) -> float:
         left = aligned(positions[rows], of_runs.position[rows])[2]
         error[rows] = left * np.sqrt(3 * np.sum(rows) / freedom) if freedom > 0 else np.inf
     return Calibrated(case.robot, error, case.fit.floor).typical
+
+
+def _is_noise(fit: Calibrated) -> bool:
+    return fit.typical < settings.CONVENTION_AT_FLOOR * max(fit.floor, settings.CONVENTION_FINEST)
 
 
 def _is_clear(before: Calibrated, after: Calibrated) -> bool:
@@ -119,12 +123,16 @@ def _applied(case: Case, hypothesis: Hypothesis) -> Case:
 
 
 def _is_jump(tried: Tried) -> bool:
-    """Whether an offset, where it is one, moves a home farther than calibration would."""
+    """Whether an offset, where it is one, moves a home farther than calibration would: by right angles, or so that only
+    noise is left. A physical effect may ask for another offset, but it leaves more.
+    """
     if not tried.hypothesis.offset:
         return True
     uncertainty, name = tried.case.robot.uncertainty, tried.hypothesis.frees
     sd = {"alpha": np.deg2rad(uncertainty.rotation_offset_deg), "beta": 1e-3 * uncertainty.translation_offset_mm}
-    return abs(offset_of(tried)) > jump(name, sd[tried.hypothesis.offset[0]])
+    kind, size = tried.hypothesis.offset[0], offset_of(tried)
+    right = kind == "alpha" and size % (np.pi / 2) == 0
+    return abs(size) > jump(name, sd[kind]) and (right or _is_noise(tried.case.fit))
 
 
 def offset_of(tried: Tried) -> float:
