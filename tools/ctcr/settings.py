@@ -218,3 +218,35 @@ PLAN_POOL = 120  # random runs to choose from
 PLAN_TRIES = 100  # random runs that are drawn for each one that the joints allow
 PLAN_STOP_S = 2.0  # [s] from stop to stop
 PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that each is reached from both sides
+
+# ---- Conventions of a table, before any physics
+
+CONVENTION_ROWS = (
+    240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
+)
+CONVENTION_WIDER = 5.0  # factor on the stated standard deviations: data sheets err by more than they say
+CONVENTION_ANYWHERE = 1.0  # [m] standard deviation and bound of a position of which nothing is known
+CONVENTION_ITERATIONS = 10  # of the fit of a hypothesis
+CONVENTION_PATIENCE = 4  # of these iterations, after which a fit must be below the error that it is to beat
+CONVENTION_DAMPING, CONVENTION_MOST_DAMPING = 1e-4, 1e6  # Levenberg-Marquardt: at first, and where the fit gives up
+CONVENTION_SETTLED = 0.1  # [log posterior] that a step gains at least
+CONVENTION_UNSOLVED = 1.0  # [m] error of a reading that the model cannot solve: as large as a robot
+CONVENTION_FINEST = 1e-6  # [m] smallest error that counts, where the tracker states no jitter
+CONVENTION_EVERY = 2  # of these readings, every second in a first look at each hypothesis
+CONVENTION_ROUGH = 1.5  # error at this first look over that of the table as it is, above which none is looked at again
+CONVENTION_LIKELY = 5  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
+CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
+CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which it is noise
+CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
+CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
+CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that
+CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts so far off finds nothing
+CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between
+CONVENTION_SHIFTS_MM = (20, 40, 80)  # of home translations
+CONVENTION_RUNS = 0.9  # quantile of the typical errors of the other runs, which a run homed elsewhere exceeds
+CONVENTION_SCAN = {"alpha": 3.15, "beta": 0.05}  # [rad], [m] offsets of a run that are looked for: all, and a large one
+CONVENTION_SCAN_POINTS, CONVENTION_SCANS = 25, 3  # of a grid, and of grids, each within two points of the one before
+MOST_CONVENTIONS = 4  # findings of a kind that are looked for, one after another
+JOINT_SPEED, JOINT_SPEED_FACTOR = 0.2, 7.0  # [rad/s] usual speed of joints, and factor of one standard deviation
+CONVENTION_ODDS = 3.0  # [log odds] from which another unit of time is clear
+CONVENTION_RUN_ROWS, CONVENTION_MOST_RUNS = 20, 60  # readings of a run on which it is judged, and runs: to save time

@@ -24,10 +24,11 @@ from ctcr.errors import InputError, Problem
     help="Fix a parameter instead of fitting it, SI units: friction.coefficient.1=0.02. May be repeated.",
 )
 @options.free
+@options.anyway
 @options.effects
 @options.new_robot
 @options.json
-def command(robot, names, diagnosis, measurements, given, free, target, in_place, out) -> None:
+def command(robot, names, diagnosis, measurements, given, free, anyway, target, in_place, out) -> None:
     """Add physical effects to a robot file.
 
     Every command then uses them; `ctcr effects` lists them. With --fit the effects are fitted together with the
@@ -42,7 +43,6 @@ def command(robot, names, diagnosis, measurements, given, free, target, in_place
     from ctcr.effects import catalogue
     from ctcr.effects.settings import diagnosed, settings
     from ctcr.robot import robot_file
-    from ctcr.table import measurements as table
 
     loaded = robot_file.load(robot)
     target = outcome.check_target(loaded, target, in_place, needed=True)
@@ -58,7 +58,7 @@ def command(robot, names, diagnosis, measurements, given, free, target, in_place
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
-    readings = table.load(measurements, loaded.n_tubes)
+    _, readings = options.load_right(robot, measurements, anyway)
     added = add.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
     add.write_added(loaded, added, target, measurements, in_place)
     out.write_json(_as_data(added))

@@ -226,20 +226,21 @@ def curvature(table: str, **others) -> None:
     "auto",
     "jitter: the tracker's white noise; field: also its smooth error; auto: the one that the data support.",
 )
+@options.anyway
 @options.new_robot
 @options.outputs
-def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, target, in_place, out) -> None:
+def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anyway, target, in_place, out) -> None:
     """Fit named parameters of ROBOT to the poses in MEASUREMENTS, all together (maximum a posteriori).
 
     The `uncertainty` of the robot file gives the priors. Shows which parameters the data determine and which they do
     not, the error on held-out runs, and the expected error of a perfect model (jitter, tracker field, parameter
-    uncertainty), which no fit can beat.
+    uncertainty), which no fit can beat. Stops where a convention is wrong, as `ctcr compare` says.
 
     Example: ctcr calibrate fit robot.yaml measurements.csv --free standard -o calibrated.yaml --report fit.html
     """
     from ctcr.calibrate import joint_fit, outcome, report
 
-    loaded, readings = options.load(robot, measurements)
+    loaded, readings = options.load_right(robot, measurements, anyway)
     target = outcome.check_target(loaded, target, in_place)
     names = [name.strip() for name in free.split(",") if name.strip()]
     chosen = {"frame_per_run": frame_per_run, "hold_out": hold_out, "noise": noise, "sd": _widths(widths)}

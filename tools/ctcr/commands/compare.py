@@ -14,7 +14,10 @@ from ctcr.commands import options
 def command(robot: str, measurements: str, steps: int, out) -> None:
     """Compare predicted poses with measured ones.
 
-    The model of ROBOT predicts the poses of MEASUREMENTS. Shows the size of the error beside the noise, the
+    First tests whether the table or the robot file follows another convention: signs, units, order and zeros of the
+    joints, the tracker frame, quaternions, the sign of the force, time, runs homed elsewhere, poses that repeat.
+
+    Then the model of ROBOT predicts the poses of MEASUREMENTS. Shows the size of the error beside the noise, the
     hysteresis (difference between visits of the same joints from opposite directions), and which of joints, load
     and time the error depends on.
 
@@ -24,12 +27,17 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     from ctcr.compare import compare, terminal
     from ctcr.robot import robot_file
 
-    loaded, readings = options.load(robot, measurements)
+    loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
+    corrected = []
+    if refusal:
+        loaded, readings = conventions.robot, conventions.readings
+        corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
     readings, excluded = spikes.left_out(loaded, readings)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(loaded, readings)
-    result = compare(loaded, readings, _predict(loaded, readings, steps), [f"{said}." for said in (*excluded, *added)])
+    notices = [f"{said}." for said in (*corrected, *excluded, *added)]
+    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings)
     out.write_report("compare.report", result, f"{measurements} compared with the model of {robot}")
     out.write_json(result.as_dict())
     terminal.show(out.console, result)

@@ -11,23 +11,32 @@ from ctcr.commands import options
 @options.outputs
 @options.effects
 @options.threads
-def command(robot: str, measurements: str, threads: int, out) -> None:
+@options.anyway
+def command(robot: str, measurements: str, threads: int, anyway: bool, out) -> None:
     """Find the physical effect that a model lacks.
 
-    Calibrates ROBOT to the poses in MEASUREMENTS first. Then fits every effect of the catalogue (`ctcr effects`)
-    together with the calibration, accepts one at a time, and checks the result on held-out runs. The verdict also
-    says when nothing is missing, when the data cannot tell effects apart, and when no effect of the catalogue
-    explains the error.
+    Stops where the table or the robot file follows a wrong convention, as `ctcr compare` finds them. Else calibrates
+    ROBOT to the poses in MEASUREMENTS first. Then fits every effect of the catalogue (`ctcr effects`) together with
+    the calibration, accepts one at a time, and checks the result on held-out runs. The verdict also says when nothing
+    is missing, when the data cannot tell effects apart, and when no effect of the catalogue explains the error.
 
     Example: ctcr diagnose robot.yaml measurements.csv --json diagnosis.json --report diagnosis.html
     """
+    from ctcr.conventions import report
     from ctcr.diagnose import diagnose, terminal
 
-    loaded, readings = options.load(robot, measurements)
+    loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
+    if conventions.findings and not anyway:
+        out.write_report("conventions.report", conventions, f"{measurements} with {robot}", command="ctcr diagnose")
+        out.write_json(report.as_diagnosis(conventions))
+        report.show(out.console, conventions)
+        return
+    if refusal:
+        raise refusal
     with terminal.progress() as say:
         result = diagnose(loaded, readings, progress=say, threads=threads)
     out.write_report("diagnose.report", result, f"{measurements} diagnosed with the model of {robot}")
-    out.write_json(result.as_json())
+    out.write_json(result.as_json() | {"conventions": [one.as_dict() for one in conventions.findings]})
     terminal.show(out.console, result)
     out.say(*readings.warnings)
     if result.accepted and not result.verdict.names_no_cause:

@@ -65,6 +65,9 @@ free = setting(
 )
 
 
+anyway = click.option("--anyway", is_flag=True, help="Go on where a wrong convention is found (see ctcr compare).")
+
+
 def folder(function):
     """--folder, as `folder`: the private folder of a bench, made where it does not exist."""
 
@@ -110,6 +113,44 @@ def load(robot: str, table: str):
 
     loaded = robot_file.load(robot)
     return loaded, measurements.load(table, loaded.n_tubes)
+
+
+def reviewed(robot: str, table: str):
+    """The robot, a table of measurements, and the review of their conventions.
+
+    A table that only another convention makes possible comes with the error that refuses it; else that is None.
+    """
+    from ctcr.conventions import review
+    from ctcr.errors import InputError
+    from ctcr.robot import robot_file
+    from ctcr.table import measurements
+
+    loaded, refusal = robot_file.load(robot), None
+    try:
+        readings = measurements.load(table, loaded.n_tubes)
+    except InputError as error:
+        refusal = error
+        try:
+            readings = measurements.load(table, loaded.n_tubes, plausible=False)
+        except InputError:
+            raise refusal from None
+    found = review(loaded, readings)
+    if refusal and not found.findings:
+        raise refusal
+    return loaded, readings, found, refusal
+
+
+def load_right(robot: str, table: str, anyway: bool):
+    """As `load`, of a table to fit. Raises InputError where a convention is wrong, unless `anyway`."""
+    from ctcr.errors import InputError, Problem
+
+    if anyway:
+        return load(robot, table)
+    loaded, readings, found, _ = reviewed(robot, table)
+    if found.findings:
+        advice = Problem("a fit would take that for physics: correct it first, or go on with --anyway")
+        raise InputError([*(Problem(one.sentence, table) for one in found.findings), advice])
+    return loaded, readings
 
 
 def with_effects(robot, given):

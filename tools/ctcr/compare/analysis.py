@@ -14,6 +14,7 @@ from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_differ
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
+from ctcr.conventions import Finding as Convention
 from ctcr.errors import InputError, Problem
 
 NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
@@ -66,6 +67,7 @@ class Comparison:
     stops: Stops
     revisits: Revisits
     notices: Sequence[str]  # changes made to the table before it was compared
+    conventions: Sequence[Convention]  # that are wrong, the clearest first
 
     def as_dict(self) -> dict:
         """The numbers for JSON, without the readings themselves."""
@@ -86,11 +88,15 @@ class Comparison:
         }
         data["never_varied"] = self.fixed
         data["notices"] = list(self.notices)
+        data["conventions"] = [one.as_dict() for one in self.conventions]
         return data
 
 
-def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Comparison:
-    """Compare measured with predicted tip poses; `notices` tell how the table was changed before.
+def compare(
+    robot, measurements, prediction, notices: Sequence[str] = (), conventions: Sequence[Convention] = ()
+) -> Comparison:
+    """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
+    `ctcr.conventions.review` found.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -148,6 +154,7 @@ def compare(robot, measurements, prediction, notices: Sequence[str] = ()) -> Com
         stops=stops,
         revisits=revisits,
         notices=notices,
+        conventions=conventions,
     )
 
 

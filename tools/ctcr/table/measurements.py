@@ -5,7 +5,7 @@ Between rows all joints move in a straight line in joint space, so order and dir
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -50,6 +50,12 @@ class Measurements:
     def __len__(self) -> int:
         return len(self.run)
 
+    def rows(self, chosen: Mask | Integers | slice) -> "Measurements":
+        """The readings of some rows."""
+        columns = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
+        kept = {name: getattr(self, name) for name in columns}
+        return replace(self, **{name: old if old is None else old[chosen] for name, old in kept.items()})
+
     @property
     def positions(self) -> Array:
         """The positions (M, 3), NaN also where their columns are absent."""
@@ -81,8 +87,12 @@ class Measurements:
         return np.column_stack([self.joint_space, self.force / settings.LOAD_LEVER])
 
 
-def load(path: str | Path, n_tubes: int) -> Measurements:
-    """Reads a table for a robot of `n_tubes` tubes. Raises InputError with row, column, value and unit."""
+def load(path: str | Path, n_tubes: int, *, plausible: bool = True) -> Measurements:
+    """Reads a table for a robot of `n_tubes` tubes. Raises InputError with row, column, value and unit.
+
+    plausible    whether values must be those of such a robot in the right units: else any finite numbers will do, from
+                 which a wrong convention may be found
+    """
     table = open_table(path)
     groups = _groups(table, n_tubes)
     faults = Faults(str(path))
@@ -91,7 +101,7 @@ def load(path: str | Path, n_tubes: int) -> Measurements:
         for rows, numbers, size in table.blocks(faults):
             for name, columns in groups.items():
                 data[name][rows - 2] = numbers[:, columns]
-                check(name, numbers[:, columns], rows, [table.columns[i] for i in columns], faults)
+                check(name, numbers[:, columns], rows, [table.columns[i] for i in columns], faults, plausible)
             progress.advance(size)
     faults.raise_any()
     return _measurements(data, table)
@@ -154,22 +164,25 @@ def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tub
             yield from ((column, f"this column is missing: {reason}") for column in absent)
 
 
-def check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults) -> None:
-    """Faults in the values (rows, columns) of one group of `group_columns`; `columns` are their names in messages."""
+def check(name: str, block: Array, rows: Integers, columns: list[str], faults: Faults, plausible: bool = True) -> None:
+    """Faults in the values (rows, columns) of one group of `group_columns`; `columns` are their names in messages.
+
+    `plausible`: whether values that can only be in another unit or of another sign are faults.
+    """
     quantity = QUANTITIES.get(name)
     needs = f": needs a number in {quantity.unit}" if quantity else ""
     for column, values in zip(columns, block.T, strict=True):
         if name not in _MAY_BE_EMPTY:
             faults.where(np.isnan(values), rows, column, "empty", lambda _: f"is empty{needs}")
         faults.where(np.isinf(values), rows, column, "finite", lambda _: f"is not finite{needs}")
-        if quantity:
+        if quantity and plausible:
             strange = np.isfinite(values) & (np.abs(values) > quantity.usual[1])
             faults.where(strange, rows, column, "unit", lambda i, v=values: quantity.doubt(v[i]))
     if name == "run":
         number = block[:, 0]
         broken = np.isfinite(number) & ((number != np.round(number)) | (np.abs(number) > _MAX_RUN))
         faults.where(broken, rows, "run", "whole", lambda i: f"{number[i]:g} is not a whole number")
-    if name == "beta":
+    if name == "beta" and plausible:
         _check_joint_order(block, rows, columns, faults)
     if name in ("position", "quaternion"):
         partly = np.isnan(block).any(1) & ~np.isnan(block).all(1)

@@ -1,0 +1,206 @@
+"""`ctcr compare` names wrong conventions of random robots, with what corrects them, and none where there is none."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conventions_bench import RUNS, design, session
+from ctcr.conventions import review
+from ctcr.conventions.hypotheses import with_frame
+from ctcr.conventions.orientation import mirror
+from ctcr.frames import conjugate
+from ctcr.model import simulation
+from ctcr.robot import robot_file
+from ctcr.table import measurements
+from scipy.spatial.transform import Rotation
+
+
+def bench(seed, n_tubes=2, **options):
+    random = np.random.default_rng(seed)
+    robot = design(random, n_tubes)
+    return robot, session(robot, random, **options)
+
+
+def scaled(readings, group, factor):
+    return replace(readings, **{group: getattr(readings, group) * np.array(factor)})
+
+
+FAULTS = {  # of a robot with two tubes: kind, columns, and how the table goes wrong
+    "one sign": ("joint_sign", ["alpha2"], lambda m: scaled(m, "alpha", [1, -1])),
+    "all signs": ("joint_sign", ["alpha1", "alpha2"], lambda m: scaled(m, "alpha", -1)),
+    "insertion": ("joint_sign", ["beta1", "beta2"], lambda m: scaled(m, "beta", -1)),
+    "degrees": ("joint_unit", ["alpha1", "alpha2"], lambda m: scaled(m, "alpha", 180 / np.pi)),
+    "mm": ("joint_unit", ["beta1", "beta2"], lambda m: scaled(m, "beta", 1e3)),
+    "plane": ("joint_offset", ["alpha2"], lambda m: replace(m, alpha=m.alpha - [0, np.pi / 2])),
+    "order": (
+        "joint_order",
+        ["beta1", "beta2", "alpha1", "alpha2"],
+        lambda m: replace(m, beta=m.beta[:, ::-1], alpha=m.alpha[:, ::-1]),
+    ),
+    "left-handed": (
+        "mirrored",
+        ["y_m"],
+        lambda m: replace(scaled(m, "position", [1, -1, 1]), quaternion=mirror(m.quaternion, 1)),
+    ),
+    "scalar last": (
+        "quaternion_order",
+        ["qw", "qx", "qy", "qz"],
+        lambda m: replace(m, quaternion=np.roll(m.quaternion, -1, 1)),
+    ),
+    "inverse": (
+        "quaternion_inverse",
+        ["qw", "qx", "qy", "qz"],
+        lambda m: replace(m, quaternion=conjugate(m.quaternion)),
+    ),
+    "reaction": ("force_sign", ["fx_N", "fy_N", "fz_N"], lambda m: scaled(m, "force", -1)),
+    "tracker in mm": ("position_unit", ["x_m", "y_m", "z_m"], lambda m: scaled(m, "position", 1e3)),
+    "clock": ("time_unit", ["t_s"], lambda m: scaled(m, "t", 1e3)),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_named(name):
+    """Each wrong convention is the only one named, and the corrected table is the right one."""
+    kind, columns, spoil = FAULTS[name]
+    robot, readings = bench([len(name), ord(name[0])])
+    found = review(robot, spoil(readings))
+    assert [(one.kind, list(one.columns)) for one in found.findings] == [(kind, columns)]
+    for group in ("t", "beta", "alpha", "force", "position", "quaternion"):
+        tolerance = 0.06 if name == "plane" else 1e-9  # where it is found by the fit, a home is off by its error
+        np.testing.assert_allclose(getattr(found.readings, group), getattr(readings, group), atol=tolerance)
+
+
+@pytest.mark.parametrize("n_tubes", [1, 2, 3, 4])
+def test_right(n_tubes):
+    """Nothing is named on tables of robots that differ from their file as real ones do."""
+    for seed in range(2):
+        noise = ("jitter", "realistic")[seed % 2]
+        robot, readings = bench([100 + seed, n_tubes], n_tubes, noise=noise)
+        assert review(robot, readings).findings == []
+
+
+@pytest.mark.parametrize(
+    "effect", [{"friction__coefficient": 0.3}, {"tip_load__mass": 3e-3}, {"backlash_rotation__play": 0.05}]
+)
+def test_physics(hidden, effect):
+    """A physical effect that the robot file lacks is no convention."""
+    robot, readings = bench(3, 3, noise="realistic", hidden=lambda built: hidden(built, **effect))
+    assert review(robot, readings).findings == []
+
+
+def test_wrong_data_sheet():
+    """Nor is a data sheet that is wrong by many of its standard deviations."""
+    robot, readings = bench(5, 3)
+    tubes = [tube.model_copy(update={"curvature_per_m": 1.2 * tube.curvature_per_m}) for tube in robot.tubes]
+    tracker = robot.tracker.model_copy(update={"position_mm": [x + 5 for x in robot.tracker.position_mm]})
+    alpha = readings.alpha + np.deg2rad([6, -5, 7])
+    found = review(robot.model_copy(update={"tubes": tubes, "tracker": tracker}), replace(readings, alpha=alpha))
+    assert found.findings == []
+
+
+def test_frame():
+    """An inverse frame and a frame that is somewhere else are told apart, both with the right six numbers."""
+    robot, readings = bench(7)
+    rotation, origin = robot.tracker.rotation, robot.tracker.position
+    other = Rotation.from_rotvec([0.5, -1.0, 0.7]).as_matrix()
+    for kind, frame in (
+        ("frame_inverse", (rotation.T, -rotation.T @ origin)),
+        ("frame_wrong", (other @ rotation, origin + 0.1)),
+    ):
+        found = review(with_frame(robot, *frame), readings)
+        assert [one.kind for one in found.findings] == [kind]
+        np.testing.assert_allclose(found.robot.tracker.position, origin, atol=4e-3)
+        np.testing.assert_allclose(found.robot.tracker.rotation, rotation, atol=0.05)
+
+
+def test_two_faults():
+    """Two wrong conventions at once are both named."""
+    robot, readings = bench(11)
+    rotation, origin = robot.tracker.rotation, robot.tracker.position
+    spoiled = replace(scaled(readings, "alpha", [-1, 1]), quaternion=conjugate(readings.quaternion))
+    found = review(with_frame(robot, rotation.T, -rotation.T @ origin), spoiled)
+    assert {one.kind for one in found.findings} == {"frame_inverse", "joint_sign", "quaternion_inverse"}
+
+
+@pytest.mark.parametrize(("kind", "move"), [("alpha", 0.35), ("beta", 4e-3)])
+def test_run(kind, move):
+    """A run that was homed elsewhere is named with its joint, and by how much it is off."""
+    robot, readings = bench(13, 2)
+    run = RUNS // 2
+    offset = np.where((readings.run == run)[:, None], [move, 0.0], 0.0)
+    [one] = review(robot, replace(readings, **{kind: getattr(readings, kind) - offset})).findings
+    assert (one.kind, list(one.columns), list(one.runs)) == ("run_offset", [f"{kind}1"], [run])
+
+
+def test_frozen():
+    """Rows in which the tracker repeats itself while the joints move are named, and only those."""
+    robot, readings = bench(17)
+    rows = np.arange(40, 50)[readings.run[40:50] == readings.run[39]]
+    position, quaternion = readings.position.copy(), readings.quaternion.copy()
+    position[rows], quaternion[rows] = position[39], quaternion[39]
+    found = review(robot, replace(readings, position=position, quaternion=quaternion))
+    [one] = found.findings
+    assert (one.kind, list(one.rows)) == ("frozen", readings.row[rows].tolist())
+    assert np.isnan(found.readings.position[rows]).all()
+
+
+def test_at_rest():
+    """A tracker without noise that repeats its pose at rest did not stand still."""
+    robot, readings = bench(19, noise="none")
+    twice = np.repeat(np.arange(len(readings)), 2)
+    held = replace(readings.rows(twice), t=np.arange(len(twice), dtype=float), row=np.arange(len(twice)) + 2)
+    assert review(robot, held).findings == []
+
+
+def test_unseen():
+    """Tables without positions, or without a row that the model solves, end in no finding and no error."""
+    robot, readings = bench(23)
+    assert review(robot, replace(readings, position=None)).findings == []
+    assert review(robot, replace(readings, beta=0 * readings.beta + 5.0)).findings == []
+
+
+@pytest.fixture
+def files(tmp_path):
+    """files(robot, readings): paths of a robot file and of a table."""
+
+    def write(robot, readings):
+        robot_file.save(robot, tmp_path / "robot.yaml")
+        simulation.write(readings, tmp_path / "measurements.csv", robot.n_tubes)
+        return tmp_path / "robot.yaml", tmp_path / "measurements.csv"
+
+    return write
+
+
+def test_commands(files, run):
+    """`compare` says it in text and JSON; `diagnose` and fits stop there and say so."""
+    robot, readings = bench(29)
+    paths = files(robot, scaled(readings, "alpha", [1, -1]))
+    code, out, _ = run("compare", *paths, "--json", "-")
+    [one] = json.loads(out)["conventions"]
+    assert (code, one["kind"], one["columns"]) == (0, "joint_sign", ["alpha2"])
+    assert "--flip alpha2" in one["fix"]
+    assert one["rms_mm"]["after"] < one["rms_mm"]["before"]
+    answer = json.loads(run("diagnose", *paths, "--json", "-")[1])
+    assert (answer["verdict"], answer["conventions"][0]["kind"]) == ("wrong_convention", "joint_sign")
+    code, _, error = run("calibrate", "fit", *paths)
+    assert code != 0
+    assert "alpha2 counts the other way" in error
+    assert "--anyway" in error
+
+
+def test_refused_table(files, run):
+    """A table that the reader refuses is compared as it should be where a convention says how; else its error stays."""
+    robot, readings = bench(31)
+    paths = files(robot, scaled(readings, "beta", -1))
+    code, out, _ = run("compare", *paths, "--json", "-")
+    answer = json.loads(out)
+    assert (code, answer["conventions"][0]["kind"]) == (0, "joint_sign")
+    assert answer["rows"]["compared"] == len(readings)
+    with pytest.raises(Exception, match="must be <= 0"):
+        measurements.load(paths[1], robot.n_tubes)
+    random = np.random.default_rng(1)
+    paths = files(robot, replace(readings, beta=random.uniform(0, 1, readings.beta.shape)))
+    code, _, error = run("compare", *paths)
+    assert code != 0
+    assert "behind the plate" in error

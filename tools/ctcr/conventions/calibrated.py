@@ -1,0 +1,120 @@
+"""The error of a hypothesis after all that a calibration may move: a short robust fit to few readings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.arrays import Array, Mask
+from ctcr.errors import InputError
+from ctcr.model import parameters, recording
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A robot fitted to K readings, and the error that it leaves."""
+
+    robot: Robot
+    error: Array  # (K,) [m] distance of each reading from its prediction; NaN where the model has no solution
+    floor: float  # [m] distance that jitter alone makes; 0: not stated
+
+    @property
+    def solved(self) -> Mask:
+        return np.isfinite(self.error)
+
+    @property
+    def log_error(self) -> Array:
+        """Logarithm of the error (K,), in which a few outliers weigh little; jitter bounds it below."""
+        missed = np.where(self.solved, self.error, settings.CONVENTION_UNSOLVED)
+        return 0.5 * np.log(missed**2 + max(self.floor, settings.CONVENTION_FINEST) ** 2)
+
+    @property
+    def typical(self) -> float:
+        """Geometric mean of the error [m]: what decides."""
+        return float(np.exp(self.log_error.mean()))
+
+    @property
+    def rms_mm(self) -> float:
+        """Root mean square of the error [mm]: what is shown."""
+        return 1e3 * float(np.sqrt(np.mean(self.error[self.solved] ** 2))) if self.solved.any() else np.inf
+
+
+def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None, to_beat: float = np.inf) -> Calibrated:
+    """The robot whose standard parameters fit the positions best, each near its value in the file.
+
+    Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
+    name begins with `free` say nothing.
+    Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
+    gives up where it does not soon fall below an error `to_beat` [m].
+    """
+    names, mean, sd, low, high = _priors(robot)
+    if free:
+        chosen = np.array([name.startswith(free) for name in names])
+        anywhere = np.array([np.pi if "rotation" in name else settings.CONVENTION_ANYWHERE for name in names])
+        sd = np.where(chosen, anywhere, sd)
+        low, high = np.where(chosen, mean - anywhere, low), np.where(chosen, mean + anywhere, high)
+    table = recording.recording_of(robot, readings, names)
+    values, floor = mean.copy(), np.sqrt(3) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
+    damping, found = settings.CONVENTION_DAMPING, None
+    for iteration in range(settings.CONVENTION_ITERATIONS):
+        if found is None:
+            residual, jacobian, _ = table.residual(values, True)
+            residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
+            error = np.linalg.norm(residual, axis=1)
+            solved = np.isfinite(error)
+            if not solved.any():
+                break
+            size = max(float(np.median(error[solved])), floor, settings.CONVENTION_FINEST)
+            if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
+                break
+            found = _cost(error, solved, size, (values - mean) / sd)
+        weight = 1 / (size**2 + error[solved] ** 2)
+        a = jacobian[solved] * np.sqrt(3 * weight)[:, None, None]
+        a, b = a.reshape(-1, len(names)), (residual[solved] * np.sqrt(3 * weight)[:, None]).ravel()
+        information = a.T @ a + np.diag(1 / sd**2)
+        scaled = damping * np.diag(np.diag(information))
+        step = np.linalg.solve(information + scaled, a.T @ b + (values - mean) / sd**2)
+        tried = np.clip(values - step, low, high)
+        missed = np.linalg.norm(table.residual(tried)[0].reshape(-1, 6)[:, :3], axis=1)
+        cost = _cost(missed, solved, size, (tried - mean) / sd)
+        if cost < found:
+            settled = found - cost < settings.CONVENTION_SETTLED
+            values, error, found, damping = tried, missed, None, damping / 10
+            if settled:
+                break
+        else:
+            damping *= 10
+            if damping > settings.CONVENTION_MOST_DAMPING:
+                break
+    return Calibrated(parameters.applied(robot, names, values), error, floor)
+
+
+def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:
+    """Minus the log posterior density: errors (K,) of Student's distribution, shifts of parameters in prior sd."""
+    missed = np.where(np.isfinite(error), error, settings.CONVENTION_UNSOLVED)[solved]
+    return 1.5 * float(np.sum(np.log1p((missed / size) ** 2))) + 0.5 * float(np.sum(shift**2))
+
+
+def _priors(robot: Robot) -> tuple[list[str], Array, Array, Array, Array]:
+    """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly.
+
+    Beyond CONVENTION_JUMP lies no data sheet, but another convention.
+    """
+    found = []
+    for name in parameters.expand(parameters.STANDARD, robot):
+        try:
+            found.append((name, *(float(part[0]) for part in parameters.priors(robot, [name]))))
+        except InputError:  # known exactly
+            continue
+    names = [name for name, *_ in found]
+    mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
+    far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
+    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, mean - far), np.minimum(high, mean + far)
+
+
+def jump(name: str, sd: float) -> float:
+    """How far a parameter with this standard deviation is off at most by an error of the data sheet, SI."""
+    far = settings.CONVENTION_JUMP * sd
+    return min(far, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if "rotation" in name else far

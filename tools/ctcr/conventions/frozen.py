@@ -1,0 +1,58 @@
+"""Rows in which the tracker repeated its last pose while the robot moved."""
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.arrays import Integers, Mask
+from ctcr.conventions import tips
+from ctcr.conventions.finding import Finding
+from ctcr.conventions.hypotheses import POSE, QUATERNION
+from ctcr.robot.description import Robot
+from ctcr.show.wording import listed
+from ctcr.table.measurements import Measurements
+
+
+def repeated(readings: Measurements) -> Mask:
+    """Rows (M,) with exactly the pose of the row before, in the same run, at other joints."""
+    same = np.zeros(len(readings), bool)
+    q = readings.load_space
+    pose = np.column_stack([readings.positions, np.nan_to_num(readings.quaternions)])
+    same[1:] = (
+        (pose[1:] == pose[:-1]).all(axis=1) & (readings.run[1:] == readings.run[:-1]) & (q[1:] != q[:-1]).any(axis=1)
+    )
+    return same
+
+
+def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | None:
+    """Repeated poses (M,) where the model says that the tip moved farther than the tracker's noise and resolution."""
+    same = repeated(readings)
+    if not same.any():
+        return None
+    first = np.arange(len(same))
+    first[same] = 0
+    first = np.maximum.accumulate(first)  # the row whose pose is repeated
+    rows = np.flatnonzero(same)
+    moved = np.linalg.norm(
+        tips.predicted(robot, readings.rows(rows)) - tips.predicted(robot, readings.rows(first[rows])), axis=1
+    )
+    steps = np.abs(np.diff(readings.positions, axis=0))
+    resolution = float(np.min(steps[steps > 0], initial=np.inf))
+    noise = np.sqrt(6) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
+    visible = moved > settings.SPIKE_VISIBLE * max(noise, resolution)
+    if not visible.any():
+        return None
+    frozen = same & np.isin(first, first[rows[visible]])
+    where = readings.row[frozen]
+    text = f"the tracker repeated its last pose while the joints moved, in {_spans(where)}"
+    fix = "leave the pose fields of these rows empty"
+    columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
+    runs = np.unique(readings.run[frozen]).tolist()
+    return Finding("frozen", text, columns, fix, runs=runs, rows=where.tolist()), frozen
+
+
+def _spans(rows: Integers) -> str:
+    """Rows as spans: rows 100 to 120, 200."""
+    ends = np.flatnonzero(np.diff(rows) > 1)
+    spans = zip(rows[np.r_[0, ends + 1]], rows[np.r_[ends, len(rows) - 1]], strict=True)
+    word = "row" if len(rows) == 1 else "rows"
+    return f"{word} {listed([str(a) if a == b else f'{a} to {b}' for a, b in spans])}"

@@ -1,0 +1,200 @@
+"""The hypotheses on joints, loads, positions and the tracker frame: each a change that would make them right."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from itertools import chain, combinations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ctcr import settings
+from ctcr.arrays import Array
+from ctcr.robot.description import Robot
+from ctcr.show.wording import join
+from ctcr.table.measurements import Measurements
+
+Change = Callable[[Measurements], Measurements]
+
+OTHER_UNITS = {  # of a group of columns: unit, factor to SI
+    "alpha": (("deg", np.pi / 180), ("rev", 2 * np.pi)),
+    "beta": (("mm", 1e-3), ("cm", 1e-2)),
+    "position": (("mm", 1e-3), ("cm", 1e-2)),
+}
+POSE = ("x_m", "y_m", "z_m")
+QUATERNION = ("qw", "qx", "qy", "qz")
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What may be wrong, and the table or the robot file as it should be."""
+
+    kind: str
+    text: str
+    columns: tuple[str, ...]
+    fix: str
+    change: Change = lambda m: m
+    frame: tuple[Array, Array] | None = None  # R_tracker_base and origin [m] instead of the file's
+    registers: bool = False  # the tracker frame is taken from the readings
+    offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
+    doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
+
+    @property
+    def frees(self) -> str | None:
+        """How the names of the parameters begin of which nothing is known by it."""
+        if self.registers:
+            return "tracker."
+        if self.offset:
+            kind, tube, _ = self.offset
+            return f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
+        return None
+
+    def robot(self, robot: Robot) -> Robot:
+        return with_frame(robot, *self.frame) if self.frame else robot
+
+
+def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
+    """All that the table and the robot have room for."""
+    parts = (_signs, _zeros, _offsets, _units, _orders, _forces, _positions, _frames)
+    return [one for part in parts for one in part(robot, readings)]
+
+
+def with_frame(robot: Robot, rotation: Array, origin: Array) -> Robot:
+    """A copy with another tracker frame."""
+    vector = Rotation.from_matrix(rotation).as_rotvec()
+    new = {"position_mm": (1e3 * origin).tolist(), "rotation_vector_rad": vector.tolist()}
+    return robot.model_copy(update={"tracker": robot.tracker.model_copy(update=new)})
+
+
+def joints(kind: str, tubes: tuple[int, ...]) -> tuple[str, ...]:
+    """Names of joints as people write them: alpha2; tubes count from 0."""
+    return tuple(f"{kind}{i + 1}" for i in tubes)
+
+
+def named(kind: str, tubes: tuple[int, ...], n_tubes: int) -> str:
+    """Those joints as the subject of a sentence."""
+    return f"all {kind}s" if len(tubes) == n_tubes > 1 else join(joints(kind, tubes))
+
+
+def changed(group: str, change: Callable[[Array], Array]) -> Change:
+    """The change of a group of columns (M, K) of a table."""
+
+    def apply(m: Measurements) -> Measurements:
+        old = getattr(m, group)
+        return m if old is None else replace(m, **{group: change(np.array(old))})
+
+    return apply
+
+
+def _some(n: int) -> Iterator[tuple[int, ...]]:
+    """All sets of tubes but the empty one, small ones first."""
+    return chain.from_iterable(combinations(range(n), size) for size in range(1, n + 1))
+
+
+def _signs(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    n = robot.n_tubes
+    homes = {"alpha": np.deg2rad(robot.actuation.home_rotation_deg)}
+    homes["beta"] = 1e-3 * np.array(robot.actuation.home_translation_mm)
+    for kind in ("alpha", "beta"):
+        for tubes in _some(n):
+            verb = "count" if len(tubes) > 1 else "counts"
+            flip = " ".join(f"--flip {name}" for name in joints(kind, tubes))
+            sign = np.ones(n)
+            sign[list(tubes)] = -1.0
+            text = f"{named(kind, tubes, n)} {verb} the other way"
+            fix = f"ctcr import {flip}, or reverse the sign of the ratio in the controller"
+            names = joints(kind, tubes)
+            yield Hypothesis("joint_sign", text, names, fix, changed(kind, lambda q, s=sign: q * s), doubts=len(tubes))
+            if (home := homes[kind] * (sign < 0)).any():
+                what = f"{text}, from home on"
+                fix = f"correct the sign of the motor and count from home: {join(names)} -> 2 home - {join(names)}"
+                change = changed(kind, lambda q, s=sign, h=home: 2 * h + q * s)
+                yield Hypothesis("joint_sign", what, names, fix, change, doubts=len(tubes) + 1)
+
+
+def _zeros(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """Insertion counted from elsewhere: tips flush with the plate, or home."""
+    length = np.array([tube.length for tube in robot.tubes])
+    home = 1e-3 * np.array(robot.actuation.home_translation_mm)
+    names = joints("beta", tuple(range(robot.n_tubes)))
+    for where, zero in (("where the tips are flush with the plate", -length), ("home", home)):
+        for way, sign in (("", 1.0), (", outwards negative", -1.0)):
+            text = f"all betas count from {where}{way}"
+            sizes = ", ".join(f"{1e3 * value:+g}" for value in zero)
+            fix = f"beta = {'-' if sign < 0 else ''}(the column) + ({sizes}) mm of tubes 1 to {robot.n_tubes}"
+            change = changed("beta", lambda q, z=zero, s=sign: z + s * q)
+            yield Hypothesis("joint_offset", text, names, fix, change, doubts=2)
+
+
+def _offsets(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    step = settings.CONVENTION_OFFSET_STEP_DEG
+    turns = np.deg2rad(np.arange(step - 180, 181, step))
+    shifts = 1e-3 * np.outer((1, -1), settings.CONVENTION_SHIFTS_MM).ravel()
+    for kind, sizes in (("alpha", turns[turns != 0]), ("beta", shifts)):
+        for i in range(robot.n_tubes):
+            any_offset = Hypothesis("joint_offset", "", joints(kind, (i,)), "", offset=(kind, i, 0.0), doubts=2)
+            yield from (offset_by(any_offset, float(size), robot.n_tubes) for size in sizes)
+
+
+def offset_by(hypothesis: Hypothesis, size: float, n_tubes: int) -> Hypothesis:
+    """An offset of the same joint by another size, SI."""
+    kind, tube, _ = hypothesis.offset
+    move = size * (np.arange(n_tubes) == tube)
+    return replace(hypothesis, offset=(kind, tube, size), change=changed(kind, lambda q: q + move))
+
+
+def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    n = robot.n_tubes
+    for kind in ("alpha", "beta"):
+        for unit, factor in OTHER_UNITS[kind]:
+            for tubes in (some for some in _some(n) if len(some) in (1, n)):
+                names, scale = joints(kind, tubes), np.ones(n)
+                scale[list(tubes)] = factor
+                verb, given = ("are", "rad") if len(tubes) > 1 else ("is", "rad")
+                given = "m" if kind == "beta" else given
+                text = f"{named(kind, tubes, n)} {verb} in {unit}, not in {given}"
+                fix = "ctcr import " + " ".join(f"--unit {name}={unit}" for name in names)
+                yield Hypothesis("joint_unit", text, names, fix, changed(kind, lambda q, s=scale: q * s))
+
+
+def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    n = robot.n_tubes
+    own = tuple(range(n))
+    exchanged = {tuple(b if i == a else a if i == b else i for i in own) for a, b in combinations(own, 2)}
+    for order in sorted(exchanged | {own[::-1]} - {own}):
+        reverse = order == own[::-1]
+        numbers = ", ".join(str(i + 1) for i in order)
+        for groups in (("beta", "alpha"), ("alpha",), ("beta",)):
+            names = tuple(name for kind in groups for name in joints(kind, tuple(i for i in own if order[i] != i)))
+            of = "joints" if len(groups) == 2 else f"{groups[0]}s"
+            text = f"the {of} stand {'outermost tube first' if reverse else 'in another order'}"
+            fix = f"the columns of tubes 1 to {n} are those called {numbers}"
+            fix = "ctcr import --order outermost-first" if reverse and len(groups) == 2 else fix
+
+            def change(m: Measurements, order=order, groups=groups) -> Measurements:
+                return replace(m, **{kind: getattr(m, kind)[:, order] for kind in groups})
+
+            yield Hypothesis("joint_order", text, names, fix, change, doubts=1 if reverse else 2)
+
+
+def _forces(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    if readings.force.any():
+        text, fix = "the force columns hold the reaction", "ctcr import --flip force negates them"
+        yield Hypothesis("force_sign", text, ("fx_N", "fy_N", "fz_N"), fix, changed("force", np.negative))
+
+
+def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    for unit, factor in OTHER_UNITS["position"]:
+        text, fix = f"positions are in {unit}, not in m", f"ctcr import --unit position={unit}"
+        yield Hypothesis("position_unit", text, POSE, fix, changed("position", lambda p, f=factor: p * f))
+    for axis, name in enumerate("xyz"):
+        sign = np.ones(3)
+        sign[axis] = -1.0
+        text = f"the tracker frame of the table is left-handed: {name} is mirrored"
+        yield Hypothesis("mirrored", text, (POSE[axis],), "", changed("position", lambda p, s=sign: p * s))
+
+
+def _frames(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    rotation, origin = robot.tracker.rotation, robot.tracker.position
+    text = "the tracker frame in the robot file is the inverse one, of the tracker in the base frame"
+    yield Hypothesis("frame_inverse", text, (), "", frame=(rotation.T, -rotation.T @ origin))
+    yield Hypothesis("frame_wrong", "the tracker frame in the robot file is wrong", (), "", registers=True, doubts=3)

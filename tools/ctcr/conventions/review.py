@@ -1,0 +1,102 @@
+"""All conventions of a table, one after another: joints, loads and frames, orientations, runs, frozen rows, time."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask, evenly
+from ctcr.conventions import clock, frozen, orientation, runs, search, tips
+from ctcr.conventions.calibrated import Calibrated, calibrated
+from ctcr.conventions.finding import Finding
+from ctcr.conventions.hypotheses import Change, changed
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+
+@dataclass(frozen=True)
+class Review:
+    """Wrong conventions, the clearest first, and robot and table as they should be."""
+
+    findings: list[Finding]
+    robot: Robot
+    readings: Measurements
+
+
+def review(robot: Robot, readings: Measurements) -> Review:
+    """Tests every hypothesis on conventions. Nothing is found in a table without positions."""
+    located = np.isfinite(readings.positions).all(axis=1) & ~frozen.repeated(readings)
+    if not located.any():
+        return Review([], robot, readings)
+    robot = robot.model_copy()
+    robot._source = None  # copies of a robot copy the text of its file too
+    few = np.flatnonzero(located)
+    of_runs = _of_every_run(readings, located)
+    sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
+    case, found = search.corrected(robot, sample, readings.rows(of_runs))
+    changes = [*case.changes]
+
+    # Orientations are judged where positions are right.
+    found = [_with_quaternion(one, case, changes) for one in found]
+    wrong, change = orientation.wrong_form(case.fit, _applied(case.readings, changes[len(case.changes) :]))
+    found += wrong
+    right = _applied(readings, [*changes, change])
+
+    # Runs need some readings of each, which a large table has.
+    fit, of_runs = case.fit, right.rows(of_runs)
+    if len(of_runs) != len(case.readings):
+        fit = calibrated(case.robot, of_runs)
+    for _ in range(settings.MOST_CONVENTIONS):
+        homed = runs.homed_elsewhere(fit, of_runs)
+        if homed is None:
+            break
+        finding, change = homed
+        of_runs, right, before = change(of_runs), change(right), fit
+        fit = calibrated(case.robot, of_runs)
+        found.append(finding.with_errors(before.rms_mm, fit.rms_mm))
+
+    if still := frozen.stood_still(fit.robot, right):
+        finding, rows = still
+        found.append(finding.with_errors(_with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows), fit.rms_mm))
+        poses = {"position": right.position, "quaternion": right.quaternion}
+        kept = {name: np.where(rows[:, None], np.nan, old) for name, old in poses.items() if old is not None}
+        right = replace(right, **kept)
+
+    if slow := clock.wrong_unit(right, fit.rms_mm):
+        finding, change = slow
+        found, right = [*found, finding], change(right)
+    return Review(sorted(found, key=lambda one: -one.clarity), case.robot, right)
+
+
+def _applied(readings: Measurements, changes: list[Change]) -> Measurements:
+    for change in changes:
+        readings = change(readings)
+    return readings
+
+
+def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change]) -> Finding:
+    """A mirror with words on the quaternions, which may be mirrored too: then that joins the changes."""
+    if finding.kind != "mirrored":
+        return finding
+    [column] = finding.columns
+    axis, fix, rivals = "xyz".index(column[0]), f"ctcr import --mirror {column[0]}", finding.rivals
+    if orientation.mirrored(case.fit, case.readings, axis):
+        changes.append(changed("quaternion", lambda q: orientation.mirror(q, axis)))
+    elif case.readings.oriented.any():
+        fix = f"negate {column}"
+        rivals = ()  # joints that count the other way would mirror the orientations too
+    return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)
+
+
+def _of_every_run(readings: Measurements, located: Mask) -> Integers:
+    """Rows of all runs, or of many runs some, at most CONVENTION_RUN_ROWS of each."""
+    runs = np.unique(readings.run[located])
+    runs = runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)]
+    rows = [np.flatnonzero(located & (readings.run == run)) for run in runs]
+    return np.concatenate([of_run[evenly(len(of_run), settings.CONVENTION_RUN_ROWS)] for of_run in rows])
+
+
+def _with_rows(fit: Calibrated, error: Array, rows: Mask) -> float:
+    """RMS error [mm] of a fit and of some further rows (M,), whose errors [m] are given."""
+    part = np.mean(rows)
+    return 1e3 * float(np.sqrt((1 - part) * np.mean(fit.error[fit.solved] ** 2) + part * np.nanmean(error**2)))
