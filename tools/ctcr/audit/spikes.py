@@ -1,7 +1,5 @@
 """Spikes of the tracker: readings that leap away and back, found by the readings around them and not by a fit."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ctcr import settings
@@ -28,9 +26,7 @@ def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, li
         f"at least {settings.SPIKE_LEAP:g} times as far as the joints and the load move the tip: spikes of the "
         "tracker, left out of all fits and errors"
     )
-    poses = {"position": measurements.position, "quaternion": measurements.quaternion}
-    kept = {name: np.where(spikes[:, None], np.nan, old) for name, old in poses.items() if old is not None}
-    return replace(measurements, **kept), [notice]
+    return measurements.without_poses(spikes), [notice]
 
 
 def leaps(robot: Robot, measurements: Measurements) -> Array:

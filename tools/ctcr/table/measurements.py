@@ -76,6 +76,12 @@ class Measurements:
         """Whether a position or an orientation was measured (M,)."""
         return np.isfinite(self.positions).all(axis=1) | self.oriented
 
+    def without_poses(self, rows: Mask) -> "Measurements":
+        """A copy whose rows (M,) have no pose: what the tracker gave there is no reading."""
+        poses = {"position": self.position, "quaternion": self.quaternion}
+        kept = {name: np.where(rows[:, None], np.nan, old) for name, old in poses.items() if old is not None}
+        return replace(self, **kept)
+
     @property
     def joint_space(self) -> Array:
         """Joints as one vector (M, 2 N) [rad], in which distances are comparable."""
