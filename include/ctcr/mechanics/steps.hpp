@@ -35,7 +35,7 @@ namespace detail {
 template <bool Loaded>
 inline constexpr double longest_step = Loaded ? 0.29 : 1.0;
 
-/// Steps that begin with these shares: no step is longer than a part of the length over which the state of the rod changes,
+/// Steps of each segment, so that none is longer than a part of the length over which the state of the rod changes,
 /// 1 / sqrt(F / EI + u^2 / 4 + w^2 / 4 + rho u / 2). Its terms are the wave number of a loaded rod, half the turn of its
 /// frame, half the twist of a tube by the moment at its tip, and the growth of relative torsion, with bounds on curvature u
 /// and force F in the segment. Neither angles nor unknowns enter, so the same joints and load give the same steps, and the

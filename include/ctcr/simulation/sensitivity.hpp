@@ -3,7 +3,6 @@
 // grow with their number.
 #include <array>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <span>
 #include <utility>

@@ -81,7 +81,7 @@ def notices(after: Robot, readings: Measurements, fit: Fit, frame_per_run: bool)
 
 
 def may_share_no_frame(after: Robot, readings: Measurements, fit: Fit) -> bool:
-    """Whether a fit with one frame, and with more than it, leaves so large an error that its runs may not share one."""
+    """Whether a fit of one frame and other parameters leaves so large an error that the runs may not share a frame."""
     kinds = {name.startswith("tracker.") for name in fit.names}
     large = 1e3 * rms(fit.residual[:, :3]) > settings.FRAMES_BEYOND * fit.expected_mm()
     several = len(kinds) == 2 and len(np.unique(readings.run)) > 1

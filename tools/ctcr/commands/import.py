@@ -4,7 +4,7 @@ import click
 
 from ctcr.commands import options
 
-NAMED = 30  # columns that are not used
+NAMED = 30  # unused columns whose names are shown
 
 
 def _pairs(context, parameter, given: tuple[str, ...]) -> dict[str, str]:

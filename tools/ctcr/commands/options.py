@@ -145,21 +145,17 @@ def load_right(robot: str, table: str, anyway: bool):
 
     Poses that the tracker repeated are left out, with a warning.
     """
-    import numpy as np
-
     from ctcr.errors import InputError, Problem
 
     if anyway:
         return load(robot, table)
-    loaded, readings, found, _ = reviewed(robot, table)
+    loaded, _, found, _ = reviewed(robot, table)
     wrong = [one for one in found.findings if one.kind != "frozen"]
     if wrong:
         advice = Problem("a fit would take that for physics: correct it first, or go on with --anyway")
         raise InputError([*(Problem(one.sentence, table) for one in wrong), advice])
-    for one in found.findings:
-        readings = readings.without_poses(np.isin(readings.row, one.rows))
-        readings.warnings.append(Problem(f"{one.text}: left out", table))
-    return loaded, readings
+    found.readings.warnings.extend(Problem(f"{one.text}: left out", table) for one in found.findings)
+    return loaded, found.readings
 
 
 def with_effects(robot, given):

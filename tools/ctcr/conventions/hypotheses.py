@@ -11,7 +11,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join
-from ctcr.table.measurements import Measurements
+from ctcr.table.measurements import Measurements, group_columns
 
 Change = Callable[[Measurements], Measurements]
 
@@ -20,8 +20,7 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
     "beta": (("mm", 1e-3), ("cm", 1e-2)),
     "position": (("mm", 1e-3), ("cm", 1e-2)),
 }
-POSE = ("x_m", "y_m", "z_m")
-QUATERNION = ("qw", "qx", "qy", "qz")
+POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
 @dataclass(frozen=True)
@@ -149,8 +148,7 @@ def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
             for tubes in (some for some in _some(n) if len(some) in (1, n)):
                 names, scale = joints(kind, tubes), np.ones(n)
                 scale[list(tubes)] = factor
-                verb, given = ("are", "rad") if len(tubes) > 1 else ("is", "rad")
-                given = "m" if kind == "beta" else given
+                verb, given = "are" if len(tubes) > 1 else "is", "m" if kind == "beta" else "rad"
                 text = f"{named(kind, tubes, n)} {verb} in {unit}, not in {given}"
                 fix = "ctcr import " + " ".join(f"--unit {name}={unit}" for name in names)
                 yield Hypothesis("joint_unit", text, names, fix, changed(kind, lambda q, s=scale: q * s))
@@ -179,7 +177,7 @@ def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 def _forces(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     if readings.force.any():
         text, fix = "the force columns hold the reaction", "ctcr import --flip force negates them"
-        yield Hypothesis("force_sign", text, ("fx_N", "fy_N", "fz_N"), fix, changed("force", np.negative))
+        yield Hypothesis("force_sign", text, FORCE, fix, changed("force", np.negative))
 
 
 def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

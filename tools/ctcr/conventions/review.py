@@ -58,9 +58,7 @@ def review(robot: Robot, readings: Measurements) -> Review:
     if still := frozen.stood_still(fit.robot, right):
         finding, rows = still
         found.append(finding.with_errors(_with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows), fit.rms_mm))
-        poses = {"position": right.position, "quaternion": right.quaternion}
-        kept = {name: np.where(rows[:, None], np.nan, old) for name, old in poses.items() if old is not None}
-        right = replace(right, **kept)
+        right = right.without_poses(rows)
 
     if slow := clock.wrong_unit(right, fit.rms_mm):
         finding, change = slow

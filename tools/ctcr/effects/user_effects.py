@@ -58,7 +58,7 @@ from ctcr.table.measurements import Measurements
 
 HOOKS = ("joints", "force", "base", "reading", "curvature", "stiffness")
 ACTS_ON = dict(zip(HOOKS, ("joints", "tip", "rod", "reading", "rod", "rod"), strict=True))  # where each hook acts
-HOOK_SECONDS = 60  # that the file, or one call of a hook, may take; a hundred thousand rows take less than one
+HOOK_SECONDS = 60  # that the file, or one call of a hook, may take; 100 000 rows take less than a second
 TEXTS = ("title", "physics", "signature", "measure", "reference")  # of an effect
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
