@@ -2,7 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include <ctcr/control/closed_loop.hpp>
-#include <ctcr/control/path.hpp>
+#include <ctcr/control/polyline.hpp>
 #include <ctcr/effects/friction.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>
 #include <vector>

@@ -9,7 +9,7 @@
 #include <bit>
 #include <cstdio>
 #include <ctcr/control/controller.hpp>
-#include <ctcr/control/path.hpp>
+#include <ctcr/control/polyline.hpp>
 #include <ctcr/ctcr.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>
 #include <numbers>

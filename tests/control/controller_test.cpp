@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "ctcr/control/closed_loop.hpp"
-#include "ctcr/control/path.hpp"
+#include "ctcr/control/polyline.hpp"
 #include "ctcr/simulation/simulated_robot.hpp"
 #include "random_control.hpp"
 #include "support/no_alloc.hpp"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "ctcr/control/closed_loop.hpp"
-#include "ctcr/control/path.hpp"
+#include "ctcr/control/polyline.hpp"
 #include "ctcr/effects/backlash.hpp"
 #include "ctcr/effects/delay.hpp"
 #include "ctcr/effects/friction.hpp"

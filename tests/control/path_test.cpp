@@ -1,8 +1,8 @@
 // Timing in closed form, and velocities that are the derivatives of positions.
-#include "ctcr/control/path.hpp"
-
 #include <gtest/gtest.h>
 
+#include "ctcr/control/polyline.hpp"
+#include "ctcr/control/spline_path.hpp"
 #include "random_control.hpp"
 #include "support/no_alloc.hpp"
 

@@ -49,9 +49,8 @@ bool can_exist(const Robot<N>& robot) {
 
 /// Solves from cold, then steps to the joints and to joints near by.
 template <Derivatives D, int N>
-void expect_defined(test::Case<N> c, test::Random& random) {
+void expect_defined(test::Case<N> c, test::Random& random, const Settings& settings = {.max_iterations = 8}) {
   const Model<N> model(c.robot);
-  const Settings settings{.max_iterations = 8};
   Workspace<N> ws;
   Solution<N> s;
   const auto expect = [&](Status status) {
@@ -104,6 +103,24 @@ TYPED_TEST(DefinedOutputs, OfGarbageJointsAndLoads) {
     spoil_each(c.load.force, p, random);
     spoil_each(c.load.moment, p, random);
     expect_defined_by_all(c, n, random);
+  }
+}
+
+TYPED_TEST(DefinedOutputs, WithGarbageSettings) {
+  constexpr int N = TypeParam::N;
+  constexpr double none = std::numeric_limits<double>::quiet_NaN(), any = std::numeric_limits<double>::infinity();
+  test::Random random(250 + N);
+  const auto one_of = [&](auto... choices) {
+    return std::array{choices...}[std::uniform_int_distribution<std::size_t>(0, sizeof...(choices) - 1)(random)];
+  };
+  for (int n = 0; n < test::cases(1000) && !this->HasFailure(); ++n) {
+    const Settings settings{.max_iterations = one_of(-1, 0, 1, 8),
+                            .tolerance = one_of(1e-10, 0.0, -1.0, none),
+                            .steps = one_of(-2, 0, 1),
+                            .accuracy = one_of(1e-4, 0.0, -1.0, none, any),
+                            .max_steps = one_of(-1, 0, 1, 64),
+                            .evaluations = one_of(-1, 0, 1, 2)};
+    expect_defined<Derivatives::compliance>(random_case<N>(0.3, random), random, settings);
   }
 }
 

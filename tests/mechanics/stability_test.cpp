@@ -72,7 +72,7 @@ void agrees_with_samples(Random& random) {
     ws.guess.rotation = problem.rotation;
     const auto smallest = test::smallest_determinant<L>(model, c.q, c.load, ws, steps);
     if (std::abs(smallest.value) < 1e-3) continue;
-    const bool found = detail::is_stable<L, MagnusRk4>(model.coefficients(), c.q, c.load, ws.guess, Steps<N>(steps));
+    const bool found = detail::is_stable<MagnusRk4>(model.coefficients(), c.q, c.load, ws.guess, Steps<N>(steps));
     // Two directions that turn over between two samples leave no sign, so a sampled determinant does not prove stability;
     // in this many samples it does not happen.
     EXPECT_EQ(found, smallest.value > 0) << "case " << k << ", determinant " << smallest.value;

@@ -8,9 +8,9 @@
 namespace ctcr::test {
 
 /// As people build them: nitinol or steel, bent up to 6 % strain, loads that bend them as far as F L^2 / EI = 3 or
-/// up to 1 N; in half of the cases gravity, in a third a moment at the tip.
+/// up to 1 N; in half of the cases gravity, in a third a moment at the tip. All this times the hardness.
 template <int N>
-Case<N> sane_case(Random& random, double hardness = 1) {
+Case<N> case_of_hardness(double hardness, Random& random) {
   Case<N> c;
   const double clearance = uniform(random, 0.02e-3, 0.2e-3);
   double diameter = uniform(random, 0.3e-3, 1.5e-3);
@@ -45,10 +45,15 @@ Case<N> sane_case(Random& random, double hardness = 1) {
   return c;
 }
 
+template <int N>
+Case<N> sane_case(Random& random) {
+  return case_of_hardness<N>(1, random);
+}
+
 /// Harder: three times the curvatures, ten times the loads.
 template <int N>
 Case<N> wide_case(Random& random) {
-  Case<N> c = sane_case<N>(random, 3);
+  Case<N> c = case_of_hardness<N>(3, random);
   c.load = {3 * c.load.force, 3 * c.load.moment};
   return c;
 }

@@ -13,9 +13,10 @@ double length_of(const Case<N>& c) {
   return std::max(0.0, c.robot.tubes[0].length + c.q.beta[0]);
 }
 
+/// @param longer  how much farther out than the robot is long a tip may be: effects may displace it [m]
 template <int N>
-bool is_defined(const Solution<N>& s, const Case<N>& c) {
-  const double length = length_of(c), reach = (std::isfinite(length) ? length : 0) * (1 + 1e-12) + N * 1e-6;
+bool is_defined(const Solution<N>& s, const Case<N>& c, double longer = 0) {
+  const double length = length_of(c), reach = (std::isfinite(length) ? length : 0) * (1 + 1e-12) + N * 1e-6 + longer;
   const auto is_pose = [&](const Mat3& R, const Vec3& p) {
     return R.allFinite() && p.allFinite() && (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-12 &&
            R.determinant() > 0 && p.stableNorm() <= reach;

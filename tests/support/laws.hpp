@@ -18,6 +18,7 @@ struct TubeCount {
 };
 using TubeCounts = ::testing::Types<TubeCount<1>, TubeCount<2>, TubeCount<3>, TubeCount<4>>;
 using OneToFiveTubes = ::testing::Types<TubeCount<1>, TubeCount<2>, TubeCount<3>, TubeCount<4>, TubeCount<5>>;
+using OneToThreeTubes = ::testing::Types<TubeCount<1>, TubeCount<2>, TubeCount<3>>;
 using TwoAndThreeTubes = ::testing::Types<TubeCount<2>, TubeCount<3>>;
 
 /// Earth's gravity in a direction that no axis shares [m/s^2].

@@ -294,11 +294,11 @@ template <Loading L, class Stepper, int N, class C>
 inline Steps<N> steps_of(const C& c, const VecN<N>& beta, const TipLoad& load, const Workspace<N>& ws,
                          const Settings& settings) noexcept {
   if (!takes_more_steps<Stepper>(settings)) return settings.steps;
-  const int times = std::max(settings.steps, ws.steps.times);
+  const int times = std::max(settings.steps, ws.steps.times), most = std::max(settings.max_steps, 1);
   if constexpr (has_effects<C>)
-    return steps_for<true>(c.plain, beta, load, times, settings.max_steps);
+    return steps_for<true>(c.plain, beta, load, times, most);
   else
-    return steps_for < L != Loading::none > (c, beta, load, times, settings.max_steps);
+    return steps_for < L != Loading::none > (c, beta, load, times, most);
 }
 
 template <Derivatives D, Loading L, class Stepper, int N, class Fx>
@@ -319,7 +319,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     stable = solved() && ev.det > 0;
     // On its branch an equilibrium stays stable while det B_u does not vanish.
     if (!stable || is_for_comparison<Stepper> || (ws.stable && way() < checked_range)) return;
-    stable = is_stable<L, Stepper>(c, q, load, guess, steps.doubled());
+    stable = is_stable<Stepper>(c, q, load, guess, steps.doubled());
     ++out.iterations;
   };
   const auto unload = [&] {
@@ -468,7 +468,9 @@ inline Status dispatch(const Model<N, Fx>& model, const Joints<N>& q, const TipL
     out.status = run(std::integral_constant<Loading, none>{});
   if (out.status == Status::needs_solve) return blank(out.status, out);
   constexpr double any = std::numeric_limits<double>::infinity();
-  const double reach = Fx::none && !is_for_comparison<Stepper> ? reach_of(model.robot(), q) : any;
+  // Effects may displace a robot in equilibrium, as a compliant front plate does.
+  const bool bounded = !is_for_comparison<Stepper> && (Fx::none || !has_equilibrium(out.status));
+  const double reach = bounded ? reach_of(model.robot(), q) : any;
   if (!are_defined<D>(out, reach)) [[unlikely]]
     out.status = define(out, reach, is_for_comparison<Stepper> ? any : no_rotation, ws);
   return out.status;
@@ -499,8 +501,8 @@ CTCR_NOINLINE Status solve(const Model<N, Fx>& model, const Joints<N>& q, const 
 /// The control step: Newton's method from the warm start predicted to the new joints, in at most `settings.evaluations`
 /// evaluations; one is usual. The last Newton step is at most 0.01 det B_u [rad], so what is left is of the order of its
 /// square. Ask for the Jacobian to have the prediction and the corrected pose (without it, the last Newton step is at most
-/// 1e-4 det B_u); tips of the outer tubes are those before that step. Where the robot has moved by more than 0.05 rad since
-/// the integration error was last estimated, one of the evaluations, in twice as many steps, estimates it.
+/// 1e-4 det B_u); J, C and the tips of the outer tubes are those before that step. Where the robot has moved by more than
+/// 0.05 rad since the integration error was last estimated, one of the evaluations, in twice as many steps, estimates it.
 /// out.residual is that before the last Newton step.
 /// @return as solve(); needs_solve: no warm start, joints or load moved too far, the robot snaps within this step, or it
 ///         needs more integration steps; `ws` is as before and `out` is blank: ask solve()

@@ -6,7 +6,6 @@
 // way: where it is not there is a conjugate point. det B_u alone tells an odd number of them from none.
 // Ref: Ha, Park & Dupont 2016, "Elastic stability of concentric tube robots subject to external loads"; Riojas,
 // Hendrick & Webster 2018.
-#include <Eigen/LU>
 #include <algorithm>
 
 #include "ctcr/mechanics/effect_evaluation.hpp"
@@ -55,34 +54,48 @@ public:
 
   /// The base at the next place.
   void base_at(const Jacobian& B) noexcept {
-    if (none_) none_ = is_regular_to<n>(last_.partialPivLu().solve(B));
+    if (none_) none_ = is_regular_to<n>(in_terms_of_last(B));
     last_ = B;
   }
   [[nodiscard]] bool none() const noexcept { return none_; }
 
 private:
+  /// last^-1 B.
+  [[nodiscard]] Jacobian in_terms_of_last(const Jacobian& B) const noexcept {
+    LaneRow<lane_groups(2 * n)> row[n] = {};
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        row[i].add(j, last_(i, j));
+        row[i].add(n + j, B(i, j));
+      }
+    constexpr auto lane = [](int j) constexpr { return j; };
+    (void)eliminate<n>(row, lane);
+    Jacobian T;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) T(i, j) = row[i][n + j];
+    return T;
+  }
+
   Jacobian last_ = Jacobian::Identity();
   bool none_ = true;
 };
 
-/// B with the base at a Bishop frame.
-/// @param frame  as seen from the tip   @param R_base_tip  of the guess   @param axis  of the unknown turns, base frame
+/// B with the base at a Bishop frame, by turns of the tip about the axes of the base frame and psi_2..N.
+/// @param frame  as seen from the tip   @param R_base_tip  of the guess
 /// @param angle  of each tube in that frame, or where it is grasped before   @param lane  lane(j) of unknown j
-template <int Turns, class S, std::size_t N, std::size_t A, class Lane>
-inline auto base_jacobian(const Frame<S>& frame, const Mat3& R_base_tip, const Vec3 (&axis)[A],
-                          const std::array<S, N>& angle, const Lane& lane) noexcept {
-  constexpr int n = Turns + int(N) - 1;
+template <class S, std::size_t N, class Lane>
+inline auto base_jacobian(const Frame<S>& frame, const Mat3& R_base_tip, const std::array<S, N>& angle,
+                          const Lane& lane) noexcept {
+  constexpr int n = int(N) + 2;
   Eigen::Matrix<double, n, n> B;
+  const Mat3 R = R_base_tip * frame.rotation();
   for (int j = 0; j < n; ++j) {
     const auto part = [at = lane(j)](const Lanes* d) { return d[at / lane_count][at % lane_count]; };
     const double turn_of_tube_1 = part(angle[0].d);
-    if constexpr (Turns > 0) {
-      const auto& twist = frame.rotation_twist;
-      const Vec3 turn =
-          R_base_tip * (frame.rotation() * Vec3(part(twist[0]), part(twist[1]), part(twist[2]) + turn_of_tube_1));
-      for (int i = 0; i < Turns; ++i) B(i, j) = axis[i].dot(turn) + (i == j);
-    }
-    for (std::size_t i = 1; i < N; ++i) B(Turns + int(i) - 1, j) = part(angle[i].d) - turn_of_tube_1;
+    const auto& twist = frame.rotation_twist;
+    const Vec3 turn = R * Vec3(part(twist[0]), part(twist[1]), part(twist[2]) + turn_of_tube_1);
+    for (int i = 0; i < 3; ++i) B(i, j) = turn[i] + (i == j);
+    for (std::size_t i = 1; i < N; ++i) B(int(i) + 2, j) = part(angle[i].d) - turn_of_tube_1;
   }
   return B;
 }
@@ -99,47 +112,42 @@ inline std::array<S, N> angles_at(double s, const Joints<N>& q, const Psi& psi, 
   return angle;
 }
 
-/// Whether the equilibrium that a guess describes is stable. One integration. Real time: yes.
-template <Loading L, class Stepper, int N>
+/// Whether the equilibrium that a guess describes is stable. One integration of the equations with every load, whatever
+/// loads the robot: this is asked once a branch. Real time: yes.
+template <class Stepper, int N>
 CTCR_NOINLINE bool is_stable(const Coefficients<N>& c, const Joints<N>& q, const TipLoad& load,
                              const TipGuess<N>& guess, const Steps<N>& steps) noexcept {
-  using Col = Columns<N, L, Derivatives::none>;
-  if constexpr (Col::unknowns > 0) {
-    using S = Dual<Col::groups>;
-    Vec3 axis[std::max(Col::turns, 1)];
-    turn_axes<L>(load, axis);
-    RobotState<S, N> state = tip_state<Col, S>(c, load, guess, axis);
-    Frame<S> frame;
-    TubeTips<N> tips;
-    ConjugatePoints<Col::unknowns> points;
-    constexpr auto lane = [](int j) constexpr { return Col::unknown(j); };
-    const auto base_at = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f) noexcept {
-      const auto psi = [&](int i) { return y.psi[std::size_t(i)]; };
-      const auto twist_rate = [&](int i) { return y.w[std::size_t(i)]; };
-      points.base_at(base_jacobian<Col::turns>(f, guess.rotation, axis, angles_at<N, S>(s, q, psi, twist_rate), lane));
-    };
-    integrate<Stepper, Col>(c, q, steps, state, frame, tips, base_at);
-    for (int i = N; i-- > 0;) base_at(q.beta[i], {}, state, frame);
-    return points.none();
-  } else {
-    return true;
-  }
+  using Col = Columns<N, Loading::weight, Derivatives::none>;
+  using S = Dual<Col::groups>;
+  const Vec3 axis[3] = {Vec3::Unit(0), Vec3::Unit(1), Vec3::Unit(2)};
+  RobotState<S, N> state = tip_state<Col, S>(c, load, guess, axis);
+  Frame<S> frame;
+  TubeTips<N> tips;
+  ConjugatePoints<Col::unknowns> points;
+  constexpr auto lane = [](int j) constexpr { return Col::unknown(j); };
+  const auto base_at = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f) noexcept {
+    const auto psi = [&](int i) { return y.psi[std::size_t(i)]; };
+    const auto twist_rate = [&](int i) { return y.w[std::size_t(i)]; };
+    points.base_at(base_jacobian(f, guess.rotation, angles_at<N, S>(s, q, psi, twist_rate), lane));
+  };
+  integrate<Stepper, Col>(c, q, steps, state, frame, tips, base_at);
+  for (int i = N; i-- > 0;) base_at(q.beta[i], {}, state, frame);
+  return points.none();
 }
 
 /// The same for a robot with effects.
-template <Loading L, class Stepper, int N, class Fx>
+template <class Stepper, int N, class Fx>
 CTCR_NOINLINE bool is_stable(const EffectCoefficients<N, Fx>& c, const Joints<N>& q, const TipLoad& load,
                              const TipGuess<N>& guess, const Steps<N>& steps) noexcept {
-  if (!c.on_rod) return is_stable<L, Stepper>(c.plain, q, load, guess, steps);
+  if (!c.on_rod) return is_stable<Stepper>(c.plain, q, load, guess, steps);
   using Window = detail::Window<lane_groups(N + 2)>;
   using Pass = EffectPass<N, Fx, Window::groups>;
   using S = typename Window::S;
   const RodInputs<N, S, Fx> in = constant_inputs<S>(c, q, load);
   ConjugatePoints<Pass::unknowns> points;
-  const Vec3 axis[3] = {Vec3::Unit(0), Vec3::Unit(1), Vec3::Unit(2)};
   const auto lane = [](int j) { return j; };
   const auto base_at = [&](const Frame<S>& f, const std::array<S, N>& angle) noexcept {
-    points.base_at(base_jacobian<3>(f, guess.rotation, axis, angle, lane));
+    points.base_at(base_jacobian(f, guess.rotation, angle, lane));
   };
   const auto node = [&](const S&, const auto&, const auto& y, const Frame<S>& f, const auto&) noexcept {
     base_at(f, angles_at<N, S>(0, q, [&](int i) { return y.psi(i); }, [](int) { return S(0.0); }));

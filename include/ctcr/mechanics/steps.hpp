@@ -15,8 +15,8 @@ struct Steps {
   int times = 1;
   std::array<int, 2 * N> share;  ///< of the segment that begins, on its tip side, at event `id` of Events<N>
 
-  /// As many steps in every segment, >= 1.
-  constexpr Steps(int in_each = 1) noexcept : times(in_each) { share.fill(1); }
+  /// As many steps in every segment, at least one.
+  constexpr Steps(int in_each = 1) noexcept : times(std::max(in_each, 1)) { share.fill(1); }
 
   [[nodiscard]] constexpr int after(int event) const noexcept { return times * share[std::size_t(event)]; }
   [[nodiscard]] constexpr int largest_share() const noexcept { return std::ranges::max(share); }

@@ -1,7 +1,8 @@
 #pragma once
 // Closed loops of a robot of N tubes.
 #include <ctcr/control/closed_loop.hpp>
-#include <ctcr/control/path.hpp>
+#include <ctcr/control/polyline.hpp>
+#include <ctcr/control/spline_path.hpp>
 #include <ctcr/parallel/thread_pool.hpp>
 #include <ctcr/simulation/sensitivity.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>

@@ -1,0 +1,55 @@
+#pragma once
+// Paths of the tip in space and time, through corners on straight lines.
+#include <span>
+#include <vector>
+
+#include "ctcr/control/control_state.hpp"
+#include "ctcr/control/trapezoid.hpp"
+
+namespace ctcr {
+
+/// Straight lines from corner to corner, with a rest at each: a corner at speed would need infinite acceleration.
+class Polyline {
+public:
+  /// @param corners  [m], base frame   @param orientation  of the tip, all along
+  /// Allocates. speed and acceleration as Trapezoid.
+  Polyline(std::span<const Vec3> corners, double speed, double acceleration, const Mat3& orientation = Mat3::Identity())
+    : orientation_(orientation), start_(corners.empty() ? Vec3(Vec3::Zero()) : corners[0]) {
+    for (std::size_t i = 1; i < corners.size(); ++i) {
+      const Vec3 way = corners[i] - corners[i - 1];
+      const double length = way.norm();
+      const Trapezoid motion(length, speed, acceleration);
+      if (!(motion.duration() > 0)) continue;  // no way, or no speed: it rests where it is
+      edges_.push_back({corners[i - 1], way / length, motion, duration_});
+      duration_ += motion.duration();
+    }
+  }
+
+  [[nodiscard]] double duration() const noexcept { return duration_; }
+
+  /// Real time: yes.
+  [[nodiscard]] Reference at(double t) const noexcept {
+    Reference r{{orientation_, start_}};
+    if (edges_.empty()) return r;
+    std::size_t k = 0;
+    while (k + 1 < edges_.size() && edges_[k + 1].begin <= t) ++k;
+    const Edge& edge = edges_[k];
+    const auto [s, v] = edge.motion.at(t - edge.begin);
+    r.pose.position = edge.start + s * edge.direction;
+    r.velocity.head<3>() = v * edge.direction;
+    return r;
+  }
+
+private:
+  struct Edge {
+    Vec3 start, direction;
+    Trapezoid motion;
+    double begin;  ///< [s]
+  };
+  std::vector<Edge> edges_;
+  Mat3 orientation_;
+  Vec3 start_;
+  double duration_ = 0;
+};
+
+}  // namespace ctcr
