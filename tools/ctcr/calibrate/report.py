@@ -183,6 +183,6 @@ def _numbers(c: Calibration) -> str:
         table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c), 1),
         table("The fit", ["", ""], rows, 1),
     ]
-    if fit.frames:
-        tables.append(table("Frames of the runs against the typical one", fit.frames.COLUMNS, fit.frames.rows(), 0))
+    if sessions := c.readings.sessions:
+        tables.append(table(sessions.TITLE, sessions.columns, sessions.rows(), 0))
     return "<h2>Numbers</h2>" + "".join(tables)

@@ -25,10 +25,11 @@ from ctcr.errors import InputError, Problem
 )
 @options.free
 @options.anyway
+@options.frames
 @options.effects
 @options.new_robot
 @options.json
-def command(robot, names, diagnosis, measurements, given, free, anyway, target, in_place, out) -> None:
+def command(robot, names, diagnosis, measurements, given, free, anyway, frame_per_run, target, in_place, out) -> None:
     """Add physical effects to a robot file.
 
     Every command then uses them; `ctcr effects` lists them. With --fit the effects are fitted together with the
@@ -58,8 +59,9 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, target, 
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
-    _, readings = options.load_right(robot, measurements, anyway)
+    _, readings, said = options.load_right(robot, measurements, anyway, frame_per_run)
     added = add.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
+    added.notices[:0] = said
     add.write_added(loaded, added, target, measurements, in_place)
     out.write_json(_as_data(added))
     _show(out, loaded, added)
@@ -74,6 +76,7 @@ def _as_data(added) -> dict:
         "rms_mm": added.rms("rms_mm"),
         "rms_deg": added.rms("rms_deg"),
         "held_out": added.held_out,
+        "frames": added.sessions and added.sessions.as_dict(),
         "reduced_chi_square": added.fit.reduced_chi_square,
         "converged": added.fit.converged,
         "notices": added.notices,

@@ -22,13 +22,16 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
+from ctcr.fit.sessions import placed
 from ctcr.model import fields
 from ctcr.model.noise import noise_of_readings
+from ctcr.model.sessions import as_given
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
+from ctcr.table.sessions import Sessions
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,7 @@ class Added:
     stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
     held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
+    sessions: Sessions | None  # what each run has of its own
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation of every fitted parameter of an effect, SI."""
@@ -108,7 +112,8 @@ def add(
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids), *nuisances]
-    return Added(fit.apply(stage.robot), list(ids), fit, stages, _name_of(readings, held_out), notices)
+    after, name = placed(fit.apply(stage.robot), readings.sessions), _name_of(readings, held_out)
+    return Added(after, list(ids), fit, stages, name, notices, readings.sessions)
 
 
 def write_added(
@@ -203,7 +208,7 @@ class _Fitter:
     def nominal(self, ids: Sequence[str]) -> Array:
         """Residuals (M, 6) at nominal values, with these effects alone."""
         self.engine.robot = self._with(ids)
-        recorded = self.engine.recording([])
+        recorded = as_given(self.engine.recording([]))
         return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
 
     def _with(self, ids: Sequence[str]) -> Robot:

@@ -109,6 +109,7 @@ class Diagnosis:
             ],
             "leftover": {"structured": self.residual.structured, "depends_on": self.depends_on},
             "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
+            "frames": self.measurements.sessions and self.measurements.sessions.as_dict(),
             "seconds": round(self.seconds, 2),
         }
 

@@ -125,7 +125,10 @@ def _parameters(d: Diagnosis) -> str:
         rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
     columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]
-    return "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
+    fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
+    if sessions := d.measurements.sessions:
+        fitted += table(sessions.TITLE, sessions.columns, sessions.rows(), 0)
+    return fitted
 
 
 def _limits(d: Diagnosis) -> str:
