@@ -28,22 +28,36 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     from ctcr.robot import robot_file
 
     loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
-    corrected = []
+    corrected, own = [], _own_of_runs(loaded, readings, conventions)
     if refusal:
         loaded, readings = conventions.robot, conventions.readings
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
+    readings, repeated = options.without_repeated(readings, conventions)
     readings, excluded = spikes.left_out(loaded, readings)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(loaded, readings)
-    notices = [f"{said}." for said in (*corrected, *excluded, *added)]
-    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings)
+    notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
+    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings, own)
     out.write_report("compare.report", result, f"{measurements} compared with the model of {robot}")
     out.write_json(result.as_dict())
     terminal.show(out.console, result)
     out.say(*readings.warnings)
     if doubts := robot_file.warnings(loaded):
         out.say(f"{len(doubts)} values look wrong in the robot file: ctcr info {robot}")
+
+
+def _own_of_runs(robot, readings, conventions) -> list[str]:
+    """Sentences on what each run has of its own; none where the file says too little for a fit."""
+    from ctcr.diagnose import sessions
+    from ctcr.errors import InputError
+
+    if conventions.wrong:
+        return []
+    try:
+        return sessions.of_runs(robot, conventions.readings)[1]
+    except InputError:
+        return []
 
 
 def _predict(robot, readings, steps: int):

@@ -145,17 +145,21 @@ def reviewed(robot: str, table: str):
     return loaded, readings, found, refusal
 
 
+def without_repeated(readings, conventions):
+    """The readings without poses that the tracker repeated, and sentences on that."""
+    import numpy as np
+
+    rows = [row for one in conventions.frozen for row in one.rows]
+    said = [f"{one.text[0].upper()}{one.text[1:]}: left out." for one in conventions.frozen]
+    return (readings.without_poses(np.isin(readings.row, rows)) if rows else readings), said
+
+
 def to_fit(robot, readings, conventions, frame_per_run: bool | None):
     """The readings as a fit takes them, and sentences on what was left out: poses that the tracker repeated, and where
     the runs are sessions, what each has of its own (`frame_per_run`: as asked; None: as the readings say)."""
-    import numpy as np
-
     from ctcr.diagnose import sessions
 
-    said = []
-    for one in conventions.frozen:
-        readings = readings.without_poses(np.isin(readings.row, one.rows))
-        said.append(f"{one.text[0].upper()}{one.text[1:]}: left out.")
+    readings, said = without_repeated(readings, conventions)
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
     return readings, [*said, *more]
 

@@ -17,9 +17,9 @@ Table = tuple[str, list[str], list[list[str]], int]  # title, columns, rows, num
 def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
     console.print(c.robot, style="bold")
-    if c.conventions:
-        console.print("Wrong conventions: correct these first", style="bold")
-        for one in c.conventions:
+    if c.wrong:
+        console.print(c.WRONG, style="bold")
+        for one in c.wrong:
             console.print(f"  • {one.sentence}")
     console.print(headline(c))
     console.print(table(*errors(c)))

@@ -60,7 +60,7 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
             f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes changed, or homed anew?"
         ]
     before, after = (wording.mm(fit.rms_mm()) for fit in (one, own))
-    text = f"The runs do not share {shared}: with one for each the error falls from {before} to {after}."
+    text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
     return framed.measurements.sessions.taken_out(readings), [text, *said]
 
 
