@@ -6,9 +6,11 @@ from ctcr import settings
 from ctcr.arrays import Integers, Mask
 from ctcr.conventions.alignment import aligned
 from ctcr.errors import InputError, Problem
+from ctcr.fit import floors
 from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
+from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.show import wording
 from ctcr.show.wording import listed
@@ -62,10 +64,12 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
     return readings.row[small.any(axis=1)].tolist()
 
 
-def notices(readings: Measurements, fit: Fit) -> list[str]:
+def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
     """What the user should know of a fit, in sentences."""
     said_as_doubts = "prior standard deviations"
-    said = [sentence(text) for text in fit.warnings if said_as_doubts not in text]
+    unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
+    explained = not unexplained or floors.explains(fit, noise_of_readings(robot, readings))
+    said = [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)

@@ -15,6 +15,7 @@ from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, joint
+from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import placed
 from ctcr.model import fields
@@ -60,7 +61,8 @@ class Calibration:
     fitted: list[Fitted]
     stages: list[Stage]  # nominal, frame alone (where more is fitted), calibrated
     held_out: HeldOut | None
-    floor: Stage  # error to be expected of a right model at the fitted readings
+    floor: Stage  # error to be expected of a right model at the fitted readings, by the noise of the fit
+    floors: Floors
     halves: Halves | None
     notices: list[str]
 
@@ -97,6 +99,7 @@ class Calibration:
             "unexplained_scatter": {"position_mm": self.unexplained.rms_mm, "rotation_deg": self.unexplained.rms_deg},
             "correlations": [{"first": a, "second": b, "r": r} for a, b, r in fit.correlations],
             "undetermined": [{"text": d.text, "ratio": d.ratio} for d in fit.directions],
+            **self.floors.as_dict(),
             "frames": sessions and sessions.as_dict(),
             "outliers": checks.outlier_rows(fit, self.readings),
             "noise": {
@@ -129,6 +132,7 @@ def calibrate(
     Raises InputError where the input cannot be used: nothing measured, a frame that is metres off, a name that does
     not exist, a prior of zero width, too few rows.
     """
+    floor = floors(robot, readings)
     robot, readings, notices = sensor_roll.usable(robot, readings)
     names = without_frame(sensor_roll.with_roll(list(free), robot), readings)
     if not names:
@@ -172,8 +176,9 @@ def calibrate(
         stages=[*stages, _stage("calibrated", fit.residual[usable])],
         held_out=held_out,
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
+        floors=floor,
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
-        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(readings, fit)],
+        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(robot, readings, fit)],
     )
 
 

@@ -76,6 +76,7 @@ def _as_data(added) -> dict:
         "rms_mm": added.rms("rms_mm"),
         "rms_deg": added.rms("rms_deg"),
         "held_out": added.held_out,
+        **added.floors.as_dict(),
         "frames": added.sessions and added.sessions.as_dict(),
         "reduced_chi_square": added.fit.reduced_chi_square,
         "converged": added.fit.converged,
@@ -94,7 +95,9 @@ def _show(out, robot, added) -> None:
     rows = [
         [stage.name.replace("_", " "), *(f"{getattr(stage, f'rms_{unit}'):.3f}" for unit in units)]
         for stage in added.stages
+        if stage.name != "noise_floor"
     ]
+    rows += [[name, f"{value:.3f}", *["" for _ in units[1:]]] for name, value in added.floors.rows()]
     on = f"held-out data ({added.held_out})" if added.held_out else "the rows that were fitted"
     out.table(f"Error on {on}, RMS", ["", *units], rows)
     out.say(*(f"  • {notice}" for notice in added.notices))

@@ -28,17 +28,18 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     from ctcr.robot import robot_file
 
     loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
-    corrected, own = [], _own_of_runs(loaded, readings, conventions)
+    corrected = []
     if refusal:
         loaded, readings = conventions.robot, conventions.readings
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
     readings, repeated = options.without_repeated(readings, conventions)
+    own, floor = _fitted(loaded, readings, conventions)
     readings, excluded = spikes.left_out(loaded, readings)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(loaded, readings)
     notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
-    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings, own)
+    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings, own, floor)
     out.write_report("compare.report", result, f"{measurements} compared with the model of {robot}")
     out.write_json(result.as_dict())
     terminal.show(out.console, result)
@@ -47,17 +48,20 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
         out.say(f"{len(doubts)} values look wrong in the robot file: ctcr info {robot}")
 
 
-def _own_of_runs(robot, readings, conventions) -> list[str]:
-    """Sentences on what each run has of its own; none where the file says too little for a fit."""
+def _fitted(robot, readings, conventions):
+    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error. None
+    where conventions are wrong or no fit is possible."""
     from ctcr.diagnose import sessions
     from ctcr.errors import InputError
+    from ctcr.fit.floors import floors
 
     if conventions.wrong:
-        return []
+        return [], None
     try:
-        return sessions.of_runs(robot, conventions.readings)[1]
+        readings, said = sessions.of_runs(robot, readings)
     except InputError:
-        return []
+        return [], None
+    return said, floors(robot, readings).as_dict()
 
 
 def _predict(robot, readings, steps: int):

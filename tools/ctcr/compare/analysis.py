@@ -1,6 +1,6 @@
 """All numbers of a comparison of the model with measurements: how large the error is, and what it depends on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,6 +68,7 @@ class Comparison:
     revisits: Revisits
     notices: Sequence[str]  # changes made to the table before it was compared
     conventions: Sequence[Convention]  # that are wrong, the clearest first
+    floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
 
     WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
@@ -98,6 +99,7 @@ class Comparison:
         data["notices"] = list(self.notices)
         data["conventions"] = [one.as_dict() for one in self.conventions]
         data["sessions"] = list(self.sessions)
+        data |= self.floors
         return data
 
 
@@ -108,9 +110,11 @@ def compare(
     notices: Sequence[str] = (),
     conventions: Sequence[Convention] = (),
     sessions: Sequence[str] = (),
+    floors: Mapping[str, float] | None = None,
 ) -> Comparison:
     """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
-    `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found.
+    `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
+    `ctcr.fit.floors` as_dict().
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -173,6 +177,7 @@ def compare(
         revisits=revisits,
         notices=notices,
         conventions=conventions,
+        floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
         sessions=sessions,
     )
 

@@ -36,7 +36,7 @@ def _opening(c: Comparison) -> str:
         numbers.append(("error", f"{angle:.3g}°", f"RMS {c.angle_kind} error, at most {most:.3g}°"))
     if np.isfinite(n.rms_mm):
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
-        numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
+        numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"scatter of a reading, RMS ({sources[n.source]})"))
     if d:
         numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {d.pairs} pairs of visits"))
     wrong = [one.sentence for one in c.wrong]

@@ -49,10 +49,10 @@ def headline(c: Comparison) -> str:
         f"or {length.rms:.2g} % of the deployed length, over {p.count} readings. "
     )
     if is_noise(c):
-        return text + f"Noise alone gives {mm(noise.rms_mm)} RMS: there is nothing to explain."
+        return text + f"Readings repeat only to {mm(noise.rms_mm)} RMS: there is nothing to explain."
     if not np.isfinite(noise.rms_mm):
-        return text + "The noise of a reading is not known."
-    source = "scatter at rest" if noise.source == "rest" else "as stated"
+        return text + "The sensor jitter is not known."
+    source = "at rest" if noise.source == "rest" else "sensor jitter as stated"
     if noise.source == "revisits":
         source = f"{noise.pairs} revisits from the same direction, ± {noise.uncertainty_mm * np.sqrt(3):.2g} mm"
     size, by_noise = f"{mm(noise.rms_mm)} RMS ({source})", (noise.rms_mm / p.rms) ** 2 if p.rms else 1.0
@@ -60,14 +60,14 @@ def headline(c: Comparison) -> str:
     if noise.source == "revisits" and noise.axis_mm > settings.NOTABLE * noise.stated_axis_mm:
         stated = mm(noise.stated_axis_mm * 3**0.5)
         return text + (
-            f"The tracker's stated scatter is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
+            f"The sensor jitter as stated is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
             f"error exceeds even that."
         )
-    return text + f"Noise is {size}, so {left} of the squared error is not noise."
+    return text + f"Readings repeat to {size}, so {left} of the squared error is not their scatter."
 
 
 def is_noise(c: Comparison) -> bool:
-    """Whether the error is no larger than the noise floor allows, within twice its uncertainty."""
+    """Whether the error is no larger than the scatter of a reading allows, within twice its uncertainty."""
     relative = np.nan_to_num(c.noise.uncertainty_mm / c.noise.axis_mm) if c.noise.axis_mm > 0 else 0.0
     slack = 2 * np.hypot(relative, 1 / np.sqrt(6 * c.position_mm.count))
     return bool(c.position_mm.rms <= c.noise.rms_mm * (1 + slack)) and not list(_all(c))
@@ -220,17 +220,17 @@ def limits(c: Comparison) -> Iterator[str]:
     n, r = c.noise, c.run_offsets
     if n.source == "rest":
         yield (
-            f"Too few joints were visited twice from the same direction in one run: the noise ({n.axis_mm:.3f} mm per "
-            f"axis) is the scatter at rest. It misses repeatability, drift and the tracker's field error."
+            f"Too few joints were visited twice from the same direction in one run: the scatter of a reading "
+            f"({n.axis_mm:.3f} mm per axis) is that at rest. It misses repeatability, drift and field error."
         )
     elif n.source == "stated":
         yield (
             "Too few joints were visited twice from the same direction in one run, and too few readings were taken at "
-            "rest: the noise is the jitter stated in the robot file. It misses repeatability, drift and field error."
+            "rest: the scatter of a reading is the sensor jitter as stated. It misses repeatability and drift."
         )
     if c.accuracy_95_mm > 0:
         yield (
-            f"The noise floor does not include the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
+            f"Repeated readings do not show the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
             f"which is the same at every visit of a position."
         )
     if c.direction is None:

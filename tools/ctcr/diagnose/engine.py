@@ -144,12 +144,6 @@ class Engine:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
-    def rejects(self, fit: joint.Fit) -> bool:
-        """Whether the noise as stated does not explain the residual."""
-        return bool(
-            np.max(fit.inflation) > settings.INFLATION_EXPLAINED or self.as_stated(fit).p_value < settings.SIGNIFICANCE
-        )
-
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)

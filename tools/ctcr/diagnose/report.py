@@ -37,14 +37,14 @@ def _opening(d: Diagnosis) -> str:
         ("error", rms["nominal"], "RMS error with the robot file"),
         ("error", rms["calibrated"], "after calibration"),
         *effects,
-        ("noise", rms["noise_floor"], "noise floor"),
+        ("noise", f"{short(d.floors.expected_error_mm)} mm", d.floors.NAMES[1]),
     ]
     verdict = d.verdict.word.replace("_", " ").capitalize()
     return (
         paragraph(" " + " ".join(d.verdict.sentences), "lead", bold=f"{verdict}.")
         + cards(numbers)
-        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. A right model would leave '
-        f"{short(d.expected_mm)} mm there: noise, and the uncertainty of its parameters.</p>"
+        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. '
+        f"{d.floors.MEANING.capitalize()}; sensor jitter alone: {short(d.floors.sensor_jitter_mm)} mm.</p>"
     )
 
 

@@ -140,7 +140,7 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    decide(round_, len({c.id for c in candidates}), bool(accepted), engine.rejects(before), _suspects(engine, accepted))
+    decide(round_, len({c.id for c in candidates}), bool(accepted), joint.rejects(before), _suspects(engine, accepted))
     unsure = round_.accepted and accepted and round_.accepted.score < settings.BEYOND_CROSS_VALIDATION
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"

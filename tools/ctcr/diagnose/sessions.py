@@ -40,7 +40,7 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
         return readings, []
     engine = Engine(robot, usable, noise_of_readings(robot, usable), rows_of_runs(usable))
     one = engine.fit()
-    if asked is None and not (engine.rejects(one) and _may_win(engine, one)):
+    if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
         return readings, []
     framed = replace(engine, measurements=as_sessions(robot, usable))
     if asked is None and not _wins(engine, one, framed):

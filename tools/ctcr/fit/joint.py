@@ -233,6 +233,13 @@ def linear_fit(
     return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
 
 
+def rejects(fit: Fit) -> bool:
+    """Whether the noise of a fit as stated, whatever model error had to be admitted, does not explain the residual."""
+    if np.max(fit.inflation) > settings.INFLATION_EXPLAINED:
+        return True
+    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value < settings.SIGNIFICANCE
+
+
 def likeliest_field(fit: Fit) -> Noise:
     """The noise of a fit with that part of its field error which makes the readings likeliest, by linearised fits."""
     parts = [
