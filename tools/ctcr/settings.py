@@ -97,9 +97,10 @@ ONE_SIDED_WIDEN = 1.5  # factor of the search along a side, and sd from which a 
 ONE_SIDED_UNSEEN = 0.99  # posterior over prior sd from which a curve may lie behind the plate altogether
 ONE_SIDED_GAIN = 0.5  # log evidence that a restart across a kink must gain
 
-FRAME_PRIOR_WIDER = 10.0  # prior sd of the frame of a run over that of the robot file's frame
-FRAME_ALIGNMENTS = 6  # Gauss-Newton steps that align the frames of the runs before the first fit
-FRAME_STARTS = 4  # starts of a fit with frames of their own, which make room for other minima
+SESSION_PRIOR_WIDER = 10.0  # prior sd of the frame and the homes of a run over that of the robot file's
+SESSION_PARTS = (1.0, 0.3, 0.1, 0.03)  # of that sd, which the scatter of the runs about the typical one may have
+SESSION_ALIGNMENTS = 6  # Gauss-Newton steps that align the runs before the first fit
+SESSION_ROWS = 600  # rows on which runs are compared, spread over all runs
 
 # ---- Folds: runs, or where there are too few of them, blocks of time or regions of joint space
 
@@ -116,8 +117,6 @@ NEARLY_EXPLAINED = 1.5  # reduced chi-square up to which the smooth field error 
 CROSS_VALIDATION_ROWS = 5000  # rows beyond which one fold is held out instead of each in turn: to save time
 HALVES_ROWS = 400  # rows at which the models of two halves are compared
 HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives is then known to 15 %
-FRAMES_BEYOND = 4.0  # RMS error over the expected one, from which frames for each run may be the reason,
-FRAMES_LEAVE = 0.5  # ... if they leave less than this part of it
 
 # ---- Diagnosis: evidence for an effect
 

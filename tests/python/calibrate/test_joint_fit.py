@@ -12,6 +12,7 @@ from ctcr import cli, frames
 from ctcr.calibrate import joint_fit, report
 from ctcr.errors import InputError
 from ctcr.fit import folds
+from ctcr.fit.sessions import as_sessions
 from ctcr.model import effect_model, fields
 from ctcr.model.model import Model
 from ctcr.robot import robot_file
@@ -326,21 +327,19 @@ def moved_runs(readings) -> tuple:
 
 
 def test_run_frames(robot, readings):
-    """Runs that do not share a frame are detected, and fitted with a frame for each."""
+    """Where runs are sessions, each has its frame: the calibration is that of the runs in one frame."""
     moved, shift, turn = moved_runs(readings)
-    plain = outcome(robot, moved, frame_per_run=False)
-    assert "The runs do not share one frame" in said(plain)
-    found = outcome(robot, moved)
-    assert found.fit.frames and "The runs do not share a frame" in said(found) and "--one-frame" in said(found)
-    framed = outcome(robot, moved, ["actuation.home_rotation.*", "tubes.*.curvature"], frame_per_run=True)
+    plain, framed = outcome(robot, moved), outcome(robot, as_sessions(robot, moved), ["tubes.*.curvature"])
     assert framed.stages[-1].rms_mm < 0.5 < 10 < plain.stages[-1].rms_mm
-    found = framed.fit.frames
-    own = (Rotation.from_rotvec(found.turn[0]) * Rotation.from_rotvec(found.turn).inv()).as_rotvec()
-    true = (Rotation.from_rotvec(turn[0]) * Rotation.from_rotvec(turn).inv()).as_rotvec()
+    assert framed.stages[0].rms_mm == pytest.approx(plain.stages[0].rms_mm)  # as the readings were taken
+    found = framed.readings.sessions
+    own = (Rotation.from_rotvec(found.turn[0]).inv() * Rotation.from_rotvec(found.turn)).as_rotvec()
+    true = (Rotation.from_rotvec(turn[0]).inv() * Rotation.from_rotvec(turn)).as_rotvec()
     np.testing.assert_allclose(own, true, atol=np.radians(1.0))
     np.testing.assert_allclose(found.shift - found.shift[0], shift - shift[0], atol=2e-3)
-    with pytest.raises(InputError, match="--frame-per-run fits the frames by itself"):
-        outcome(robot, moved, ["tracker.frame"], frame_per_run=True)
+    assert len(framed.as_dict()["frames"]) == 12 and "each run has of its own" in report.page(framed, "these")
+    with pytest.raises(InputError, match="the frames of the runs are fitted by themselves"):
+        outcome(robot, framed.readings, ["tracker.frame"])
 
 
 def test_split_places(readings):

@@ -220,7 +220,7 @@ def test_variety_first():
         replace(candidate_fit("delay", 20.0 - k, shape=shape), candidate=Candidate("delay", (name,), shape))
         for k, (name, shape) in enumerate([("a", ()), ("a", ((SPREAD, 0.5),)), ("b", ())])
     ]
-    assert [one.candidate.names for one in rounds._worth_a_refit(found)] == [("a",), ("b",)]
+    assert [one.candidate.names for one in rounds.worth_a_refit(found)] == [("a",), ("b",)]
 
 
 def test_other_amplitudes():

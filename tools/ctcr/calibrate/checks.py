@@ -1,19 +1,16 @@
 """What is wrong with, or worth knowing of, a table that is to be fitted."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Integers, Mask
-from ctcr.compare.offsets import find_run_offsets
-from ctcr.compare.sample import take_sample
-from ctcr.compare.visits import find_revisits, find_stops
+from ctcr.conventions.alignment import aligned
 from ctcr.errors import InputError, Problem
+from ctcr.fit import floors
 from ctcr.fit.result import Fit, rms
-from ctcr.fit.run_frames import error_with_frames
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
+from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.show import wording
 from ctcr.show.wording import listed
@@ -67,25 +64,19 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
     return readings.row[small.any(axis=1)].tolist()
 
 
-def notices(after: Robot, readings: Measurements, fit: Fit, frame_per_run: bool) -> list[str]:
+def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
     """What the user should know of a fit, in sentences."""
     said_as_doubts = "prior standard deviations"
-    said = [sentence(text) for text in fit.warnings if said_as_doubts not in text]
+    unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
+    explained = not unexplained or floors.explains(fit, noise_of_readings(robot, readings))
+    said = [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
-    return said if frame_per_run else said + (_one_frame(after, readings, fit) or _run_frames(after, readings, fit))
-
-
-def may_share_no_frame(after: Robot, readings: Measurements, fit: Fit) -> bool:
-    """Whether a fit of one frame and other parameters leaves so large an error that the runs may not share a frame."""
-    kinds = {name.startswith("tracker.") for name in fit.names}
-    large = 1e3 * rms(fit.residual[:, :3]) > settings.FRAMES_BEYOND * fit.expected_mm()
-    several = len(kinds) == 2 and len(np.unique(readings.run)) > 1
-    return several and large and not _one_frame(after, readings, fit)
+    return said + _frame_elsewhere(readings, fit)
 
 
 def sentence(text: str) -> str:
@@ -94,47 +85,19 @@ def sentence(text: str) -> str:
     return first + ("" if text.endswith(".") else ".")
 
 
-def _one_frame(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
-    """A sentence where an error far beyond the expected one disappears with another frame for all runs."""
-    found = _errors_if_framed(robot, replace(readings, run=np.zeros_like(readings.run)), fit)
-    if not found:
+def _frame_elsewhere(readings: Measurements, fit: Fit) -> list[str]:
+    """A sentence where most of the error that the noise does not explain disappears with another tracker frame."""
+    fitted = readings.rows(fit.used)
+    error = fit.residual[fit.used, :3]
+    _, _, left = aligned(fitted.positions - error, fitted.positions)
+    before, after = 1e3 * rms(error), 1e3 * rms(left[:, None])
+    if fit.p_value > settings.SIGNIFICANCE or not after < settings.CONVENTION_CLEAR * before:
         return []
     return [
-        f"Another tracker frame leaves {found[1]} of the {found[0]} RMS error, but lies "
+        f"Another tracker frame leaves {wording.mm(after)} of the {wording.mm(before)} RMS error, but lies "
         "further off than the robot file allows: find it with `ctcr calibrate registration`, or widen "
         "tracker_frame_mm and tracker_frame_deg under uncertainty."
     ]
-
-
-def _run_frames(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
-    """A sentence where the runs do not share one frame: an error far beyond the expected one disappears with a frame
-    for each, or the same joints give other positions in other runs."""
-    if len(np.unique(readings.run)) < 2:
-        return []
-    if found := _errors_if_framed(robot, readings, fit):
-        text = f"The runs do not share one frame: a frame for each leaves {found[1]} of the {found[0]} RMS error."
-        return [f"{text} --frame-per-run fits them."]
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    sample = take_sample(robot, readings, Model(robot.standard).predict(beta, alpha, readings.force))
-    revisits = find_revisits(find_stops(sample), sample.lever)
-    offsets = find_run_offsets(sample, revisits)
-    if not offsets.found:
-        return []
-    share = wording.percent(offsets.share)
-    text = f"The runs do not share one frame or homing: an offset for each explains {share} of the squared error that "
-    text += "is left"
-    if offsets.outlying:
-        far = wording.join([str(run) for run in offsets.outlying[:8]])
-        text += f"; runs {far} lie about {wording.mm(offsets.outlying_mm)} from the others"
-    return [text + ". --frame-per-run fits a frame for each."]
-
-
-def _errors_if_framed(robot: Robot, readings: Measurements, fit: Fit) -> tuple[str, str] | None:
-    """RMS errors with one frame and with a frame for each run, in words; None where the second explains little."""
-    before_mm, after_mm = error_with_frames(robot, readings, fit.noise)
-    if before_mm > settings.FRAMES_BEYOND * fit.expected_mm() and after_mm < settings.FRAMES_LEAVE * before_mm:
-        return wording.mm(before_mm), wording.mm(after_mm)
-    return None
 
 
 def _rows(rows: Integers) -> str:

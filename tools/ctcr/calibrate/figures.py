@@ -25,7 +25,7 @@ def waterfall(figure, c: Calibration) -> None:
     steps = [(names.get(stage.name, stage.name), stage.rms_mm) for stage in c.stages]
     if c.held_out:
         steps.append((f"held out\n({c.held_out.kind})", c.held_out.error.rms_mm))
-    last, floor = len(steps), (c.held_out or c).floor.rms_mm
+    last, floor = len(steps), c.floors.expected_error_mm
 
     def bar(x: int, size: float, colour: str, ink: str = INK) -> None:
         inside = ink == "white" and size > 0.12 * steps[0][1]
@@ -43,7 +43,7 @@ def waterfall(figure, c: Calibration) -> None:
             axes.annotate(f"{100 * (size / before - 1):+.0f} %", (x, max(size, before)), (0, 4), **style)
     bar(last, floor, NOISE)
     axes.axhline(floor, color=NOISE, ls="--", lw=1)
-    axes.set_xticks(range(last + 1), [*(name for name, _ in steps), "expected"])
+    axes.set_xticks(range(last + 1), [*(name for name, _ in steps), "expected error"])
     axes.set(ylabel="error, mm RMS", ylim=(0, 1.12 * max(size for _, size in steps)))
     axes.grid(axis="x", visible=False)
 
@@ -53,7 +53,7 @@ def histogram(figure, c: Calibration) -> None:
     axes = figure.subplots()
     sizes = (1e3 * np.linalg.norm(r[:, :3], axis=1) for r in (c.fit.nominal_residual, c.fit.residual))
     before, after = (size[np.isfinite(size)] for size in sizes)
-    axis_sd = c.floor.rms_mm / np.sqrt(3)
+    axis_sd = c.floors.expected_error_mm / np.sqrt(3)
     low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
     edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
     for sizes, colour, label in ((before, ERROR, "robot file"), (after, GOOD, "calibrated")):
@@ -76,7 +76,7 @@ def course(figure, c: Calibration) -> None:
             axes.axvspan(start, stop - 1, color="#f2f4f7", lw=0)
     for values, colour, label in zip(size, (ERROR, GOOD), ("robot file", "calibrated"), strict=True):
         axes.plot(rows, values[rows], color=colour, lw=0.9, label=label)
-    axes.axhline(c.floor.rms_mm, color=NOISE, ls="--", lw=1, label="expected, RMS")
+    axes.axhline(c.floors.expected_error_mm, color=NOISE, ls="--", lw=1, label="expected error")
     axes.set(xlabel="reading (runs shaded in turn)", ylabel="error, mm", ylim=(0, None))
     axes.margins(x=0.01)
     axes.legend(fontsize=9)

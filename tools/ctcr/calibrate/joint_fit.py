@@ -1,8 +1,7 @@
 """The joint fit as `ctcr calibrate fit` runs it: the fit, its error on held-out readings, how far two halves agree."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,17 @@ from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_roll
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
-from ctcr.fit import folds, joint, run_frames
+from ctcr.errors import InputError, Problem
+from ctcr.fit import folds, joint
+from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
+from ctcr.fit.sessions import placed
 from ctcr.model import fields
 from ctcr.model.fields import Fitted
 from ctcr.model.noise import Noise, noise_of_readings
+from ctcr.model.sessions import without_frame
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
-from ctcr.show import wording
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
 
@@ -59,7 +61,8 @@ class Calibration:
     fitted: list[Fitted]
     stages: list[Stage]  # nominal, frame alone (where more is fitted), calibrated
     held_out: HeldOut | None
-    floor: Stage  # error to be expected of a right model at the fitted readings
+    floor: Stage  # error to be expected of a right model at the fitted readings, by the noise of the fit
+    floors: Floors
     halves: Halves | None
     notices: list[str]
 
@@ -83,7 +86,7 @@ class Calibration:
 
     def as_dict(self) -> dict[str, Any]:
         """The numbers for JSON."""
-        fit, halves = self.fit, self.halves
+        fit, halves, sessions = self.fit, self.halves, self.readings.sessions
         plain = ("reduced_chi_square", "chi_square", "observations", "effective_parameters", "p_value", "converged")
         return {
             "robot": self.before.name,
@@ -96,7 +99,8 @@ class Calibration:
             "unexplained_scatter": {"position_mm": self.unexplained.rms_mm, "rotation_deg": self.unexplained.rms_deg},
             "correlations": [{"first": a, "second": b, "r": r} for a, b, r in fit.correlations],
             "undetermined": [{"text": d.text, "ratio": d.ratio} for d in fit.directions],
-            "frames": fit.frames and fit.frames.as_dict(),
+            **self.floors.as_dict(),
+            "frames": sessions and sessions.as_dict(),
             "outliers": checks.outlier_rows(fit, self.readings),
             "noise": {
                 "jitter_mm": 1e3 * fit.noise.position_jitter,
@@ -109,12 +113,17 @@ class Calibration:
 
 
 def calibrate(
-    robot: Robot, readings: Measurements, free: Sequence[str], *, frame_per_run: bool | None = None, **options: Any
+    robot: Robot,
+    readings: Measurements,
+    free: Sequence[str],
+    *,
+    hold_out: int | None = None,
+    halves: bool = True,
+    noise: str = "auto",
+    sd: Mapping[str, float] | None = None,
 ) -> Calibration:
-    """Fits the parameters named in `free`.
+    """Fits the parameters named in `free`; where runs are sessions, with the frame of each in place of the robot's.
 
-    `frame_per_run`: a tracker frame for each run, in place of that of the parameters; None: where the runs do not share
-    one frame and held-out readings are met better.
     `hold_out`: runs that are held out; None: a quarter, each in turn. `halves`: whether the fits of two halves are
     compared.
     `noise`: "jitter", "field" (with the smooth error that the tracker's accuracy figure allows), or "auto": the smaller
@@ -123,46 +132,23 @@ def calibrate(
     Raises InputError where the input cannot be used: nothing measured, a frame that is metres off, a name that does
     not exist, a prior of zero width, too few rows.
     """
-    one = _calibrate(robot, readings, free, frame_per_run=bool(frame_per_run), **options)
-    if frame_per_run is not None or not checks.may_share_no_frame(one.after, one.readings, one.fit):
-        return one
-    framed = _calibrate(robot, readings, free, frame_per_run=True, **options)
-    before, after = (c.held_out.error.rms_mm if c.held_out else c.stages[-1].rms_mm for c in (one, framed))
-    if not after < settings.FRAMES_LEAVE * before:
-        return one
-    error = "the error of held-out readings" if one.held_out else "the error"
-    text = f"The runs do not share a frame: with one for each {error} falls from {wording.mm(before)} to "
-    text += f"{wording.mm(after)}; --one-frame fits one for all."
-    return replace(framed, notices=[text, *framed.notices])
-
-
-def _calibrate(
-    robot: Robot,
-    readings: Measurements,
-    free: Sequence[str],
-    *,
-    frame_per_run: bool,
-    hold_out: int | None = None,
-    halves: bool = True,
-    noise: str = "auto",
-    sd: Mapping[str, float] | None = None,
-) -> Calibration:
-    """As `calibrate`, with one frame or with a frame for each run."""
+    floor = floors(robot, readings)
     robot, readings, notices = sensor_roll.usable(robot, readings)
-    names = sensor_roll.with_roll(list(free), robot)
+    names = without_frame(sensor_roll.with_roll(list(free), robot), readings)
+    if not names:
+        raise InputError(
+            Problem("the frames of the runs are fitted by themselves: name other parameters in --free too")
+        )
     lever = checks.start(robot, readings)
     usable, repeated = checks.usable_rows(readings)
     frame = [name for name in names if name.startswith("tracker.")]
-    if frame_per_run:
-        names = [name for name in names if name not in frame or name == sensor_roll.NAME]
     split, judged = _held_out_parts(readings, lever, hold_out)
     both = folds.parts_of(readings, lever, 2) if halves else None
-    fit_with = partial(run_frames.fit_with_frames if frame_per_run else joint.fit, robot, readings)
     prior_sd = fields.in_si(sd or {}, robot)
     with Progress("fitting", 3 + len(judged) + 2 * (both is not None)) as progress:
 
         def fitted(only: Sequence[str], rows: Array | bool = True, **options) -> Fit:
-            found = fit_with(only, rows=usable & rows, sd=prior_sd, **options)
+            found = joint.fit(robot, readings, only, rows=usable & rows, sd=prior_sd, **options)
             progress.advance(1)
             return found
 
@@ -178,21 +164,21 @@ def _calibrate(
             ]
             fit, held_out = min(zip(tried, errors, strict=True), key=lambda pair: pair[1].error.rms_mm)
         stages = [_stage("nominal", fit.nominal_residual[usable])]
-        if frame and len(frame) < len(names) and not frame_per_run:
+        if frame and len(frame) < len(names):
             stages.append(_stage("frame alone", fitted(frame, noise=fit.noise, starts=1).residual[usable]))
         pair = [refitted(fit, both.part == part) for part in range(2)] if both else []
-    after = fit.apply(robot)
     return Calibration(
         before=robot,
-        after=after,
+        after=placed(fit.apply(robot), readings.sessions),
         readings=readings,
         fit=fit,
         fitted=fields.fitted(fit),
         stages=[*stages, _stage("calibrated", fit.residual[usable])],
         held_out=held_out,
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
+        floors=floor,
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
-        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(after, readings, fit, frame_per_run)],
+        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(robot, readings, fit)],
     )
 
 

@@ -42,10 +42,8 @@ def headline(c: Calibration) -> str:
     before, after = c.stages[0].rms_mm, c.stages[-1].rms_mm
     text = f"{len(c.fitted)} parameters fitted: the error falls from {mm(before)} to {mm(after)} RMS"
     if c.held_out:
-        error, floor = mm(c.held_out.error.rms_mm), mm(c.held_out.floor.rms_mm)
-        text += f", {error} on held-out {c.held_out.kind}, where a right model would leave {floor}."
-    else:
-        text += f". A right model would leave {mm(c.floor.rms_mm)}."
+        text += f", {mm(c.held_out.error.rms_mm)} on held-out {c.held_out.kind}"
+    text += f". Expected error of a right model: {mm(c.floors.expected_error_mm)}."
     return text + f" Reduced chi-square {c.fit.reduced_chi_square:.3g}."
 
 
@@ -55,9 +53,7 @@ def error_rows(c: Calibration) -> list[list[str]]:
     if c.held_out:
         name = f"held out ({c.held_out.kind}, {c.held_out.fits} fits)"
         rows.append([name, *_sizes(c.held_out.error), str(c.held_out.readings)])
-        rows.append(["expected there", *_sizes(c.held_out.floor), ""])
-    smooth = " and field" if c.fit.noise.position_field > 0 else ""
-    return [*rows, [f"expected (jitter{smooth})", *_sizes(c.floor), ""]]
+    return rows + [[name, *_sizes(Stage(name, size)), ""] for name, size in c.floors.rows()]
 
 
 def parameter_rows(c: Calibration) -> list[list[str]]:
@@ -112,10 +108,8 @@ def _opening(c: Calibration) -> str:
     ]
     if c.held_out:
         numbers.append(("good", f"{c.held_out.error.rms_mm:.3g} mm", f"RMS error on held-out {c.held_out.kind}"))
-    smooth = ", smooth error" if c.fit.noise.position_field > 0 else ""
-    expected = f"{(c.held_out or c).floor.rms_mm:.2g} mm"
     numbers += [
-        ("noise", expected, f"noise floor: expected error of a right model (jitter{smooth}, parameters)"),
+        ("noise", f"{c.floors.expected_error_mm:.2g} mm", c.floors.MEANING),
         ("noise", f"{c.fit.reduced_chi_square:.3g}", "reduced chi-square: 1 where noise explains all"),
     ]
     return paragraph(headline(c), "lead") + cards(numbers)
@@ -183,6 +177,6 @@ def _numbers(c: Calibration) -> str:
         table("Error, measured minus predicted", ERROR_COLUMNS, error_rows(c), 1),
         table("The fit", ["", ""], rows, 1),
     ]
-    if fit.frames:
-        tables.append(table("Frames of the runs against the typical one", fit.frames.COLUMNS, fit.frames.rows(), 0))
+    if sessions := c.readings.sessions:
+        tables.append(table(sessions.TITLE, sessions.columns, sessions.rows(), 0))
     return "<h2>Numbers</h2>" + "".join(tables)

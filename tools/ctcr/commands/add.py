@@ -25,10 +25,11 @@ from ctcr.errors import InputError, Problem
 )
 @options.free
 @options.anyway
+@options.frames
 @options.effects
 @options.new_robot
 @options.json
-def command(robot, names, diagnosis, measurements, given, free, anyway, target, in_place, out) -> None:
+def command(robot, names, diagnosis, measurements, given, free, anyway, frame_per_run, target, in_place, out) -> None:
     """Add physical effects to a robot file.
 
     Every command then uses them; `ctcr effects` lists them. With --fit the effects are fitted together with the
@@ -58,8 +59,9 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, target, 
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
-    _, readings = options.load_right(robot, measurements, anyway)
+    _, readings, said = options.load_right(robot, measurements, anyway, frame_per_run)
     added = add.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
+    added.notices[:0] = said
     add.write_added(loaded, added, target, measurements, in_place)
     out.write_json(_as_data(added))
     _show(out, loaded, added)
@@ -74,6 +76,8 @@ def _as_data(added) -> dict:
         "rms_mm": added.rms("rms_mm"),
         "rms_deg": added.rms("rms_deg"),
         "held_out": added.held_out,
+        **added.floors.as_dict(),
+        "frames": added.sessions and added.sessions.as_dict(),
         "reduced_chi_square": added.fit.reduced_chi_square,
         "converged": added.fit.converged,
         "notices": added.notices,
@@ -91,7 +95,9 @@ def _show(out, robot, added) -> None:
     rows = [
         [stage.name.replace("_", " "), *(f"{getattr(stage, f'rms_{unit}'):.3f}" for unit in units)]
         for stage in added.stages
+        if stage.name != "noise_floor"
     ]
+    rows += [[name, f"{value:.3f}", *["" for _ in units[1:]]] for name, value in added.floors.rows()]
     on = f"held-out data ({added.held_out})" if added.held_out else "the rows that were fitted"
     out.table(f"Error on {on}, RMS", ["", *units], rows)
     out.say(*(f"  • {notice}" for notice in added.notices))

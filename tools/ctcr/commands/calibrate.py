@@ -209,11 +209,7 @@ def curvature(table: str, **others) -> None:
     metavar="NAME=SD",
     help="Prior standard deviation of a parameter, in the unit of the robot file, or inf. May be repeated.",
 )
-@click.option(
-    "--frame-per-run/--one-frame",
-    default=None,
-    help="Fit a tracker frame for every run, or one for all; default: for every run where they do not share one.",
-)
+@options.frames
 @click.option(
     "--hold-out",
     type=click.IntRange(min=0),
@@ -240,11 +236,12 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anywa
     """
     from ctcr.calibrate import joint_fit, outcome, report
 
-    loaded, readings = options.load_right(robot, measurements, anyway)
+    loaded, readings, said = options.load_right(robot, measurements, anyway, frame_per_run)
     target = outcome.check_target(loaded, target, in_place)
     names = [name.strip() for name in free.split(",") if name.strip()]
-    chosen = {"frame_per_run": frame_per_run, "hold_out": hold_out, "noise": noise, "sd": _widths(widths)}
+    chosen = {"hold_out": hold_out, "noise": noise, "sd": _widths(widths)}
     calibration = joint_fit.calibrate(loaded, readings, names, halves=out.report is not None, **chosen)
+    calibration.notices[:0] = said
     if target:
         joint_fit.write_robot(calibration, target, measurements, in_place=in_place)
     out.write_report("calibrate.report", calibration, f"{measurements} fitted with {robot}")

@@ -32,18 +32,36 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     if refusal:
         loaded, readings = conventions.robot, conventions.readings
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
+    readings, repeated = options.without_repeated(readings, conventions)
+    own, floor = _fitted(loaded, readings, conventions)
     readings, excluded = spikes.left_out(loaded, readings)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(loaded, readings)
-    notices = [f"{said}." for said in (*corrected, *excluded, *added)]
-    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings)
+    notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
+    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings, own, floor)
     out.write_report("compare.report", result, f"{measurements} compared with the model of {robot}")
     out.write_json(result.as_dict())
     terminal.show(out.console, result)
     out.say(*readings.warnings)
     if doubts := robot_file.warnings(loaded):
         out.say(f"{len(doubts)} values look wrong in the robot file: ctcr info {robot}")
+
+
+def _fitted(robot, readings, conventions):
+    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error. None
+    where conventions are wrong or no fit is possible."""
+    from ctcr.diagnose import sessions
+    from ctcr.errors import InputError
+    from ctcr.fit.floors import floors
+
+    if conventions.wrong:
+        return [], None
+    try:
+        readings, said = sessions.of_runs(robot, readings)
+    except InputError:
+        return [], None
+    return said, floors(robot, readings).as_dict()
 
 
 def _predict(robot, readings, steps: int):

@@ -12,7 +12,8 @@ from ctcr.commands import options
 @options.effects
 @options.threads
 @options.anyway
-def command(robot: str, measurements: str, threads: int, anyway: bool, out) -> None:
+@options.frames
+def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per_run: bool | None, out) -> None:
     """Find the physical effect that a model lacks.
 
     Stops where the table or the robot file follows a wrong convention, as `ctcr compare` finds them. Else calibrates
@@ -26,7 +27,7 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, out) -> N
     from ctcr.diagnose import diagnose, terminal
 
     loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
-    if conventions.findings and not anyway:
+    if conventions.wrong and not anyway:
         out.write_report("conventions.report", conventions, f"{measurements} with {robot}", command="ctcr diagnose")
         out.write_json(report.as_diagnosis(conventions))
         report.show(out.console, conventions)
@@ -34,7 +35,10 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, out) -> N
     if refusal:
         raise refusal
     with terminal.progress() as say:
+        say("conventions and runs")
+        readings, said = options.to_fit(loaded, readings, conventions, frame_per_run)
         result = diagnose(loaded, readings, progress=say, threads=threads)
+    result.verdict.sentences.extend(said)
     out.write_report("diagnose.report", result, f"{measurements} diagnosed with the model of {robot}")
     out.write_json(result.as_json() | {"conventions": [one.as_dict() for one in conventions.findings]})
     terminal.show(out.console, result)

@@ -21,7 +21,9 @@ from ctcr.commands import options
 @options.json
 @options.effects
 @options.threads
-def command(robot, measurements, runs, masses, target, threads, out) -> None:
+@options.anyway
+@options.frames
+def command(robot, measurements, runs, masses, target, threads, anyway, frame_per_run, out) -> None:
     """Propose the runs to measure next.
 
     They discriminate best between the effects that MEASUREMENTS leave open about ROBOT. Diagnoses first. Each run
@@ -36,7 +38,7 @@ def command(robot, measurements, runs, masses, target, threads, out) -> None:
     from ctcr.model import simulation
 
     kilograms = _masses(masses)
-    loaded, readings = options.load(robot, measurements)
+    loaded, readings, _ = options.load_right(robot, measurements, anyway, frame_per_run)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
         say("looking for the runs that decide")

@@ -65,6 +65,11 @@ free = setting(
 )
 
 
+frames = click.option(
+    "--frame-per-run/--one-frame",
+    default=None,
+    help="A tracker frame for every run, or one for all; default: for every run where the readings say so.",
+)
 anyway = click.option("--anyway", is_flag=True, help="Go on where a wrong convention is found (see ctcr compare).")
 
 
@@ -140,22 +145,37 @@ def reviewed(robot: str, table: str):
     return loaded, readings, found, refusal
 
 
-def load_right(robot: str, table: str, anyway: bool):
-    """As `load`, of a table to fit. Raises InputError where a convention is wrong, unless `anyway`.
+def without_repeated(readings, conventions):
+    """The readings without poses that the tracker repeated, and sentences on that."""
+    import numpy as np
 
-    Poses that the tracker repeated are left out, with a warning.
-    """
+    rows = [row for one in conventions.frozen for row in one.rows]
+    said = [f"{one.text[0].upper()}{one.text[1:]}: left out." for one in conventions.frozen]
+    return (readings.without_poses(np.isin(readings.row, rows)) if rows else readings), said
+
+
+def to_fit(robot, readings, conventions, frame_per_run: bool | None):
+    """The readings as a fit takes them, and sentences on what was left out: poses that the tracker repeated, and where
+    the runs are sessions, what each has of its own (`frame_per_run`: as asked; None: as the readings say)."""
+    from ctcr.diagnose import sessions
+
+    readings, said = without_repeated(readings, conventions)
+    readings, more = sessions.of_runs(robot, readings, frame_per_run)
+    return readings, [*said, *more]
+
+
+def load_right(robot: str, table: str, anyway: bool, frame_per_run: bool | None):
+    """As `load`, of a table `to_fit`, with its sentences. Raises InputError where a convention is wrong, unless
+    `anyway`."""
     from ctcr.errors import InputError, Problem
 
-    if anyway:
-        return load(robot, table)
-    loaded, _, found, _ = reviewed(robot, table)
-    wrong = [one for one in found.findings if one.kind != "frozen"]
-    if wrong:
+    loaded, readings, found, refusal = reviewed(robot, table)
+    if found.wrong and not anyway:
         advice = Problem("a fit would take that for physics: correct it first, or go on with --anyway")
-        raise InputError([*(Problem(one.sentence, table) for one in wrong), advice])
-    found.readings.warnings.extend(Problem(f"{one.text}: left out", table) for one in found.findings)
-    return loaded, found.readings
+        raise InputError([*(Problem(one.sentence, table) for one in found.wrong), advice])
+    if refusal:
+        raise refusal
+    return loaded, *to_fit(loaded, readings, found, frame_per_run)
 
 
 def with_effects(robot, given):

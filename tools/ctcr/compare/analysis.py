@@ -1,6 +1,6 @@
 """All numbers of a comparison of the model with measurements: how large the error is, and what it depends on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,6 +68,15 @@ class Comparison:
     revisits: Revisits
     notices: Sequence[str]  # changes made to the table before it was compared
     conventions: Sequence[Convention]  # that are wrong, the clearest first
+    floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
+    sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
+
+    WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
+
+    @property
+    def wrong(self) -> list[Convention]:
+        """Conventions to correct; poses that the tracker repeated are only left out."""
+        return [one for one in self.conventions if one.kind != "frozen"]
 
     def as_dict(self) -> dict:
         """The numbers for JSON, without the readings themselves."""
@@ -89,14 +98,23 @@ class Comparison:
         data["never_varied"] = self.fixed
         data["notices"] = list(self.notices)
         data["conventions"] = [one.as_dict() for one in self.conventions]
+        data["sessions"] = list(self.sessions)
+        data |= self.floors
         return data
 
 
 def compare(
-    robot, measurements, prediction, notices: Sequence[str] = (), conventions: Sequence[Convention] = ()
+    robot,
+    measurements,
+    prediction,
+    notices: Sequence[str] = (),
+    conventions: Sequence[Convention] = (),
+    sessions: Sequence[str] = (),
+    floors: Mapping[str, float] | None = None,
 ) -> Comparison:
     """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
-    `ctcr.conventions.review` found.
+    `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
+    `ctcr.fit.floors` as_dict().
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -110,12 +128,14 @@ def compare(
             )
         )
     tracker = robot.tracker
+    headline = sample
+    if sessions:
+        sample = _in_one_frame(sample)
     rows, label, _ = split(sample.run, sample.motion.scaled)
     folds, shift, turn = make_folds(label, settings.SIGN_TRIALS), None, None
     if folds.count >= settings.FEWEST_BLOCKS:
         shift = find_shift(sample.error[rows], folds)
         turn = find_turn(sample.predicted[rows], sample.measured[rows], folds)
-    headline = sample
     if turn and turn.gross:
         rotation, move = rigid_motion(sample.predicted, sample.measured)
         sample = replace(sample, predicted=sample.predicted @ rotation.T + move, rotation=rotation @ sample.rotation)
@@ -124,7 +144,9 @@ def compare(
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
-    run_offsets = find_run_offsets(sample, revisits)
+    given = headline if sessions else sample
+    visits = find_stops(given) if sessions else stops
+    run_offsets = find_run_offsets(given, visits, find_revisits(visits, given.lever) if sessions else revisits, noise)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
     ranking = rank(sample, error, settings.LEVEL)
@@ -155,7 +177,19 @@ def compare(
         revisits=revisits,
         notices=notices,
         conventions=conventions,
+        floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
+        sessions=sessions,
     )
+
+
+def _in_one_frame(sample: Sample) -> Sample:
+    """The readings, those of each run moved to where they fit the model best."""
+    measured = sample.measured.copy()
+    for run in np.unique(sample.run):
+        rows = sample.run == run
+        rotation, move = rigid_motion(sample.predicted[rows], measured[rows])
+        measured[rows] = (measured[rows] - move) @ rotation
+    return replace(sample, measured=measured)
 
 
 def _spread(values: Array) -> Spread | None:

@@ -35,6 +35,7 @@ class DirectionDifference:
     maximum_mm: float
     typical_rms_mm: float  # RMS that the median of the pairs implies: a few outliers do not move it
     outliers: int  # pairs that differ more than noise of the tracker's scatter does once in 10^5
+    moved: dict[str, int]  # pairs by what moved into the later visit: rotation, translation, both
     floor_mm: float  # half the RMS: no model without history can be better
     p_against_same: float  # that they differ no more than same-direction visits; NaN with too few of those
     p_against_quiet: float  # that they differ no more than NOTABLE times the stated jitter or the scatter at rest
@@ -94,7 +95,7 @@ def direction_difference(
     scaled, reference = (pairs.square / pairs.noise_factor for pairs in (opposite, same))
     known = [axis for axis in (floor.axis_mm, floor.rest_axis_mm, floor.stated_axis_mm) if np.isfinite(axis)]
     quiet = min(known, default=np.nan) * 1e-3
-    p_quiet = _beyond(scaled, settings.NOTABLE * quiet, blocks) if known else np.nan
+    p_quiet = beyond(scaled, settings.NOTABLE * quiet, blocks) if known else np.nan
     outliers = int(np.sum(scaled > stats.chi2.isf(settings.OUTLYING_PAIR, 3) * quiet**2))
     if len(opposite) > settings.DENSE_STREAM * settings.PATH_SEGMENTS:  # neighbours are not independent
         scaled, reference = _block_quartiles(scaled, blocks), _block_quartiles(reference, same_blocks)
@@ -114,6 +115,7 @@ def direction_difference(
         maximum_mm=float(np.sqrt(square.max())) * 1e3,
         typical_rms_mm=float(np.sqrt(np.median(square) * 3 / stats.chi2.median(3))) * 1e3,
         outliers=outliers,
+        moved=_moved(stops, opposite),
         floor_mm=rms / 2 * 1e3,
         p_against_same=float(p_same),
         p_against_quiet=float(p_quiet),
@@ -126,6 +128,17 @@ def direction_difference(
         rms_without_delay_mm=rms_mm(left),
         maximum_without_delay_mm=float(np.sqrt(left.max())) * 1e3 if len(left) else np.nan,
     )
+
+
+def _moved(stops: Stops, pairs: Revisits) -> dict[str, int]:
+    """How many pairs come to the later visit by rotation alone, by translation alone, by both."""
+    step = np.abs(stops.scaled[pairs.later] - stops.scaled[np.maximum(pairs.later - 1, 0)])
+    translated, rotated = (part.max(axis=1) > settings.REST for part in np.split(step, 2, axis=1))
+    return {
+        "rotation": int(np.sum(rotated & ~translated)),
+        "translation": int(np.sum(translated & ~rotated)),
+        "both": int(np.sum(translated & rotated)),
+    }
 
 
 def _delay(opposite: Revisits, blocks: Integers, velocity: Array) -> tuple[float, float, Array]:
@@ -157,7 +170,7 @@ def _block_quartiles(values: Array, blocks: Integers) -> Array:
     return np.array([np.percentile(values[blocks == block], 75) for block in np.unique(blocks)])
 
 
-def _beyond(square: Array, axis: float, blocks: Integers) -> float:
+def beyond(square: Array, axis: float, blocks: Integers) -> float:
     """p-value that no more than a quarter of (P,) squared 3-D distances lie beyond the upper quartile of noise.
 
     axis: the noise of one reading per axis. The fraction beyond is judged by its scatter from block to block.

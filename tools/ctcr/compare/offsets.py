@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
-from ctcr.compare.crossvalidation import Folds, chance, group_means, unexplained
-from ctcr.compare.noise import rms_mm
+from ctcr.compare.crossvalidation import Folds, chance, group_means, segments, unexplained
+from ctcr.compare.noise import NoiseFloor, beyond, rms_mm
 from ctcr.compare.sample import Sample
-from ctcr.compare.visits import Revisits
+from ctcr.compare.visits import SAME, Revisits, Stops
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class RunOffsets:
     rms_between_mm: float
     rms_within_mm: float
     p_value: float  # NaN when too few joints were visited in two runs
+    noise_mm: float  # difference of two visits by noise, with which they are compared where too few are inside a run
     share: float  # of the squared error explained by one vector a run, in sample
     outlying: tuple[int, ...]  # runs whose mean error is an outlier, though others came near their joints
     outlying_mm: float  # their usual distance from the others
@@ -95,16 +96,20 @@ def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:
     return FrameTurn(float(np.degrees(angle)), tuple(axis), rms_mm(before), rms_mm(after))
 
 
-def find_run_offsets(sample: Sample, revisits: Revisits) -> RunOffsets:
-    """Compare visits of the same joints in different runs with visits inside one run.
+def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: NoiseFloor) -> RunOffsets:
+    """Compare visits of the same joints in different runs with visits inside one run, or where there are too few, those
+    from the same direction with the noise.
 
     Offsets count as found when these visits differ more at LEVEL, or when some runs lie far from the others.
     """
     square, error = revisits.square, sample.error
     between, within = square[revisits.between_runs], square[~revisits.between_runs]
-    p_value = np.nan
+    p_value, alike = np.nan, revisits.select((revisits.kind == SAME) & revisits.between_runs)
     if min(len(between), len(within)) >= settings.FEWEST_PAIRS:
         p_value = float(stats.mannwhitneyu(between, within, alternative="greater").pvalue)
+    elif len(alike) >= settings.FEWEST_PAIRS and np.isfinite(noise.axis_mm):
+        scaled, axis = alike.square / alike.noise_factor, settings.NOTABLE * 1e-3 * noise.axis_mm
+        p_value = beyond(scaled, axis, segments(stops.run[alike.later]))
     names, label = np.unique(sample.run, return_inverse=True)
     means = group_means(error, label)
     around = np.sum((error - error.mean(axis=0)) ** 2)
@@ -116,6 +121,7 @@ def find_run_offsets(sample: Sample, revisits: Revisits) -> RunOffsets:
         rms_between_mm=rms_mm(between),
         rms_within_mm=rms_mm(within),
         p_value=p_value,
+        noise_mm=float(np.sqrt(6) * noise.axis_mm),
         share=float(1 - np.sum((error - means[label]) ** 2) / max(around, 1e-300)),
         outlying=tuple(int(name) for name in names[far]),
         outlying_mm=float(np.median(distance[far])) * 1e3 if far.any() else 0.0,

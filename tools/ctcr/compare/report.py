@@ -36,11 +36,11 @@ def _opening(c: Comparison) -> str:
         numbers.append(("error", f"{angle:.3g}°", f"RMS {c.angle_kind} error, at most {most:.3g}°"))
     if np.isfinite(n.rms_mm):
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
-        numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"noise of a reading, RMS ({sources[n.source]})"))
+        numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"scatter of a reading, RMS ({sources[n.source]})"))
     if d:
         numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {d.pairs} pairs of visits"))
-    wrong = [one.sentence for one in c.conventions]
-    first = f"<h2>Wrong conventions: correct these first</h2>{bullets(wrong)}" if wrong else ""
+    wrong = [one.sentence for one in c.wrong]
+    first = f"<h2>{c.WRONG}</h2>{bullets(wrong)}" if wrong else ""
     return first + paragraph(headline(c), "lead") + cards(numbers)
 
 

@@ -15,6 +15,7 @@ from ctcr.compare.noise import DirectionDifference
 from ctcr.show.wording import join, mm, most, percent, probability
 
 MOST = 6
+_MOTIONS = ("rotating only", "translating only", "doing both")  # in the order of DirectionDifference.moved
 
 CAUSES = {  # by how the name of a dependence begins
     "frame_turn": "a small rotation error of the registered tracker frame",
@@ -48,10 +49,10 @@ def headline(c: Comparison) -> str:
         f"or {length.rms:.2g} % of the deployed length, over {p.count} readings. "
     )
     if is_noise(c):
-        return text + f"Noise alone gives {mm(noise.rms_mm)} RMS: there is nothing to explain."
+        return text + f"Readings repeat only to {mm(noise.rms_mm)} RMS: there is nothing to explain."
     if not np.isfinite(noise.rms_mm):
-        return text + "The noise of a reading is not known."
-    source = "scatter at rest" if noise.source == "rest" else "as stated"
+        return text + "The sensor jitter is not known."
+    source = "at rest" if noise.source == "rest" else "sensor jitter as stated"
     if noise.source == "revisits":
         source = f"{noise.pairs} revisits from the same direction, ± {noise.uncertainty_mm * np.sqrt(3):.2g} mm"
     size, by_noise = f"{mm(noise.rms_mm)} RMS ({source})", (noise.rms_mm / p.rms) ** 2 if p.rms else 1.0
@@ -59,14 +60,14 @@ def headline(c: Comparison) -> str:
     if noise.source == "revisits" and noise.axis_mm > settings.NOTABLE * noise.stated_axis_mm:
         stated = mm(noise.stated_axis_mm * 3**0.5)
         return text + (
-            f"The tracker's stated scatter is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
+            f"The sensor jitter as stated is {stated} RMS, but readings repeat only to {size}; {left} of the squared "
             f"error exceeds even that."
         )
-    return text + f"Noise is {size}, so {left} of the squared error is not noise."
+    return text + f"Readings repeat to {size}, so {left} of the squared error is not their scatter."
 
 
 def is_noise(c: Comparison) -> bool:
-    """Whether the error is no larger than the noise floor allows, within twice its uncertainty."""
+    """Whether the error is no larger than the scatter of a reading allows, within twice its uncertainty."""
     relative = np.nan_to_num(c.noise.uncertainty_mm / c.noise.axis_mm) if c.noise.axis_mm > 0 else 0.0
     slack = 2 * np.hypot(relative, 1 / np.sqrt(6 * c.position_mm.count))
     return bool(c.position_mm.rms <= c.noise.rms_mm * (1 + slack)) and not list(_all(c))
@@ -83,6 +84,11 @@ def held_out(c: Comparison) -> str:
 
 
 def _all(c: Comparison) -> Iterator[Finding]:
+    if c.sessions:
+        r = c.run_offsets
+        apart = f" The same joints lie {mm(r.rms_between_mm)} RMS apart in different runs ({r.pairs_between} pairs)."
+        text = " ".join(c.sessions) + (apart if r.pairs_between else "")
+        yield Finding(f"{text} All that follows is computed with a frame for each run.", 1.0)
     shifted = c.shift if c.shift and c.shift.p_value <= settings.LEVEL else None
     if c.turn and c.turn.gross:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
@@ -100,7 +106,7 @@ def _all(c: Comparison) -> Iterator[Finding]:
             f"tracker frame.",
             shifted.share,
         )
-    if c.run_offsets.found:
+    if c.run_offsets.found and not c.sessions:
         yield Finding(_run_text(c), c.run_offsets.share)
     if c.direction and differs(c.direction):
         yield Finding(_hysteresis_text(c, c.direction), (c.direction.floor_mm / c.position_mm.rms) ** 2)
@@ -113,9 +119,12 @@ def _run_text(c: Comparison) -> str:
     r = c.run_offsets
     text = "The runs do not share one frame or homing. "
     if r.p_value <= settings.LEVEL:
+        within = f"{mm(r.rms_within_mm)} inside one run"
+        if r.pairs_within < settings.FEWEST_PAIRS:
+            within = f"noise gives {mm(r.noise_mm)}"
         text += (
-            f"The same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs, but "
-            f"{mm(r.rms_within_mm)} inside one run. "
+            f"The same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs "
+            f"({r.pairs_between} pairs), but {within}. "
         )
     if r.outlying:
         names = ", ".join(map(str, r.outlying[:8])) + (" and others" if len(r.outlying) > 8 else "")
@@ -137,7 +146,7 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
         )
     text = (
         f"There is hysteresis: visits of the same joints from opposite directions differ by {mm(d.rms_mm)} RMS (at "
-        f"most {mm(d.maximum_mm)}), over {d.pairs} pairs. No model without history or delay can be better than "
+        f"most {mm(d.maximum_mm)}), over {coverage(d)}. No model without history or delay can be better than "
         f"{mm(d.floor_mm)} RMS there."
     )
     share = 1 - (d.rms_without_delay_mm / d.rms_mm) ** 2
@@ -148,6 +157,13 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
             f"of {mm(d.rms_without_delay_mm / 2)}."
         )
     return text + " Possible causes: friction, play or delay."
+
+
+def coverage(d: DirectionDifference) -> str:
+    """How many pairs there are, and what moved in them: friction between tubes shows in rotation alone, say."""
+    counts = [(n, f"while {how}") for n, how in zip(d.moved.values(), _MOTIONS, strict=True)]
+    said = [f"{n or 'none'} {text}" for n, text in counts]
+    return f"{d.pairs} pairs: {join(said)}"
 
 
 def differs(d: DirectionDifference) -> bool:
@@ -182,12 +198,12 @@ def quiet(c: Comparison) -> list[str]:
             like = f"like visits from the same direction ({mm(d.same_rms_mm)})"
         text = (
             f"There is no hysteresis: visits of the same joints from opposite directions typically lie "
-            f"{mm(d.typical_rms_mm)} RMS apart ({d.pairs} pairs), {like}."
+            f"{mm(d.typical_rms_mm)} RMS apart ({coverage(d)}), {like}."
         )
         if d.outliers:
             text += f" Pairs far beyond that: {d.outliers}, at most {mm(d.maximum_mm)} apart. Possible cause: outliers."
         found.append(text)
-    if c.shift and c.shift.p_value > settings.LEVEL:
+    if c.shift and c.shift.p_value > settings.LEVEL and not c.sessions:
         size, p = mm(c.shift.size_mm), probability(c.shift.p_value)
         found.append(f"There is no significant constant offset (mean error {size}, p = {p}).")
     if c.ranking.alone and not c.ranking.chosen and not is_noise(c):
@@ -204,21 +220,21 @@ def limits(c: Comparison) -> Iterator[str]:
     n, r = c.noise, c.run_offsets
     if n.source == "rest":
         yield (
-            f"No joints were visited twice from the same direction: the noise ({n.axis_mm:.3f} mm per axis) is the "
-            f"scatter at rest. It misses repeatability, drift and the tracker's field error."
+            f"Too few joints were visited twice from the same direction in one run: the scatter of a reading "
+            f"({n.axis_mm:.3f} mm per axis) is that at rest. It misses repeatability, drift and field error."
         )
     elif n.source == "stated":
         yield (
-            "Too few joints were visited twice from the same direction, and too few readings were taken at rest: the "
-            "noise is the jitter stated in the robot file. It misses repeatability, drift and the field error."
+            "Too few joints were visited twice from the same direction in one run, and too few readings were taken at "
+            "rest: the scatter of a reading is the sensor jitter as stated. It misses repeatability and drift."
         )
     if c.accuracy_95_mm > 0:
         yield (
-            f"The noise floor does not include the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
+            f"Repeated readings do not show the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
             f"which is the same at every visit of a position."
         )
     if c.direction is None:
-        yield "No joints were visited from opposite directions: hysteresis and delay cannot be examined."
+        yield "No joints were visited from opposite directions in one run: hysteresis and delay cannot be examined."
     if len(c.runs) == 1:
         yield "There is one run: the findings are not tested on another run."
     if c.fixed:
@@ -238,8 +254,9 @@ def limits(c: Comparison) -> Iterator[str]:
         )
     if len(c.ranking.rows) < len(c.sample.row):
         yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."
-    if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not is_noise(c):
+    if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not c.sessions and not is_noise(c):
+        pairs = f"{r.pairs_between} pairs of visits" if r.pairs_between else "no joints"
         yield (
-            "No joints were visited in two runs: an offset that belongs to a run (frame, homing, drift) cannot be "
-            "separated from an error that belongs to the joints of that run."
+            f"Too few joints were visited in two runs ({pairs}): an offset that belongs to a run (frame, homing, "
+            "drift) cannot be separated from an error that belongs to the joints of that run."
         )

@@ -17,9 +17,9 @@ Table = tuple[str, list[str], list[list[str]], int]  # title, columns, rows, num
 def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
     console.print(c.robot, style="bold")
-    if c.conventions:
-        console.print("Wrong conventions: correct these first", style="bold")
-        for one in c.conventions:
+    if c.wrong:
+        console.print(c.WRONG, style="bold")
+        for one in c.wrong:
             console.print(f"  • {one.sentence}")
     console.print(headline(c))
     console.print(table(*errors(c)))
@@ -75,7 +75,7 @@ def by_run(c: Comparison) -> Table:
 
 
 def repeatability(c: Comparison) -> Table:
-    """Noise floor and hysteresis beside the stated jitter."""
+    """How readings repeat, and hysteresis, beside the floors of any model."""
     n, d, root3 = c.noise, c.direction, 3**0.5
 
     def number(value: float) -> str:
@@ -84,10 +84,11 @@ def repeatability(c: Comparison) -> Table:
     rows = []
     if n.source == "revisits":
         axis = f"{n.axis_mm:.3f} ± {number(n.uncertainty_mm)}"
-        rows.append(["noise of a reading, from revisits", f"{n.rms_mm:.3f}", axis, str(n.pairs)])
+        rows.append(["scatter of repeated readings", f"{n.rms_mm:.3f}", axis, str(n.pairs)])
     if n.dwells:
         rows.append(["scatter at rest", f"{n.rest_axis_mm * root3:.3f}", f"{n.rest_axis_mm:.3f}", str(n.dwells)])
-    rows.append(["stated jitter", number(n.stated_axis_mm * root3), number(n.stated_axis_mm), ""])
+    rows.append(["sensor jitter, as stated", number(n.stated_axis_mm * root3), number(n.stated_axis_mm), ""])
+    rows.append(["expected error of a right model", number(c.floors["expected_error_mm"]), "", ""])
     if d:
         rows.append(["hysteresis", f"{d.rms_mm:.3f} ± {number(d.uncertainty_mm)}", "", str(d.pairs)])
         rows.append(["floor of a model without history", f"{d.floor_mm:.3f}", "", ""])

@@ -22,6 +22,16 @@ class Review:
     robot: Robot
     readings: Measurements
 
+    @property
+    def frozen(self) -> list[Finding]:
+        """Poses that the tracker repeated: readings that are missing."""
+        return [one for one in self.findings if one.kind == "frozen"]
+
+    @property
+    def wrong(self) -> list[Finding]:
+        """The others: conventions that must be corrected."""
+        return [one for one in self.findings if one.kind != "frozen"]
+
 
 def review(robot: Robot, readings: Measurements) -> Review:
     """Tests every hypothesis on conventions. Nothing is found in a table without positions."""

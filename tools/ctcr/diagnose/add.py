@@ -21,14 +21,18 @@ from ctcr.diagnose.round import linearised_end, screen
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.fit import folds, joint, one_sided
+from ctcr.fit.floors import Floors, floors, warnings
 from ctcr.fit.result import rms
+from ctcr.fit.sessions import placed
 from ctcr.model import fields
 from ctcr.model.noise import noise_of_readings
+from ctcr.model.sessions import as_given
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements
+from ctcr.table.sessions import Sessions
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ class Added:
     stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
     held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
+    sessions: Sessions | None  # what each run has of its own
+    floors: Floors
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation of every fitted parameter of an effect, SI."""
@@ -71,7 +77,7 @@ def add(
     blocks of time, where there are few runs) is held out of the fits that give the errors; the values are those of a
     fit to all rows. Raises InputError where no fit is possible.
     """
-    readings, said = prepared(robot, readings)
+    given, (readings, said) = readings, prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     fitted = [identity for identity in robot.effects if identity not in ids]
@@ -102,13 +108,16 @@ def add(
         if held_out.any():
             fit = stage(fitted, fitted, everything, [now | values_of(fit)])
         progress.advance(1)
-    _, nuisances = segment_delays.corrected(stage.engine, fit)
+    corrected, nuisances = segment_delays.corrected(stage.engine, fit)
+    explained = stage.explained or (bool(nuisances) and not joint.rejects(corrected))
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
         nuisances.append(smooth_field.message(smooth))
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
-    notices = [*said, *about_outliers, *_notices(robot, fit, ids), *nuisances]
-    return Added(fit.apply(stage.robot), list(ids), fit, stages, _name_of(readings, held_out), notices)
+    notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
+    after, name = fit.apply(stage.robot), _name_of(readings, held_out)
+    floor, sessions = floors(robot.with_effects(after.effects), given), readings.sessions
+    return Added(placed(after, sessions), list(ids), fit, stages, name, notices, sessions, floor)
 
 
 def write_added(
@@ -203,7 +212,7 @@ class _Fitter:
     def nominal(self, ids: Sequence[str]) -> Array:
         """Residuals (M, 6) at nominal values, with these effects alone."""
         self.engine.robot = self._with(ids)
-        recorded = self.engine.recording([])
+        recorded = as_given(self.engine.recording([]))
         return recorded.residual(recorded.nominal())[0].reshape(-1, 6)
 
     def _with(self, ids: Sequence[str]) -> Robot:
@@ -221,6 +230,7 @@ class _Fitter:
         likely = engine.fit_with_field(own, self._best(own, starts))
         if any("order" in effect.needs for effect in known) and engine.revise_initial_history(likely, own):
             likely = engine.fit_with_field(own, values_of(likely))
+        self.explained = not joint.rejects(likely)
         # Values under the noise that predicts best, uncertainty under the likeliest noise.
         fit = fit_to_predict(engine, likely, {}, tolerance=engine.tolerance)
         return replace(fit, sd=np.maximum(fit.sd, likely.sd), ratio=np.maximum(fit.ratio, likely.ratio))
@@ -269,10 +279,10 @@ def _stage(name: str, residual: Array, rows: Mask) -> Stage:
     return Stage(name, 1e3 * rms(residual[:, :3], rows), float(np.degrees(rms(residual[:, 3:], rows))))
 
 
-def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str]) -> list[str]:
-    """Doubts about the fitted effects."""
+def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
+    """Doubts about the fitted effects; `explained`: whether the noise explains what is left."""
     known = catalogue.parameter_of(robot.n_tubes)
-    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
+    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
     index = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)

@@ -12,6 +12,7 @@ from ctcr.diagnose.linearised import Linear
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
 from ctcr.model import parameters, recording, user_recording
+from ctcr.model.sessions import without_frame
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -36,7 +37,7 @@ class Engine:
 
     def __post_init__(self) -> None:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
-        self.base = parameters.expand(list(self.free), self.robot)
+        self.base = without_frame(parameters.expand(list(self.free), self.robot), self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, settings.INTEGRATION_ERROR_COARSE)
 
     @property
@@ -143,12 +144,6 @@ class Engine:
         """The linearised fit under the noise as stated, whatever model error had to be admitted."""
         return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
-    def rejects(self, fit: joint.Fit) -> bool:
-        """Whether the noise as stated does not explain the residual."""
-        return bool(
-            np.max(fit.inflation) > settings.INFLATION_EXPLAINED or self.as_stated(fit).p_value < settings.SIGNIFICANCE
-        )
-
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian * fit.prior_sd)
@@ -162,7 +157,7 @@ class Engine:
         neutral, sd, _, _ = self.priors(everything)
         at = dict(zip(everything, neutral, strict=True)) | values_of(fit)
         table = self.recording(everything, fixed)
-        if isinstance(fit.model, _core.Recording):
+        if type(fit.model) is type(table):
             table.begin_at(fit.model)
         table.activate(self.fitted.tolist())
         values = np.array([at[name] for name in everything])

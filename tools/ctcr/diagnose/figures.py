@@ -16,7 +16,7 @@ PALE = 0.45  # opacity of bars of linearised gains
 
 
 def waterfall(figure, d: Diagnosis) -> None:
-    """RMS error on held-out runs, from the robot file to the noise floor."""
+    """RMS error on held-out runs, from the robot file to the expected error."""
     axes = figure.subplots()
     rms = d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
@@ -28,13 +28,13 @@ def waterfall(figure, d: Diagnosis) -> None:
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
         axes.text(i, 1.04 * value, f"{short(value)} mm", **above)
-    axes.axhline(rms["noise_floor"], color=NOISE, linestyle="--")
-    last = len(bars) - 0.6
-    axes.text(last, rms["noise_floor"], f"noise floor\n{short(rms['noise_floor'])} mm", color=NOISE, va="bottom")
+    last, (_, (name, floor)) = len(bars) - 0.6, d.floors.rows()
+    axes.axhline(floor, color=NOISE, linestyle="--")
+    axes.text(last, floor, f"{name}\n{short(floor)} mm", color=NOISE, va="bottom")
     axes.set_xlim(right=last + 0.75)
     axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
     sizes = [value for _, value, _ in bars]
-    limits = 0.5 * min(rms["noise_floor"], *sizes), 2 * max(sizes)
+    limits = 0.5 * min(floor, *sizes), 2 * max(sizes)
     axes.set(ylabel="RMS error on held-out runs, mm", yscale="log", ylim=limits)
 
 

@@ -21,6 +21,7 @@ from ctcr.diagnose.varying_coefficients import VaryingModel, may_outdo, varying_
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint, one_sided
+from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import rms
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
@@ -37,7 +38,8 @@ class Diagnosis:
     calibrated: joint.Fit  # without effects, for prediction
     with_effects: joint.Fit  # for prediction
     final: joint.Fit  # with effects, under the noise of the most evidence: its values are those to quote
-    noise_floor_mm: float  # RMS position residual that the tracker's noise leaves of a right model
+    noise_floor_mm: float  # RMS position residual that the tracker's noise leaves, as the residual shows it
+    floors: Floors  # of the model with the effects found
     rounds: list[Round]
     accepted: list[Accepted]
     residual: Residual
@@ -109,6 +111,8 @@ class Diagnosis:
             ],
             "leftover": {"structured": self.residual.structured, "depends_on": self.depends_on},
             "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
+            **{name: round(value, 5) for name, value in self.floors.as_dict().items()},
+            "frames": self.measurements.sessions and self.measurements.sessions.as_dict(),
             "seconds": round(self.seconds, 2),
         }
 
@@ -156,6 +160,12 @@ def _diagnose_robustly(robot: Robot, measurements: Measurements, held_out: Mask,
         there = np.isin(measurements.row, clusters)
         return min(result, other, key=lambda r: (outliers.outliers(r.with_effects).sum(), r.with_effects.rms_mm(there)))
     return max(result, other, key=lambda r: r.final.log_evidence)
+
+
+def _with_effects(robot: Robot, fit: joint.Fit, accepted: list[Accepted], fixed: dict[str, float]) -> Robot:
+    """The robot as its file describes it, with the effects that were found."""
+    found = fixed | {name: value for name, value in values_of(fit).items() if name.startswith("effects.")}
+    return catalogue.with_values(robot, [*robot.effects, *(a.id for a in accepted)], found)
 
 
 def _undetermined_groups(result: Diagnosis) -> set[int]:
@@ -241,6 +251,7 @@ def _diagnose(
         calibrated=calibrated,
         with_effects=one_sided.widened(with_effects),
         final=segment_delays.widened(engine, one_sided.widened(fit)),
+        floors=floors(_with_effects(robot, fit, accepted, fixed), measurements),
         noise_floor_mm=joint.tracker_error(with_effects, floor_noise)[0],
         rounds=chosen.rounds,
         accepted=accepted,

@@ -37,14 +37,14 @@ def _opening(d: Diagnosis) -> str:
         ("error", rms["nominal"], "RMS error with the robot file"),
         ("error", rms["calibrated"], "after calibration"),
         *effects,
-        ("noise", rms["noise_floor"], "noise floor"),
+        ("noise", f"{short(d.floors.expected_error_mm)} mm", d.floors.NAMES[1]),
     ]
     verdict = d.verdict.word.replace("_", " ").capitalize()
     return (
         paragraph(" " + " ".join(d.verdict.sentences), "lead", bold=f"{verdict}.")
         + cards(numbers)
-        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. A right model would leave '
-        f"{short(d.expected_mm)} mm there: noise, and the uncertainty of its parameters.</p>"
+        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. '
+        f"{d.floors.MEANING.capitalize()}; sensor jitter alone: {short(d.floors.sensor_jitter_mm)} mm.</p>"
     )
 
 
@@ -125,7 +125,10 @@ def _parameters(d: Diagnosis) -> str:
         rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
     columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]
-    return "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
+    fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
+    if sessions := d.measurements.sessions:
+        fitted += table(sessions.TITLE, sessions.columns, sessions.rows(), 0)
+    return fitted
 
 
 def _limits(d: Diagnosis) -> str:

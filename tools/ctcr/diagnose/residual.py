@@ -55,7 +55,7 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    return Residual(engine.rejects(fit), clusters, ranked, after, sample, corrections)
+    return Residual(joint.rejects(fit), clusters, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:

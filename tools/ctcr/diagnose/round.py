@@ -133,14 +133,14 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     if not screened:
         return Round(before, [], reason="no effect is left to try")
     refits = Refits(engine, before, fixed)
-    tried = refits.of_all(refits.in_reach(_worth_a_refit(screened)))
+    tried = refits.of_all(refits.in_reach(worth_a_refit(screened)))
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
     fitted = [one.candidate for one in tried]
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    decide(round_, len({c.id for c in candidates}), bool(accepted), engine.rejects(before), _suspects(engine, accepted))
+    decide(round_, len({c.id for c in candidates}), bool(accepted), joint.rejects(before), _suspects(engine, accepted))
     unsure = round_.accepted and accepted and round_.accepted.score < settings.BEYOND_CROSS_VALIDATION
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
@@ -179,7 +179,7 @@ def screen(
     return sorted(found, key=lambda one: -one.linear)
 
 
-def _worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
+def worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
     """The best effects, few variants of each. Forms of the same parameters come last: once an effect is accepted,
     all its forms are tried."""
     worth = [one for one in screened if one.linear > max(settings.REFIT_GAIN, settings.NEAR * screened[0].linear)]

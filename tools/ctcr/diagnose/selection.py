@@ -89,7 +89,7 @@ class Selection:
         self.fit = self.calibrate(self.fits, values_of(converged))
         if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
             self.fit = engine.fit_like(before, names, values_of(converged), fixed=fixed)
-        rejected = engine.rejects(self.fit)
+        rejected = joint.rejects(self.fit)
         needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
         if needs_history and engine.revise_initial_history(self.fit, names, fixed):
             self.fit = self.calibrate(self.fits, values_of(self.fit))

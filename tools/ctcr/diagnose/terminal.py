@@ -17,12 +17,7 @@ from ctcr.show.wording import deviation, number
 
 CANDIDATES = 8  # of a round
 ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest
-STAGES = {
-    "nominal": "as described",
-    "calibrated": "calibrated",
-    "with_effects": "with the effects found",
-    "noise_floor": "noise floor",
-}
+STAGES = {"nominal": "as described", "calibrated": "calibrated", "with_effects": "with the effects found"}
 
 
 @contextmanager
@@ -63,8 +58,8 @@ def show(console: Any, result: Diagnosis) -> None:
 
 
 def _errors(result: Diagnosis) -> Any:
-    rows = [[STAGES[name], f"{value:.3f}"] for name, value in result.rms_mm.items()]
-    rows.append(["expected from noise and uncertain parameters", f"{result.expected_mm:.3f}"])
+    rows = [[STAGES[name], f"{value:.3f}"] for name, value in result.rms_mm.items() if name in STAGES]
+    rows += [[name, f"{value:.3f}"] for name, value in result.floors.rows()]
     runs = len(set(result.measurements.run[result.judged].tolist()))
     title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} held-out run(s)"
     return output.table(title, ["model", "mm"], rows)

@@ -33,6 +33,14 @@ MEASURE = {  # by how the id of a quantity begins: what shows it best
 }
 
 
+def label_of(parameter: str) -> str:
+    """A parameter of the calibration, for people."""
+    first, middle, last = parameter.replace("_", " ").split(".")
+    if first == "tracker":
+        return f"{middle} {last} of the tracker frame"
+    return f"{last} of tube {middle}" if first == "tubes" else f"{middle} of tube {last}"
+
+
 @dataclass(frozen=True)
 class Variation:
     """A parameter that changes with a quantity."""
@@ -44,11 +52,7 @@ class Variation:
 
     @property
     def label(self) -> str:
-        """Of the parameter, for people."""
-        first, middle, last = self.parameter.replace("_", " ").split(".")
-        if first == "tracker":
-            return f"{middle} {last} of the tracker frame"
-        return f"{last} of tube {middle}" if first == "tubes" else f"{middle} of tube {last}"
+        return label_of(self.parameter)
 
     @property
     def measure(self) -> str:

@@ -26,6 +26,7 @@ from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
+from ctcr.model.sessions import without_frame
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -68,7 +69,7 @@ def fit(
     """
     began = perf_counter()
     robot, measurements, said = sensor_roll.usable(robot, measurements)
-    names = sensor_roll.with_roll(free, robot)
+    names = without_frame(sensor_roll.with_roll(free, robot), measurements)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
@@ -230,6 +231,13 @@ def linear_fit(
     priors = replace(at.priors, gauges=(), limits=())
     options |= {"start": at.values, "few_first": False}
     return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
+
+
+def rejects(fit: Fit) -> bool:
+    """Whether the noise of a fit as stated, whatever model error had to be admitted, does not explain the residual."""
+    if np.max(fit.inflation) > settings.INFLATION_EXPLAINED:
+        return True
+    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value < settings.SIGNIFICANCE
 
 
 def likeliest_field(fit: Fit) -> Noise:

@@ -16,6 +16,7 @@ from ctcr.arrays import Array, Integers, Mask
 from ctcr.model import parameters
 from ctcr.model.noise import Noise
 from ctcr.model.protocol import ResidualModel
+from ctcr.model.sessions import as_given
 from ctcr.robot.description import Robot
 
 
@@ -72,8 +73,6 @@ class Fit:
     starts: list[Any]  # that were compared: .cost, .distance from the result in posterior sd, .converged
     warnings: list[str]
     seconds: float
-
-    frames = None  # RunFrames, of a fit that has them
 
     def __getattr__(self, name: str):
         if name.startswith("__") or name == "core":
@@ -161,9 +160,10 @@ class Fit:
 
     @cached_property
     def nominal_residual(self) -> Array:
-        """(M, 6) at the robot file's values."""
+        """(M, 6) at the robot file's values, of the readings as they were taken."""
         self._activate_all()
-        return self.model.residual(self.model.nominal())[0].reshape(-1, 6)
+        model = as_given(self.model)
+        return model.residual(model.nominal())[0].reshape(-1, 6)
 
     @cached_property
     def p_value(self) -> float:

@@ -17,12 +17,26 @@ from ctcr.errors import InputError, Problem
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector
 from ctcr.model import recording
 from ctcr.model.protocol import ResidualModel
+from ctcr.model.sessions import SessionRecording, home_names
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
 def recording_of(robot: Robot, measurements: Measurements, names: Sequence[str] = (), **options: Any) -> Any:
-    """As `recording.recording_of`, also where the robot or the names have effects of loaded files."""
+    """As `recording.recording_of`, also where runs are sessions, and the robot or the names have effects of loaded
+    files."""
+    if (sessions := measurements.sessions) is not None:
+        one, tables = replace(measurements, sessions=None), [names]
+        if sessions.homes is not None:
+            tables.append(home_names(robot.n_tubes))
+        table, *homes = (recording_of(robot, one, some, **options) for some in tables)
+        return SessionRecording(
+            robot,
+            measurements,
+            table,
+            as_given=lambda: recording_of(robot, sessions.put_back(measurements), names, **options),
+            homes=homes[0] if homes else None,
+        )
     own = user_effects.used_by(robot, names)
     if own:
         return UserRecording(robot, measurements, names, own, **options)

@@ -17,6 +17,7 @@ from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
 from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
+from ctcr.table.sessions import Sessions
 
 JOINT_ORDER_SLACK_M = 1e-6  # rounding of recorded joints
 UNIT_QUATERNION_SLACK = 1e-3
@@ -45,6 +46,7 @@ class Measurements:
     quaternion: Array | None  # (M, 4) sensor (w, x, y, z), unit, tracker frame
     row: Integers  # (M,) row of the file; the header is row 1
     warnings: list[Problem] = field(default_factory=list)
+    sessions: Sessions | None = None  # what was taken out of each run; None: nothing, the runs are one session
     from_home: bool = True  # whether the robot came to the first row straight from home; else it was at rest there
 
     def __len__(self) -> int:

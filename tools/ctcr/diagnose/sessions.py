@@ -1,0 +1,152 @@
+"""Whether the runs of a table share one frame and one set of homes: the one place that decides it, for all commands.
+
+What each run may have of its own competes with the effects of the catalogue by the log evidence of the readings, in
+which every number of every run has its cost. So a load, a jump or a drift is not taken for a frame of each run.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.audit import sensor_roll
+from ctcr.diagnose.candidates import candidates
+from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.linearised import Linear
+from ctcr.diagnose.round import Refits, fraction_explained, screen, unexplained, worth_a_refit
+from ctcr.diagnose.varying_coefficients import label_of
+from ctcr.fit import joint
+from ctcr.fit.result import Fit
+from ctcr.fit.sessions import as_sessions, rows_of_runs
+from ctcr.model import user_recording
+from ctcr.model.noise import noise_of_readings
+from ctcr.model.sessions import home_names
+from ctcr.robot.description import Robot
+from ctcr.show import wording
+from ctcr.table.measurements import Measurements
+from ctcr.table.sessions import Sessions
+
+
+def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> tuple[Measurements, list[str]]:
+    """The readings without what each run has of its own, and sentences on that; the same readings, where the runs are
+    one session.
+
+    asked    whether each run has a frame of its own; None: where the readings say so
+    Raises InputError where no fit is possible.
+    """
+    robot, usable, _ = sensor_roll.usable(robot, readings)
+    located = np.isfinite(usable.positions).all(axis=1)
+    if asked is False or len(np.unique(usable.run[located])) < 2:
+        return readings, []
+    engine = Engine(robot, usable, noise_of_readings(robot, usable), rows_of_runs(usable))
+    one = engine.fit()
+    if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
+        return readings, []
+    framed = replace(engine, measurements=as_sessions(robot, usable))
+    if asked is None and not _wins(engine, one, framed):
+        return readings, []
+    own, shared, said = framed.fit(), "a frame", []
+    homes = tuple(home_names(robot.n_tubes))
+    explained = _explained_by_run(framed, own)
+    if homes in explained:
+        homed = replace(engine, measurements=as_sessions(robot, usable, homes=True))
+        if _held_out(homed) < (1 - settings.EXPLAINED) * _held_out(framed):
+            framed, own, shared, explained = homed, homed.fit(), "a frame and homes", {}
+    if explained:
+        best = max(explained.values())
+        alike = [names for names in explained if explained[names] > settings.IN_REACH * best]
+        said = [
+            f"{wording.percent(best)} of what is left looks as if the runs did not share "
+            f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes changed, or homed anew?"
+        ]
+    before, after = (wording.mm(fit.rms_mm()) for fit in (one, own))
+    text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
+    return framed.measurements.sessions.taken_out(readings), [text, *said]
+
+
+def _may_win(engine: Engine, one: Fit) -> bool:
+    """Whether small moves of each run's frame, and with them of the calibration, are likelier than none."""
+    table = Sessions.alike(engine.robot, engine.measurements).taken_out(engine.measurements)
+    recorded = user_recording.recording_of(engine.robot, table)
+    columns = recorded.columns(one.residual.ravel()).reshape(*one.residual.shape, -1)
+    linear, columns = engine.linear(one), one.whiten(columns)
+    gains = (linear.gain(part * columns).log_evidence for part in settings.SESSION_PARTS)
+    return max(gains) > settings.DECISIVE
+
+
+def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
+    """Whether a frame for each run is likelier than one frame, wherever that lies, and than any effect beside it."""
+    own = framed.fit_like(one, start={})
+    frame = [name for name in one.names if name not in own.names]
+    evidence, numbers = own.log_evidence + _cost(own), len(frame) * len(framed.measurements.sessions.run)
+    beyond = evidence - one.log_evidence
+    if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.EXPLAINED:
+        return False
+    wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
+    elsewhere = joint.fit(engine.robot, engine.measurements, rows=engine.rows, sd=wide, noise=one.noise, **one.frozen)
+    if evidence < elsewhere.log_evidence + settings.DECISIVE:
+        return False
+    pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
+    near = [rival for rival in screen(*engine.thinned(one), pool, {}) if rival.linear > settings.NEAR * beyond]
+    refits = Refits(engine, one, {})
+    rivals = refits.of_all(refits.in_reach(worth_a_refit(near))) if near else []
+    return all(beyond > rival.score + settings.DECISIVE for rival in rivals)
+
+
+def _cost(own: Fit) -> float:
+    """Log evidence that the numbers of all runs cost, which the fit has profiled out: under the likeliest of the widths
+    that their scatter about the typical run may have."""
+    model, sessions = own.model, own.model.readings.sessions
+    columns = own.whiten(model.columns(own.residual.ravel()).reshape(*own.residual.shape, -1))
+    information = columns.T @ columns
+    values = np.hstack([sessions.shift, sessions.turn]) / model.sd
+    values = values - np.median(values, axis=0)
+
+    def cost(part: float) -> float:
+        determinant = np.linalg.slogdet(part**2 * information + np.eye(len(information)))[1]
+        return -0.5 * float(determinant + np.sum(values**2) / part**2)
+
+    return max(map(cost, settings.SESSION_PARTS))
+
+
+def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
+    """Fraction of the unexplained chi-square that values of their own in each run explain: of all homes, of a parameter
+    of a tube, of all of it. Those that are sure alone."""
+    residual, jacobian = fit.whitened()
+    linear = Linear(residual, jacobian * fit.prior_sd)
+    numbers = np.flatnonzero(np.repeat(fit.weights > 0, 3, axis=1).ravel())
+    run = engine.measurements.run[numbers // 6]
+    of_run = (run[:, None] == np.unique(run)) * settings.SESSION_PRIOR_WIDER
+    of_tubes = [name for name in fit.names if name.startswith("tubes.")]
+    groups = [home_names(engine.robot.n_tubes), *([name] for name in of_tubes)]
+    groups += [[name for name in of_tubes if f"tubes.{i + 1}." in name] for i in range(engine.robot.n_tubes)]
+    found = {}
+    for names in groups:
+        own = linear.jacobian[:, [fit.names.index(name) for name in names]]
+        gain = linear.gain((own[:, :, None] * of_run[:, None, :]).reshape(len(run), -1))
+        removed = np.sum(residual**2) - np.sum((residual + gain.signal) ** 2)
+        sure = gain.log_evidence > settings.DECISIVE + np.log(len(groups))
+        if sure and removed > settings.EXPLAINED * unexplained(fit):
+            found[tuple(names)] = float(min(removed / unexplained(fit), 1.0))
+    return found
+
+
+def _held_out(engine: Engine) -> float:
+    """Mean square position error [m^2] of runs, some at a time left out of a fit."""
+    _, run = np.unique(engine.measurements.run, return_inverse=True)
+    measured = engine.measurements.measured
+    rows = measured if np.sum(measured) < settings.CROSS_VALIDATION_ROWS else engine.rows
+    square = np.full(len(run), np.nan)
+    for fold in range(settings.FOLDS):
+        out = run % settings.FOLDS == fold
+        if out.any() and (rows & ~out).any():
+            fit = replace(engine, rows=rows & ~out).fit()
+            square[out] = np.sum(fit.residual[out, :3] ** 2, axis=1)
+    return float(np.nanmean(square))
+
+
+def _named(names: tuple[str, ...]) -> str:
+    """Parameters for people: one of a tube, the tube, or the homes."""
+    if not names[0].startswith("tubes."):
+        return "their homes"
+    return f"the {label_of(names[0])}" if len(names) == 1 else f"tube {names[0].split('.')[1]}"
