@@ -21,6 +21,7 @@ from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, one_sided
 from ctcr.fit.result import Fit, Priors, rms
+from ctcr.fit.widening import Likelihood, Scales
 from ctcr.frames import base_to_tracker
 from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
@@ -41,7 +42,8 @@ class FitOptions:
     start: Array | None = None  # (n,); the priors' mean by default
     weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
     inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
-    # Log evidences of models can be compared at the same weights and inflation.
+    scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
+    # Log evidences of models can be compared at the same weights, inflation and scales.
     starts: int = 1  # that are compared, all but the first drawn from the priors
     max_iterations: int = settings.ITERATIONS
     tolerance: float = settings.TOLERANCE  # of log evidence
@@ -57,6 +59,7 @@ def fit(
     noise: Noise | None = None,
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
+    scales: Scales | None = None,
     starts: int = settings.STARTS,
 ) -> Fit:
     """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
@@ -74,7 +77,7 @@ def fit(
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
-    given = {"weights": weights, "inflation": inflation}
+    given = {"weights": weights, "inflation": inflation, "scales": scales}
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)
@@ -83,7 +86,7 @@ def fit(
         kept = like.frozen if like else given
         return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept)
 
-    start = _with_frame(model(), priors, noise, positions, rows, **given)
+    start, priors = _with_frame(model(), priors, noise, positions, rows, **given)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
@@ -113,16 +116,34 @@ def fit_joint(
     few = folds.few_of(rows) if few_first else None
     if few is None:
         model.activate(rows.tolist())
-        return _fit_active(*arguments, how)
+        return _fit_widened(*arguments, how)
     model.activate(few.tolist())
-    first = _fit_active(*arguments, replace(how, tolerance=settings.COARSE))
+    first = _fit_widened(*arguments, replace(how, tolerance=settings.COARSE))
     model.activate(rows.tolist())
-    fitted = _fit_active(*arguments, replace(how, start=first.values, starts=1))
+    fitted = _fit_widened(model, first.priors, noise, positions, replace(how, start=first.values, starts=1))
     return replace(fitted, starts=first.starts)
 
 
+def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
+    """As fit_joint(), of the active rows. Uncertainties that the readings contradict are widened, which changes what
+    the readings say: fits and scales alternate until little is gained."""
+    if how.scales is not None:
+        return _fit_active(model, replace(priors, scales=how.scales), noise, positions, how)
+    fit = _fit_active(model, priors, noise, positions, how)
+    while True:
+        likelihood = Likelihood.of(fit)
+        scales = likelihood.likeliest()
+        if likelihood.posterior(scales) - likelihood.posterior(fit.priors.scales) < settings.COARSE:
+            return fit
+        again = replace(how, start=fit.values, starts=1)
+        refitted = _fit_active(model, replace(priors, scales=scales), noise, positions, again)
+        if not refitted.log_evidence > fit.log_evidence:
+            return fit
+        fit = replace(refitted, starts=fit.starts)
+
+
 def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
-    """As fit_joint(), of the active rows. With distributed friction the friction path depends on the parameters: fits
+    """As fit_joint(), of the active rows and within the priors as they are. With distributed friction the friction path depends on the parameters: fits
     and solutions of the path alternate until the path hardly changes."""
     began, starts = perf_counter(), how.starts
     start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
@@ -194,11 +215,9 @@ class _FrameAlone(ResidualModel):
 
 def _with_frame(
     model: ResidualModel, priors: Priors, noise: Noise, positions: Array, rows: Mask, **options: Array | None
-) -> Array:
-    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free.
-
-    A frame that is far off would drag the others along.
-    """
+) -> tuple[Array, Priors]:
+    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free; and priors
+    that are wide enough for it. A frame that is far off would drag the others along."""
     start = np.clip(model.nominal(), priors.low, priors.high)
     frame = np.array([name.startswith("tracker.") for name in priors.names])
     if frame.any() and not frame.all() and rows.any():
@@ -208,7 +227,8 @@ def _with_frame(
             alone, priors.some(frame), noise, positions, rows, start=start[frame], few_first=False, **options
         )
         start[frame] = found.values
-    return start
+        priors = replace(priors, scales=found.priors.scales)
+    return start, priors
 
 
 def linear_fit(
@@ -228,7 +248,7 @@ def linear_fit(
         residual = np.where(rows[:, None], residual, nan)
     model = LinearModel(residual.ravel(), at.jacobian_all, at.values, at.prior_mean)
     priors = replace(at.priors, gauges=(), limits=())
-    options |= {"start": at.values, "few_first": False}
+    options |= {"start": at.values, "few_first": False, "scales": priors.scales}
     return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
 
 

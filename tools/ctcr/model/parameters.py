@@ -47,6 +47,19 @@ _FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), u
     "tracker.sensor_roll": (("tracker", "sensor_roll_deg"), "deg", 180 / pi),
     "tracker.rotation.*": (None, "deg", 180 / pi),  # a turn of the rotation vector, not one of its numbers
 }
+_UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
+    ("tracker", "position"): "tracker_frame_mm",
+    ("tracker", "rotation"): "tracker_frame_deg",
+    ("actuation", "home_translation"): "translation_offset_mm",
+    ("actuation", "home_rotation"): "rotation_offset_deg",
+    ("tubes", "length"): "length_mm",
+    ("tubes", "curved_length"): "curved_length_mm",
+    ("tubes", "curvature"): "curvature_percent",
+    ("tubes", "youngs_modulus"): "youngs_modulus_percent",
+    ("tubes", "bending_stiffness"): "youngs_modulus_percent",
+}
+CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little more than the sums of the two
+_UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
 ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
 
 
@@ -278,23 +291,21 @@ def _set(robot: Robot, path: FieldPath, value: float) -> None:
         setattr(section, key, _replaced(old, i, value))
 
 
+def uncertainty_of(name: str) -> str | None:
+    """The key under `uncertainty` in the robot file that holds the standard deviation of a parameter; None: no key."""
+    section, *rest = name.split(".")
+    return _UNCERTAINTY.get((section, rest[1 if section == "tubes" else 0])) if rest else None
+
+
 def _stated_sd(robot: Robot, name: str) -> float | None:
     """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
-    u, kind = robot.uncertainty, name.split(".")[2 if name.startswith("tubes.") else 1]
-    size = abs(_value(robot, name))
-    if kind == "sensor_roll":
+    if name == "tracker.sensor_roll":
         return ANYWHERE if robot.tracker.sensor_roll == "unknown" else None
-    if name.startswith("tracker."):
-        return 1e-3 * u.tracker_frame_mm if kind == "position" else pi / 180 * u.tracker_frame_deg
-    return {
-        "home_translation": 1e-3 * u.translation_offset_mm,
-        "home_rotation": pi / 180 * u.rotation_offset_deg,
-        "length": 1e-3 * u.length_mm,
-        "curved_length": 1e-3 * u.curved_length_mm,
-        "curvature": u.curvature_percent / 100 * size,
-        "youngs_modulus": u.youngs_modulus_percent / 100 * size,
-        "bending_stiffness": u.youngs_modulus_percent / 100 * size,
-    }.get(kind)
+    key = uncertainty_of(name)
+    if key is None:
+        return None
+    relative = abs(_value(robot, name)) if key.endswith("_percent") else 1.0
+    return getattr(robot.uncertainty, key) * _UNCERTAINTY_UNITS[key.rsplit("_", 1)[-1]] * relative
 
 
 def _prior(robot: Robot, name: str) -> tuple[float, float | None, float, float]:

@@ -1,0 +1,101 @@
+"""How far the readings contradict what the robot file says of its own uncertainty: a scale on each of its numbers.
+
+Each number of the file's `uncertainty` is the prior standard deviation of a group of parameters, such as the curvatures
+of all tubes. Its scale, 1 or larger, maximises the log evidence (empirical Bayes), which follows from the Gaussian
+posterior of a fit alone. A scale beyond 1 must gain DECISIVE, so that chance widens nothing.
+Ref: MacKay, "Bayesian Interpolation", 1992.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
+
+from ctcr import settings
+from ctcr.arrays import Array, Mask
+from ctcr.model import parameters
+
+NEARLY_NONE = 1e-9  # precision of a prior that is not stated: keeps sums of information positive definite
+Scales = Mapping[str, float]  # on the standard deviations of a group, by its key under `uncertainty`; 1 where absent
+
+
+def log_prior(scales: Scales) -> float:
+    """Log probability of the scales, up to a constant: each that differs from 1 is as unlikely as DECISIVE says."""
+    return -settings.DECISIVE * len(scales)
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """Quadratic log likelihood of n shifts z from the prior mean, in stated prior sd (where none is stated, in the sd
+    that the readings give it): linear @ z - z @ information @ z / 2."""
+
+    information: Array  # (n, n)
+    linear: Array  # (n,)
+    known: Mask  # (n,) whether a prior sd is stated
+    members: Mapping[str, Mask]  # (n,) the parameters of each group
+
+    @classmethod
+    def of(cls, fit: Any, more: Array | None = None) -> "Likelihood":
+        """Of the readings of a fit; with `more` (K, k), also of parameters at their prior mean by which its whitened
+        residual has these derivatives, in prior sd."""
+        residual, jacobian = fit.whitened()
+        stated = fit.priors.stated
+        known = np.isfinite(stated)
+        unit = np.where(known, stated, 1 / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny))
+        columns, shift = jacobian * unit, (fit.values - fit.priors.mean) / unit
+        if more is not None:
+            columns, shift = np.hstack([columns, more]), np.append(shift, np.zeros(more.shape[1]))
+            known = np.append(known, np.ones(more.shape[1], bool))
+        groups = np.array([parameters.uncertainty_of(name) or "" for name in fit.names])
+        groups = np.append(groups, [""] * (len(shift) - len(groups)))
+        members = {key: known & (groups == key) for key in sorted({*groups[known]} - {""})}
+        return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, members)
+
+    def log_evidence(self, scales: Scales, derivatives: Collection[str] = ()) -> tuple[float, Array]:
+        """Up to a constant, and its derivatives by the logarithms of some scales."""
+        scale = np.ones(len(self.linear))
+        for key, value in scales.items():
+            scale[self.members[key]] = value
+        prior = np.where(self.known, scale**-2, NEARLY_NONE)
+        factor = cho_factor(self.information + np.diag(prior))
+        z = cho_solve(factor, self.linear)
+        value = 0.5 * self.linear @ z - np.log(np.diag(factor[0])).sum() - np.log(scale[self.known]).sum()
+        if not derivatives:
+            return float(value), np.zeros(0)
+        each = prior * (z**2 + np.diag(cho_solve(factor, np.eye(len(z))))) - 1
+        return float(value), np.array([each[self.members[key]].sum() for key in derivatives])
+
+    def posterior(self, scales: Scales) -> float:
+        """Log evidence and prior of the scales, up to a constant."""
+        return self.log_evidence(scales)[0] + log_prior(scales)
+
+    def likeliest(self) -> dict[str, float]:
+        """The scales of largest posterior that differ from 1: of all groups, those are dropped that gain too little."""
+        first, second = parameters.CONFOUNDED
+        choices = [[key for key in self.members if key != confounded] for confounded in (first, second)]
+        best = max(map(self._maximum, choices), key=self.posterior)
+        if self.log_evidence(best)[0] - self.log_evidence({})[0] < settings.DECISIVE:
+            return {}
+        while best:
+            others = [self._maximum([other for other in best if other != key]) for key in best]
+            without = max(others, key=self.posterior)
+            if self.posterior(without) <= self.posterior(best):
+                return best
+            best = without
+        return best
+
+    def _maximum(self, groups: Collection[str]) -> dict[str, float]:
+        """The scales of these groups of largest log evidence; those that stay 1 are left out."""
+
+        def cost(log_scales: Array) -> tuple[float, Array]:
+            value, slope = self.log_evidence(dict(zip(groups, np.exp(log_scales), strict=True)), groups)
+            return -value, -slope
+
+        if not groups:
+            return {}
+        bounds = [(0.0, np.log(settings.WIDEST))] * len(groups)
+        found = minimize(cost, np.ones(len(groups)), jac=True, method="L-BFGS-B", bounds=bounds)
+        return {key: float(np.exp(x)) for key, x in zip(groups, found.x, strict=True) if x > 0}
