@@ -1,7 +1,5 @@
 """What is wrong with, or worth knowing of, a table that is to be fitted."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ctcr import settings
@@ -12,6 +10,7 @@ from ctcr.compare.visits import find_revisits, find_stops
 from ctcr.errors import InputError, Problem
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.run_frames import error_with_frames
+from ctcr.fit.widening import widened
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
@@ -70,40 +69,29 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
 def notices(after: Robot, readings: Measurements, fit: Fit, frame_per_run: bool) -> list[str]:
     """What the user should know of a fit, in sentences."""
     said_as_doubts = "prior standard deviations"
-    said = [sentence(text) for text in fit.warnings if said_as_doubts not in text]
+    said = [sentence(wider.text) for wider in widened(after, fit.priors.scales)]
+    said += [sentence(text) for text in fit.warnings if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
-    return said if frame_per_run else said + (_one_frame(after, readings, fit) or _run_frames(after, readings, fit))
+    return said if frame_per_run else said + _run_frames(after, readings, fit)
 
 
-def may_share_no_frame(after: Robot, readings: Measurements, fit: Fit) -> bool:
+def may_share_no_frame(readings: Measurements, fit: Fit) -> bool:
     """Whether a fit of one frame and other parameters leaves so large an error that the runs may not share a frame."""
     kinds = {name.startswith("tracker.") for name in fit.names}
     large = 1e3 * rms(fit.residual[:, :3]) > settings.FRAMES_BEYOND * fit.expected_mm()
     several = len(kinds) == 2 and len(np.unique(readings.run)) > 1
-    return several and large and not _one_frame(after, readings, fit)
+    return several and large
 
 
 def sentence(text: str) -> str:
     """A warning of a fit as a sentence."""
     first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
     return first + ("" if text.endswith(".") else ".")
-
-
-def _one_frame(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
-    """A sentence where an error far beyond the expected one disappears with another frame for all runs."""
-    found = _errors_if_framed(robot, replace(readings, run=np.zeros_like(readings.run)), fit)
-    if not found:
-        return []
-    return [
-        f"Another tracker frame leaves {found[1]} of the {found[0]} RMS error, but lies "
-        "further off than the robot file allows: find it with `ctcr calibrate registration`, or widen "
-        "tracker_frame_mm and tracker_frame_deg under uncertainty."
-    ]
 
 
 def _run_frames(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:

@@ -14,7 +14,7 @@ from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_roll
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
-from ctcr.fit import folds, joint, run_frames
+from ctcr.fit import folds, joint, run_frames, widening
 from ctcr.fit.result import Fit, rms
 from ctcr.model import fields
 from ctcr.model.fields import Fitted
@@ -95,6 +95,7 @@ class Calibration:
             **{name: getattr(fit, name) for name in (*plain, "seconds")},
             "unexplained_scatter": {"position_mm": self.unexplained.rms_mm, "rotation_deg": self.unexplained.rms_deg},
             "correlations": [{"first": a, "second": b, "r": r} for a, b, r in fit.correlations],
+            "widened": widening.widened(self.before, fit.priors.scales),
             "undetermined": [{"text": d.text, "ratio": d.ratio} for d in fit.directions],
             "frames": fit.frames and fit.frames.as_dict(),
             "outliers": checks.outlier_rows(fit, self.readings),
@@ -124,7 +125,7 @@ def calibrate(
     not exist, a prior of zero width, too few rows.
     """
     one = _calibrate(robot, readings, free, frame_per_run=bool(frame_per_run), **options)
-    if frame_per_run is not None or not checks.may_share_no_frame(one.after, one.readings, one.fit):
+    if frame_per_run is not None or not checks.may_share_no_frame(one.readings, one.fit):
         return one
     framed = _calibrate(robot, readings, free, frame_per_run=True, **options)
     before, after = (c.held_out.error.rms_mm if c.held_out else c.stages[-1].rms_mm for c in (one, framed))
@@ -167,7 +168,9 @@ def _calibrate(
             return found
 
         def refitted(like: Fit, rows: Array) -> Fit:
-            return fitted(names, rows=rows, noise=like.noise, inflation=like.inflation, starts=1)
+            return fitted(
+                names, rows=rows, noise=like.noise, inflation=like.inflation, scales=like.priors.scales, starts=1
+            )
 
         tried = _explaining(fitted(names, noise=one) for one in _noises(robot, readings, noise))
         fit, held_out = tried[-1], None

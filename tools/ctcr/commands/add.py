@@ -67,6 +67,8 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, target, 
 
 
 def _as_data(added) -> dict:
+    from ctcr.fit.widening import widened
+
     return {
         "added": added.ids,
         "effects": added.robot.effects,
@@ -76,6 +78,7 @@ def _as_data(added) -> dict:
         "held_out": added.held_out,
         "reduced_chi_square": added.fit.reduced_chi_square,
         "converged": added.fit.converged,
+        "widened": widened(added.robot, added.fit.priors.scales),
         "notices": added.notices,
     }
 

@@ -22,6 +22,7 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import rms
+from ctcr.fit.widening import widened
 from ctcr.model import fields
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import ledger
@@ -272,7 +273,8 @@ def _stage(name: str, residual: Array, rows: Mask) -> Stage:
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str]) -> list[str]:
     """Doubts about the fitted effects."""
     known = catalogue.parameter_of(robot.n_tubes)
-    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
+    said = [sentence(wider.text) for wider in widened(robot, fit.priors.scales)]
+    said += [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, fit.warnings)]
     index = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)

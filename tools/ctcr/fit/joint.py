@@ -143,8 +143,8 @@ def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: 
 
 
 def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
-    """As fit_joint(), of the active rows and within the priors as they are. With distributed friction the friction path depends on the parameters: fits
-    and solutions of the path alternate until the path hardly changes."""
+    """As fit_joint(), of the active rows within the priors as they are. With distributed friction the friction path
+    depends on the parameters: fits and solutions of the path alternate until the path hardly changes."""
     began, starts = perf_counter(), how.starts
     start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
     try:

@@ -17,9 +17,40 @@ from scipy.optimize import minimize
 from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.model import parameters
+from ctcr.robot.description import Robot
 
+WORDS = {
+    "tracker_frame_mm": "the position of the tracker frame",
+    "tracker_frame_deg": "the rotation of the tracker frame",
+    "rotation_offset_deg": "the home rotations",
+    "translation_offset_mm": "the home translations",
+    "length_mm": "the lengths of the tubes",
+    "curved_length_mm": "the curved lengths of the tubes",
+    "curvature_percent": "the curvatures",
+    "youngs_modulus_percent": "the stiffnesses of the tubes",
+}
 NEARLY_NONE = 1e-9  # precision of a prior that is not stated: keeps sums of information positive definite
 Scales = Mapping[str, float]  # on the standard deviations of a group, by its key under `uncertainty`; 1 where absent
+
+
+@dataclass(frozen=True)
+class Widened:
+    """A number of the file's `uncertainty` that the readings contradict."""
+
+    uncertainty: str  # its key
+    stated: float  # in the unit of the key
+    factor: float  # by which it was widened
+
+    @property
+    def text(self) -> str:
+        stated = f"{self.stated:g} {self.uncertainty.rsplit('_', 1)[-1].replace('percent', '%')}"
+        of = f"the stated uncertainty of {WORDS[self.uncertainty]}, {stated}"
+        return f"{of}, is contradicted by the data: widened {self.factor:.2g} times"
+
+
+def widened(robot: Robot, scales: Scales) -> list[Widened]:
+    """What the scales of a fit say of the robot file."""
+    return [Widened(key, getattr(robot.uncertainty, key), factor) for key, factor in scales.items()]
 
 
 def log_prior(scales: Scales) -> float:
@@ -49,9 +80,10 @@ class Likelihood:
         if more is not None:
             columns, shift = np.hstack([columns, more]), np.append(shift, np.zeros(more.shape[1]))
             known = np.append(known, np.ones(more.shape[1], bool))
-        groups = np.array([parameters.uncertainty_of(name) or "" for name in fit.names])
-        groups = np.append(groups, [""] * (len(shift) - len(groups)))
-        members = {key: known & (groups == key) for key in sorted({*groups[known]} - {""})}
+        groups = [parameters.uncertainty_of(name) for name in fit.names]
+        groups += [None] * (len(shift) - len(groups))
+        members = {key: known & [group == key for group in groups] for key in dict.fromkeys(groups) if key}
+        members = {key: own for key, own in members.items() if own.any()}
         return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, members)
 
     def log_evidence(self, scales: Scales, derivatives: Collection[str] = ()) -> tuple[float, Array]:
