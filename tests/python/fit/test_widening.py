@@ -14,6 +14,7 @@ NAMES = [
     *(f"actuation.home_rotation.{i}" for i in (1, 2, 3)),
     *(f"tracker.position.{axis}" for axis in "xyz"),
 ]
+GROUPS = [*3 * ["curvature_percent"], *3 * ["rotation_offset_deg"], *3 * ["tracker_frame_mm"]]
 STATED = np.repeat([0.5, 0.02, 5e-4], 3)
 NOISE = Noise(position_jitter=1.0, rotation_jitter=1.0)
 
@@ -25,7 +26,7 @@ def fitted(random: np.random.Generator, scale: np.ndarray | float, rows: int = 3
     # Residual: measured - predicted, so that parameters enter with a minus.
     residual = jacobian @ truth + random.normal(size=6 * rows)
     zero, far = np.zeros(len(NAMES)), np.full(len(NAMES), np.inf)
-    model, priors = LinearModel(residual, -jacobian, zero, zero), Priors(NAMES, zero, STATED, -far, far)
+    model, priors = LinearModel(residual, -jacobian, zero, zero), Priors(NAMES, zero, STATED, -far, far, groups=GROUPS)
     return joint.fit_joint(model, priors, NOISE, np.zeros((rows, 3)), weights=np.ones((rows, 2)), inflation=np.ones(2))
 
 

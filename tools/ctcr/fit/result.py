@@ -32,24 +32,29 @@ class Priors:
     high: Array  # (n,)
     gauges: Sequence[tuple[str, Array]] = ()  # changes (n,) that leave the readings nearly as they are, with words
     limits: Sequence[tuple[str, Array, float]] = ()  # least values of row @ change, row (n,), with words
-    scales: Scales = field(default_factory=dict)  # on the stated standard deviations, see fit.widening
+    groups: Sequence[str | None] = ()  # (n,) which stated number each standard deviation is, see parameters.group_of
+    scales: Scales = field(default_factory=dict)  # by group on the stated standard deviations, see fit.widening
 
     @classmethod
     def of(cls, robot: Robot, names: Sequence[str], beta: Array, sd: Any = None) -> "Priors":
         """From the robot file, for joints beta (M, N) [m] that must stay possible; `sd` as of parameters.priors."""
         gauges, limits = parameters.known_directions(robot, names), parameters.admissible(robot, beta, names)
-        return cls(list(names), *parameters.priors(robot, names, sd), gauges, limits)
+        groups = [parameters.group_of(robot, name) for name in names]
+        return cls(list(names), *parameters.priors(robot, names, sd), gauges, limits, groups)
 
     def some(self, chosen: Mask) -> "Priors":
         """Those of some parameters (n,), without gauges and limits, which combine several."""
         names = [name for name, kept in zip(self.names, chosen, strict=True) if kept]
         parts = (part[chosen] for part in (self.mean, self.stated, self.low, self.high))
-        return Priors(names, *parts, scales=self.scales)
+        groups = [group for group, kept in zip(self.groups, chosen, strict=True) if kept]
+        return Priors(names, *parts, groups=groups, scales=self.scales)
 
     @cached_property
     def scale(self) -> Array:
         """(n,) on the stated standard deviation."""
-        return np.array([self.scales.get(parameters.uncertainty_of(name), 1.0) for name in self.names])
+        if not self.scales:
+            return np.ones(len(self.names))
+        return np.array([self.scales.get(group, 1.0) for group in self.groups])
 
     @property
     def sd(self) -> Array:

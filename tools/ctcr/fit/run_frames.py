@@ -124,8 +124,11 @@ class FramedRecording(ResidualModel):
         self.run, self.index = np.unique(readings.run, return_inverse=True)
         self.shift, self.turn = np.zeros((len(self.run), 3)), np.zeros((len(self.run), 3))
         u = robot.uncertainty
-        width = settings.FRAME_PRIOR_WIDER * np.array([1e-3 * u.tracker_frame_mm, np.radians(u.tracker_frame_deg)])
-        self.prior = 1 / np.repeat(width, 3) ** 2  # information on a shift [1/m^2] and a turn [1/rad^2]
+        width = [1e-3 * u.of("tracker_frame_mm", axis) for axis in range(3)]
+        width += [np.radians(u.of("tracker_frame_deg", axis)) for axis in range(3)]
+        self.prior = (
+            1 / (settings.FRAME_PRIOR_WIDER * np.array(width)) ** 2
+        )  # information on a shift [1/m^2] and a turn [1/rad^2]
         jitter = (noise.position_jitter, noise.rotation_jitter)
         field = (noise.position_field, noise.rotation_field)
         self.steps = recording.steps_for(robot, readings, noise)

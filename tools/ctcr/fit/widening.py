@@ -1,8 +1,8 @@
 """How far the readings contradict what the robot file says of its own uncertainty: a scale on each of its numbers.
 
 Each number of the file's `uncertainty` is the prior standard deviation of a group of parameters, such as the curvatures
-of all tubes. Its scale, 1 or larger, maximises the log evidence (empirical Bayes), which follows from the Gaussian
-posterior of a fit alone. A scale beyond 1 must gain DECISIVE, so that chance widens nothing.
+of all tubes, or in a list of one parameter. Its scale, 1 or larger, maximises the log evidence (empirical Bayes), which
+follows from the Gaussian posterior of a fit alone. A scale beyond 1 must gain DECISIVE, so that chance widens nothing.
 Ref: MacKay, "Bayesian Interpolation", 1992.
 """
 
@@ -30,27 +30,37 @@ WORDS = {
     "youngs_modulus_percent": "the stiffnesses of the tubes",
 }
 NEARLY_NONE = 1e-9  # precision of a prior that is not stated: keeps sums of information positive definite
-Scales = Mapping[str, float]  # on the standard deviations of a group, by its key under `uncertainty`; 1 where absent
+Scales = Mapping[str, float]  # on the standard deviations of a group, by its key in `uncertainty`; 1 where absent
 
 
 @dataclass(frozen=True)
 class Widened:
     """A number of the file's `uncertainty` that the readings contradict."""
 
-    uncertainty: str  # its key
+    uncertainty: str  # its key; in a list, with its index
     stated: float  # in the unit of the key
     factor: float  # by which it was widened
 
     @property
     def text(self) -> str:
-        stated = f"{self.stated:g} {self.uncertainty.rsplit('_', 1)[-1].replace('percent', '%')}"
-        of = f"the stated uncertainty of {WORDS[self.uncertainty]}, {stated}"
+        key, index = key_and_index(self.uncertainty)
+        which = "" if index is None else f" ({'xyz'[index] if key.startswith('tracker') else f'tube {index + 1}'})"
+        unit = key.rsplit("_", 1)[-1].replace("percent", "%")
+        of = f"the stated uncertainty of {WORDS[key]}{which}, {self.stated:g} {unit}"
         return f"{of}, is contradicted by the data: widened {self.factor:.2g} times"
 
 
 def widened(robot: Robot, scales: Scales) -> list[Widened]:
     """What the scales of a fit say of the robot file."""
-    return [Widened(key, getattr(robot.uncertainty, key), factor) for key, factor in scales.items()]
+    places = {group: key_and_index(group) for group in scales}
+    stated = {group: robot.uncertainty.of(key, index or 0) for group, (key, index) in places.items()}
+    return [Widened(group, stated[group], factor) for group, factor in scales.items()]
+
+
+def key_and_index(group: str) -> tuple[str, int | None]:
+    """length_mm[1] as ("length_mm", 1), length_mm as ("length_mm", None)."""
+    key, _, index = group.rstrip("]").partition("[")
+    return key, int(index) if index else None
 
 
 def log_prior(scales: Scales) -> float:
@@ -80,8 +90,7 @@ class Likelihood:
         if more is not None:
             columns, shift = np.hstack([columns, more]), np.append(shift, np.zeros(more.shape[1]))
             known = np.append(known, np.ones(more.shape[1], bool))
-        groups = [parameters.uncertainty_of(name) for name in fit.names]
-        groups += [None] * (len(shift) - len(groups))
+        groups = [*fit.priors.groups, *[None] * (len(shift) - len(fit.priors.groups))]
         members = {key: known & [group == key for group in groups] for key in dict.fromkeys(groups) if key}
         members = {key: own for key, own in members.items() if own.any()}
         return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, members)
@@ -106,8 +115,7 @@ class Likelihood:
 
     def likeliest(self) -> dict[str, float]:
         """The scales of largest posterior that differ from 1: of all groups, those are dropped that gain too little."""
-        first, second = parameters.CONFOUNDED
-        choices = [[key for key in self.members if key != confounded] for confounded in (first, second)]
+        choices = [[key for key in self.members if key_and_index(key)[0] != no] for no in parameters.CONFOUNDED]
         best = max(map(self._maximum, choices), key=self.posterior)
         if self.log_evidence(best)[0] - self.log_evidence({})[0] < settings.DECISIVE:
             return {}

@@ -291,21 +291,37 @@ def _set(robot: Robot, path: FieldPath, value: float) -> None:
         setattr(section, key, _replaced(old, i, value))
 
 
-def uncertainty_of(name: str) -> str | None:
-    """The key under `uncertainty` in the robot file that holds the standard deviation of a parameter; None: no key."""
+def uncertainty_of(name: str) -> tuple[str, int] | None:
+    """Where `uncertainty` holds the standard deviation of a parameter: its key, and which tube or axis, from 0."""
     section, *rest = name.split(".")
-    return _UNCERTAINTY.get((section, rest[1 if section == "tubes" else 0])) if rest else None
+    which, kind = rest if section == "tubes" else reversed(rest) if len(rest) == 2 else (None, None)
+    key = _UNCERTAINTY.get((section, kind))
+    return key and (key, "xyz".index(which) if which in "xyz" else int(which) - 1)
+
+
+def group_of(robot: Robot, name: str) -> str | None:
+    """The number of the file's `uncertainty` that is the standard deviation of a parameter and maybe of others, such as
+    length_mm, or length_mm[1] in a list; None: there is no such number."""
+    key, index = uncertainty_of(name) or (None, 0)
+    return f"{key}[{index}]" if key and isinstance(getattr(robot.uncertainty, key), list) else key
+
+
+def uncertainty_at(path: FieldPath) -> tuple[str, int] | None:
+    """As uncertainty_of(), by the path of a field. A rotation vector stands for the turns about the tracker's axes."""
+    if path[:2] == ("tracker", "rotation_vector_rad"):
+        return "tracker_frame_deg", path[2]
+    return next((uncertainty_of(name) for name, field in _fields().items() if field.path == path), None)
 
 
 def _stated_sd(robot: Robot, name: str) -> float | None:
     """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
     if name == "tracker.sensor_roll":
         return ANYWHERE if robot.tracker.sensor_roll == "unknown" else None
-    key = uncertainty_of(name)
+    key, index = uncertainty_of(name) or (None, 0)
     if key is None:
         return None
     relative = abs(_value(robot, name)) if key.endswith("_percent") else 1.0
-    return getattr(robot.uncertainty, key) * _UNCERTAINTY_UNITS[key.rsplit("_", 1)[-1]] * relative
+    return robot.uncertainty.of(key, index) * _UNCERTAINTY_UNITS[key.rsplit("_", 1)[-1]] * relative
 
 
 def _prior(robot: Robot, name: str) -> tuple[float, float | None, float, float]:
