@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ctcr.model import parameters
 from ctcr.robot import robot_file
 
 ROOT = Path(__file__).parents[3]
@@ -121,6 +122,43 @@ def test_chain(run, tmp_path):
     assert len(final.history) == len(STEPS)
     assert final.actuation.recorded_home_rotation_deg == [0.0, 0.0, 0.0]
     np.testing.assert_allclose(final.actuation.home_translation_mm, truth("home translation"), atol=2.5)
+
+
+@pytest.mark.parametrize(
+    "command, table, options, known",
+    [
+        ("cantilever", "cantilever.csv", ("--tube", 1, "--diameter-sd-mm", 0.005), {"tubes.1.youngs_modulus"}),
+        (
+            "curvature",
+            "picture.csv",
+            ("--tube", 2, "--mm-per-px", 0.083333),
+            {"tubes.2.curvature", "tubes.2.curved_length"},
+        ),
+        ("rotation-offset", "circles.csv", (), {f"actuation.home_rotation.{i}" for i in (1, 2, 3)}),
+        (
+            "registration",
+            "points.csv",
+            (),
+            {f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"},
+        ),
+    ],
+)
+def test_becomes_prior(run, tmp_path, command, table, options, known):
+    """What a procedure measures is the prior of the next fit, with its standard deviation; other priors stay."""
+    code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "-o", tmp_path / "new.yaml", "--json", "-")
+    assert code == 0, err
+    before, after = robot_file.load(ROBOT), robot_file.load(tmp_path / "new.yaml")
+    names = parameters.expand("standard", before)
+    old, new = (parameters.priors(robot, names)[1] for robot in (before, after))
+    assert {name for name, a, b in zip(names, old, new, strict=True) if not np.isclose(a, b, rtol=0.02)} == known
+    units = {"GPa": 1e9, "1/m": 1.0, "mm": 1e-3, "deg": np.pi / 180, "rad": 1.0}
+    measured = {
+        row["sd"] * units[row["unit"]] for row in json.loads(out)["values"] if row["sd"] and row["unit"] in units
+    }
+    for name in known:
+        assert np.min(np.abs(np.log(np.array([*measured]) / new[names.index(name)]))) < 0.01
+    fields = [row["field"] for row in after.history[-1]["changes"]]
+    assert any(field.startswith("uncertainty.") for field in fields)
 
 
 def test_in_place(run, tmp_path):

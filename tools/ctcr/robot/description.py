@@ -211,8 +211,8 @@ class Tracker(Section):
 
 
 class Uncertainty(Section):
-    """Prior standard deviations of calibration parameters: a number for all tubes (of the frame, all axes) or a list with
-    one for each."""
+    """Prior standard deviations of calibration parameters: a number for all tubes (of the frame, all axes) or a list
+    with one for each."""
 
     tracker_frame_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 100), count=EACH_AXIS, least=0)]
     tracker_frame_deg: Annotated[Each, Quantity("deg", usual=(1e-3, 90), count=EACH_AXIS, least=0)]
