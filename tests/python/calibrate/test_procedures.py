@@ -7,8 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ctcr.errors import InputError
+from ctcr.fit.result import Priors
 from ctcr.model import parameters
 from ctcr.robot import robot_file
+from ctcr.robot.description import Correlation
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / "examples" / "data" / "calibration"
@@ -159,6 +162,44 @@ def test_becomes_prior(run, tmp_path, command, table, options, known):
         assert np.min(np.abs(np.log(np.array([*measured]) / new[names.index(name)]))) < 0.01
     fields = [row["field"] for row in after.history[-1]["changes"]]
     assert any(field.startswith("uncertainty.") for field in fields)
+
+
+def test_correlated_prior(run, tmp_path):
+    """Home and length come from one ruler: as priors of the next fit they keep what the encoder knows of their sum."""
+    code, out, err = run("home", DATA / "home.csv", "--robot", ROBOT, "-o", tmp_path / "new.yaml", "--json", "-")
+    assert code == 0, err
+    robot = robot_file.load(tmp_path / "new.yaml")
+    deployed = [1e-3 * row["sd"] for row in json.loads(out)["values"] if row["name"].strip() == "deployed at home"]
+    for tube, sd in enumerate(deployed, start=1):
+        priors = Priors.of(robot, [f"tubes.{tube}.length", f"actuation.home_translation.{tube}"], np.zeros((0, 3)))
+        covariance = np.linalg.inv(priors.precision)
+        assert np.sqrt(covariance.sum()) == pytest.approx(sd, rel=0.05) and sd < 0.3 * priors.sd[0]
+    pairs = [{pair.first, pair.second} for pair in robot.uncertainty.correlations]
+    assert pairs == [{f"tubes.{i}.length", f"actuation.home_translation.{i}"} for i in (1, 2, 3)]
+    again = tmp_path / "again.yaml"
+    code, out, err = run("home", DATA / "home.csv", "--robot", tmp_path / "new.yaml", "-o", again)
+    assert code == 0 and robot_file.load(again).uncertainty == robot.uncertainty, err
+
+
+@pytest.mark.parametrize(
+    "pairs, words",
+    [
+        ([("tubes.1.lenght", "tubes.2.length", 0.5)], "did you mean tubes.1.length?"),
+        ([("tubes.1.length", "tubes.1.length", 0.5)], "tubes.1.length is named twice"),
+        (
+            [("tubes.1.length", "tubes.1.poisson_ratio", 0.5)],
+            "no parameter with an uncertainty is named tubes.1.poisson",
+        ),
+        ([(f"tubes.{i}.length", f"tubes.{i % 3 + 1}.length", -0.9) for i in (1, 2, 3)], "no errors can have all these"),
+    ],
+)
+def test_bad_correlations(pairs, words):
+    """Correlations of unknown parameters, and such as no errors can have, are refused in words."""
+    robot = robot_file.load(ROBOT)
+    robot.uncertainty.correlations = [Correlation(first=a, second=b, r=r) for a, b, r in pairs]
+    with pytest.raises(InputError) as error:
+        parameters.correlations(robot, parameters.expand("standard", robot))
+    assert words in str(error.value) and "uncertainty.correlations" in str(error.value)
 
 
 def test_in_place(run, tmp_path):

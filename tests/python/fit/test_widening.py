@@ -19,28 +19,49 @@ STATED = np.repeat([0.5, 0.02, 5e-4], 3)
 NOISE = Noise(position_jitter=1.0, rotation_jitter=1.0)
 
 
-def fitted(random: np.random.Generator, scale: np.ndarray | float, rows: int = 30) -> joint.Fit:
+def fitted(
+    random: np.random.Generator, scale: np.ndarray | float, rows: int = 30, correlations: np.ndarray | None = None
+) -> joint.Fit:
     """A fit of readings of a random linear model whose parameters differ by `scale` (n,) stated deviations."""
     jacobian = random.normal(size=(6 * rows, len(NAMES))) / STATED
     truth = scale * STATED * random.normal(size=len(NAMES))
     # Residual: measured - predicted, so that parameters enter with a minus.
     residual = jacobian @ truth + random.normal(size=6 * rows)
     zero, far = np.zeros(len(NAMES)), np.full(len(NAMES), np.inf)
-    model, priors = LinearModel(residual, -jacobian, zero, zero), Priors(NAMES, zero, STATED, -far, far, groups=GROUPS)
+    model = LinearModel(residual, -jacobian, zero, zero)
+    priors = Priors(NAMES, zero, STATED, -far, far, groups=GROUPS, correlations=correlations)
     return joint.fit_joint(model, priors, NOISE, np.zeros((rows, 3)), weights=np.ones((rows, 2)), inflation=np.ones(2))
 
 
-def test_evidence():
-    """The log evidence of scales is that of the readings under their marginal distribution, and so are derivatives."""
+def some_correlations(random: np.random.Generator) -> np.ndarray:
+    covariance = np.cov(random.normal(size=(len(NAMES), 2 * len(NAMES))))
+    sd = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(sd, sd)
+
+
+@pytest.mark.parametrize("correlated", [False, True])
+def test_evidence(correlated):
+    """The log evidence of scales is that of the readings under their marginal distribution, and so are derivatives; the
+    fit is that of Bayes' formula for a normal prior."""
     random, rows = np.random.default_rng(1), 4
-    fit = fitted(random, 1.0, rows)
+    correlations = some_correlations(random) if correlated else np.eye(len(NAMES))
+    fit = fitted(random, 1.0, rows, correlations if correlated else None)
     likelihood, left = Likelihood.of(fit), fit.nominal_residual.ravel()
     scales = {"curvature_percent": 1.7, "tracker_frame_mm": 3.0}
 
-    def marginal(scale: np.ndarray) -> float:
-        spread = fit.jacobian_all * STATED * scale
-        return multivariate_normal(np.zeros(6 * rows), np.eye(6 * rows) + spread @ spread.T).logpdf(left)
+    def prior(scale: np.ndarray) -> np.ndarray:
+        return correlations * np.outer(STATED * scale, STATED * scale)
 
+    def marginal(scale: np.ndarray) -> float:
+        covariance = np.eye(6 * rows) + fit.jacobian_all @ prior(scale) @ fit.jacobian_all.T
+        return multivariate_normal(np.zeros(6 * rows), covariance).logpdf(left)
+
+    covariance = np.linalg.inv(fit.jacobian_all.T @ fit.jacobian_all + np.linalg.inv(prior(np.ones(9))))
+    np.testing.assert_allclose(
+        fit.covariance / np.outer(STATED, STATED), covariance / np.outer(STATED, STATED), atol=1e-9
+    )
+    np.testing.assert_allclose(fit.values / STATED, -covariance @ fit.jacobian_all.T @ left / STATED, atol=1e-6)
+    assert fit.log_evidence == pytest.approx(marginal(np.ones(9)), abs=1e-6)
     by_marginal = marginal(np.repeat([1.7, 1.0, 3.0], 3)) - marginal(np.ones(9))
     assert likelihood.log_evidence(scales)[0] - likelihood.log_evidence({})[0] == pytest.approx(by_marginal, abs=1e-6)
     _, slope = likelihood.log_evidence(scales, ["curvature_percent"])

@@ -168,7 +168,7 @@ class Engine:
 
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
-        return Linear(residual, jacobian * fit.prior_sd)
+        return Linear(residual, jacobian @ fit.priors.factor)
 
     def derivatives(self, fit: joint.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
         """Of the residual (M, 6, k) by parameters, at their fitted or neutral values, in units of their prior sd.

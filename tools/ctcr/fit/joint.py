@@ -162,6 +162,7 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
                 high=priors.high,
                 known=list(priors.gauges),
                 within=list(priors.limits),
+                correlations=priors.correlations,
                 noise=noise,
                 positions=np.asarray(positions, dtype=float),
                 weights=how.weights,

@@ -23,7 +23,7 @@ from ctcr.robot.description import Robot
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known of n parameters before the readings, SI: independent normal distributions within bounds."""
+    """What is known of n parameters before the readings, SI: a normal distribution within bounds."""
 
     names: list[str]
     mean: Array  # (n,)
@@ -33,6 +33,7 @@ class Priors:
     gauges: Sequence[tuple[str, Array]] = ()  # changes (n,) that leave the readings nearly as they are, with words
     limits: Sequence[tuple[str, Array, float]] = ()  # least values of row @ change, row (n,), with words
     groups: Sequence[str | None] = ()  # (n,) which stated number each standard deviation is, see parameters.group_of
+    correlations: Array | None = None  # (n, n); independent without
     scales: Scales = field(default_factory=dict)  # by group on the stated standard deviations, see fit.widening
 
     @classmethod
@@ -40,14 +41,19 @@ class Priors:
         """From the robot file, for joints beta (M, N) [m] that must stay possible; `sd` as of parameters.priors."""
         gauges, limits = parameters.known_directions(robot, names), parameters.admissible(robot, beta, names)
         groups = [parameters.group_of(robot, name) for name in names]
-        return cls(list(names), *parameters.priors(robot, names, sd), gauges, limits, groups)
+        known, correlations = parameters.priors(robot, names, sd), parameters.correlations(robot, list(names))
+        if correlations is not None:
+            stated = np.isfinite(known[1])  # what is not known at all correlates with nothing
+            correlations = np.where(np.outer(stated, stated), correlations, np.eye(len(names)))
+        return cls(list(names), *known, gauges, limits, groups, correlations)
 
     def some(self, chosen: Mask) -> "Priors":
         """Those of some parameters (n,), without gauges and limits, which combine several."""
         names = [name for name, kept in zip(self.names, chosen, strict=True) if kept]
         parts = (part[chosen] for part in (self.mean, self.stated, self.low, self.high))
         groups = [group for group, kept in zip(self.groups, chosen, strict=True) if kept]
-        return Priors(names, *parts, groups=groups, scales=self.scales)
+        correlations = None if self.correlations is None else self.correlations[np.ix_(chosen, chosen)]
+        return Priors(names, *parts, groups=groups, correlations=correlations, scales=self.scales)
 
     @cached_property
     def scale(self) -> Array:
@@ -60,6 +66,19 @@ class Priors:
     def sd(self) -> Array:
         """(n,) Standard deviation; inf: nothing is known."""
         return self.stated * self.scale
+
+    @property
+    def factor(self) -> Array:
+        """(n, n) that makes correlated parameters of independent ones of unit variance."""
+        if self.correlations is None:
+            return np.diag(self.sd)
+        return self.sd[:, None] * np.linalg.cholesky(self.correlations)
+
+    @property
+    def precision(self) -> Array:
+        """(n, n) inverse of the covariance; 0 where nothing is known."""
+        inverse = np.eye(len(self.names)) if self.correlations is None else np.linalg.inv(self.correlations)
+        return inverse / np.outer(self.sd, self.sd)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ Ref: MacKay, "Bayesian Interpolation", 1992.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,6 +76,7 @@ class Likelihood:
     information: Array  # (n, n)
     linear: Array  # (n,)
     known: Mask  # (n,) whether a prior sd is stated
+    prior: Array  # (n, n) precision of the prior, in stated prior sd; 0 without
     members: Mapping[str, Mask]  # (n,) the parameters of each group
 
     @classmethod
@@ -93,20 +94,22 @@ class Likelihood:
         groups = [*fit.priors.groups, *[None] * (len(shift) - len(fit.priors.groups))]
         members = {key: known & [group == key for group in groups] for key in dict.fromkeys(groups) if key}
         members = {key: own for key, own in members.items() if own.any()}
-        return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, members)
+        prior = np.eye(len(shift))
+        prior[: len(unit), : len(unit)] = replace(fit.priors, scales={}).precision * np.outer(unit, unit)
+        return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, prior, members)
 
     def log_evidence(self, scales: Scales, derivatives: Collection[str] = ()) -> tuple[float, Array]:
         """Up to a constant, and its derivatives by the logarithms of some scales."""
         scale = np.ones(len(self.linear))
         for key, value in scales.items():
             scale[self.members[key]] = value
-        prior = np.where(self.known, scale**-2, NEARLY_NONE)
-        factor = cho_factor(self.information + np.diag(prior))
+        prior = self.prior / np.outer(scale, scale)
+        factor = cho_factor(self.information + prior + np.diag(np.where(self.known, 0.0, NEARLY_NONE)))
         z = cho_solve(factor, self.linear)
         value = 0.5 * self.linear @ z - np.log(np.diag(factor[0])).sum() - np.log(scale[self.known]).sum()
         if not derivatives:
             return float(value), np.zeros(0)
-        each = prior * (z**2 + np.diag(cho_solve(factor, np.eye(len(z))))) - 1
+        each = z * (prior @ z) + np.sum(cho_solve(factor, np.eye(len(z))) * prior, axis=1) - 1
         return float(value), np.array([each[self.members[key]].sum() for key in derivatives])
 
     def posterior(self, scales: Scales) -> float:

@@ -4,7 +4,7 @@ Names and units are those of the compiled library, in SI; tracker.rotation is th
 of the file, about the tracker's axes, as a rotation vector.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
@@ -60,6 +60,7 @@ _UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
 }
 CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little more than the sums of the two
 _UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
+LEAST_EIGENVALUE = 1e-6  # of correlations: beyond it they leave a sum of parameters exactly known
 ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
 
 
@@ -181,6 +182,33 @@ def priors(
     if problems:
         raise InputError(problems)
     return tuple(np.array(column, float) for column in (mean, width, low, high))
+
+
+def correlations(robot: Robot, names: Sequence[str]) -> Array | None:
+    """Correlations (n, n) of the priors of parameters by the file's `uncertainty`; None: they are independent.
+
+    Raises InputError for pairs of which the file states no uncertainty, and where all together are impossible.
+    """
+    matrix, problems = np.eye(len(names)), []
+    file = robot._source.file if robot._source else None
+    known = [name for name in names_of(robot.n_tubes) if uncertainty_of(name)]
+    for k, pair in enumerate(robot.uncertainty.correlations):
+        field = f"uncertainty.correlations[{k}]"
+        for name in {pair.first, pair.second}.difference(known):
+            meant = did_you_mean(name, known)
+            hint = f"did you mean {meant}?" if meant else f"names are {known[0]} and others"
+            problems.append(Problem(f"no parameter with an uncertainty is named {name}: {hint}", file, field=field))
+        if pair.first == pair.second:
+            problems.append(Problem(f"{pair.first} is named twice: name two parameters", file, field=field))
+        elif pair.first in names and pair.second in names:
+            i, j = names.index(pair.first), names.index(pair.second)
+            matrix[i, j] = matrix[j, i] = pair.r
+    if not problems and np.linalg.eigvalsh(matrix)[0] < LEAST_EIGENVALUE:
+        text = "no errors can have all these correlations together: leave out some, or make them smaller"
+        problems.append(Problem(text, file, field="uncertainty.correlations"))
+    if problems:
+        raise InputError(problems)
+    return None if np.array_equal(matrix, np.eye(len(names))) else matrix
 
 
 def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
@@ -306,11 +334,11 @@ def group_of(robot: Robot, name: str) -> str | None:
     return f"{key}[{index}]" if key and isinstance(getattr(robot.uncertainty, key), list) else key
 
 
-def uncertainty_at(path: FieldPath) -> tuple[str, int] | None:
-    """As uncertainty_of(), by the path of a field. A rotation vector stands for the turns about the tracker's axes."""
+def name_at(path: FieldPath) -> str | None:
+    """The parameter of a field; that of a rotation vector is the turn about the same axis of the tracker."""
     if path[:2] == ("tracker", "rotation_vector_rad"):
-        return "tracker_frame_deg", path[2]
-    return next((uncertainty_of(name) for name, field in _fields().items() if field.path == path), None)
+        return f"tracker.rotation.{'xyz'[path[2]]}"
+    return next((name for name, field in _fields().items() if field.path == path), None)
 
 
 def _stated_sd(robot: Robot, name: str) -> float | None:

@@ -210,6 +210,14 @@ class Tracker(Section):
         return self.sensor_roll == "known" or self.sensor_roll_deg is not None
 
 
+class Correlation(Section):
+    """Of the priors of two parameters, by their names as fits show them."""
+
+    first: str = Field(description="the name of a parameter, such as tubes.1.length")
+    second: str = Field(description="the name of a parameter, such as tubes.1.length")
+    r: Annotated[float, Quantity("", above=-1.0, most=1.0)]
+
+
 class Uncertainty(Section):
     """Prior standard deviations of calibration parameters: a number for all tubes (of the frame, all axes) or a list
     with one for each."""
@@ -222,6 +230,10 @@ class Uncertainty(Section):
     curved_length_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 50), count=EACH_TUBE, least=0)]
     curvature_percent: Annotated[Each, Quantity("%", usual=(0.01, 100), count=EACH_TUBE, least=0)]
     youngs_modulus_percent: Annotated[Each, Quantity("%", usual=(0.01, 200), count=EACH_TUBE, least=0)]
+
+    correlations: list[Correlation] = Field(
+        default_factory=list, description="a list of pairs of parameters: first, second, r; others are independent"
+    )
 
     def of(self, key: str, index: int) -> float:
         """The standard deviation of a tube or an axis, from 0, in the unit of the key."""

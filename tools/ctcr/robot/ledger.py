@@ -31,13 +31,12 @@ _RECORDED_NOTE = "of the controller that recorded the tables; remove once it use
 
 @dataclass(frozen=True)
 class Change:
-    """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), or a list of
-    numbers, and its new value in the unit of that field; `deviation` is the standard deviation of the new value, where
-    known."""
+    """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), or a list,
+    and its new value in the unit of that field; `deviation` is the standard deviation of the new value, where known."""
 
     path: FieldPath
     unit: str
-    new: float | list[float]
+    new: float | list
     deviation: float | None = None
 
 
@@ -165,7 +164,8 @@ def _tidy(value: Any) -> Any:
         value = value.tolist()
     if isinstance(value, list | tuple):
         made = CommentedSeq(_tidy(each) for each in value)
-        made.fa.set_flow_style()
+        if not any(isinstance(each, Mapping) for each in value):
+            made.fa.set_flow_style()
         return made
     return _shortest(value) if isinstance(value, float) else value
 
@@ -177,9 +177,9 @@ def _one_line(row: Mapping[str, Any]) -> CommentedMap:
 
 
 def _plain(value: Any) -> Any:
-    """A number of the document, or a list of them, without its layout."""
-    if isinstance(value, list):
-        return _tidy([_plain(each) for each in value])
+    """A value of the document without its layout."""
+    if isinstance(value, list | dict):
+        return _tidy(value)
     return float(value) if isinstance(value, float) else value
 
 
