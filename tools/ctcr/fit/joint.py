@@ -28,6 +28,7 @@ from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.robot.description import Robot
+from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 
@@ -182,7 +183,9 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
             if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break
     except ValueError as error:
-        raise NoFit([Problem(line) for line in str(error).splitlines()]) from None
+        unsolved = _numbered(model.unsolved())
+        hint = f": the model has no solution for {unsolved}; correct their joints or loads, or leave them out"
+        raise NoFit([Problem(line + hint * bool(unsolved)) for line in str(error).splitlines()]) from None
     own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
     warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded)], perf_counter() - began
     return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
@@ -305,7 +308,9 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
 
 def _exclusion_warnings(rows: Sequence[int]) -> list[str]:
     """Names rows without a solution, counted from 0."""
-    if not rows:
-        return []
-    shown = ", ".join(str(row + 1) for row in rows[:8]) + (" .." if len(rows) > 8 else "")
-    return [f"{len(rows)} readings were left out, for which the model has no solution: number {shown}"]
+    return [f"the model has no solution for {_numbered(rows)}, which are left out"] if rows else []
+
+
+def _numbered(rows: Sequence[int]) -> str:
+    """Rows counted from 0 as readings counted from 1; "" without any."""
+    return f"{len(rows)} readings, number {listed([row + 1 for row in rows], 8)}" if rows else ""

@@ -239,9 +239,9 @@ private:
     out.reduced_chi_square = out.chi_square / (out.bulk_observations - out.effective_parameters);
     out.log_evidence = -0.5 * (here_.chi_square + out.shift_square + posterior.log_determinant() +
                                whitening.log_determinant() + double(out.observations) * std::log(2 * std::numbers::pi));
-    if (options_.correlations) out.log_evidence -= options_.correlations->llt().matrixLLT().diagonal().array().log().sum();
-    if ((objective_.prior().diagonal().array() == 0).any())
-      out.log_evidence = std::numeric_limits<double>::quiet_NaN();
+    if (options_.correlations)
+      out.log_evidence -= options_.correlations->llt().matrixLLT().diagonal().array().log().sum();
+    if ((objective_.prior().diagonal().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
   }
 
   void report_convergence(Identification& out) const {
