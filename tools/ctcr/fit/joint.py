@@ -121,7 +121,8 @@ def fit_joint(
     model.activate(few.tolist())
     first = _fit_widened(*arguments, replace(how, tolerance=settings.COARSE))
     model.activate(rows.tolist())
-    fitted = _fit_widened(model, first.priors, noise, positions, replace(how, start=first.values, starts=1))
+    how = replace(how, start=first.values, starts=1, scales=first.priors.scales)
+    fitted = _fit_widened(*arguments, how)
     return replace(fitted, starts=first.starts)
 
 
@@ -129,18 +130,19 @@ def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: 
     """As fit_joint(), of the active rows. Uncertainties that the readings contradict are widened, which changes what
     the readings say: fits and scales alternate until little is gained."""
     if how.scales is not None:
-        return _fit_active(model, replace(priors, scales=how.scales), noise, positions, how)
+        priors = replace(priors, scales=how.scales)
     fit = _fit_active(model, priors, noise, positions, how)
-    while True:
+    for _ in range(settings.WIDENINGS if how.scales is None and any(priors.groups) else 0):
         likelihood = Likelihood.of(fit)
         scales = likelihood.likeliest()
         if likelihood.posterior(scales) - likelihood.posterior(fit.priors.scales) < settings.COARSE:
-            return fit
+            break
         again = replace(how, start=fit.values, starts=1)
         refitted = _fit_active(model, replace(priors, scales=scales), noise, positions, again)
-        if not refitted.log_evidence > fit.log_evidence:
-            return fit
+        if refitted.log_evidence < fit.log_evidence:
+            break
         fit = replace(refitted, starts=fit.starts)
+    return fit
 
 
 def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:

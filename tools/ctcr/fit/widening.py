@@ -87,16 +87,19 @@ class Likelihood:
         stated = fit.priors.stated
         known = np.isfinite(stated)
         unit = np.where(known, stated, 1 / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny))
-        columns, shift = jacobian * unit, (fit.values - fit.priors.mean) / unit
+        shift = (fit.values - fit.priors.mean) / unit
         if more is not None:
-            columns, shift = np.hstack([columns, more]), np.append(shift, np.zeros(more.shape[1]))
-            known = np.append(known, np.ones(more.shape[1], bool))
+            one = np.ones(more.shape[1])
+            jacobian, known = np.hstack([jacobian, more]), np.append(known, one > 0)
+            unit, shift = np.append(unit, one), np.append(shift, 0 * one)
+        information = jacobian.T @ jacobian * np.outer(unit, unit)
         groups = [*fit.priors.groups, *[None] * (len(shift) - len(fit.priors.groups))]
         members = {key: known & [group == key for group in groups] for key in dict.fromkeys(groups) if key}
         members = {key: own for key, own in members.items() if own.any()}
         prior = np.eye(len(shift))
-        prior[: len(unit), : len(unit)] = replace(fit.priors, scales={}).precision * np.outer(unit, unit)
-        return cls(columns.T @ columns, columns.T @ (columns @ shift - residual), known, prior, members)
+        n = len(fit.names)
+        prior[:n, :n] = replace(fit.priors, scales={}).precision * np.outer(unit[:n], unit[:n])
+        return cls(information, information @ shift - unit * (jacobian.T @ residual), known, prior, members)
 
     def log_evidence(self, scales: Scales, derivatives: Collection[str] = ()) -> tuple[float, Array]:
         """Up to a constant, and its derivatives by the logarithms of some scales."""

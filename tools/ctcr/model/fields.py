@@ -27,6 +27,11 @@ class Fitted:
     widened: float  # factor on the stated deviation, which the readings contradict; 1: as stated
 
     @property
+    def sd_left(self) -> float:
+        """Posterior standard deviation over the prior one as stated."""
+        return self.widened * self.ratio
+
+    @property
     def moved_far(self) -> bool:
         """Whether what the file says of it can hardly be true."""
         return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR * self.widened
