@@ -108,7 +108,7 @@ struct UnitNoise {
     : scale(Eigen::Index(parameters.size())),
       whitening({.position_jitter = 1, .rotation_jitter = 1}, {Eigen::MatrixXd(rows, 0), Eigen::VectorXd::Zero(rows)},
                 RowWeights::Ones(rows, 2)),
-      objective(predict, parameters, scaled(parameters)),
+      objective(predict, parameters, scaled(parameters), prior_precision(parameters)),
       bounds(parameters, {}, scale) {
     objective.set_whitening(whitening);
   }

@@ -90,6 +90,8 @@ STARTS = 3  # starts that are compared
 FRICTION_PATH_CHANGE = 0.005  # [rad] of relative torsion angle below which the friction path is solved
 FRICTION_PATH_ROUNDS = 10  # fits, each followed by a solution of the friction path, at most
 FRICTION_PATH_ITERATIONS = 2  # of a fit whose friction path still changes much
+WIDENINGS = 5  # fits, each followed by new scales on the stated uncertainties, at most: two or three suffice
+WIDEST = 1000.0  # factor on a stated uncertainty, at most: beyond it lies no data sheet, but another unit
 
 KINKED = ".curved_length"  # parameters in which chi-square has a kink: where the curve just reaches the plate
 ONE_SIDED_WIDTH = 2.0  # [sd] at which the sides of a kink are judged

@@ -7,7 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ctcr.errors import InputError
+from ctcr.fit.result import Priors
+from ctcr.model import parameters
 from ctcr.robot import robot_file
+from ctcr.robot.description import Correlation
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / "examples" / "data" / "calibration"
@@ -121,6 +125,81 @@ def test_chain(run, tmp_path):
     assert len(final.history) == len(STEPS)
     assert final.actuation.recorded_home_rotation_deg == [0.0, 0.0, 0.0]
     np.testing.assert_allclose(final.actuation.home_translation_mm, truth("home translation"), atol=2.5)
+
+
+@pytest.mark.parametrize(
+    "command, table, options, known",
+    [
+        ("cantilever", "cantilever.csv", ("--tube", 1, "--diameter-sd-mm", 0.005), {"tubes.1.youngs_modulus"}),
+        (
+            "curvature",
+            "picture.csv",
+            ("--tube", 2, "--mm-per-px", 0.083333),
+            {"tubes.2.curvature", "tubes.2.curved_length"},
+        ),
+        ("rotation-offset", "circles.csv", (), {f"actuation.home_rotation.{i}" for i in (1, 2, 3)}),
+        (
+            "registration",
+            "points.csv",
+            (),
+            {f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"},
+        ),
+    ],
+)
+def test_becomes_prior(run, tmp_path, command, table, options, known):
+    """What a procedure measures is the prior of the next fit, with its standard deviation; other priors stay."""
+    code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "-o", tmp_path / "new.yaml", "--json", "-")
+    assert code == 0, err
+    before, after = robot_file.load(ROBOT), robot_file.load(tmp_path / "new.yaml")
+    names = parameters.expand("standard", before)
+    old, new = (parameters.priors(robot, names)[1] for robot in (before, after))
+    assert {name for name, a, b in zip(names, old, new, strict=True) if not np.isclose(a, b, rtol=0.02)} == known
+    units = {"GPa": 1e9, "1/m": 1.0, "mm": 1e-3, "deg": np.pi / 180, "rad": 1.0}
+    measured = {
+        row["sd"] * units[row["unit"]] for row in json.loads(out)["values"] if row["sd"] and row["unit"] in units
+    }
+    for name in known:
+        assert np.min(np.abs(np.log(np.array([*measured]) / new[names.index(name)]))) < 0.01
+    fields = [row["field"] for row in after.history[-1]["changes"]]
+    assert any(field.startswith("uncertainty.") for field in fields)
+
+
+def test_correlated_prior(run, tmp_path):
+    """Home and length come from one ruler: as priors of the next fit they keep what the encoder knows of their sum."""
+    code, out, err = run("home", DATA / "home.csv", "--robot", ROBOT, "-o", tmp_path / "new.yaml", "--json", "-")
+    assert code == 0, err
+    robot = robot_file.load(tmp_path / "new.yaml")
+    deployed = [1e-3 * row["sd"] for row in json.loads(out)["values"] if row["name"].strip() == "deployed at home"]
+    for tube, sd in enumerate(deployed, start=1):
+        priors = Priors.of(robot, [f"tubes.{tube}.length", f"actuation.home_translation.{tube}"], np.zeros((0, 3)))
+        covariance = np.linalg.inv(priors.precision)
+        assert np.sqrt(covariance.sum()) == pytest.approx(sd, rel=0.05) and sd < 0.3 * priors.sd[0]
+    pairs = [{pair.first, pair.second} for pair in robot.uncertainty.correlations]
+    assert pairs == [{f"tubes.{i}.length", f"actuation.home_translation.{i}"} for i in (1, 2, 3)]
+    again = tmp_path / "again.yaml"
+    code, out, err = run("home", DATA / "home.csv", "--robot", tmp_path / "new.yaml", "-o", again)
+    assert code == 0 and robot_file.load(again).uncertainty == robot.uncertainty, err
+
+
+@pytest.mark.parametrize(
+    "pairs, words",
+    [
+        ([("tubes.1.lenght", "tubes.2.length", 0.5)], "did you mean tubes.1.length?"),
+        ([("tubes.1.length", "tubes.1.length", 0.5)], "tubes.1.length is named twice"),
+        (
+            [("tubes.1.length", "tubes.1.poisson_ratio", 0.5)],
+            "no parameter with an uncertainty is named tubes.1.poisson",
+        ),
+        ([(f"tubes.{i}.length", f"tubes.{i % 3 + 1}.length", -0.9) for i in (1, 2, 3)], "no errors can have all these"),
+    ],
+)
+def test_bad_correlations(pairs, words):
+    """Correlations of unknown parameters, and such as no errors can have, are refused in words."""
+    robot = robot_file.load(ROBOT)
+    robot.uncertainty.correlations = [Correlation(first=a, second=b, r=r) for a, b, r in pairs]
+    with pytest.raises(InputError) as error:
+        parameters.correlations(robot, parameters.expand("standard", robot))
+    assert words in str(error.value) and "uncertainty.correlations" in str(error.value)
 
 
 def test_in_place(run, tmp_path):

@@ -10,12 +10,7 @@ ROOT = Path(__file__).parents[3]
 SHARED = ROOT.parent / "shared" / "data" / "hidden_effect"
 FLOORS = ("sensor_jitter_mm", "expected_error_mm")
 MISSING = "something is missing in the model"
-TABLES = [
-    ROOT / "examples/data/demo",
-    ROOT / "examples/data/calibration",
-    SHARED / "set02",
-    SHARED / "set07",
-]
+TABLES = [ROOT / "examples/data/demo", ROOT / "examples/data/calibration", SHARED / "set02", SHARED / "set07"]
 
 
 def told(tmp_path, *arguments):

@@ -56,7 +56,7 @@ def test_unconverged_fit(weighted):
 def test_contenders_converge(weighted, monkeypatch):
     """A candidate that is slow to fit does not lose to one that is quick."""
     monkeypatch.setattr(settings, "FIRST_ITERATIONS", 1)
-    before = weighted.fit()
+    before = weighted.less_widened(weighted.fit(), candidates(weighted.robot, weighted.measurements)[0], {})
     screened = rounds.screen(weighted, before, pool(weighted, "tip_load", "softening"), {})
     tried = rounds.Refits(weighted, before, {}).of_all(screened)
     best = max(tried, key=lambda one: one.score)

@@ -91,6 +91,9 @@ SINGLE_FAULTS = [
     ("rate_Hz", "fast", "tracker.rate_Hz", "is not a number"),
     ("home_translation_mm", "[1, 2]", "actuation.home_translation_mm", "one a tube"),
     ("tracker_frame_mm", "-1", "uncertainty.tracker_frame_mm", ">= 0"),
+    ("tracker_frame_mm", "[1, 2]", "uncertainty.tracker_frame_mm", "needs 3, one for each axis"),
+    ("curvature_percent", "[1, 2]", "uncertainty.curvature_percent", "needs 3, one for each tube"),
+    ("length_mm", "[1, one, 2]", "tubes[0].length_mm", "needs a number in mm"),
     ("name", "3", "name", "needs text"),
 ]
 

@@ -52,11 +52,12 @@ std::pair<Identification, std::vector<int>> identify_any(
     const Eigen::MatrixX3d& positions, const std::optional<Eigen::MatrixX2d>& weights,
     const std::optional<Eigen::Vector2d>& inflation, const std::optional<Eigen::VectorXd>& start,
     const std::optional<Eigen::MatrixX2d>& first_weights, int starts, int max_iterations, double tolerance,
-    const Known& known, const Within& within) {
+    const Known& known, const Within& within, const std::optional<Eigen::MatrixXd>& correlations) {
   const std::vector<FreeParameter> parameters = free_parameters(names, mean, sd, low, high);
   IdentifyOptions options;
   options.weights = weights;
   if (inflation) options.inflation = inflation->array();
+  options.correlations = correlations;
   options.start = start;
   options.first_weights = first_weights;
   options.starts = starts;
@@ -171,7 +172,7 @@ void bind_identify(nb::module_& m) {
       "identify", &identify_any, nb::kw_only(), "predict"_a, "names"_a, "mean"_a, "sd"_a, "low"_a, "high"_a, "noise"_a,
       "positions"_a, "weights"_a.none() = nb::none(), "inflation"_a.none() = nb::none(), "start"_a.none() = nb::none(),
       "first_weights"_a.none() = nb::none(), "starts"_a = 3, "max_iterations"_a = 50, "tolerance"_a = 0.02,
-      "known"_a = Known{}, "within"_a = Within{},
+      "known"_a = Known{}, "within"_a = Within{}, "correlations"_a.none() = nb::none(),
       "Fits a Recording, or a function (x, derivatives) -> (residual, jacobian) or None. Returns the fit and the rows "
       "left out because they could not be solved. Raises ValueError where no fit is possible.");
 }

@@ -4,10 +4,10 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Integers, Mask
-from ctcr.conventions.alignment import aligned
 from ctcr.errors import InputError, Problem
 from ctcr.fit import floors
-from ctcr.fit.result import Fit, rms
+from ctcr.fit.result import Fit
+from ctcr.fit.widening import widened
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
 from ctcr.model.noise import noise_of_readings
@@ -69,35 +69,21 @@ def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
     said_as_doubts = "prior standard deviations"
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
     explained = not unexplained or floors.explains(fit, noise_of_readings(robot, readings))
-    said = [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
+    said = [sentence(wider.text) for wider in widened(robot, fit.priors.scales)]
+    said += [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
-    return said + _frame_elsewhere(readings, fit)
+    return said
 
 
 def sentence(text: str) -> str:
     """A warning of a fit as a sentence."""
     first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
     return first + ("" if text.endswith(".") else ".")
-
-
-def _frame_elsewhere(readings: Measurements, fit: Fit) -> list[str]:
-    """A sentence where most of the error that the noise does not explain disappears with another tracker frame."""
-    fitted = readings.rows(fit.used)
-    error = fit.residual[fit.used, :3]
-    _, _, left = aligned(fitted.positions - error, fitted.positions)
-    before, after = 1e3 * rms(error), 1e3 * rms(left[:, None])
-    if fit.p_value > settings.SIGNIFICANCE or not after < settings.CONVENTION_CLEAR * before:
-        return []
-    return [
-        f"Another tracker frame leaves {wording.mm(after)} of the {wording.mm(before)} RMS error, but lies "
-        "further off than the robot file allows: find it with `ctcr calibrate registration`, or widen "
-        "tracker_frame_mm and tracker_frame_deg under uncertainty."
-    ]
 
 
 def _rows(rows: Integers) -> str:

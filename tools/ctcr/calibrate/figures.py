@@ -88,9 +88,9 @@ def shifts(figure, c: Calibration) -> None:
     axes = figure.subplots()
     for y, item in enumerate(items):
         colour = ERROR if item.implausible or item.moved_far else FAINT if item.says_nothing else OUT
-        axes.hlines(y, item.shift - item.ratio, item.shift + item.ratio, color=colour, lw=2.2)
+        axes.hlines(y, item.shift - item.sd_left, item.shift + item.sd_left, color=colour, lw=2.2)
         axes.plot(item.shift, y, "o", color=colour, ms=4.5)
-    reach = max(3.0, 1.1 * max(abs(item.shift) + item.ratio for item in items))
+    reach = max(3.0, 1.1 * max(abs(item.shift) + item.sd_left for item in items))
     axes.axvspan(-2, 2, color="#eef2f5", lw=0, zorder=0)
     axes.axvspan(-1, 1, color="#dfe6eb", lw=0, zorder=0)
     axes.axvline(0, color=NOISE, lw=0.8)

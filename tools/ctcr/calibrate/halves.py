@@ -83,6 +83,6 @@ def _difference_covariance(first: Fit, second: Fit) -> Array:
     prior, which does not drive them apart.
     """
     a, b = (np.nan_to_num(fit.covariance, posinf=0.0, neginf=0.0) for fit in (first, second))
-    prior = np.diag(1 / first.prior_sd**2)
+    prior = first.priors.precision
     covariance = a + b - a @ prior @ b - b @ prior @ a
     return (covariance + covariance.T) / 2

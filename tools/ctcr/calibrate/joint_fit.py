@@ -14,7 +14,7 @@ from ctcr.audit import sensor_roll
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
 from ctcr.errors import InputError, Problem
-from ctcr.fit import folds, joint
+from ctcr.fit import folds, joint, widening
 from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import placed
@@ -98,6 +98,7 @@ class Calibration:
             **{name: getattr(fit, name) for name in (*plain, "seconds")},
             "unexplained_scatter": {"position_mm": self.unexplained.rms_mm, "rotation_deg": self.unexplained.rms_deg},
             "correlations": [{"first": a, "second": b, "r": r} for a, b, r in fit.correlations],
+            "widened": widening.widened(self.before, fit.priors.scales),
             "undetermined": [{"text": d.text, "ratio": d.ratio} for d in fit.directions],
             **self.floors.as_dict(),
             "frames": sessions and sessions.as_dict(),
@@ -153,7 +154,9 @@ def calibrate(
             return found
 
         def refitted(like: Fit, rows: Array) -> Fit:
-            return fitted(names, rows=rows, noise=like.noise, inflation=like.inflation, starts=1)
+            return fitted(
+                names, rows=rows, noise=like.noise, inflation=like.inflation, scales=like.priors.scales, starts=1
+            )
 
         tried = _explaining(fitted(names, noise=one) for one in _noises(robot, readings, noise))
         fit, held_out = tried[-1], None

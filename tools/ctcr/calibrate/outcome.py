@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import isfinite, nan
+from math import degrees, inf, isfinite, nan
 from typing import Any
 
 from ctcr.calibrate.procedure_figures import WIDTH
 from ctcr.errors import InputError, Problem
-from ctcr.model.parameters import value_at
+from ctcr.model.parameters import name_at, uncertainty_of, value_at
 from ctcr.robot import ledger
 from ctcr.robot.ledger import Change, Entry
 from ctcr.robot.yaml_document import FieldPath
@@ -43,7 +43,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The rows to show and notices about them."""
+    """The rows to show and notices about them. `correlations`: pairs of the rows' paths, and r of their errors."""
 
     title: str
     rows: list[Row]
@@ -51,6 +51,7 @@ class Outcome:
     figures: dict[str, Any] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     picture: Picture | None = None
+    correlations: list[tuple[FieldPath, FieldPath, float]] = field(default_factory=list)
 
     @property
     def changes(self) -> list[Change]:
@@ -91,7 +92,32 @@ def check_target(robot, target: str | None, in_place: bool, needed: bool = False
 def write_robot(outcome: Outcome, robot, target: str, command: str, source: str, in_place: bool) -> None:
     """Writes the robot file with the changes, and an entry of its ledger."""
     entry = Entry(command, [source], outcome.figures, " ".join(outcome.notices))
-    ledger.write(robot, target, outcome.changes, entry, in_place=in_place)
+    changes = [*outcome.changes, *_uncertainties(robot, outcome.rows), *_correlations(robot, outcome)]
+    ledger.write(robot, target, changes, entry, in_place=in_place)
+
+
+def _uncertainties(robot, rows: list[Row]) -> list[Change]:
+    """The standard deviations of measured values, which become the priors of the next fit, a list for each key."""
+    found: dict[str, list[float]] = {}
+    for row in rows:
+        name = name_at(row.path) if row.path and row.value and 0 < row.sd < inf else None
+        if name is None or uncertainty_of(name) is None:
+            continue
+        key, index = uncertainty_of(name)
+        count = 3 if row.path[0] == "tracker" else robot.n_tubes
+        each = found.setdefault(key, [robot.uncertainty.of(key, i) for i in range(count)])
+        factor = 100 / abs(row.value) if key.endswith("_percent") else degrees(1) if row.unit == "rad" else 1.0
+        each[index] = float(f"{factor * row.sd:.3g}")
+    return [Change(("uncertainty", key), key.rsplit("_", 1)[-1], each) for key, each in found.items()]
+
+
+def _correlations(robot, outcome: Outcome) -> list[Change]:
+    """Those of the measured values, in place of all that the file says of these."""
+    measured = {name_at(row.path) for row in outcome.rows if row.path}
+    old = robot.uncertainty.correlations
+    kept = [vars(pair) for pair in old if not {pair.first, pair.second} & measured]
+    found = [{"first": name_at(a), "second": name_at(b), "r": float(f"{r:.3g}")} for a, b, r in outcome.correlations]
+    return [Change(("uncertainty", "correlations"), "", [*kept, *found])] if found or len(kept) < len(old) else []
 
 
 def show(console, outcome: Outcome) -> None:

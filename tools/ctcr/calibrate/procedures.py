@@ -212,9 +212,10 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
         1e3 * np.asarray(getattr(fit, name))
         for name in ("offset", "offset_sd", "length", "length_sd", "deployed", "deployed_sd")
     )
-    rows, old = [], []
+    rows, old, correlations = [], [], []
     for i, tube in enumerate(tubes):
         before = []
+        correlations.append((("actuation", "home_translation_mm", i), ("tubes", i, "length_mm"), fit.correlation[i]))
         for name, path, value, sd in (
             ("home translation", ("actuation", "home_translation_mm", i), offset[i], offset_sd[i]),
             ("length", ("tubes", i, "length_mm"), length[i], length_sd[i]),
@@ -227,7 +228,7 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
     caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
     picture = Picture(figures_of.homes, (tubes, offset, deployed, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
     notices, details = [notice.text for notice in fit.notices], {"correlation": fit.correlation}
-    return Outcome("Home", rows, notices, {}, details, picture)
+    return Outcome("Home", rows, notices, {}, details, picture, correlations)
 
 
 def check_tube(tube: int, robot: Robot | None, file: str, row: int | None = None) -> None:
@@ -366,7 +367,8 @@ def curvature(
     ends, bend = (np.asarray(fit.junction), np.asarray(fit.tip)), fit.curved_length / abs(fit.radius)
     caption = "The points on the fitted tube; the mark is where its curve starts."
     picture = Picture(figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)), caption, 5.0)
-    return Outcome("Shape of the tube", rows, notices, {"shape_rms_mm": 1e3 * fit.rms}, details, picture)
+    pair = (_path(tube, "curvature_per_m"), _path(tube, "curved_length_mm"), sign * fit.correlation)
+    return Outcome("Shape of the tube", rows, notices, {"shape_rms_mm": 1e3 * fit.rms}, details, picture, [pair])
 
 
 def _path(tube: int | None, field: str) -> FieldPath:

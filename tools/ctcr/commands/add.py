@@ -69,6 +69,8 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
 
 
 def _as_data(added) -> dict:
+    from ctcr.fit.widening import widened
+
     return {
         "added": added.ids,
         "effects": added.robot.effects,
@@ -80,6 +82,7 @@ def _as_data(added) -> dict:
         "frames": added.sessions and added.sessions.as_dict(),
         "reduced_chi_square": added.fit.reduced_chi_square,
         "converged": added.fit.converged,
+        "widened": widened(added.robot, added.fit.priors.scales),
         "notices": added.notices,
     }
 

@@ -128,11 +128,13 @@ def _is_jump(tried: Tried) -> bool:
     """
     if not tried.hypothesis.offset:
         return True
-    uncertainty, name = tried.case.robot.uncertainty, tried.hypothesis.frees
-    sd = {"alpha": np.deg2rad(uncertainty.rotation_offset_deg), "beta": 1e-3 * uncertainty.translation_offset_mm}
-    kind, size = tried.hypothesis.offset[0], offset_of(tried)
+    kind, tube, _ = tried.hypothesis.offset
+    uncertainty, size = tried.case.robot.uncertainty, offset_of(tried)
+    sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
+    if kind == "beta":
+        sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
     right = kind == "alpha" and size % (np.pi / 2) == 0
-    return abs(size) > jump(name, sd[kind]) and (right or _is_noise(tried.case.fit))
+    return abs(size) > jump(tried.hypothesis.frees, sd) and (right or _is_noise(tried.case.fit))
 
 
 def offset_of(tried: Tried) -> float:
@@ -145,7 +147,7 @@ def offset_of(tried: Tried) -> float:
     old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
     size += factor * (new - old)
     right = np.pi / 2 * round(size / (np.pi / 2))
-    near = 3 * np.deg2rad(tried.case.robot.uncertainty.rotation_offset_deg)
+    near = 3 * np.deg2rad(tried.case.robot.uncertainty.of("rotation_offset_deg", tube))
     return right if kind == "alpha" and right and abs(size - right) < near else size
 
 

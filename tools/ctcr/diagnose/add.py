@@ -24,6 +24,7 @@ from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.floors import Floors, floors, warnings
 from ctcr.fit.result import rms
 from ctcr.fit.sessions import placed
+from ctcr.fit.widening import widened
 from ctcr.model import fields
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.sessions import as_given
@@ -282,7 +283,8 @@ def _stage(name: str, residual: Array, rows: Mask) -> Stage:
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
     """Doubts about the fitted effects; `explained`: whether the noise explains what is left."""
     known = catalogue.parameter_of(robot.n_tubes)
-    said = [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
+    said = [sentence(wider.text) for wider in widened(robot, fit.priors.scales)]
+    said += [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
     index = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)

@@ -8,9 +8,11 @@ import numpy as np
 
 from ctcr import _core, settings
 from ctcr.arrays import Array, Mask
+from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.linearised import Linear
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
+from ctcr.fit.widening import Likelihood, Scales
 from ctcr.model import parameters, recording, user_recording
 from ctcr.model.sessions import without_frame
 from ctcr.robot.description import Robot
@@ -34,6 +36,7 @@ class Engine:
     positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
     base: list[str] = field(init=False)  # names of the calibration parameters
     _friction_path: _core.Recording | None = field(init=False, default=None)  # of the last fit with friction
+    _scales: Scales = field(init=False, default_factory=dict)  # on the stated uncertainties, of the last fit
 
     def __post_init__(self) -> None:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
@@ -74,7 +77,7 @@ class Engine:
         in fit_joint().
         """
         names = [*self.base, *added]
-        priors = Priors.of(self.robot, names, self.measurements.beta[self.rows])
+        priors = replace(Priors.of(self.robot, names, self.measurements.beta[self.rows]), scales=self._scales)
         at = dict(zip(names, priors.mean, strict=True)) | (start or {})
         at = np.clip([at[name] for name in names], priors.low, priors.high)
         table = self.recording(names, fixed)
@@ -86,6 +89,8 @@ class Engine:
         fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
         if table.friction_is_solved:
             self._friction_path = table
+        if options.get("scales") is None:
+            self._scales = fitted.priors.scales
         return fitted
 
     def fit_like(
@@ -127,6 +132,18 @@ class Engine:
         self.measurements = other.measurements
         return True
 
+    def less_widened(self, fit: joint.Fit, candidates: Iterable[Candidate], fixed: dict[str, float]) -> joint.Fit:
+        """The fit with those scales alone that the readings ask for whatever the candidates do: a data sheet must not
+        be blamed for what an effect may have done."""
+        if not fit.priors.scales:
+            return fit
+        names = [name for name in dict.fromkeys(n for c in candidates for n in c.names) if name not in fit.names]
+        columns = fit.whiten(self.derivatives(fit, names, fixed))
+        scales = Likelihood.of(fit, columns).likeliest()
+        if scales.keys() == fit.priors.scales.keys():
+            return fit
+        return self.fit(effects_in(fit), start=values_of(fit), fixed=fixed, noise=fit.noise, near=True, scales=scales)
+
     def linear_fit(self, at: joint.Fit, **options: Any) -> joint.Fit:
         """joint.linear_fit() of the rows of this engine."""
         return joint.linear_fit(at, rows=self.rows, **options)
@@ -146,7 +163,7 @@ class Engine:
 
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
-        return Linear(residual, jacobian * fit.prior_sd)
+        return Linear(residual, jacobian @ fit.priors.factor)
 
     def derivatives(self, fit: joint.Fit, names: Sequence[str], fixed: dict[str, float] | None = None) -> Array:
         """Of the residual (M, 6, k) by parameters, at their fitted or neutral values, in units of their prior sd.

@@ -23,6 +23,7 @@ from ctcr.effects import catalogue
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import rms
+from ctcr.fit.widening import Widened, widened
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -81,6 +82,11 @@ class Diagnosis:
         """
         return max(self.with_effects.expected_mm(self.judged), self.noise_floor_mm)
 
+    @property
+    def widened(self) -> list[Widened]:
+        """Uncertainties of the robot file that the measurements contradict."""
+        return widened(self.robot, self.final.priors.scales)
+
     def rms_mm_after(self, accepted: Accepted) -> float:
         """RMS error of the judged rows with this effect and those accepted before."""
         return 1e3 * rms(accepted.residual, self.judged)
@@ -110,6 +116,7 @@ class Diagnosis:
                 for a in self.accepted
             ],
             "leftover": {"structured": self.residual.structured, "depends_on": self.depends_on},
+            "widened": [vars(wider) for wider in self.widened],
             "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
             **{name: round(value, 5) for name, value in self.floors.as_dict().items()},
             "frames": self.measurements.sessions and self.measurements.sessions.as_dict(),
@@ -143,7 +150,7 @@ def diagnose(
             break
     if not result.measurements.from_home:
         notices.append("taken to have been at rest at the first reading, not to have come from home: it fits better")
-    result.notices += notices
+    result.notices += [*notices, *(wider.text for wider in result.widened)]
     result.seconds = perf_counter() - began
     return result
 

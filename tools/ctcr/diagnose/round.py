@@ -255,7 +255,7 @@ def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict
     """Values at which the refit will end if the model is linear."""
     fitted = one.candidate.names[: len(one.gain.values)]  # shapes that have no derivatives yet come after
     neutral, sd, _, _ = engine.priors(fitted)
-    moved = before.values + before.prior_sd * one.gain.calibration[: len(before.names)]
+    moved = before.values + before.priors.factor @ one.gain.calibration[: len(before.names)]
     own = dict(zip(fitted, neutral + sd * one.gain.values, strict=True))
     return dict(zip(before.names, map(float, moved), strict=True)) | dict(one.candidate.shape) | own
 

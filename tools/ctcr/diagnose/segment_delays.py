@@ -66,7 +66,7 @@ def widened(engine: Engine, fit: Fit) -> Fit:
     if lags is None or lags.log_evidence <= 0:
         return fit
     more = lags.linear.covariance()[:n, :n] - lags.plain.covariance()
-    covariance = fit.covariance + more * np.outer(fit.prior_sd, fit.prior_sd)
+    covariance = fit.covariance + fit.priors.factor @ more @ fit.priors.factor.T
     sd = np.sqrt(np.diag(covariance))
     return replace(fit, covariance=covariance, sd=sd, ratio=sd / fit.prior_sd)
 

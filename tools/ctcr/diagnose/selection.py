@@ -61,7 +61,7 @@ class Selection:
         while len(self.accepted) < settings.MAX_EFFECTS:
             taken = {identity for a in self.accepted for identity in a.ids}
             open_to = [c for c in pool if c.id not in taken]
-            round_ = run_round(self.engine, self.fit, open_to, self.fits)
+            round_ = self._round(open_to)
             sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= settings.DECISIVE)
             if more > 1 and not sure:
                 return
@@ -74,6 +74,17 @@ class Selection:
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
         self.finished = True
+
+    def _round(self, open_to: list[Candidate]) -> Round:
+        """A round before which no prior was widened for what one of its candidates may have done; where it accepts
+        nothing that is likelier than the wider priors, one with these."""
+        engine, fit = self.engine, self.fit
+        before = engine.less_widened(fit, open_to, parameters_of(self.fits)[1])
+        round_ = run_round(engine, before, open_to, self.fits)
+        best = round_.accepted
+        if before is fit or (best and best.fit.log_evidence > fit.log_evidence + settings.DECISIVE):
+            return round_
+        return run_round(engine, fit, open_to, self.fits)
 
     def _accept(self, round_: Round) -> bool:
         """Adds the effect of a round in its best form; whether the noise rejected the fit in the form of the round."""

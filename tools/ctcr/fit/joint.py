@@ -21,6 +21,7 @@ from ctcr.audit import sensor_roll
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, one_sided
 from ctcr.fit.result import Fit, Priors, rms
+from ctcr.fit.widening import Likelihood, Scales
 from ctcr.frames import base_to_tracker
 from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
@@ -28,6 +29,7 @@ from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.model.sessions import without_frame
 from ctcr.robot.description import Robot
+from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 
@@ -42,7 +44,8 @@ class FitOptions:
     start: Array | None = None  # (n,); the priors' mean by default
     weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
     inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
-    # Log evidences of models can be compared at the same weights and inflation.
+    scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
+    # Log evidences of models can be compared at the same weights, inflation and scales.
     starts: int = 1  # that are compared, all but the first drawn from the priors
     max_iterations: int = settings.ITERATIONS
     tolerance: float = settings.TOLERANCE  # of log evidence
@@ -58,6 +61,7 @@ def fit(
     noise: Noise | None = None,
     weights: Array | None = None,
     inflation: ArrayLike | None = None,
+    scales: Scales | None = None,
     starts: int = settings.STARTS,
 ) -> Fit:
     """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
@@ -75,7 +79,7 @@ def fit(
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
-    given = {"weights": weights, "inflation": inflation}
+    given = {"weights": weights, "inflation": inflation, "scales": scales}
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)
@@ -84,7 +88,7 @@ def fit(
         kept = like.frozen if like else given
         return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept)
 
-    start = _with_frame(model(), priors, noise, positions, rows, **given)
+    start, priors = _with_frame(model(), priors, noise, positions, rows, **given)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
@@ -114,17 +118,37 @@ def fit_joint(
     few = folds.few_of(rows) if few_first else None
     if few is None:
         model.activate(rows.tolist())
-        return _fit_active(*arguments, how)
+        return _fit_widened(*arguments, how)
     model.activate(few.tolist())
-    first = _fit_active(*arguments, replace(how, tolerance=settings.COARSE))
+    first = _fit_widened(*arguments, replace(how, tolerance=settings.COARSE))
     model.activate(rows.tolist())
-    fitted = _fit_active(*arguments, replace(how, start=first.values, starts=1))
+    how = replace(how, start=first.values, starts=1, scales=first.priors.scales)
+    fitted = _fit_widened(*arguments, how)
     return replace(fitted, starts=first.starts)
 
 
+def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
+    """As fit_joint(), of the active rows. Uncertainties that the readings contradict are widened, which changes what
+    the readings say: fits and scales alternate until little is gained."""
+    if how.scales is not None:
+        priors = replace(priors, scales=how.scales)
+    fit = _fit_active(model, priors, noise, positions, how)
+    for _ in range(settings.WIDENINGS if how.scales is None and any(priors.groups) else 0):
+        likelihood = Likelihood.of(fit)
+        scales = likelihood.likeliest()
+        if likelihood.posterior(scales) - likelihood.posterior(fit.priors.scales) < settings.COARSE:
+            break
+        again = replace(how, start=fit.values, starts=1)
+        refitted = _fit_active(model, replace(priors, scales=scales), noise, positions, again)
+        if refitted.log_evidence < fit.log_evidence:
+            break
+        fit = replace(refitted, starts=fit.starts)
+    return fit
+
+
 def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
-    """As fit_joint(), of the active rows. With distributed friction the friction path depends on the parameters: fits
-    and solutions of the path alternate until the path hardly changes."""
+    """As fit_joint(), of the active rows within the priors as they are. With distributed friction the friction path
+    depends on the parameters: fits and solutions of the path alternate until the path hardly changes."""
     began, starts = perf_counter(), how.starts
     start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
     try:
@@ -142,6 +166,7 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
                 high=priors.high,
                 known=list(priors.gauges),
                 within=list(priors.limits),
+                correlations=priors.correlations,
                 noise=noise,
                 positions=np.asarray(positions, dtype=float),
                 weights=how.weights,
@@ -161,7 +186,9 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
             if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break
     except ValueError as error:
-        raise NoFit([Problem(line) for line in str(error).splitlines()]) from None
+        unsolved = _numbered(model.unsolved())
+        hint = f": the model has no solution for {unsolved}; correct their joints or loads, or leave them out"
+        raise NoFit([Problem(line + hint * bool(unsolved)) for line in str(error).splitlines()]) from None
     own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
     warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded)], perf_counter() - began
     return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
@@ -195,11 +222,9 @@ class _FrameAlone(ResidualModel):
 
 def _with_frame(
     model: ResidualModel, priors: Priors, noise: Noise, positions: Array, rows: Mask, **options: Array | None
-) -> Array:
-    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free.
-
-    A frame that is far off would drag the others along.
-    """
+) -> tuple[Array, Priors]:
+    """Nominal values as a start, with the tracker frame that fits them best, where it and others are free; and priors
+    that are wide enough for it. A frame that is far off would drag the others along."""
     start = np.clip(model.nominal(), priors.low, priors.high)
     frame = np.array([name.startswith("tracker.") for name in priors.names])
     if frame.any() and not frame.all() and rows.any():
@@ -209,7 +234,8 @@ def _with_frame(
             alone, priors.some(frame), noise, positions, rows, start=start[frame], few_first=False, **options
         )
         start[frame] = found.values
-    return start
+        priors = replace(priors, scales=found.priors.scales)
+    return start, priors
 
 
 def linear_fit(
@@ -229,7 +255,7 @@ def linear_fit(
         residual = np.where(rows[:, None], residual, nan)
     model = LinearModel(residual.ravel(), at.jacobian_all, at.values, at.prior_mean)
     priors = replace(at.priors, gauges=(), limits=())
-    options |= {"start": at.values, "few_first": False}
+    options |= {"start": at.values, "few_first": False, "scales": priors.scales}
     return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
 
 
@@ -292,7 +318,9 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
 
 def _exclusion_warnings(rows: Sequence[int]) -> list[str]:
     """Names rows without a solution, counted from 0."""
-    if not rows:
-        return []
-    shown = ", ".join(str(row + 1) for row in rows[:8]) + (" .." if len(rows) > 8 else "")
-    return [f"{len(rows)} readings were left out, for which the model has no solution: number {shown}"]
+    return [f"the model has no solution for {_numbered(rows)}, which are left out"] if rows else []
+
+
+def _numbered(rows: Sequence[int]) -> str:
+    """Rows counted from 0 as readings counted from 1; "" without any."""
+    return f"{len(rows)} readings, number {listed([row + 1 for row in rows], 8)}" if rows else ""

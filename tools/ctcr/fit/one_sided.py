@@ -58,13 +58,14 @@ def restarted(fit: Fit, refit: Callable[[Array, Fit | None], Fit]) -> Fit:
 
 def _chi_square(fit: Fit) -> Callable[[Array], float]:
     """Of readings and prior, as a function of the values; inf where the model fails."""
+    precision = fit.priors.precision
 
     def chi_square(values: Array) -> float:
         residual = fit.model.residual(values)[0].reshape(-1, 6)
         if np.isnan(residual[fit.used]).all(axis=1).any():
             return np.inf
-        shift = (values - fit.prior_mean) / fit.prior_sd
-        return float(np.sum(fit.whiten(residual) ** 2) + np.sum(shift[np.isfinite(fit.prior_sd)] ** 2))
+        shift = values - fit.prior_mean
+        return float(np.sum(fit.whiten(residual) ** 2) + shift @ precision @ shift)
 
     return chi_square
 

@@ -1,7 +1,7 @@
 """What a joint fit found: the maximum a posteriori estimate and its Laplace approximation."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import nan
 from types import SimpleNamespace
@@ -13,6 +13,8 @@ from scipy.stats import chi2
 
 from ctcr import _core
 from ctcr.arrays import Array, Integers, Mask
+from ctcr.fit import widening
+from ctcr.fit.widening import Scales
 from ctcr.model import parameters
 from ctcr.model.noise import Noise
 from ctcr.model.protocol import ResidualModel
@@ -22,26 +24,62 @@ from ctcr.robot.description import Robot
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known of n parameters before the readings, SI: independent normal distributions within bounds."""
+    """What is known of n parameters before the readings, SI: a normal distribution within bounds."""
 
     names: list[str]
     mean: Array  # (n,)
-    sd: Array  # (n,); inf: nothing is known
+    stated: Array  # (n,) standard deviation as stated; inf: nothing is known
     low: Array  # (n,)
     high: Array  # (n,)
     gauges: Sequence[tuple[str, Array]] = ()  # changes (n,) that leave the readings nearly as they are, with words
     limits: Sequence[tuple[str, Array, float]] = ()  # least values of row @ change, row (n,), with words
+    groups: Sequence[str | None] = ()  # (n,) which stated number each standard deviation is, see parameters.group_of
+    correlations: Array | None = None  # (n, n); independent without
+    scales: Scales = field(default_factory=dict)  # by group on the stated standard deviations, see fit.widening
 
     @classmethod
     def of(cls, robot: Robot, names: Sequence[str], beta: Array, sd: Any = None) -> "Priors":
         """From the robot file, for joints beta (M, N) [m] that must stay possible; `sd` as of parameters.priors."""
         gauges, limits = parameters.known_directions(robot, names), parameters.admissible(robot, beta, names)
-        return cls(list(names), *parameters.priors(robot, names, sd), gauges, limits)
+        groups = [parameters.group_of(robot, name) for name in names]
+        known, correlations = parameters.priors(robot, names, sd), parameters.correlations(robot, list(names))
+        if correlations is not None:
+            stated = np.isfinite(known[1])  # what is not known at all correlates with nothing
+            correlations = np.where(np.outer(stated, stated), correlations, np.eye(len(names)))
+        return cls(list(names), *known, gauges, limits, groups, correlations)
 
     def some(self, chosen: Mask) -> "Priors":
         """Those of some parameters (n,), without gauges and limits, which combine several."""
         names = [name for name, kept in zip(self.names, chosen, strict=True) if kept]
-        return Priors(names, *(part[chosen] for part in (self.mean, self.sd, self.low, self.high)))
+        parts = (part[chosen] for part in (self.mean, self.stated, self.low, self.high))
+        groups = [group for group, kept in zip(self.groups, chosen, strict=True) if kept]
+        correlations = None if self.correlations is None else self.correlations[np.ix_(chosen, chosen)]
+        return Priors(names, *parts, groups=groups, correlations=correlations, scales=self.scales)
+
+    @cached_property
+    def scale(self) -> Array:
+        """(n,) on the stated standard deviation."""
+        if not self.scales:
+            return np.ones(len(self.names))
+        return np.array([self.scales.get(group, 1.0) for group in self.groups])
+
+    @property
+    def sd(self) -> Array:
+        """(n,) Standard deviation; inf: nothing is known."""
+        return self.stated * self.scale
+
+    @property
+    def factor(self) -> Array:
+        """(n, n) that makes correlated parameters of independent ones of unit variance."""
+        if self.correlations is None:
+            return np.diag(self.sd)
+        return self.sd[:, None] * np.linalg.cholesky(self.correlations)
+
+    @property
+    def precision(self) -> Array:
+        """(n, n) inverse of the covariance; 0 where nothing is known."""
+        inverse = np.eye(len(self.names)) if self.correlations is None else np.linalg.inv(self.correlations)
+        return inverse / np.outer(self.sd, self.sd)
 
 
 @dataclass(frozen=True)
@@ -49,7 +87,8 @@ class Fit:
     """Fitted parameters and their uncertainty. Arrays by parameter (n,) are in SI; by row (M, ..) over all rows.
 
     All attributes of the compiled fit (`_core.Identification`) are attributes of this one:
-    shift, ratio     (n,) (value - mean) / prior sd, and posterior over prior sd: 1 means that the readings say nothing
+    shift, ratio     (n,) (value - mean) / prior sd, and posterior over prior sd: 1 means that the readings say nothing;
+                     the prior sd is the widened one
     directions       undetermined combinations: .text, .ratio, .coefficients in prior sd
     weights          (M, 2) robust weights of position and rotation: 1 plain, less for outliers, 0 not fitted
     inflation        (2,) factor on the jitter of positions and rotations by which the fit admits model error; 1: none
@@ -57,7 +96,6 @@ class Fit:
     shift_square     of the prior; observations: numbers fitted
     bulk_observations    without outliers: degrees of freedom of chi_square + shift_square
     reduced_chi_square, effective_parameters, converged, status, iterations, evaluations
-    log_evidence     log marginal likelihood (Laplace) at these weights and inflation; NaN where a prior is infinite
     """
 
     priors: Priors
@@ -84,6 +122,12 @@ class Fit:
         return self.priors.names
 
     @property
+    def log_evidence(self) -> float:
+        """Log marginal likelihood (Laplace) at these weights, this inflation and these scales, with the prior of the
+        scales; NaN where a prior is infinite."""
+        return self.core.log_evidence + widening.log_prior(self.priors.scales)
+
+    @property
     def prior_mean(self) -> Array:
         return self.priors.mean
 
@@ -103,8 +147,8 @@ class Fit:
 
     @property
     def frozen(self) -> dict[str, Array]:
-        """Options of fits that keep its weights and inflation, so that their evidences can be compared."""
-        return {"weights": self.weights, "inflation": self.inflation}
+        """Options of fits that keep its weights, inflation and scales, so that their evidences can be compared."""
+        return {"weights": self.weights, "inflation": self.inflation, "scales": self.priors.scales}
 
     def without_readings(self) -> "Fit":
         """Its values and statistics alone: small, however many rows there are. It has no residual."""

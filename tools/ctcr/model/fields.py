@@ -21,14 +21,20 @@ class Fitted:
     prior_sd: float
     value: float
     sd: float
-    shift: float  # in prior standard deviations
+    shift: float  # in prior standard deviations as stated
     ratio: float
     implausible: str  # why no real robot has this value, or empty
+    widened: float  # factor on the stated deviation, which the readings contradict; 1: as stated
+
+    @property
+    def sd_left(self) -> float:
+        """Posterior standard deviation over the prior one as stated."""
+        return self.widened * self.ratio
 
     @property
     def moved_far(self) -> bool:
         """Whether what the file says of it can hardly be true."""
-        return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR
+        return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR * self.widened
 
     @property
     def says_nothing(self) -> bool:
@@ -40,7 +46,9 @@ class Fitted:
         """The gravest doubt in a word or two."""
         if self.implausible:
             return "implausible"
-        return "moved far" if self.moved_far else "unknown" if self.says_nothing else ""
+        if self.moved_far:
+            return "moved far"
+        return "widened" if self.widened > 1 else "unknown" if self.says_nothing else ""
 
 
 def doubts(items: list[Fitted]) -> list[str]:
@@ -72,9 +80,10 @@ def fitted(fit) -> list[Fitted]:
     rows = []
     for i, name in enumerate(fit.names):
         field = field_of(name)
-        numbers = [float(field.factor * of[i]) for of in (fit.prior_mean, fit.prior_sd, fit.values, fit.sd)]
-        against_prior = float(fit.shift[i]), float(fit.ratio[i])
-        rows.append(Fitted(name, field.unit, *numbers, *against_prior, _implausible(field, numbers[2])))
+        numbers = [float(field.factor * of[i]) for of in (fit.prior_mean, fit.priors.stated, fit.values, fit.sd)]
+        scale = float(fit.priors.scale[i])
+        against_prior = scale * float(fit.shift[i]), float(fit.ratio[i])
+        rows.append(Fitted(name, field.unit, *numbers, *against_prior, _implausible(field, numbers[2]), scale))
     return rows
 
 

@@ -4,7 +4,7 @@ Names and units are those of the compiled library, in SI; tracker.rotation is th
 of the file, about the tracker's axes, as a rotation vector.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache
@@ -47,6 +47,20 @@ _FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), u
     "tracker.sensor_roll": (("tracker", "sensor_roll_deg"), "deg", 180 / pi),
     "tracker.rotation.*": (None, "deg", 180 / pi),  # a turn of the rotation vector, not one of its numbers
 }
+_UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
+    ("tracker", "position"): "tracker_frame_mm",
+    ("tracker", "rotation"): "tracker_frame_deg",
+    ("actuation", "home_translation"): "translation_offset_mm",
+    ("actuation", "home_rotation"): "rotation_offset_deg",
+    ("tubes", "length"): "length_mm",
+    ("tubes", "curved_length"): "curved_length_mm",
+    ("tubes", "curvature"): "curvature_percent",
+    ("tubes", "youngs_modulus"): "youngs_modulus_percent",
+    ("tubes", "bending_stiffness"): "youngs_modulus_percent",
+}
+CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little more than the sums of the two
+_UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
+LEAST_EIGENVALUE = 1e-6  # of correlations: beyond it they leave a sum of parameters exactly known
 ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
 
 
@@ -170,6 +184,33 @@ def priors(
     return tuple(np.array(column, float) for column in (mean, width, low, high))
 
 
+def correlations(robot: Robot, names: Sequence[str]) -> Array | None:
+    """Correlations (n, n) of the priors of parameters by the file's `uncertainty`; None: they are independent.
+
+    Raises InputError for pairs of which the file states no uncertainty, and where all together are impossible.
+    """
+    matrix, problems = np.eye(len(names)), []
+    file = robot._source.file if robot._source else None
+    known = [name for name in names_of(robot.n_tubes) if uncertainty_of(name)]
+    for k, pair in enumerate(robot.uncertainty.correlations):
+        field = f"uncertainty.correlations[{k}]"
+        for name in {pair.first, pair.second}.difference(known):
+            meant = did_you_mean(name, known)
+            hint = f"did you mean {meant}?" if meant else f"names are {known[0]} and others"
+            problems.append(Problem(f"no parameter with an uncertainty is named {name}: {hint}", file, field=field))
+        if pair.first == pair.second:
+            problems.append(Problem(f"{pair.first} is named twice: name two parameters", file, field=field))
+        elif pair.first in names and pair.second in names:
+            i, j = names.index(pair.first), names.index(pair.second)
+            matrix[i, j] = matrix[j, i] = pair.r
+    if not problems and np.linalg.eigvalsh(matrix)[0] < LEAST_EIGENVALUE:
+        text = "no errors can have all these correlations together: leave out some, or make them smaller"
+        problems.append(Problem(text, file, field="uncertainty.correlations"))
+    if problems:
+        raise InputError(problems)
+    return None if np.array_equal(matrix, np.eye(len(names))) else matrix
+
+
 def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robot:
     """A copy of the robot with other values. New homes leave the old ones as those of the tables."""
     changed, values = robot.model_copy(deep=True), dict(zip(names, map(float, fitted), strict=True))
@@ -278,23 +319,37 @@ def _set(robot: Robot, path: FieldPath, value: float) -> None:
         setattr(section, key, _replaced(old, i, value))
 
 
+def uncertainty_of(name: str) -> tuple[str, int] | None:
+    """Where `uncertainty` holds the standard deviation of a parameter: its key, and which tube or axis, from 0."""
+    section, *rest = name.split(".")
+    which, kind = rest if section == "tubes" else reversed(rest) if len(rest) == 2 else (None, None)
+    key = _UNCERTAINTY.get((section, kind))
+    return key and (key, "xyz".index(which) if which in "xyz" else int(which) - 1)
+
+
+def group_of(robot: Robot, name: str) -> str | None:
+    """The number of the file's `uncertainty` that is the standard deviation of a parameter and maybe of others, such as
+    length_mm, or length_mm[1] in a list; None: there is no such number."""
+    key, index = uncertainty_of(name) or (None, 0)
+    return f"{key}[{index}]" if key and isinstance(getattr(robot.uncertainty, key), list) else key
+
+
+def name_at(path: FieldPath) -> str | None:
+    """The parameter of a field; that of a rotation vector is the turn about the same axis of the tracker."""
+    if path[:2] == ("tracker", "rotation_vector_rad"):
+        return f"tracker.rotation.{'xyz'[path[2]]}"
+    return next((name for name, field in _fields().items() if field.path == path), None)
+
+
 def _stated_sd(robot: Robot, name: str) -> float | None:
     """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
-    u, kind = robot.uncertainty, name.split(".")[2 if name.startswith("tubes.") else 1]
-    size = abs(_value(robot, name))
-    if kind == "sensor_roll":
+    if name == "tracker.sensor_roll":
         return ANYWHERE if robot.tracker.sensor_roll == "unknown" else None
-    if name.startswith("tracker."):
-        return 1e-3 * u.tracker_frame_mm if kind == "position" else pi / 180 * u.tracker_frame_deg
-    return {
-        "home_translation": 1e-3 * u.translation_offset_mm,
-        "home_rotation": pi / 180 * u.rotation_offset_deg,
-        "length": 1e-3 * u.length_mm,
-        "curved_length": 1e-3 * u.curved_length_mm,
-        "curvature": u.curvature_percent / 100 * size,
-        "youngs_modulus": u.youngs_modulus_percent / 100 * size,
-        "bending_stiffness": u.youngs_modulus_percent / 100 * size,
-    }.get(kind)
+    key, index = uncertainty_of(name) or (None, 0)
+    if key is None:
+        return None
+    relative = abs(_value(robot, name)) if key.endswith("_percent") else 1.0
+    return robot.uncertainty.of(key, index) * _UNCERTAINTY_UNITS[key.rsplit("_", 1)[-1]] * relative
 
 
 def _prior(robot: Robot, name: str) -> tuple[float, float | None, float, float]:

@@ -45,10 +45,12 @@ class SessionRecording(ResidualModel):
         self.table, self.as_given, self.readings = table, as_given, readings
         self.index = np.searchsorted(readings.sessions.run, readings.run)
         u, n, wider = robot.uncertainty, robot.n_tubes, settings.SESSION_PRIOR_WIDER
-        frame = [1e-3 * u.tracker_frame_mm, np.radians(u.tracker_frame_deg)]
-        home = [1e-3 * u.translation_offset_mm, np.radians(u.rotation_offset_deg)]
-        width = np.repeat(frame, 3) if homes is None else np.concatenate([np.repeat(frame, 3), np.repeat(home, n)])
-        self.sd = np.maximum(wider * width, np.finfo(float).tiny ** 0.5)  # (k,) of what a run has of its own
+        width = [1e-3 * u.of("tracker_frame_mm", axis) for axis in range(3)]
+        width += [np.radians(u.of("tracker_frame_deg", axis)) for axis in range(3)]
+        if homes is not None:
+            width += [1e-3 * u.of("translation_offset_mm", tube) for tube in range(n)]
+            width += [np.radians(u.of("rotation_offset_deg", tube)) for tube in range(n)]
+        self.sd = np.maximum(wider * np.array(width), np.finfo(float).tiny ** 0.5)  # (k,) of what a run has of its own
         noise = noise_of_readings(robot, readings)
         jitter, field = (noise.position_jitter, noise.rotation_jitter), (noise.position_field, noise.rotation_field)
         self.weight = 1 / np.repeat(np.hypot(jitter, field), 3) ** 2

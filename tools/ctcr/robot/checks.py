@@ -107,6 +107,10 @@ def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
         home = actuation.get(key)
         if tubes and isinstance(home, list) and len(home) != len(tubes):
             yield ("actuation", key), f"has {len(home)} values: needs {len(tubes)}, one a tube"
+    for key, stated in _mapping(data.get("uncertainty")).items():
+        count, what = (3, "axis") if str(key).startswith("tracker_frame") else (len(tubes), "tube")
+        if tubes and key != "correlations" and isinstance(stated, list) and len(stated) != count:
+            yield ("uncertainty", key), f"has {len(stated)} values: needs {count}, one for each {what}, or one for all"
     sensor = tracker.get("sensor_on_tube")
     if tubes and isinstance(sensor, int) and sensor > len(tubes):
         yield ("tracker", "sensor_on_tube"), f"{sensor} is not a tube: the robot has {len(tubes)}"

@@ -3,13 +3,13 @@
 Tubes go from the innermost outwards. Base frame: origin where the tubes leave the front plate, z along insertion.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from math import pi
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from annotated_types import Len
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, field_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, WrapValidator, field_validator
 from pydantic_core import PydanticCustomError
 
 from ctcr.arrays import Array
@@ -23,7 +23,15 @@ AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plat
 Three = Annotated[list[float], Len(3, 3)]
 TRANSLATIONS = Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
 ROTATIONS = Quantity("deg", usual=(0, 360), count="one number a tube,")
+EACH_TUBE, EACH_AXIS = "a number, or a list of one a tube,", "a number, or a list of one an axis,"
 BELOW = "its fields, indented below it"
+
+
+def _each(value: Any, number: Callable[[Any], float]) -> Any:
+    return [number(each) for each in value] if isinstance(value, list) else number(value)
+
+
+Each = Annotated[float, WrapValidator(_each)]  # one number for all, or a list of one for each
 
 
 class Section(BaseModel):
@@ -202,17 +210,35 @@ class Tracker(Section):
         return self.sensor_roll == "known" or self.sensor_roll_deg is not None
 
 
-class Uncertainty(Section):
-    """Prior standard deviations of calibration parameters, independent per tube and per axis."""
+class Correlation(Section):
+    """Of the priors of two parameters, by their names as fits show them."""
 
-    tracker_frame_mm: Annotated[float, Quantity("mm", usual=(1e-3, 100), least=0)]
-    tracker_frame_deg: Annotated[float, Quantity("deg", usual=(1e-3, 90), least=0)]
-    rotation_offset_deg: Annotated[float, Quantity("deg", usual=(1e-3, 180), least=0)]
-    translation_offset_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
-    length_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
-    curved_length_mm: Annotated[float, Quantity("mm", usual=(1e-3, 50), least=0)]
-    curvature_percent: Annotated[float, Quantity("%", usual=(0.01, 100), least=0)]
-    youngs_modulus_percent: Annotated[float, Quantity("%", usual=(0.01, 200), least=0)]
+    first: str = Field(description="the name of a parameter, such as tubes.1.length")
+    second: str = Field(description="the name of a parameter, such as tubes.1.length")
+    r: Annotated[float, Quantity("", above=-1.0, most=1.0)]
+
+
+class Uncertainty(Section):
+    """Prior standard deviations of calibration parameters: a number for all tubes (of the frame, all axes) or a list
+    with one for each."""
+
+    tracker_frame_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 100), count=EACH_AXIS, least=0)]
+    tracker_frame_deg: Annotated[Each, Quantity("deg", usual=(1e-3, 90), count=EACH_AXIS, least=0)]
+    rotation_offset_deg: Annotated[Each, Quantity("deg", usual=(1e-3, 180), count=EACH_TUBE, least=0)]
+    translation_offset_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 50), count=EACH_TUBE, least=0)]
+    length_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 50), count=EACH_TUBE, least=0)]
+    curved_length_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 50), count=EACH_TUBE, least=0)]
+    curvature_percent: Annotated[Each, Quantity("%", usual=(0.01, 100), count=EACH_TUBE, least=0)]
+    youngs_modulus_percent: Annotated[Each, Quantity("%", usual=(0.01, 200), count=EACH_TUBE, least=0)]
+
+    correlations: list[Correlation] = Field(
+        default_factory=list, description="a list of pairs of parameters: first, second, r; others are independent"
+    )
+
+    def of(self, key: str, index: int) -> float:
+        """The standard deviation of a tube or an axis, from 0, in the unit of the key."""
+        stated = getattr(self, key)
+        return stated[index] if isinstance(stated, list) else stated
 
 
 class Robot(Section):

@@ -31,12 +31,12 @@ _RECORDED_NOTE = "of the controller that recorded the tables; remove once it use
 
 @dataclass(frozen=True)
 class Change:
-    """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), and its new
-    value in the unit of that field; `deviation` is the standard deviation of the new value, where known."""
+    """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), or a list,
+    and its new value in the unit of that field; `deviation` is the standard deviation of the new value, where known."""
 
     path: FieldPath
     unit: str
-    new: float
+    new: float | list
     deviation: float | None = None
 
 
@@ -108,11 +108,11 @@ def _apply(document: CommentedMap, change: Change) -> CommentedMap:
     """Sets one value; returns its row of the ledger."""
     *parents, last = change.path
     parent = reduce(getitem, parents, document)
-    old, new = parent.get(last) if isinstance(parent, dict) else parent[last], _shortest(change.new)
+    old = parent.get(last) if isinstance(parent, dict) else parent[last]
     if change.path[0] == "actuation" and change.path[1] in _RECORDED:
         _keep_recorded(document["actuation"], change.path[1])
-    parent[last] = new
-    row = {"field": path_text(change.path), "unit": change.unit, "old": _plain(old), "new": new}
+    parent[last] = _tidy(change.new)
+    row = {"field": path_text(change.path), "unit": change.unit, "old": _plain(old), "new": _tidy(change.new)}
     if change.deviation is not None:
         row["sd"] = _shortest(change.deviation, 3)
     return _one_line(row)
@@ -164,7 +164,8 @@ def _tidy(value: Any) -> Any:
         value = value.tolist()
     if isinstance(value, list | tuple):
         made = CommentedSeq(_tidy(each) for each in value)
-        made.fa.set_flow_style()
+        if not any(isinstance(each, Mapping) for each in value):
+            made.fa.set_flow_style()
         return made
     return _shortest(value) if isinstance(value, float) else value
 
@@ -176,7 +177,9 @@ def _one_line(row: Mapping[str, Any]) -> CommentedMap:
 
 
 def _plain(value: Any) -> Any:
-    """A scalar of the document without its layout."""
+    """A value of the document without its layout."""
+    if isinstance(value, list | dict):
+        return _tidy(value)
     return float(value) if isinstance(value, float) else value
 
 

@@ -6,7 +6,7 @@
 namespace ctcr {
 namespace detail {
 
-/// Minus the log of a posterior near a point z, up to a constant: chi_square / 2 + prior . z^2 / 2 and its derivatives.
+/// Minus the log of a posterior near a point z, up to a constant: chi_square / 2 + z . prior z / 2 and its derivatives.
 struct Linearised {
   double chi_square = 0, cost = 0;
   Eigen::VectorXd gradient;
@@ -17,18 +17,17 @@ struct Linearised {
 /// A posterior in scaled parameters z, x = origin + scale z.
 class Objective {
 public:
-  Objective(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::VectorXd scale)
-    : predict_(predict), scale_(std::move(scale)), origin_(scale_.size()), prior_(scale_.size()) {
-    for (Eigen::Index k = 0; k < scale_.size(); ++k) {
-      const FreeParameter& p = parameters[std::size_t(k)];
-      origin_[k] = p.mean;
-      prior_[k] = std::isfinite(p.sd);
-    }
+  Objective(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::VectorXd scale,
+            Eigen::MatrixXd prior)
+    : predict_(predict), scale_(std::move(scale)), origin_(scale_.size()), prior_(std::move(prior)) {
+    for (Eigen::Index k = 0; k < scale_.size(); ++k) origin_[k] = parameters[std::size_t(k)].mean;
   }
 
   Eigen::VectorXd x(const Eigen::VectorXd& z) const { return origin_ + scale_.cwiseProduct(z); }
   Eigen::VectorXd z(const Eigen::VectorXd& x) const { return (x - origin_).cwiseQuotient(scale_); }
-  const Eigen::VectorXd& prior() const { return prior_; }  ///< precision, 1 or 0
+  const Eigen::MatrixXd& prior() const { return prior_; }  ///< precision
+  /// Of a shift from the prior mean: its square in the metric of the prior.
+  double shift_square(const Eigen::VectorXd& z) const { return z.dot(prior_ * z); }
   int evaluations() const { return evaluations_; }
 
   void set_whitening(Whitening whitening) { whitening_ = std::move(whitening); }
@@ -65,7 +64,7 @@ public:
     if (!point) return std::numeric_limits<double>::infinity();
     Eigen::VectorXd residual = point->residual;
     whitening_.apply(residual);
-    const double cost = 0.5 * (residual.squaredNorm() + prior_.dot(z.cwiseAbs2()));
+    const double cost = 0.5 * (residual.squaredNorm() + shift_square(z));
     return std::isfinite(cost) ? cost : std::numeric_limits<double>::infinity();
   }
   bool linearise(const Eigen::VectorXd& z, Linearised& out) {
@@ -76,17 +75,17 @@ public:
     whitening_.apply(residual);
     whitening_.apply(jacobian);
     out.chi_square = residual.squaredNorm();
-    out.cost = 0.5 * (out.chi_square + prior_.dot(z.cwiseAbs2()));
-    out.gradient = jacobian.transpose() * residual + prior_.cwiseProduct(z);
+    out.cost = 0.5 * (out.chi_square + shift_square(z));
+    out.gradient = jacobian.transpose() * residual + prior_ * z;
     out.information = transposed_product(jacobian, jacobian);
-    out.hessian = out.information;
-    out.hessian.diagonal() += prior_;
+    out.hessian = out.information + prior_;
     return std::isfinite(out.cost) && out.information.allFinite();
   }
 
 private:
   const Predictor& predict_;
-  Eigen::VectorXd scale_, origin_, prior_;
+  Eigen::VectorXd scale_, origin_;
+  Eigen::MatrixXd prior_;
   Whitening whitening_;
   Point point_, held_;
   int evaluations_ = 0;

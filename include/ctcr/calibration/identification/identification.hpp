@@ -17,12 +17,13 @@ struct IdentifyOptions {
   /// Adds jitter where the residuals exceed the noise: else the fit would trade millimetres that look like a field error
   /// for micrometres that do not. Off: the noise is taken as stated.
   bool admit_model_error = true;
-  std::optional<RowWeights> weights = {};        ///< frozen; a weight of 0 leaves a position or a rotation out
-  std::optional<Eigen::Array2d> inflation = {};  ///< frozen, see Identification
-  std::optional<Eigen::VectorXd> start = {};     ///< where to start; the prior means otherwise
-  std::optional<RowWeights> first_weights = {};  ///< of a fit near the start, to begin with; all count otherwise
-  int starts = 3;                                ///< the first and others drawn from the prior, compared at the end
-  int max_iterations = 50;                       ///< of each descent
+  std::optional<RowWeights> weights = {};            ///< frozen; a weight of 0 leaves a position or a rotation out
+  std::optional<Eigen::Array2d> inflation = {};      ///< frozen, see Identification
+  std::optional<Eigen::MatrixXd> correlations = {};  ///< of the priors; independent otherwise
+  std::optional<Eigen::VectorXd> start = {};         ///< where to start; the prior means otherwise
+  std::optional<RowWeights> first_weights = {};      ///< of a fit near the start, to begin with; all count otherwise
+  int starts = 3;                                    ///< the first and others drawn from the prior, compared at the end
+  int max_iterations = 50;                           ///< of each descent
   double tolerance = 0.02;                 ///< of minus the log posterior: where less is to gain, a descent may end
   std::vector<LinearBound> within = {};    ///< bounds of sums of parameters, in addition to those of each
   std::vector<KnownDirection> known = {};  ///< directions that are described in words where they are undetermined
@@ -49,7 +50,7 @@ struct Identification {
 
   double chi_square = 0;            ///< of the residuals under the noise as stated, outliers counting for little
   double admitted_chi_square = 0;   ///< the same under the noise as the fit had to admit it
-  double shift_square = 0;          ///< sum of the squared shifts
+  double shift_square = 0;          ///< sum of the squared shifts, of correlated priors in their metric
   Eigen::Index observations = 0;    ///< numbers fitted
   double bulk_observations = 0;     ///< without the outliers: degrees of freedom of chi_square + shift_square
   double effective_parameters = 0;  ///< trace of the hat matrix: how many the readings determine rather than the prior

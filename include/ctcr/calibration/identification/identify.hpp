@@ -78,7 +78,7 @@ public:
       field_everywhere_(field_at(positions, noise)),
       field_(rows_.field(field_everywhere_)),
       scale_(scale_for(rows_.of(first.jacobian))),
-      objective_(predict_, parameters, scale_),
+      objective_(predict_, parameters, scale_, prior_precision(parameters, options.correlations)),
       bounds_(parameters, options.within, scale_),
       z_(objective_.z(first.x)) {
     objective_.know(z_, rows_.of(first.residual), rows_.of(first.jacobian));
@@ -202,11 +202,12 @@ private:
 
   /// The current z with new values of the parameters that have a prior, within the bounds.
   Eigen::VectorXd drawn_from_prior(std::mt19937_64& random) {
-    Eigen::VectorXd other = z_;
+    Eigen::VectorXd other = z_, drawn(z_.size());
+    for (double& value : drawn) value = normal_(random);
+    if (options_.correlations) drawn = options_.correlations->llt().matrixL() * drawn.eval();
     for (Eigen::Index k = 0; k < other.size(); ++k) {
       const FreeParameter& p = parameters_[std::size_t(k)];
-      const double drawn = normal_(random);
-      if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn, p.low, p.high) - p.mean) / p.sd;
+      if (std::isfinite(p.sd)) other[k] = (std::clamp(p.mean + p.sd * drawn[k], p.low, p.high) - p.mean) / p.sd;
     }
     return bounds_.clamped(other);
   }
@@ -215,12 +216,13 @@ private:
     out.values = objective_.x(z_);
     out.sd = scale_.cwiseProduct(posterior.sd());
     out.covariance = scale_.asDiagonal() * posterior.covariance() * scale_.asDiagonal();
-    const auto has_prior = objective_.prior().array() > 0;
+    const Eigen::VectorXd precision = objective_.prior().diagonal();
+    const auto has_prior = precision.array() > 0;
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     out.shift = has_prior.select(z_, nan);
     out.ratio = has_prior.select(posterior.sd(), nan);
     out.correlations = strong_correlations(posterior, options_.strong_correlation);
-    out.directions = undetermined_directions(posterior, parameters_, options_.known);
+    out.directions = undetermined_directions(posterior, parameters_, options_.known, options_.correlations);
   }
 
   /// Chi-square, degrees of freedom and the log marginal likelihood.
@@ -230,14 +232,16 @@ private:
     const Whitening& whitening = objective_.whitening();
     out.chi_square = residual.squaredNorm();
     out.admitted_chi_square = here_.chi_square;
-    out.shift_square = z_.cwiseProduct(objective_.prior()).squaredNorm();
+    out.shift_square = objective_.shift_square(z_);
     out.observations = whitening.observations();
     out.effective_parameters = posterior.effective_parameters();
     out.bulk_observations = 3 * (inlier_rows(weights_, 0) + inlier_rows(weights_, 1));
     out.reduced_chi_square = out.chi_square / (out.bulk_observations - out.effective_parameters);
     out.log_evidence = -0.5 * (here_.chi_square + out.shift_square + posterior.log_determinant() +
                                whitening.log_determinant() + double(out.observations) * std::log(2 * std::numbers::pi));
-    if ((objective_.prior().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
+    if (options_.correlations)
+      out.log_evidence -= options_.correlations->llt().matrixLLT().diagonal().array().log().sum();
+    if ((objective_.prior().diagonal().array() == 0).any()) out.log_evidence = std::numeric_limits<double>::quiet_NaN();
   }
 
   void report_convergence(Identification& out) const {

@@ -44,6 +44,11 @@ inline void check(const std::vector<FreeParameter>& parameters, const Noise& noi
   require(!options.weights || (options.weights->rows() == positions.rows() && options.weights->allFinite() &&
                                options.weights->minCoeff() >= 0),
           "weights must be two numbers, not negative, for each row");
+  const auto n = Eigen::Index(parameters.size());
+  require(!options.correlations || (options.correlations->rows() == n && options.correlations->cols() == n &&
+                                    options.correlations->allFinite() &&
+                                    Eigen::LLT<Eigen::MatrixXd>(*options.correlations).info() == Eigen::Success),
+          "the correlations of the priors must be a positive definite matrix, one row a parameter");
   require(!options.inflation || (options.inflation->allFinite() && options.inflation->minCoeff() > 0),
           "the inflation of the jitter must be above 0");
   require(!options.start || options.start->size() == Eigen::Index(parameters.size()),

@@ -1,13 +1,14 @@
 #pragma once
 // The Gaussian posterior of parameters, and the combinations of them that stay undetermined.
 //
-// Parameters are scaled by their prior sd, so that the prior's precision is 1 (0 without a prior) and every number below
+// Parameters are scaled by their prior sd, so that the prior's covariance is its correlations and every number below
 // compares the posterior with the prior.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,13 +40,24 @@ struct Direction {
   Eigen::VectorXd coefficients;  ///< unit vector, in prior sd
 };
 
+/// Precision of the prior of scaled parameters: the inverse of its correlations (independent without any), and 0 for a
+/// parameter without a prior, which correlates with no other.
+inline Eigen::MatrixXd prior_precision(const std::vector<FreeParameter>& parameters,
+                                       const std::optional<Eigen::MatrixXd>& correlations = {}) {
+  const auto n = Eigen::Index(parameters.size());
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Identity(n, n);
+  if (correlations) precision = correlations->ldlt().solve(precision).eval();
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (!std::isfinite(parameters[std::size_t(k)].sd)) precision.row(k).setZero(), precision.col(k).setZero();
+  return precision;
+}
+
 /// Gaussian approximation of the posterior in scaled parameters.
 class Posterior {
 public:
-  /// @param information  J^T Sigma^-1 J   @param prior  precision of the prior, 1 or 0, for each parameter
-  Posterior(const Eigen::MatrixXd& information, const Eigen::VectorXd& prior) {
-    Eigen::MatrixXd H = information;
-    H.diagonal() += prior;
+  /// @param information  J^T Sigma^-1 J   @param prior  precision of the prior
+  Posterior(const Eigen::MatrixXd& information, const Eigen::MatrixXd& prior) {
+    const Eigen::MatrixXd H = information + prior;
     // Equilibrated, so that a direction without information stands out whatever the units.
     const Eigen::VectorXd unit = (H.diagonal().array() > 0).select(H.diagonal().array().rsqrt(), 1.0);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * H * unit.asDiagonal());
@@ -139,9 +151,11 @@ inline std::vector<Correlation> strong_correlations(const Posterior& posterior, 
 
 /// Directions along which the posterior is wider than `limit` times the prior: first those of `known` for which that
 /// holds, with their words, then the rest, each with as few parameters as possible.
+/// @param correlations  of the prior; independent without any
 inline std::vector<Direction> undetermined_directions(const Posterior& posterior,
                                                       const std::vector<FreeParameter>& parameters,
                                                       const std::vector<KnownDirection>& known = {},
+                                                      const std::optional<Eigen::MatrixXd>& correlations = {},
                                                       double limit = 0.7) {
   const Eigen::Index n = Eigen::Index(parameters.size());
   // Without a prior there is nothing to compare with: a parameter nobody knew is either determined or singular.
@@ -150,7 +164,8 @@ inline std::vector<Direction> undetermined_directions(const Posterior& posterior
   const Eigen::MatrixXd C = finite.asDiagonal() * posterior.covariance() * finite.asDiagonal();
   std::vector<Direction> found;
   const auto add = [&](const Eigen::VectorXd& v, std::string text) {
-    const double ratio = std::sqrt(std::max(0.0, v.dot(C * v)));
+    const double prior = correlations ? v.dot(*correlations * v) : v.squaredNorm();
+    const double ratio = std::sqrt(std::max(0.0, v.dot(C * v)) / prior);
     if (ratio > limit) found.push_back({std::move(text), ratio, v});
     return ratio > limit;
   };
