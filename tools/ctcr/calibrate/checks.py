@@ -13,7 +13,7 @@ from ctcr.model.model import Model
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.show import wording
-from ctcr.show.wording import listed
+from ctcr.show.wording import listed, sentence
 from ctcr.table.measurements import Measurements
 
 LISTED = 12
@@ -78,12 +78,6 @@ def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
         said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
     return said
-
-
-def sentence(text: str) -> str:
-    """A warning of a fit as a sentence."""
-    first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
-    return first + ("" if text.endswith(".") else ".")
 
 
 def _rows(rows: Integers) -> str:

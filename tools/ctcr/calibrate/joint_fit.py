@@ -25,6 +25,7 @@ from ctcr.model.sessions import without_frame
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
+from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 
 
@@ -181,7 +182,7 @@ def calibrate(
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
         floors=floor,
         halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
-        notices=[*map(checks.sentence, notices), *repeated, *checks.notices(robot, readings, fit)],
+        notices=[*map(sentence, notices), *repeated, *checks.notices(robot, readings, fit)],
     )
 
 

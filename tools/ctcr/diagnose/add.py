@@ -11,7 +11,6 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import prepared
-from ctcr.calibrate.checks import sentence
 from ctcr.calibrate.joint_fit import Stage
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
@@ -32,6 +31,7 @@ from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
+from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 from ctcr.table.sessions import Sessions
 

@@ -13,7 +13,7 @@ from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, cards, figure, paragraph, table
-from ctcr.show.wording import short
+from ctcr.show.wording import sentence, short
 
 MOST_ARROWS = 800
 
@@ -133,7 +133,7 @@ def _parameters(d: Diagnosis) -> str:
 
 def _limits(d: Diagnosis) -> str:
     not_tested = (f"{identity}: {reason}" for identity, reason in d.not_testable.items())
-    lines = [*d.residual.messages, *d.notices, *not_tested]
+    lines = [*d.residual.messages, *map(sentence, d.notices), *not_tested]
     return "<h2>The residual, and limits of these data</h2>" + _listed(map(as_html, lines))
 
 

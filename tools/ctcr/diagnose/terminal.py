@@ -13,7 +13,7 @@ from ctcr.diagnose.round import Round
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
 from ctcr.show import output
-from ctcr.show.wording import deviation, number
+from ctcr.show.wording import deviation, number, sentence
 
 CANDIDATES = 8  # of a round
 ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest
@@ -53,7 +53,7 @@ def show(console: Any, result: Diagnosis) -> None:
     if result.varying:
         say(f"{result.varying.lead}:", *(f"  • {variation.message}" for variation in result.varying.variations))
         say(ADVICE, f"What to measure next: {result.varying.measure[0]}")
-    say(*(f"{notice}." for notice in result.notices))
+    say(*map(sentence, result.notices))
     say(*(f"Not tested: {identity}: {reason}." for identity, reason in result.not_testable.items()))
 
 

@@ -21,6 +21,12 @@ def visible(text: str) -> str:
     return "".join(map(shown, text))
 
 
+def sentence(text: str) -> str:
+    """A notice or a warning as a sentence."""
+    first = text if "." in text.split()[0] else text[0].upper() + text[1:]  # a parameter keeps its name
+    return first + ("" if text.endswith(".") else ".")
+
+
 def short(value: float) -> str:
     """An error in two or three digits: 1.36, 0.93, 0.10, 0.061."""
     return (f"{value:#.3g}" if value >= 1 else f"{value:#.2g}").rstrip(".")
