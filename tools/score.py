@@ -70,6 +70,10 @@ def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
     unseen = bool(hidden) and truth["chi_square_after_calibration"] < VISIBLE
     if group == "look_alike" and not unseen:  # what calibration takes up is no effect
         scores["look-alikes: their class named, or none where calibration takes both up"] = exact
+    if said and not truth.get("wrong_sheet"):
+        scores["right data sheets: nothing widened"] = not said["widened"]
+    elif said:
+        scores["wrong data sheets: said"] = bool(said["widened"])
     if truth["verdict"] == "nothing_missing":
         scores["controls: nothing named"] = word == "nothing_missing"
     elif truth["verdict"] == "not_in_catalogue":

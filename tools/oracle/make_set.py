@@ -39,6 +39,7 @@ class Order:
     loads: bool = True
     stream: bool = False
     modulus_scatter: float = 1.0  # of the true moduli, relative to what the description promises
+    wrong_sheet: bool = False  # whether the description is wrong by far more than it says
 
     @property
     def streamed(self) -> bool:
@@ -81,7 +82,7 @@ def measure(order: Order, *, even: bool = False) -> Session:
     plan = draw_plan(joint_range(description), plan_rng, loads=order.loads, stream=order.streamed)
     promised = description | {"uncertainty": dict(description["uncertainty"])}
     promised["uncertainty"]["youngs_modulus_percent"] *= order.modulus_scatter
-    bench = draw_bench(promised, bench_rng)
+    bench = draw_bench(promised, bench_rng, wrong=order.wrong_sheet)
     setup = Setup(bench, plan, Mechanics(from_description(bench.description)))
     truths = [hide(setup, name, size, rng) for (name, size), rng in zip(order.effects, hidden_rng, strict=True)]
     if even:
@@ -116,6 +117,7 @@ def answer(order: Order, session: Session) -> dict:
         "noise": order.noise,
         "seed": order.seed,
         "half": "reporting" if order.seed % 2 else "tuning",
+        "wrong_sheet": order.wrong_sheet,
         "loads": order.loads,
         "streamed": order.streamed,
         "rows": len(session.plan.time),
@@ -175,15 +177,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--robot", choices=ROBOTS, default="table2")
     parser.add_argument("--loads", action=argparse.BooleanOptionalAction, default=True, help="hung masses")
     parser.add_argument("--stream", action="store_true", help="readings in motion, as a delay needs them")
+    parser.add_argument("--wrong-sheet", action="store_true", help="robot.yaml is wrong by far more than it says")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--truth", type=Path)
     given = parser.parse_args(arguments)
     sizes = given.size or [1.0] * len(given.effect)
     if len(sizes) != len(given.effect):
         parser.error(f"{len(given.effect)} effects but {len(sizes)} sizes")
-    order = Order(
-        tuple(zip(given.effect, sizes, strict=True)), given.seed, given.noise, given.robot, given.loads, given.stream
-    )
+    effects = tuple(zip(given.effect, sizes, strict=True))
+    plan = {"loads": given.loads, "stream": given.stream, "wrong_sheet": given.wrong_sheet}
+    order = Order(effects, given.seed, given.noise, given.robot, **plan)
     truth = given.truth or given.out.parent / "truth" / f"{given.out.name}.yaml"
     content = write_set(order, given.out, truth)
     print(f"{given.out}: {content['rows']} rows; effect {content['rms_mm']['effect']:.3f} mm RMS; answer in {truth}")

@@ -72,6 +72,18 @@ STRANGE = (
     "load_not_as_known",
     "grip_slip",
 )
+WRONG_SHEETS = (
+    (),
+    ("friction",),
+    ("backlash_rotation",),
+    ("softening",),
+    ("sensor_offset",),
+    ("tip_load",),
+    ("torsional_compliance",),
+    ("entry_compliance",),
+    ("precurvature_profile",),
+    ("friction", "tip_load"),
+)
 ROBOTS = ("table2", "B", "table2", "two_tubes", "table2", "four_tubes", "table2", "B", "table2")  # in turn
 
 
@@ -120,6 +132,10 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
     for noise in ("jitter", "realistic"):
         for name in STRANGE:
             yield "strange", order((name, 1.0), noise=noise)
+    for noise in ("jitter", "realistic"):
+        for hidden in WRONG_SHEETS:
+            for _ in range(2):
+                yield "wrong_sheet", order(*((name, 1.0) for name in hidden), noise=noise, wrong_sheet=True)
 
 
 def entries(shift: int = 0) -> list[Entry]:

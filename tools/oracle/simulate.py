@@ -9,6 +9,16 @@ from equilibrium import Pose
 from scipy.spatial.transform import Rotation
 
 SHARE_OF_UNCERTAINTY = 0.7  # how far the true bench lies from its description
+WRONG_SHEET = {  # the same of a data sheet that is wrong: half to all of so many stated uncertainties, either sign
+    "tracker_frame_mm": 16.0,
+    "tracker_frame_deg": 15.0,
+    "rotation_offset_deg": 8.0,
+    "translation_offset_mm": 1.0,
+    "length_mm": 4.0,
+    "curved_length_mm": 1.0,
+    "curvature_percent": 3.6,
+    "youngs_modulus_percent": 2.2,
+}
 FIELD_LENGTH = 0.1  # [m] over which the tracker's field error changes
 QUANTILE_95 = 2.795  # 95 % of the norms of a 3-D normal vector with unit standard deviation lie below
 SPEED_ROTATION, SPEED_TRANSLATION = np.deg2rad(10.0), 5e-3  # [rad/s, m/s] of approach moves
@@ -26,11 +36,13 @@ class Bench:
     tracker_rotation: Rotation
 
 
-def draw_bench(description: dict, rng: np.random.Generator) -> Bench:
-    """A bench that differs from its description by normal draws of 0.7 of the stated uncertainties."""
+def draw_bench(description: dict, rng: np.random.Generator, *, wrong: bool = False) -> Bench:
+    """A bench that differs from its description by normal draws of 0.7 of the stated uncertainties, or far more."""
     sigma = description["uncertainty"]
 
     def draw(name: str, size: int = 1) -> np.ndarray:
+        if wrong:
+            return WRONG_SHEET[name] * sigma[name] * rng.uniform(0.5, 1.0, size) * rng.choice([-1.0, 1.0], size)
         return SHARE_OF_UNCERTAINTY * sigma[name] * rng.normal(size=size)
 
     true = deepcopy(description)

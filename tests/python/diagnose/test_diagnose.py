@@ -32,7 +32,7 @@ def test_nothing_missing(robot):
     """Where nothing was hidden nothing is found, and the error on held-out runs is noise."""
     result = diagnose(robot, measured(robot, np.random.default_rng(1), {}))
     assert result.verdict.word == "nothing_missing"
-    assert not result.accepted
+    assert not result.accepted and not result.widened
     assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]
     json.dumps(result.as_json(), allow_nan=False)
 
@@ -60,6 +60,27 @@ def test_backlash(robot):
 def test_tip_load(tip_load):
     """A weight at the tip is named, with its mass within its uncertainty."""
     names_what_was_hidden(tip_load, {"effects.tip_load.mass": 2e-3}, "tip_load")
+
+
+@pytest.mark.parametrize(
+    "hidden", [{}, {"effects.backlash_rotation.play.1": 0.012, "effects.backlash_rotation.play.2": 0.01}]
+)
+def test_wrong_sheet(robot, hidden):
+    """Of a robot file that is wrong by many times what it says, the faults are named, and what is hidden besides; the
+    error falls to noise."""
+    table = measured(robot, np.random.default_rng(3), hidden)
+    file = robot.model_copy(deep=True)
+    file.tracker.position_mm = (np.array(file.tracker.position_mm) + [6.0, -7.0, 5.0]).tolist()
+    for tube, factor in zip(file.tubes, (1.18, 0.83, 0.85), strict=True):
+        tube.curvature_per_m *= factor
+    table = replace(table, alpha=table.alpha + np.radians([7.0, -8.0, 6.0]))
+    result = diagnose(file, table)
+    assert [a.id for a in result.accepted] == (["backlash_rotation"] if hidden else [])
+    assert hidden or result.verdict.word == "nothing_missing"
+    said = {one["uncertainty"]: one["factor"] for one in result.as_json()["widened"]}
+    assert {"tracker_frame_mm", "rotation_offset_deg"} <= said.keys() and min(said.values()) > 1
+    assert any("the home rotations, 1 deg, is contradicted by the data: widened" in text for text in result.notices)
+    assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]
 
 
 def test_positions_alone(robot):

@@ -200,7 +200,7 @@ def test_hiding(monkeypatch):
 
 
 def test_true_bench():
-    """The true bench lies within the stated uncertainties."""
+    """The true bench lies within the stated uncertainties; that of a wrong sheet far beyond them."""
     description = describe("table2")
     benches = [draw_bench(description, np.random.default_rng(seed)) for seed in range(300)]
     relative = [
@@ -209,6 +209,8 @@ def test_true_bench():
         for i in range(3)
     ]
     assert np.std(relative) == pytest.approx(0.7 * 0.15, rel=0.1)
+    wrong = [draw_bench(description, np.random.default_rng(seed), wrong=True) for seed in range(20)]
+    assert min(np.abs(np.degrees(bench.alpha_offset)).min() for bench in wrong) > 3 * 1.0
 
 
 def test_suite():
@@ -224,5 +226,6 @@ def test_suite():
         assert singles == {((name, size),) for name in make_suite.EFFECTS for size in make_suite.SIZES}
         assert sum(entry.group == "strange" for entry in own) >= 8
         assert sum(entry.group == "control" for entry in own) >= 10
+        assert sum(entry.order.wrong_sheet for entry in own) >= 20
     ids = {i for name in make_suite.EFFECTS for i in CAUSES[name].ids}
     assert ids == set(make_suite.EFFECTS)

@@ -15,7 +15,7 @@ WIDE = 10.4  # [in] of a figure as wide as the page
 ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
 PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]
 SHOWN = 12
-NEEDED_WIDTH = 108  # of the table of parameters; a narrower terminal wraps its lines
+NEEDED_WIDTH = 114  # of the table of parameters; a narrower terminal wraps its lines
 
 
 def show(console, c: Calibration) -> None:
