@@ -32,7 +32,8 @@ TEST(TwoEquilibria, TheStartDecidesNotTheStep) {
     Solution<3> solution;
     Vec3 tip[2];
     for (const int steps : {1, 20}) {
-      Workspace<3> ws{.guess = starts[k], .q = q, .load = load, .warm = true};
+      Workspace<3> ws;
+      ws.begin_at(starts[k]);
       ASSERT_EQ(solve(model, q, load, ws, solution, {.steps = steps, .accuracy = test::as_told}), Status::ok);
       EXPECT_LE(solution.iterations, 5);
       EXPECT_GT(solution.stability, 0.2);
