@@ -111,7 +111,7 @@ def test_report(calibration):
         "Two halves of the data",
     ):
         assert f"<h2>{title}</h2>" in shown
-    assert shown.count("<svg") == 6 and "noise floor" in shown
+    assert shown.count("<svg") == 6 and "expected error" in shown
     assert not re.search(r"""(?:src|href)=["']https?:""", shown)
     drawing = json.loads(re.search(r"const drawing = (.*);\nPlotly", page)[1].replace("<\\/", "</"))
     assert len(drawing["data"]) == 4 and drawing["data"][3]["visible"] and not drawing["data"][0]["visible"]

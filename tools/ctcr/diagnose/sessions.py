@@ -17,7 +17,7 @@ from ctcr.diagnose.round import Refits, fraction_explained, screen, unexplained,
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
-from ctcr.fit.sessions import as_sessions, rows_of_runs
+from ctcr.fit.sessions import as_sessions, part_of_runs, rows_of_runs, some_runs
 from ctcr.model import user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.sessions import home_names
@@ -34,14 +34,19 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
     asked    whether each run has a frame of its own; None: where the readings say so
     Raises InputError where no fit is possible.
     """
-    robot, usable, _ = sensor_roll.usable(robot, readings)
-    located = np.isfinite(usable.positions).all(axis=1)
-    if asked is False or len(np.unique(usable.run[located])) < 2:
+    robot, every, _ = sensor_roll.usable(robot, readings)
+    located = np.isfinite(every.positions).all(axis=1)
+    if asked is False or len(np.unique(every.run[located])) < 2:
         return readings, []
-    engine = Engine(robot, usable, noise_of_readings(robot, usable), rows_of_runs(usable))
+    noise, usable = noise_of_readings(robot, every), some_runs(every)
+    if asked is None:
+        table, rows = part_of_runs(robot, usable)
+        part = Engine(robot, table, noise, rows)
+        one = part.fit()
+        if not (joint.rejects(one) and _may_win(part, one)):
+            return readings, []
+    engine = Engine(robot, usable, noise, rows_of_runs(usable))
     one = engine.fit()
-    if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
-        return readings, []
     framed = replace(engine, measurements=as_sessions(robot, usable))
     if asked is None and not _wins(engine, one, framed):
         return readings, []
@@ -61,7 +66,10 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
         ]
     before, after = (wording.mm(fit.rms_mm()) for fit in (one, own))
     text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
-    return framed.measurements.sessions.taken_out(readings), [text, *said]
+    sessions = framed.measurements.sessions
+    if len(usable) < len(readings):
+        sessions = as_sessions(robot, every, homes=sessions.homes is not None).sessions
+    return sessions.taken_out(readings), [text, *said]
 
 
 def _may_win(engine: Engine, one: Fit) -> bool:

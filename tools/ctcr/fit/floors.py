@@ -12,7 +12,7 @@ from ctcr.audit import sensor_roll
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
-from ctcr.fit.sessions import rows_of_runs
+from ctcr.fit.sessions import part_of_runs
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.sessions import without_frame
@@ -51,7 +51,7 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     """
     jitter = sqrt(3) * (robot.tracker.jitter_mm or nan)
     readings, _ = sensor_roll.positions_alone(robot, readings)
-    chosen = rows_of_runs(readings)
+    readings, chosen = part_of_runs(robot, readings)
     try:
         noise = noise_of_readings(robot, readings)
         names = without_frame(parameters.expand("standard", robot), readings)

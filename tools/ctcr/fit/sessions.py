@@ -5,7 +5,7 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Mask, evenly
 from ctcr.fit import joint
-from ctcr.model import parameters, user_recording
+from ctcr.model import effect_model, parameters, user_recording
 from ctcr.model.sessions import home_names
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -33,13 +33,32 @@ def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) ->
     return sessions.taken_out(readings)
 
 
+def some_runs(readings: Measurements) -> Measurements:
+    """The table, or of very many runs some, evenly spread, with all their rows."""
+    runs = np.unique(readings.run[readings.measured])
+    if len(runs) <= settings.CONVENTION_MOST_RUNS:
+        return readings
+    return readings.rows(np.isin(readings.run, runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)]))
+
+
 def rows_of_runs(readings: Measurements) -> Mask:
-    """SESSION_ROWS measured rows (M,) of a long table, equally many of each run."""
-    runs, chosen = np.unique(readings.run[readings.measured]), np.zeros(len(readings), bool)
-    for run in runs:
-        rows = np.flatnonzero(readings.measured & (readings.run == run))
-        chosen[rows[evenly(len(rows), max(settings.SESSION_ROWS // len(runs), 1))]] = True
+    """SESSION_ROWS measured rows (M,) of a long table, of the runs alike."""
+    measured, chosen = np.flatnonzero(readings.measured), np.zeros(len(readings), bool)
+    order = measured[np.argsort(readings.run[measured], kind="stable")]
+    each = np.split(order, np.flatnonzero(np.diff(readings.run[order])) + 1)
+    for rows in each:
+        chosen[rows[evenly(len(rows), max(settings.SESSION_ROWS // len(each), 1))]] = True
     return chosen
+
+
+def part_of_runs(robot: Robot, readings: Measurements) -> tuple[Measurements, Mask]:
+    """A table of `rows_of_runs` alone, which is cheap, all its rows chosen (M,); the whole one and those rows, where
+    the robot has effects of the path."""
+    readings = some_runs(readings)
+    chosen = rows_of_runs(readings)
+    if effect_model.of_the_path(robot):
+        return readings, chosen
+    return readings.rows(chosen), np.ones(np.sum(chosen), bool)
 
 
 def placed(robot: Robot, sessions: Sessions | None) -> Robot:
