@@ -49,18 +49,13 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
 
 
 def _fitted(robot, readings, conventions):
-    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error. None
-    where conventions are wrong or no fit is possible."""
+    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error."""
     from ctcr.diagnose import sessions
-    from ctcr.errors import InputError
     from ctcr.fit.floors import floors
 
-    if conventions.wrong:
-        return [], None
-    try:
+    said: list[str] = []
+    if not conventions.wrong:
         readings, said = sessions.of_runs(robot, readings)
-    except InputError:
-        return [], None
     return said, floors(robot, readings).as_dict()
 
 

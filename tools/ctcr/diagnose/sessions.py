@@ -15,9 +15,10 @@ from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Linear
 from ctcr.diagnose.round import Refits, fraction_explained, screen, unexplained, worth_a_refit
 from ctcr.diagnose.varying_coefficients import label_of
+from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
-from ctcr.fit.sessions import as_sessions, part_of_runs, rows_of_runs, some_runs
+from ctcr.fit.sessions import as_sessions, part_of_runs, rows_of_runs, some_runs, uncertain
 from ctcr.model import user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.sessions import home_names
@@ -29,23 +30,32 @@ from ctcr.table.sessions import Sessions
 
 def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> tuple[Measurements, list[str]]:
     """The readings without what each run has of its own, and sentences on that; the same readings, where the runs are
-    one session.
+    one session, or nobody asked and no fit is possible that could tell.
 
     asked    whether each run has a frame of its own; None: where the readings say so
-    Raises InputError where no fit is possible.
+    Raises InputError where a frame for each run was asked for, and no fit is possible.
     """
+    try:
+        return _of_runs(robot, readings, asked)
+    except InputError:
+        if asked:
+            raise
+        return readings, []
+
+
+def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[Measurements, list[str]]:
     robot, every, _ = sensor_roll.usable(robot, readings)
     located = np.isfinite(every.positions).all(axis=1)
     if asked is False or len(np.unique(every.run[located])) < 2:
         return readings, []
-    noise, usable = noise_of_readings(robot, every), some_runs(every)
+    noise, free, usable = noise_of_readings(robot, every), uncertain(robot), some_runs(every)
     if asked is None:
         table, rows = part_of_runs(robot, usable)
-        part = Engine(robot, table, noise, rows)
+        part = Engine(robot, table, noise, rows, free=free)
         one = part.fit()
         if not (joint.rejects(one) and _may_win(part, one)):
             return readings, []
-    engine = Engine(robot, usable, noise, rows_of_runs(usable))
+    engine = Engine(robot, usable, noise, rows_of_runs(usable), free=free)
     one = engine.fit()
     framed = replace(engine, measurements=as_sessions(robot, usable))
     if asked is None and not _wins(engine, one, framed):
@@ -91,7 +101,8 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
-    elsewhere = joint.fit(engine.robot, engine.measurements, rows=engine.rows, sd=wide, noise=one.noise, **one.frozen)
+    options = {"rows": engine.rows, "sd": wide, "noise": one.noise, **one.frozen}
+    elsewhere = joint.fit(engine.robot, engine.measurements, one.names, **options)
     if evidence < elsewhere.log_evidence + settings.DECISIVE:
         return False
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
@@ -130,6 +141,8 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     groups += [[name for name in of_tubes if f"tubes.{i + 1}." in name] for i in range(engine.robot.n_tubes)]
     found = {}
     for names in groups:
+        if not set(names) <= set(fit.names):  # known exactly
+            continue
         own = linear.jacobian[:, [fit.names.index(name) for name in names]]
         gain = linear.gain((own[:, :, None] * of_run[:, None, :]).reshape(len(run), -1))
         removed = np.sum(residual**2) - np.sum((residual + gain.signal) ** 2)

@@ -4,6 +4,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Mask, evenly
+from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.model import effect_model, parameters, user_recording
 from ctcr.model.sessions import home_names
@@ -28,9 +29,21 @@ def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) ->
         return found
 
     sessions = aligned(settings.SESSION_ALIGNMENTS)  # at the robot file's values: within a fit they act linearly
-    at = joint.fit(robot, sessions.taken_out(readings), rows=rows_of_runs(readings)).apply(robot)
+    at = joint.fit(robot, sessions.taken_out(readings), uncertain(robot), rows=rows_of_runs(readings)).apply(robot)
     sessions = aligned(2)
     return sessions.taken_out(readings)
+
+
+def uncertain(robot: Robot) -> list[str]:
+    """The standard parameters that the robot file does not know exactly."""
+    found = []
+    for name in parameters.expand("standard", robot):
+        try:
+            parameters.priors(robot, [name])
+        except InputError:
+            continue
+        found.append(name)
+    return found
 
 
 def some_runs(readings: Measurements) -> Measurements:
