@@ -51,6 +51,8 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     """
     jitter = sqrt(3) * (robot.tracker.jitter_mm or nan)
     readings, _ = sensor_roll.positions_alone(robot, readings)
+    if not np.isfinite(readings.positions).any():
+        return Floors(jitter)
     readings, chosen = part_of_runs(robot, readings)
     try:
         noise = noise_of_readings(robot, readings)
@@ -62,7 +64,7 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     recorded.activate(chosen.tolist())
     residual, jacobian, _ = recorded.residual(recorded.nominal(), True)
     known = np.isfinite(residual).reshape(-1, 6) & chosen[:, None]
-    if not known[:, :3].any():
+    if not known[:, :3].any():  # nothing is solved
         return Floors(jitter)
     # Of the K numbers read: derivatives (K, n), the gain of the fit (n, K), and what it leaves of jitter and field.
     row, axis = np.nonzero(known)
