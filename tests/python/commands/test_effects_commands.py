@@ -307,7 +307,7 @@ def test_waterfall(robot):
         ("calibrated", 1.6),
         ("friction", 0.4),
         ("delay", 0.3),
-        ("noise floor", 0.2),
+        ("expected error", 0.2),
     ]
 
 
@@ -328,6 +328,6 @@ def test_history_report(run, tmp_path, robot, plan, hidden):
     simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data, 3)
     assert run("add", ROBOT, "sensor_offset", "--fit", data, "-o", new, "--free", "tracker.position.*")[0] == 0
     code, out, _ = run("history", new, "--report", page)
-    assert code == 0 and "sensor offset" in out and "m.csv" in out and "noise floor" in out
+    assert code == 0 and "sensor offset" in out and "m.csv" in out and "expected error" in out
     text = page.read_text()
     assert "<svg" in text and 'src="http' not in text and 'href="http' not in text

@@ -188,7 +188,8 @@ def calibrate(
 
 def write_robot(c: Calibration, target: str | Path, measurements: str | Path, in_place: bool = False) -> Robot:
     """Writes the calibrated robot file with its entry in the ledger."""
-    figures = {"rms_mm": c.rms("rms_mm"), "reduced_chi_square": c.fit.reduced_chi_square}
+    rms_mm = c.rms("rms_mm") | {"noise_floor": c.floors.expected_error_mm}
+    figures = {"rms_mm": rms_mm, "reduced_chi_square": c.fit.reduced_chi_square}
     if np.isfinite(c.floor.rms_deg):
         figures["rms_deg"] = c.rms("rms_deg")
     wider = [checks.sentence(one.text) for one in widening.widened(c.before, c.fit.priors.scales)]

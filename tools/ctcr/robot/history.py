@@ -1,4 +1,4 @@
-"""The ledger of a robot file as a table and as a waterfall: the error from the first file down to the noise floor."""
+"""The ledger of a robot file as a table and as a waterfall: the error from the first file down to the expected error."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from ctcr.show.style import ERROR, NOISE, OUT
 from ctcr.show.wording import visible
 
 COLUMNS = ["date", "command", "from", "changes", "error"]
-FLOOR = "noise floor"
+FLOOR = "expected error"
 _BAR = 44  # characters of the longest bar
 
 
@@ -31,7 +31,7 @@ def entries(robot: Robot) -> list[list[str]]:
 
 
 def waterfall(robot: Robot) -> list[Stage]:
-    """Errors from the oldest entry that has them to the newest, and the noise floor of the newest last.
+    """Errors from the oldest entry that has them to the newest, and the expected error of the newest last.
 
     An entry begins with the error that the one before ended with, so that only the first gives that of the first file.
     """
@@ -90,7 +90,7 @@ def _lead(stages: list[Stage]) -> str:
 
 
 def draw_waterfall(figure, stages: list[Stage]) -> None:
-    """A bar a stage, and the noise floor as a line."""
+    """A bar a stage, and the expected error as a line."""
     axes = figure.subplots()
     above = {"textcoords": "offset points", "ha": "center", "fontweight": "bold"}
     for x, (before, stage) in enumerate(zip([None, *stages], stages, strict=False)):
