@@ -114,10 +114,10 @@ def add(
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
         nuisances.append(smooth_field.message(smooth))
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
+    stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), _name_of(readings, held_out)
     floor, sessions = floors(robot.with_effects(after.effects), given), readings.sessions
-    stages.append(Stage("noise_floor", floor.expected_error_mm, joint.tracker_error(fit, fit.noise)[1]))
     return Added(placed(after, sessions), list(ids), fit, stages, name, notices, sessions, floor)
 
 
@@ -126,7 +126,8 @@ def write_added(
 ) -> Robot:
     """Writes the robot with its effects and an entry of the ledger."""
     changes = fields.changes(added.fit, before, added.robot)
-    figures: dict[str, Any] = {"added": added.ids, "rms_mm": added.rms("rms_mm")}
+    rms_mm = added.rms("rms_mm") | {"noise_floor": added.floors.expected_error_mm}
+    figures: dict[str, Any] = {"added": added.ids, "rms_mm": rms_mm}
     if np.isfinite([stage.rms_deg for stage in added.stages]).all():
         figures["rms_deg"] = added.rms("rms_deg")
     figures |= {"held_out": added.held_out, "parameters": added.parameters(), "effects_before": before.effects}

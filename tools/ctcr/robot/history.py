@@ -1,4 +1,4 @@
-"""The ledger of a robot file as a table and as a waterfall: the error from the first file down to the expected error."""
+"""The ledger of a robot file as a table and as a waterfall: the error from the first file down to what is expected."""
 
 from dataclasses import dataclass
 
