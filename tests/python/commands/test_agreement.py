@@ -10,7 +10,13 @@ ROOT = Path(__file__).parents[3]
 SHARED = ROOT.parent / "shared" / "data" / "hidden_effect"
 FLOORS = ("sensor_jitter_mm", "expected_error_mm")
 MISSING = "something is missing in the model"
-TABLES = [ROOT / "examples/data/demo", ROOT / "examples/data/calibration", SHARED / "set02", SHARED / "set07"]
+# A hidden effect is found in a minute.
+TABLES = [
+    pytest.param(ROOT / "examples/data/demo", marks=pytest.mark.slow, id="demo"),
+    pytest.param(ROOT / "examples/data/calibration", id="calibration"),
+    pytest.param(SHARED / "set02", id="set02"),
+    pytest.param(SHARED / "set07", marks=pytest.mark.slow, id="set07"),
+]
 
 
 def told(tmp_path, *arguments):
@@ -20,7 +26,7 @@ def told(tmp_path, *arguments):
     return json.loads(target.read_text())
 
 
-@pytest.mark.parametrize("folder", TABLES, ids=lambda folder: folder.name)
+@pytest.mark.parametrize("folder", TABLES)
 def test_agreement(folder, tmp_path, capsys):
     """All commands give the same floors; what a diagnosis calls noise, no fit of the same model calls an error of the
     model, and none says so of an error below its floor."""

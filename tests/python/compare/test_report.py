@@ -14,6 +14,7 @@ from ctcr import cli
 from ctcr.commands import compare as compare_command
 from ctcr.compare import compare, report
 from ctcr.compare.summary import findings, headline
+from ctcr.fit.floors import Floors
 from ctcr.show import output
 
 ROOT = Path(__file__).parents[3]
@@ -114,6 +115,7 @@ def table(tmp_path, monkeypatch):
     readings = replace(readings, **wider)
     write_table(tmp_path / "table.csv", readings)
     monkeypatch.setattr(compare_command, "_predict", lambda robot, readings, steps: prediction)
+    monkeypatch.setattr(compare_command, "_fitted", lambda *_: ([], Floors().as_dict()))
     return tmp_path / "table.csv"
 
 

@@ -51,11 +51,11 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     noise, free, usable = noise_of_readings(robot, every), uncertain(robot), some_runs(every)
     if asked is None:
         table, rows = part_of_runs(robot, usable)
-        part = Engine(robot, table, noise, rows, free=free)
+        part = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
         one = part.fit()
         if not (joint.rejects(one) and _may_win(part, one)):
             return readings, []
-    engine = Engine(robot, usable, noise, rows_of_runs(usable), free=free)
+    engine = Engine(robot, usable, noise, rows_of_runs(usable), free=free, tolerance=settings.COARSE)
     one = engine.fit()
     framed = replace(engine, measurements=as_sessions(robot, usable))
     if asked is None and not _wins(engine, one, framed):
