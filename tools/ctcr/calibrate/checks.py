@@ -69,7 +69,7 @@ def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
     said_as_doubts = "prior standard deviations"
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
     explained = not unexplained or floors.explains(fit, noise_of_readings(robot, readings))
-    said = [sentence(wider.text) for wider in widened(robot, fit.priors.scales)]
+    said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
     said += [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")

@@ -192,7 +192,7 @@ def write_robot(c: Calibration, target: str | Path, measurements: str | Path, in
     figures = {"rms_mm": rms_mm, "reduced_chi_square": c.fit.reduced_chi_square}
     if np.isfinite(c.floor.rms_deg):
         figures["rms_deg"] = c.rms("rms_deg")
-    wider = [checks.sentence(one.text) for one in widening.widened(c.before, c.fit.priors.scales)]
+    wider = [one.sentence for one in widening.widened(c.before, c.fit.priors.scales)]
     entry = ledger.Entry("ctcr calibrate fit", [measurements], figures, " ".join([*wider, *fields.doubts(c.fitted)]))
     changes = fields.changes(c.fit, c.before, c.after)
     effects = c.after.effects if c.after.effects != c.before.effects else None

@@ -149,8 +149,10 @@ def without_repeated(readings, conventions):
     """The readings without poses that the tracker repeated, and sentences on that."""
     import numpy as np
 
+    from ctcr.show.wording import sentence
+
     rows = [row for one in conventions.frozen for row in one.rows]
-    said = [f"{one.text[0].upper()}{one.text[1:]}: left out." for one in conventions.frozen]
+    said = [sentence(f"{one.text}: left out") for one in conventions.frozen]
     return (readings.without_poses(np.isin(readings.row, rows)) if rows else readings), said
 
 

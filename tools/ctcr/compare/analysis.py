@@ -144,9 +144,11 @@ def compare(
     noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
-    given = headline if sessions else sample
-    visits = find_stops(given) if sessions else stops
-    run_offsets = find_run_offsets(given, visits, find_revisits(visits, given.lever) if sessions else revisits, noise)
+    as_taken, visits, pairs = sample, stops, revisits
+    if sessions:
+        as_taken, visits = headline, find_stops(headline)
+        pairs = find_revisits(visits, headline.lever)
+    run_offsets = find_run_offsets(as_taken, visits, pairs, noise)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
     ranking = rank(sample, error, settings.LEVEL)

@@ -11,10 +11,9 @@ from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
+from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
-
-FRAME = 6  # numbers of a frame
 
 
 @dataclass(frozen=True)

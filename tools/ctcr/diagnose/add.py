@@ -284,7 +284,7 @@ def _stage(name: str, residual: Array, rows: Mask) -> Stage:
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
     """Doubts about the fitted effects; `explained`: whether the noise explains what is left."""
     known = catalogue.parameter_of(robot.n_tubes)
-    said = [sentence(wider.text) for wider in widened(robot, fit.priors.scales)]
+    said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
     said += [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
     index = {name: i for i, name in enumerate(fit.names)}
     for identity in ids:

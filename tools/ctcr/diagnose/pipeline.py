@@ -75,14 +75,6 @@ class Diagnosis:
         }
 
     @property
-    def expected_mm(self) -> float:
-        """Expected RMS error of a right model on the judged rows: noise and uncertain parameters.
-
-        Far above the noise floor where these rows are unlike those that were fitted.
-        """
-        return max(self.with_effects.expected_mm(self.judged), self.noise_floor_mm)
-
-    @property
     def widened(self) -> list[Widened]:
         """Uncertainties of the robot file that the measurements contradict."""
         return widened(self.robot, self.final.priors.scales)
@@ -150,7 +142,7 @@ def diagnose(
             break
     if not result.measurements.from_home:
         notices.append("taken to have been at rest at the first reading, not to have come from home: it fits better")
-    result.notices += [*notices, *(wider.text for wider in result.widened)]
+    result.notices += [*notices, *(wider.sentence for wider in result.widened)]
     result.seconds = perf_counter() - began
     return result
 

@@ -12,7 +12,6 @@ from ctcr import settings
 from ctcr.audit import sensor_roll
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.linearised import Linear
 from ctcr.diagnose.round import Refits, fraction_explained, screen, unexplained, worth_a_refit
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
@@ -132,7 +131,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     """Fraction of the unexplained chi-square that values of their own in each run explain: of all homes, of a parameter
     of a tube, of all of it. Those that are sure alone."""
     residual, jacobian = fit.whitened()
-    linear = Linear(residual, jacobian * fit.prior_sd)
+    linear, jacobian = engine.linear(fit), jacobian * fit.prior_sd
     numbers = np.flatnonzero(np.repeat(fit.weights > 0, 3, axis=1).ravel())
     run = engine.measurements.run[numbers // 6]
     of_run = (run[:, None] == np.unique(run)) * settings.SESSION_PRIOR_WIDER
@@ -143,7 +142,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     for names in groups:
         if not set(names) <= set(fit.names):  # known exactly
             continue
-        own = linear.jacobian[:, [fit.names.index(name) for name in names]]
+        own = jacobian[:, [fit.names.index(name) for name in names]]
         gain = linear.gain((own[:, :, None] * of_run[:, None, :]).reshape(len(run), -1))
         removed = np.sum(residual**2) - np.sum((residual + gain.signal) ** 2)
         sure = gain.log_evidence > settings.DECISIVE + np.log(len(groups))

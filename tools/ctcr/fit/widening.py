@@ -42,12 +42,12 @@ class Widened:
     factor: float  # by which it was widened
 
     @property
-    def text(self) -> str:
+    def sentence(self) -> str:
         key, index = key_and_index(self.uncertainty)
         which = "" if index is None else f" ({'xyz'[index] if key.startswith('tracker') else f'tube {index + 1}'})"
         unit = key.rsplit("_", 1)[-1].replace("percent", "%")
-        of = f"the stated uncertainty of {WORDS[key]}{which}, {self.stated:g} {unit}"
-        return f"{of}, is contradicted by the data: widened {self.factor:.2g} times"
+        of = f"The stated uncertainty of {WORDS[key]}{which}, {self.stated:g} {unit}"
+        return f"{of}, is contradicted by the data: widened {self.factor:.2g} times."
 
 
 def widened(robot: Robot, scales: Scales) -> list[Widened]:
