@@ -1,7 +1,6 @@
 """The pictures of the calibration report and its 3-D view. Colours mean what they mean in the comparison's."""
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
 from ctcr import settings
@@ -60,7 +59,6 @@ def histogram(figure, c: Calibration) -> None:
         axes.hist(sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label)
     axes.stairs(100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)), edges, color=NOISE, lw=1.5, label="noise alone")
     axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
-    _plain_ticks(axes.xaxis)
     axes.legend(fontsize=9)
 
 
@@ -159,8 +157,6 @@ def half_difference(figure, c: Calibration) -> bool | None:
         ylabel="difference, mm",
         ylim=(low, 1.3 * high),
     )
-    _plain_ticks(axes.xaxis)
-    _plain_ticks(axes.yaxis)
     axes.legend(fontsize=8, loc="lower right")
     return None
 
@@ -207,9 +203,3 @@ def view(c: Calibration) -> str:
     menu = {"type": "buttons", "direction": "right", "buttons": buttons, "active": 1, "bgcolor": "#f6f8fa"}
     menu |= {"x": 0.01, "y": 0.99, "xanchor": "left", "yanchor": "top"}
     return scene.view(data, eye=(1.3, 1.3, 0.7), updatemenus=[menu])
-
-
-def _plain_ticks(axis) -> None:
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_formatter(NullFormatter())

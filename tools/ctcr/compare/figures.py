@@ -4,7 +4,6 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from scipy import stats
 
 from ctcr.arrays import Array, evenly
@@ -36,20 +35,13 @@ def histogram(figure: Figure, c: Comparison) -> None:
         axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=f"noise {c.noise.rms_mm:.2g} mm RMS")
     axes.axvline(c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS")
     axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
-    _log_ticks(axes)
+    axes.set_xscale("log")
     axes.legend(loc="best", fontsize=9)
 
 
 def _percent(axes, values: Array, edges: Array, **style) -> None:
     """Histogram in percent of the values."""
     axes.hist(values, edges, weights=np.full(len(values), 100 / len(values)), **style)
-
-
-def _log_ticks(axes) -> None:
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def course(figure: Figure, c: Comparison) -> None:
@@ -97,7 +89,7 @@ def hysteresis(figure: Figure, c: Comparison) -> bool | None:
         share = 100 * np.diff(stats.maxwell.cdf(edges, scale=c.noise.axis_mm * np.sqrt(2)))
         left.stairs(share, edges, color=NOISE, lw=1.4, label="noise alone")
     left.set(xlabel="distance between two visits, mm", ylabel="% of pairs", title="Same joints, visited twice")
-    _log_ticks(left)
+    left.set_xscale("log")
     left.legend(fontsize=8, loc="best")
     left.margins(y=0.3)
     _both_ways(right, c, opposite)

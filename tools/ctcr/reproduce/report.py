@@ -96,5 +96,4 @@ def _beyond(picture: Figure, s: Scenarios) -> None:
     axes.plot(list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits")
     axes.axhline(1, color="#8794a0", lw=1, ls="--")
     axes.set(yscale="log", xlabel="weight at the tip, g", ylabel="largest error, mm")
-    axes.yaxis.set_major_formatter("{x:g}")
     axes.legend(fontsize=9)

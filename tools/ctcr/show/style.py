@@ -6,6 +6,7 @@ from typing import Any
 
 import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
 AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
@@ -41,7 +42,20 @@ def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height:
         figure = Figure(figsize=(width, height), layout="constrained")
         if plot(figure, subject) is False:
             return None
+        _number_ticks(figure)
         target = io.StringIO()
         figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
     text = target.getvalue()
     return text[text.index("<svg") :]
+
+
+def _number_ticks(figure: Figure) -> None:
+    """Logarithmic axes with plain numbers: the usual powers are formulas."""
+    for axes in figure.axes:
+        for axis, scale in ((axes.xaxis, axes.get_xscale()), (axes.yaxis, axes.get_yscale())):
+            if scale == "linear":
+                continue
+            if scale == "log":
+                axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
