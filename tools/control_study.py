@@ -48,7 +48,7 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     known = {"robot file": robot, "calibrated": joint.fit(robot, session).apply(robot)}
     result = diagnose(robot, session)
     if result.accepted:
-        ids, fixed, start = settings.found(result.as_json(), robot)
+        ids, fixed, start = settings.found(result.as_dict(), robot)
         known["with the effects found"] = add.add(robot, session, ids, fixed=fixed, start=start).robot
     return known, f"{result.verdict.word}: {' + '.join(a.id for a in result.accepted) or 'nothing'}"
 

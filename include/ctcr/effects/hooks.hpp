@@ -197,6 +197,10 @@ struct EffectList {
   /// Those on the reading of the tracker.
   using OnReading =
       typename detail::Picked<[]<class Effect> { return HasSense<Effect, double>; }, EffectList<>, E...>::List;
+  /// Those with some ids, in the same order.
+  /// @tparam wanted  wanted(id), id a std::string_view: whether an effect is among them
+  template <auto wanted>
+  using Those = typename detail::Picked<[]<class Effect> { return wanted(Effect::info.id); }, EffectList<>, E...>::List;
 
   template <int N, class P = double>
   struct On {

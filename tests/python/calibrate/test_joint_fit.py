@@ -84,7 +84,7 @@ def test_held_out_error(calibration):
 
 def test_written_file(calibration, readings, tmp_path):
     """Homes, turned frame and recorded homes together: the file's model has the error that the fit reports."""
-    joint_fit.write_robot(calibration, tmp_path / "new.yaml", TABLE)
+    calibration.save(tmp_path / "new.yaml")
     written = robot_file.load(tmp_path / "new.yaml")
     assert rms_mm(written, readings) == pytest.approx(calibration.stages[-1].rms_mm, abs=2e-4)
     assert written.uncertainty == calibration.before.uncertainty
@@ -182,7 +182,7 @@ def test_unknown_roll(robot, loose, readings, roll_deg, tmp_path):
     assert "roll is unknown" in said(found) and found.fit.observations == plain.fit.observations
     others = [item for item in found.fitted if item is not roll]
     assert max(abs(a.value - b.value) / a.sd for a, b in zip(others, plain.fitted, strict=True)) < 1
-    joint_fit.write_robot(found, tmp_path / "new.yaml", TABLE)
+    found.save(tmp_path / "new.yaml")
     written = robot_file.load(tmp_path / "new.yaml")
     assert written.tracker.sensor_roll_deg == pytest.approx(roll.value, abs=1e-4) and written.tracker.roll_known
     again = outcome(written, turned)
@@ -252,7 +252,7 @@ def test_effects(robot, readings, tmp_path):
     (found,) = [item for item in freed.fitted if item.name.startswith("effects.")]
     assert found.unit == "m" and abs(found.value - 2e-3) < 4 * found.sd < 1e-3
     assert freed.stages[0].rms_mm > 1 > 0.1 > freed.stages[-1].rms_mm
-    joint_fit.write_robot(freed, tmp_path / "new.yaml", TABLE)
+    freed.save(tmp_path / "new.yaml")
     assert robot_file.load(tmp_path / "new.yaml").effects["sensor_offset"]["x"] == pytest.approx(found.value)
     with pytest.raises(InputError, match=r"effects.friction.coefficient.1"):
         outcome(beside, made, ["effects.friction.coefficient.1"])

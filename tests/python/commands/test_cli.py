@@ -6,14 +6,13 @@ import os
 import shlex
 import subprocess
 import sys
-import types
 from pathlib import Path
 
 import click
 import numpy as np
 import pytest
 from ctcr import cli, frames
-from ctcr.model import model
+from ctcr.model import model, table_poses
 from ctcr.robot import robot_file
 from ctcr.robot.table_ii import table_ii
 from ctcr.table import measurements
@@ -35,7 +34,7 @@ class Straight:
         turn = np.stack([0 * length, 0 * length, alpha[:, 0]], axis=1)
         quaternion = frames.quaternion_from_rotation_vector(turn)
         status = np.where(alpha[:, 0] > 3, 3, 0)
-        return types.SimpleNamespace(position=position, quaternion=quaternion, status=status, stability=0 * length + 1)
+        return model.Prediction(position, quaternion, status, 0 * length + 1, None, None)
 
     def shape(self, beta, alpha, force=None, moment=None, *, points=200):
         length = np.linspace(0, self.lengths[0] + beta[0], points)
@@ -47,7 +46,8 @@ class Straight:
 @pytest.fixture(autouse=True)
 def straight(monkeypatch):
     monkeypatch.setattr(model, "Model", Straight)
-    monkeypatch.setattr(model, "status_text", lambda code: {3: "not converged"}[code])
+    monkeypatch.setattr(table_poses, "Model", Straight)
+    monkeypatch.setattr(model, "status_text", lambda code: {0: "ok", 3: "not converged"}[code])
 
 
 @pytest.fixture
@@ -83,9 +83,7 @@ def test_info(run, tmp_path):
 @pytest.mark.parametrize("chunk", [7, 1 << 16])
 def test_predict(run, tmp_path, table, monkeypatch, frame, chunk):
     """Each row is kept and gets the pose of the model in the asked frame, in chunks of any size."""
-    from ctcr.commands import predict
-
-    monkeypatch.setattr(predict, "CHUNK_ROWS", chunk)
+    monkeypatch.setattr(table_poses, "CHUNK_ROWS", chunk)
     code, out, _ = run("predict", ROBOT, table, "--frame", frame, "-o", tmp_path / "out.csv", "--steps", 3)
     assert code == 0 and "48 of 50 rows" in out
     assert "row 11: not converged" in out and "row 40: not converged" in out

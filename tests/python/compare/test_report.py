@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from compare_bench import bench, stop_and_go
 from ctcr import cli
-from ctcr.commands import compare as compare_command
+from ctcr.api import compare as compare_api
 from ctcr.compare import compare, report
 from ctcr.compare.summary import findings, headline
 from ctcr.fit.floors import Floors
@@ -114,8 +114,8 @@ def table(tmp_path, monkeypatch):
     wider = {name: np.hstack([getattr(readings, name), third]) for name in ("beta", "alpha")}
     readings = replace(readings, **wider)
     write_table(tmp_path / "table.csv", readings)
-    monkeypatch.setattr(compare_command, "_predict", lambda robot, readings, steps: prediction)
-    monkeypatch.setattr(compare_command, "_fitted", lambda *_: ([], Floors().as_dict()))
+    monkeypatch.setattr(compare_api, "predict", lambda robot, readings, steps: prediction)
+    monkeypatch.setattr(compare_api, "_fitted", lambda *_: ([], Floors().as_dict()))
     return tmp_path / "table.csv"
 
 
@@ -166,7 +166,7 @@ def test_real_robot():
 
     robot = robot_file.load(SHARED / "robot.yaml")
     readings = measurements.load(SHARED / "measurements.csv", robot.n_tubes)
-    result = compare(robot, readings, compare_command._predict(robot, readings, 4))
+    result = compare(robot, readings, compare_api.predict(robot, readings))
     assert result.position_mm.mean == pytest.approx(5.4, abs=0.1)
     assert result.direction.delay_s == pytest.approx(0.10, abs=0.01)
     assert result.direction.rms_without_delay_mm == pytest.approx(3.5, abs=0.1)

@@ -34,13 +34,13 @@ def test_nothing_missing(robot):
     assert result.verdict.word == "nothing_missing"
     assert not result.accepted and not result.widened
     assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]
-    json.dumps(result.as_json(), allow_nan=False)
+    json.dumps(result.as_dict(), allow_nan=False)
 
 
 def names_what_was_hidden(result, hidden, identity):
     assert result.accepted[0].ids[0] == identity
     assert result.verdict.word in ("identified", "probable")
-    found = result.as_json()["effects"][0]
+    found = result.as_dict()["effects"][0]
     assert found["class"][0] == identity and found["delta_log_evidence"] > 8
     rms = result.rms_mm
     assert rms["with_effects"] < 1.2 * rms["noise_floor"] < rms["calibrated"] * 1.2
@@ -77,7 +77,7 @@ def test_wrong_sheet(robot, hidden):
     result = diagnose(file, table)
     assert [a.id for a in result.accepted] == (["backlash_rotation"] if hidden else [])
     assert hidden or result.verdict.word == "nothing_missing"
-    said = {one["uncertainty"]: one["factor"] for one in result.as_json()["widened"]}
+    said = {one["uncertainty"]: one["factor"] for one in result.as_dict()["widened"]}
     assert {"tracker_frame_mm", "rotation_offset_deg"} <= said.keys() and min(said.values()) > 1
     assert any("the home rotations, 1 deg, is contradicted by the data: widened" in text for text in result.notices)
     assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]

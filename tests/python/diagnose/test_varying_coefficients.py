@@ -134,7 +134,7 @@ def test_diagnosis(robot, plan, capsys):
     """The terminal, the report and the JSON say what varies."""
     found = diagnose(robot, readings_of(robot, plan, twisted(plan)))
     assert found.verdict.word != "identified"
-    assert "length1" in found.as_json()["leftover"]["depends_on"]
+    assert "length1" in found.as_dict()["leftover"]["depends_on"]
     terminal.show(output.console(), found)
     page = report.page(found, "a test")
     for text in (capsys.readouterr().out, page):

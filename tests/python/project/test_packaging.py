@@ -13,9 +13,9 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 # A package that installs a module of another name.
 PART_OF = {"mpl_toolkits": "matplotlib", "serial": "pyserial"}
 FOLDERS = {
-    "tools/ctcr": ["bench", "cluster"],
-    "tools": ["dev", "bench", "cluster"],
-    "tests": ["dev", "bench"],
+    "tools/ctcr": ["bench", "cluster", "pandas"],
+    "tools": ["dev", "bench", "cluster", "pandas"],
+    "tests": ["dev", "bench", "pandas"],
     "examples": ["dev"],
 }
 TRIED = {"sksurgerynditracker"}  # tests of others' programs are skipped without them

@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
+from functools import cached_property
+from math import isfinite, nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,8 +26,12 @@ from ctcr.model.sessions import without_frame
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
+from ctcr.show.result import Glance, Result, frame
 from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,14 @@ class HeldOut:
     floor: Stage
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Result):
     """A joint fit and what is known of its worth."""
 
-    before: Robot
+    PAGE = "calibrate.report"
+    PICTURE = "calibrate.figures", "waterfall", 10.4, 4.2
+
+    before: Robot  # as it was given
     after: Robot
     readings: Measurements
     fit: Fit
@@ -66,6 +74,38 @@ class Calibration:
     floors: Floors
     halves: Halves | None
     notices: list[str]
+
+    @cached_property
+    def robot(self) -> Robot:
+        """With the fitted values and an entry of the ledger: what `save` writes."""
+        changes, entry, effects = _change(self)
+        return ledger.changed(self.before, changes, entry, effects=effects)
+
+    @property
+    def source(self) -> str:
+        return f"{self.readings.source} fitted with {self.before.file or self.before.name}"
+
+    def save(self, path: str | Path, *, in_place: bool = False) -> Robot:
+        """Writes the calibrated robot file with its entry in the ledger, and returns that robot.
+
+        in_place    whether `path` may be the file that the robot came from
+        """
+        changes, entry, effects = _change(self)
+        return ledger.write(self.before, path, changes, entry, effects=effects, in_place=in_place)
+
+    def to_frame(self) -> "DataFrame":
+        """A row a fitted parameter, in the unit of the robot file."""
+        names = ("name", "unit", "nominal", "prior_sd", "value", "sd", "shift", "ratio", "flag")
+        return frame({name: [getattr(item, name) for item in self.fitted] for name in names})
+
+    def glance(self) -> Glance:
+        stages = [*self.stages, *([self.held_out.error] if self.held_out else [])]
+        rows = [[stage.name, f"{stage.rms_mm:.3f}"] for stage in stages]
+        rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows() if isfinite(size)]
+        first, last = self.stages[0].rms_mm, stages[-1].rms_mm
+        held = " on held-out readings" if self.held_out else ""
+        line = f"Calibration {self.before.name}: {len(self.fitted)} parameters, {first:.3g} to {last:.3g} mm RMS{held}"
+        return Glance(line, ["error", "mm RMS"], rows, [*fields.doubts(self.fitted), *self.notices])
 
     @property
     def unexplained(self) -> Stage:
@@ -134,7 +174,7 @@ def calibrate(
     Raises InputError where the input cannot be used: nothing measured, a frame that is metres off, a name that does
     not exist, a prior of zero width, too few rows.
     """
-    floor = floors(robot, readings)
+    floor, given = floors(robot, readings), robot
     robot, readings, notices = sensor_roll.usable(robot, readings)
     names = without_frame(sensor_roll.with_roll(list(free), robot), readings)
     if not names:
@@ -172,7 +212,7 @@ def calibrate(
             stages.append(_stage("frame alone", fitted(frame, noise=fit.noise, starts=1).residual[usable]))
         pair = [refitted(fit, both.part == part) for part in range(2)] if both else []
     return Calibration(
-        before=robot,
+        before=given,
         after=placed(fit.apply(robot), readings.sessions),
         readings=readings,
         fit=fit,
@@ -186,17 +226,17 @@ def calibrate(
     )
 
 
-def write_robot(c: Calibration, target: str | Path, measurements: str | Path, in_place: bool = False) -> Robot:
-    """Writes the calibrated robot file with its entry in the ledger."""
+def _change(c: Calibration) -> tuple[list[ledger.Change], ledger.Entry, dict[str, Any] | None]:
+    """What a fit changes in the robot file, its entry of the ledger, and the effects where they changed."""
     rms_mm = c.rms("rms_mm") | {"noise_floor": c.floors.expected_error_mm}
     figures = {"rms_mm": rms_mm, "reduced_chi_square": c.fit.reduced_chi_square}
     if np.isfinite(c.floor.rms_deg):
         figures["rms_deg"] = c.rms("rms_deg")
     wider = [one.sentence for one in widening.widened(c.before, c.fit.priors.scales)]
-    entry = ledger.Entry("ctcr calibrate fit", [measurements], figures, " ".join([*wider, *fields.doubts(c.fitted)]))
+    entry = ledger.Entry("ctcr calibrate fit", c.readings.files, figures, " ".join([*wider, *fields.doubts(c.fitted)]))
     changes = fields.changes(c.fit, c.before, c.after)
     effects = c.after.effects if c.after.effects != c.before.effects else None
-    return ledger.write(c.before, target, changes, entry, effects=effects, in_place=in_place)
+    return changes, entry, effects
 
 
 def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> tuple[folds.Split | None, list[int]]:

@@ -39,8 +39,9 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
 
     Example: ctcr add robot.yaml friction --fit measurements.csv -o new.yaml
     """
+    from ctcr.api.add import add
     from ctcr.calibrate import outcome
-    from ctcr.diagnose import add
+    from ctcr.diagnose.add import write_values
     from ctcr.effects import catalogue
     from ctcr.effects.settings import diagnosed, settings
     from ctcr.robot import robot_file
@@ -55,36 +56,17 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
     fixed = held | settings(given, loaded, ids)
     if not measurements:
         after = catalogue.with_values(loaded, ids, fixed)
-        add.write_values(loaded, after, ids, target, in_place)
+        write_values(loaded, after, ids, target, in_place)
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
-    _, readings, said = options.load_right(robot, measurements, anyway, frame_per_run)
-    added = add.add(loaded, readings, ids, fixed=fixed, start=start, free=free.split(","))
-    added.notices[:0] = said
-    add.write_added(loaded, added, target, measurements, in_place)
-    out.write_json(_as_data(added))
+    loaded, readings = options.load_any(robot, measurements)
+    given = {"fixed": fixed, "start": start, "free": free, "anyway": anyway, "frame_per_run": frame_per_run}
+    added = add(loaded, ids, readings, **given)
+    added.save(target, in_place=in_place)
+    out.write_json(added.as_dict())
     _show(out, loaded, added)
     out.say(*readings.warnings, f"Robot file: {target}")
-
-
-def _as_data(added) -> dict:
-    from ctcr.fit.widening import widened
-
-    return {
-        "added": added.ids,
-        "effects": added.robot.effects,
-        "parameters": added.parameters(),
-        "rms_mm": added.rms("rms_mm"),
-        "rms_deg": added.rms("rms_deg"),
-        "held_out": added.held_out,
-        **added.floors.as_dict(),
-        "frames": added.sessions and added.sessions.as_dict(),
-        "reduced_chi_square": added.fit.reduced_chi_square,
-        "converged": added.fit.converged,
-        "widened": widened(added.robot, added.fit.priors.scales),
-        "notices": added.notices,
-    }
 
 
 def _show(out, robot, added) -> None:

@@ -234,17 +234,16 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anywa
 
     Example: ctcr calibrate fit robot.yaml measurements.csv --free standard -o calibrated.yaml --report fit.html
     """
-    from ctcr.calibrate import joint_fit, outcome, report
+    from ctcr.api.calibrate import calibrate
+    from ctcr.calibrate import outcome, report
 
-    loaded, readings, said = options.load_right(robot, measurements, anyway, frame_per_run)
+    loaded, readings = options.load_any(robot, measurements)
     target = outcome.check_target(loaded, target, in_place)
-    names = [name.strip() for name in free.split(",") if name.strip()]
-    chosen = {"hold_out": hold_out, "noise": noise, "sd": _widths(widths)}
-    calibration = joint_fit.calibrate(loaded, readings, names, halves=out.report is not None, **chosen)
-    calibration.notices[:0] = said
+    chosen = {"free": free, "hold_out": hold_out, "noise": noise, "sd": _widths(widths), "anyway": anyway}
+    calibration = calibrate(loaded, readings, halves=out.report is not None, frame_per_run=frame_per_run, **chosen)
     if target:
-        joint_fit.write_robot(calibration, target, measurements, in_place=in_place)
-    out.write_report("calibrate.report", calibration, f"{measurements} fitted with {robot}")
+        calibration.save(target, in_place=in_place)
+    out.write_page(calibration)
     out.write_json(calibration.as_dict())
     report.show(out.console, calibration)
     out.say(*readings.warnings)

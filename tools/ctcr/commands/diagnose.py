@@ -23,24 +23,25 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
 
     Example: ctcr diagnose robot.yaml measurements.csv --json diagnosis.json --report diagnosis.html
     """
+    from ctcr.api.diagnose import diagnose
+    from ctcr.api.reviewed import WrongConventions
     from ctcr.conventions import report
-    from ctcr.diagnose import diagnose, terminal
+    from ctcr.diagnose import terminal
 
-    loaded, readings, conventions, refusal = options.reviewed(robot, measurements)
-    if conventions.wrong and not anyway:
-        out.write_report("conventions.report", conventions, f"{measurements} with {robot}", command="ctcr diagnose")
-        out.write_json(report.as_diagnosis(conventions))
-        report.show(out.console, conventions)
+    loaded, readings = options.load_any(robot, measurements)
+    try:
+        with terminal.progress() as say:
+            result = diagnose(
+                loaded, readings, anyway=anyway, frame_per_run=frame_per_run, threads=threads, progress=say
+            )
+    except WrongConventions as wrong:
+        found, source = wrong.review, f"{measurements} with {robot}"
+        out.write_report("conventions.report", found, source, command="ctcr diagnose")
+        out.write_json(report.as_diagnosis(found))
+        report.show(out.console, found)
         return
-    if refusal:
-        raise refusal
-    with terminal.progress() as say:
-        say("conventions and runs")
-        readings, said = options.to_fit(loaded, readings, conventions, frame_per_run)
-        result = diagnose(loaded, readings, progress=say, threads=threads)
-    result.verdict.sentences.extend(said)
-    out.write_report("diagnose.report", result, f"{measurements} diagnosed with the model of {robot}")
-    out.write_json(result.as_json() | {"conventions": [one.as_dict() for one in conventions.findings]})
+    out.write_page(result)
+    out.write_json(result.as_dict())
     terminal.show(out.console, result)
     out.say(*readings.warnings)
     if result.accepted and not result.verdict.names_no_cause:

@@ -34,11 +34,13 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
     Example: ctcr next robot.yaml measurements.csv --runs 4 --masses 0,20 -o plan.csv
     """
     from ctcr import plan
+    from ctcr.api.reviewed import to_fit
     from ctcr.diagnose import diagnose, terminal
     from ctcr.model import simulation
 
     kilograms = _masses(masses)
-    loaded, readings, _ = options.load_right(robot, measurements, anyway, frame_per_run)
+    loaded, table = options.load_any(robot, measurements)
+    readings, _, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=frame_per_run)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
         say("looking for the runs that decide")

@@ -120,64 +120,13 @@ def load(robot: str, table: str):
     return loaded, measurements.load(table, loaded.n_tubes)
 
 
-def reviewed(robot: str, table: str):
-    """The robot, a table of measurements, and the review of their conventions.
-
-    A table that only another convention makes possible comes with the error that refuses it; else that is None.
-    """
-    from ctcr.conventions import review
-    from ctcr.errors import InputError
+def load_any(robot: str, table: str):
+    """The same of a table that may follow another convention: a comparison or a fit tells."""
     from ctcr.robot import robot_file
     from ctcr.table import measurements
 
-    loaded, refusal = robot_file.load(robot), None
-    try:
-        readings = measurements.load(table, loaded.n_tubes)
-    except InputError as error:
-        refusal = error
-        try:
-            readings = measurements.load(table, loaded.n_tubes, plausible=False)
-        except InputError:
-            raise refusal from None
-    found = review(loaded, readings)
-    if refusal and not found.findings:
-        raise refusal
-    return loaded, readings, found, refusal
-
-
-def without_repeated(readings, conventions):
-    """The readings without poses that the tracker repeated, and sentences on that."""
-    import numpy as np
-
-    from ctcr.show.wording import sentence
-
-    rows = [row for one in conventions.frozen for row in one.rows]
-    said = [sentence(f"{one.text}: left out") for one in conventions.frozen]
-    return (readings.without_poses(np.isin(readings.row, rows)) if rows else readings), said
-
-
-def to_fit(robot, readings, conventions, frame_per_run: bool | None):
-    """The readings as a fit takes them, and sentences on what was left out: poses that the tracker repeated, and where
-    the runs are sessions, what each has of its own (`frame_per_run`: as asked; None: as the readings say)."""
-    from ctcr.diagnose import sessions
-
-    readings, said = without_repeated(readings, conventions)
-    readings, more = sessions.of_runs(robot, readings, frame_per_run)
-    return readings, [*said, *more]
-
-
-def load_right(robot: str, table: str, anyway: bool, frame_per_run: bool | None):
-    """As `load`, of a table `to_fit`, with its sentences. Raises InputError where a convention is wrong, unless
-    `anyway`."""
-    from ctcr.errors import InputError, Problem
-
-    loaded, readings, found, refusal = reviewed(robot, table)
-    if found.wrong and not anyway:
-        advice = Problem("a fit would take that for physics: correct it first, or go on with --anyway")
-        raise InputError([*(Problem(one.sentence, table) for one in found.wrong), advice])
-    if refusal:
-        raise refusal
-    return loaded, *to_fit(loaded, readings, found, frame_per_run)
+    loaded = robot_file.load(robot)
+    return loaded, measurements.read(table, loaded.n_tubes)
 
 
 def with_effects(robot, given):
@@ -219,6 +168,11 @@ class Output:
             from ctcr.show import output
 
             output.write_json(data, self.json_target)
+
+    def write_page(self, result) -> None:
+        """Where --report asks for it: the page of a result of `show.result`."""
+        if self.report:
+            result.report(self.report)
 
     def write_report(self, module: str, result, source: str, **details) -> None:
         """Where --report asks for it: the page of the module, below ctcr; `source` says what it is made from."""

@@ -8,9 +8,7 @@ import click
 
 from ctcr.commands import options
 
-CHUNK_ROWS = 1 << 16
 LISTED_ROWS = 20
-POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_qy", "pred_qz")
 
 
 @click.command(name="predict")
@@ -34,6 +32,7 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
 
     Example: ctcr predict robot.yaml measurements.csv -o predicted.csv
     """
+    from ctcr.model.table_poses import predictions
     from ctcr.robot import robot_file
     from ctcr.show.output import atomic_writer
 
@@ -53,32 +52,10 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
         out.say(f"  and {len(unsolved) - LISTED_ROWS} more rows (all of them: --json FILE)")
 
 
-def predictions(robot, readings, steps: int):
-    """Yields (rows, their predicted poses) in chunks, so that a long table shows its progress and takes no memory.
-
-    Effects may have a history: they are predicted for all rows at once, in their order.
-    """
-    from types import SimpleNamespace
-
-    from ctcr.model import effect_model
-    from ctcr.model.model import Model
-    from ctcr.show.output import Progress
-
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    model = None if robot.effects else Model(robot, steps=steps)
-    found = vars(effect_model.readings(robot, readings, steps)) if robot.effects else {}
-    with Progress("predicting", len(readings)) as progress:
-        for start in range(0, len(readings), CHUNK_ROWS):
-            rows = slice(start, min(start + CHUNK_ROWS, len(readings)))
-            if model:
-                yield rows, model.predict(beta[rows], alpha[rows], readings.force[rows])
-            else:
-                yield rows, SimpleNamespace(**{name: values[rows] for name, values in found.items()})
-            progress.advance(rows.stop - start)
-
-
 def _write(file, table: Path, readings, answers, tracker, frame: str) -> list[tuple[int, str]]:
     """Copies the table with the predictions beside it; returns (row, why) of those not solved."""
+    from ctcr.model.model import POSE_COLUMNS
+
     unsolved = []
     with open(table, "rb") as source:
         file.write(_line(source.readline(), "," + ",".join(POSE_COLUMNS)))
@@ -94,14 +71,14 @@ def _fields(answer, tracker, frame: str) -> tuple[list[str], list[str]]:
     import numpy as np
 
     from ctcr import frames
-    from ctcr.model.model import status_text
+    from ctcr.model.model import POSE_COLUMNS, SOLVED
 
     position, quaternion = answer.position, answer.quaternion
     if frame == "tracker":
         position, quaternion = frames.base_to_tracker(tracker, position, quaternion)
     form, empty = ",%.10g" * len(POSE_COLUMNS), "," * len(POSE_COLUMNS)
     poses = np.hstack([position, quaternion]).tolist()
-    status = ["" if code == 0 else status_text(code) for code in np.asarray(answer.status).tolist()]
+    status = ["" if why == SOLVED else why for why in answer.why]
     return [empty if why else form % tuple(pose) for pose, why in zip(poses, status, strict=True)], status
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +18,10 @@ from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.conventions import Finding as Convention
 from ctcr.errors import InputError, Problem
+from ctcr.show.result import Glance, Result, frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
 
@@ -41,9 +47,12 @@ class RunErrors:
     angle_deg: Spread | None
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
     """Everything `compare` finds. Lengths in mm, angles in degrees, as the names say."""
+
+    PAGE = "compare.report"
+    PICTURE = "compare.figures", "histogram", 5.2, 3.4
 
     robot: str
     position_mm: Spread
@@ -70,6 +79,7 @@ class Comparison:
     conventions: Sequence[Convention]  # that are wrong, the clearest first
     floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
+    source: str = ""  # what was compared with what
 
     WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
 
@@ -102,6 +112,32 @@ class Comparison:
         data |= self.floors
         return data
 
+    def to_frame(self) -> "DataFrame":
+        """A row a compared reading: row of the table, run, time, measured and predicted position in the tracker frame,
+        size of the error."""
+        sample = self.headline
+        columns: dict = {"row": sample.row, "run": sample.run, "t_s": sample.t}
+        for prefix, positions in (("", sample.measured), ("pred_", sample.predicted)):
+            columns |= {f"{prefix}{axis}_m": values for axis, values in zip("xyz", positions.T, strict=True)}
+        columns["error_mm"] = 1e3 * np.linalg.norm(sample.error, axis=1)
+        if sample.rotation_error is not None:
+            columns["angle_deg"] = np.degrees(np.linalg.norm(sample.rotation_error, axis=1))
+        return frame(columns)
+
+    def glance(self) -> Glance:
+        spreads = [("position", "mm", self.position_mm), (self.angle_kind, "deg", self.angle_deg)]
+        rows = [
+            [name, unit, *(f"{value:.3g}" for value in (of.mean, of.rms, of.p95, of.maximum))]
+            for name, unit, of in spreads
+            if of
+        ]
+        small = {"readings repeat to": self.noise.rms_mm, "expected error": self.floors["expected_error_mm"]}
+        rows += [[name, "mm", "", f"{value:.2g}", "", ""] for name, value in small.items() if isfinite(value)]
+        count, rms = self.position_mm.count, self.position_mm.rms
+        line = f"Comparison {self.robot}: {rms:.3g} mm RMS over {count} readings"
+        notes = [*([self.WRONG] if self.wrong else []), *(one.sentence for one in self.wrong)]
+        return Glance(line, ["error", "unit", "mean", "RMS", "95 %", "max"], rows, notes, 2)
+
 
 def compare(
     robot,
@@ -111,10 +147,11 @@ def compare(
     conventions: Sequence[Convention] = (),
     sessions: Sequence[str] = (),
     floors: Mapping[str, float] | None = None,
+    source: str = "",
 ) -> Comparison:
     """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
     `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
-    `ctcr.fit.floors` as_dict().
+    `ctcr.fit.floors` as_dict(), `source` what is compared, in words.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -181,6 +218,7 @@ def compare(
         conventions=conventions,
         floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
         sessions=sessions,
+        source=source,
     )
 
 

@@ -3,8 +3,9 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,20 +28,27 @@ from ctcr.fit.widening import widened
 from ctcr.model import fields
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.sessions import as_given
-from ctcr.robot import ledger
+from ctcr.robot import history, ledger
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.show.output import Progress
-from ctcr.show.wording import sentence
+from ctcr.show.result import Glance, Shown, frame
+from ctcr.show.style import Picture, picture
+from ctcr.show.wording import deviation, number, sentence
 from ctcr.table.measurements import Measurements
 from ctcr.table.sessions import Sessions
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
-@dataclass(frozen=True)
-class Added:
+
+@dataclass(frozen=True, repr=False)
+class Added(Shown):
     """Effects fitted to measurements."""
 
-    robot: Robot  # with them
+    before: Robot  # as it was given
+    after: Robot  # with them
+    files: list[str]  # of the measurements
     ids: list[str]
     fit: joint.Fit  # of all rows
     stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
@@ -61,6 +69,67 @@ class Added:
         """By stage; `unit` is rms_mm or rms_deg."""
         return {stage.name: getattr(stage, unit) for stage in self.stages}
 
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers for JSON."""
+        return {
+            "added": self.ids,
+            "effects": self.after.effects,
+            "parameters": self.parameters(),
+            "rms_mm": self.rms("rms_mm"),
+            "rms_deg": self.rms("rms_deg"),
+            "held_out": self.held_out,
+            **self.floors.as_dict(),
+            "frames": self.sessions and self.sessions.as_dict(),
+            "reduced_chi_square": self.fit.reduced_chi_square,
+            "converged": self.fit.converged,
+            "widened": widened(self.after, self.fit.priors.scales),
+            "notices": self.notices,
+        }
+
+    @cached_property
+    def robot(self) -> Robot:
+        """With the effects and an entry of the ledger: what `save` writes."""
+        changes, entry = _change(self)
+        return ledger.changed(self.before, changes, entry, effects=self.after.effects)
+
+    def save(self, path: str | Path, *, in_place: bool = False) -> Robot:
+        """Writes the robot with its effects and an entry of the ledger, and returns that robot.
+
+        in_place    whether `path` may be the file that the robot came from
+        """
+        changes, entry = _change(self)
+        return ledger.write(self.before, path, changes, entry, effects=self.after.effects, in_place=in_place)
+
+    def plot(self) -> Picture:
+        """The error after each step, a matplotlib figure; `savefig` writes it."""
+        stages = [history.Stage(name, size, "") for name, size in self._errors()]
+        made = picture(history.draw_waterfall, stages, 10.4, 4.4)
+        assert made is not None
+        return made
+
+    def to_frame(self) -> "DataFrame":
+        """A row a fitted parameter of an effect, SI."""
+        known, found = catalogue.parameter_of(self.before.n_tubes), self.parameters()
+        columns: dict[str, list] = {"name": [*found], "unit": [known[name].unit for name in found]}
+        return frame(columns | {key: [one[key] for one in found.values()] for key in ("value", "sd")})
+
+    def glance(self) -> Glance:
+        known = catalogue.parameter_of(self.before.n_tubes)
+        rows = [
+            [name.removeprefix("effects."), known[name].unit, number(one["value"], one["sd"]), deviation(one["sd"])]
+            for name, one in self.parameters().items()
+        ]
+        errors = [f"{name}: {size:.3f} mm RMS" for name, size in self._errors()]
+        steps = self.rms("rms_mm")
+        fall = f"{steps['calibrated']:.3g} to {steps[self.ids[-1]]:.3g} mm RMS"
+        line = f"Added {', '.join(self.ids)} to {self.before.name}: {fall}"
+        return Glance(line, ["fitted (SI)", "unit", "value", "sd"], rows, [*errors, *self.notices], 2)
+
+    def _errors(self) -> list[tuple[str, float]]:
+        """The RMS error [mm] of each step, the expected error last."""
+        steps = [(stage.name, stage.rms_mm) for stage in self.stages if stage.name != "noise_floor"]
+        return [*steps, (history.FLOOR, self.floors.expected_error_mm)]
+
 
 def add(
     robot: Robot,
@@ -78,7 +147,7 @@ def add(
     blocks of time, where there are few runs) is held out of the fits that give the errors; the values are those of a
     fit to all rows. Raises InputError where no fit is possible.
     """
-    given, (readings, said) = readings, prepared(robot, readings)
+    given, unchanged, (readings, said) = readings, robot, prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     fitted = [identity for identity in robot.effects if identity not in ids]
@@ -117,22 +186,20 @@ def add(
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), _name_of(readings, held_out)
-    floor, sessions = floors(robot.with_effects(after.effects), given), readings.sessions
-    return Added(placed(after, sessions), list(ids), fit, stages, name, notices, sessions, floor)
+    floor, own = floors(robot.with_effects(after.effects), given), readings.sessions
+    return Added(unchanged, placed(after, own), given.files, list(ids), fit, stages, name, notices, own, floor)
 
 
-def write_added(
-    before: Robot, added: Added, target: str | Path, measurements: str | Path, in_place: bool = False
-) -> Robot:
-    """Writes the robot with its effects and an entry of the ledger."""
-    changes = fields.changes(added.fit, before, added.robot)
+def _change(added: Added) -> tuple[list[Change], Entry]:
+    """What the fit changes in the robot file beside its effects, and its entry of the ledger."""
+    before = added.before
+    changes = fields.changes(added.fit, before, added.after)
     rms_mm = added.rms("rms_mm") | {"noise_floor": added.floors.expected_error_mm}
     figures: dict[str, Any] = {"added": added.ids, "rms_mm": rms_mm}
     if np.isfinite([stage.rms_deg for stage in added.stages]).all():
         figures["rms_deg"] = added.rms("rms_deg")
     figures |= {"held_out": added.held_out, "parameters": added.parameters(), "effects_before": before.effects}
-    entry = Entry(f"ctcr add {' '.join(added.ids)}", [measurements], figures, " ".join(added.notices))
-    return ledger.write(before, target, changes, entry, effects=added.robot.effects, in_place=in_place)
+    return changes, Entry(f"ctcr add {' '.join(added.ids)}", added.files, figures, " ".join(added.notices))
 
 
 def write_values(before: Robot, after: Robot, ids: Sequence[str], target: str | Path, in_place: bool = False) -> Robot:

@@ -1,14 +1,16 @@
 """The whole diagnosis: which effects are missing, judged on runs that no fit has seen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Mask
 from ctcr.audit import prepared
+from ctcr.conventions import Finding
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, Progress, values_of
@@ -26,11 +28,21 @@ from ctcr.fit.result import rms
 from ctcr.fit.widening import Widened, widened
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
+from ctcr.show.result import Glance, Result, frame
+from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
-@dataclass
-class Diagnosis:
+
+@dataclass(repr=False)
+class Diagnosis(Result):
+    """What was tried and found, and the verdict."""
+
+    PAGE = "diagnose.report"
+    PICTURE = "diagnose.figures", "waterfall", 5.2, 3.8
+
     robot: Robot
     measurements: Measurements
     held_out: Mask  # (M,) rows that no fit has seen
@@ -48,6 +60,35 @@ class Diagnosis:
     verdict: Verdict
     notices: list[str] = field(default_factory=list)
     seconds: float = 0.0
+    conventions: Sequence[Finding] = ()  # that the review of the table found
+
+    @property
+    def source(self) -> str:
+        return f"{self.measurements.source} diagnosed with the model of {self.robot.file or self.robot.name}"
+
+    def to_frame(self) -> "DataFrame":
+        """A row an effect that was tried in a round: log evidence gained, linearised and in the joint fit (NaN: not
+        fitted), fraction of the unexplained chi-square, and whether it was accepted or is as likely."""
+        rows = [(number, one, r) for number, r in enumerate(self.rounds, start=1) for one in r.best]
+        known = {"linear": "linear", "fit": "refit", "explained": "explained"}
+        columns: dict[str, list] = {"round": [n for n, _, _ in rows], "effect": [one.id for _, one, _ in rows]}
+        for name, attribute in known.items():
+            fitted = [one.refit is not None or name == "linear" for _, one, _ in rows]
+            columns[name] = [
+                float(getattr(one, attribute)) if there else np.nan
+                for (_, one, _), there in zip(rows, fitted, strict=True)
+            ]
+        columns["accepted"] = [one is r.accepted for _, one, r in rows]
+        columns["as_likely"] = [one.id in r.ids for _, one, r in rows]
+        return frame(columns)
+
+    def glance(self) -> Glance:
+        found = " and ".join(" or ".join(a.ids) for a in self.accepted)
+        line = f"Diagnosis {self.robot.name}: {self.verdict.word.replace('_', ' ')}{f', {found}' if found else ''}"
+        rows = [[name.replace("_", " "), f"{size:.3f}"] for name, size in self.rms_mm.items() if name != "noise_floor"]
+        rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows()]
+        notes = [*self.verdict.sentences, *map(sentence, self.notices)]
+        return Glance(line, ["error on held-out runs", "mm RMS"], rows, notes)
 
     @property
     def mistakes_effect_for_outliers(self) -> bool:
@@ -100,7 +141,7 @@ class Diagnosis:
         more = self.varying.depends_on if self.varying else []
         return list(dict.fromkeys([*self.residual.depends_on, *more]))
 
-    def as_json(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         return {
             "verdict": self.verdict.word,
             "effects": [
@@ -113,6 +154,7 @@ class Diagnosis:
             **{name: round(value, 5) for name, value in self.floors.as_dict().items()},
             "frames": self.measurements.sessions and self.measurements.sessions.as_dict(),
             "seconds": round(self.seconds, 2),
+            "conventions": [one.as_dict() for one in self.conventions],
         }
 
 

@@ -39,7 +39,7 @@ def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, floa
 
 
 def found(answer: Any, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
-    """Effects of a diagnosis (its as_json()), the first of each class, then their held and their fitted values.
+    """Effects of a diagnosis (its as_dict()), the first of each class, then their held and their fitted values.
 
     Choices are held, and so are parameters without a fitted value, at their neutral value.
     """

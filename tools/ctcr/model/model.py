@@ -1,7 +1,8 @@
 """The kinetostatic model of a robot: poses, derivatives and shapes from joints and tip loads."""
 
+from collections import Counter
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,13 @@ from ctcr.model import parameters as free_parameters
 from ctcr.model import recording
 from ctcr.model.effect_model import of_the_path, of_the_poses
 from ctcr.robot.description import Robot
+from ctcr.show.result import Glance, Shown, frame
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_qy", "pred_qz")
+SHOWN = 5  # rows at a glance
 INTEGRATORS = {
     "default": _core.Integrator.standard,
     "ssprk3": _core.Integrator.ssp_rk3,
@@ -24,9 +31,9 @@ INTEGRATORS = {
 }
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """What the model says of M configurations, base frame. NaN where there is no solution."""
+@dataclass(frozen=True, repr=False)
+class Prediction(Shown):
+    """What the model says of M configurations, base frame. NaN where there is no solution: `why` says why."""
 
     position: Array  # (M, 3) [m], tip of the tube that carries the sensor
     quaternion: Array  # (M, 4), w first and not negative
@@ -40,6 +47,27 @@ class Prediction:
     def solved(self) -> Mask:
         """Which rows have a trustworthy answer (M,)."""
         return self.status == 0
+
+    @property
+    def why(self) -> list[str]:
+        """Of each row: "ok", or why it has no answer."""
+        text = {int(code): status_text(int(code)) for code in np.unique(self.status)}
+        return [text[code] for code in self.status.tolist()]
+
+    def to_frame(self) -> "DataFrame":
+        """A row a configuration: the pose in the columns of `ctcr predict`, and in `status` why there is none."""
+        poses = np.hstack([self.position, self.quaternion])
+        return frame(dict(zip(POSE_COLUMNS, poses.T, strict=True)) | {"status": self.why})
+
+    def glance(self) -> Glance:
+        count, failed = len(self.status), Counter(text for text in self.why if text != SOLVED)
+        line = f"Prediction: {count} configurations, {count - failed.total()} solved"
+        rows = [
+            [str(i + 1), *(f"{1e3 * x:.3f}" for x in self.position[i]), why] for i, why in enumerate(self.why[:SHOWN])
+        ]
+        notes = [f"not solved: {number}, {text}" for text, number in failed.most_common()]
+        notes += [f"and {count - SHOWN} more configurations"] if count > SHOWN else []
+        return Glance(line, ["", "x, mm", "y, mm", "z, mm", "status"], rows, notes)
 
 
 @dataclass(frozen=True)
@@ -76,6 +104,9 @@ def status_text(code: int) -> str:
     return _core.status_text(_core.Status(code))
 
 
+SOLVED = status_text(0)
+
+
 class Model:
     """Model of a robot. `steps` integration steps per segment: more is finer and slower.
 
@@ -84,7 +115,7 @@ class Model:
     first. Loads act at the robot tip: `force` [N] and `moment` [N m], base frame. Arrays of other types than float64
     are converted. A robot's effects (see `effects.catalogue`) act on poses, derivatives and shapes, but for those
     of the tracker: poses are those of the tube. Raises ValueError where shapes do not fit, and InputError where the
-    robot has effects that depend on the path, which single configurations do not have: see `effect_model.readings`.
+    robot has effects that depend on the path, which single configurations do not have: see `table_poses.predict`.
     """
 
     def __init__(self, robot: Robot, *, steps: int = 1, integrator: str = "default"):
@@ -216,7 +247,7 @@ def _acting(robot: Robot, integrator: str) -> dict[str, Any]:
     if path := of_the_path(robot):
         text = (
             f"a model solves configurations one by one, but the effects {', '.join(path)} need the rows in their "
-            "order: use `ctcr predict`, or ctcr.model.effect_model.readings"
+            "order: use `ctcr predict`, or ctcr.predict(robot, table)"
         )
         raise InputError(Problem(text))
     return of_the_poses(robot)

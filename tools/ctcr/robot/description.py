@@ -16,6 +16,7 @@ from ctcr.arrays import Array
 from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
+from ctcr.show.result import Glance, Shown
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
@@ -241,7 +242,7 @@ class Uncertainty(Section):
         return stated[index] if isinstance(stated, list) else stated
 
 
-class Robot(Section):
+class Robot(Shown, Section):
     """The whole file. `gravity` [m/s^2] in the base frame; null where its direction is not known.
 
     `effects` are the physical effects beyond the standard model, by id; `history` is the ledger of calibrations, see
@@ -264,6 +265,23 @@ class Robot(Section):
     @property
     def n_tubes(self) -> int:
         return len(self.tubes)
+
+    @property
+    def file(self) -> str:
+        """That it was loaded from; empty where it was not."""
+        return self._source.file if self._source else ""
+
+    def glance(self) -> Glance:
+        effects = f", effects: {', '.join(self.effects)}" if self.effects else ""
+        fields = ("length_mm", "curved_length_mm", "curvature_per_m", "inner_diameter_mm", "outer_diameter_mm")
+        rows = [
+            [field.rsplit("_", 1)[0].removesuffix("_per").replace("_", " "), Tube.quantity(field).unit]
+            + ["-" if (value := getattr(tube, field)) is None else f"{value:g}" for tube in self.tubes]
+            for field in fields
+        ]
+        rows.append(["bending stiffness", "N m^2", *(f"{tube.bending_stiffness:.4g}" for tube in self.tubes)])
+        columns = ["", "unit", *(f"tube {i + 1}" for i in range(self.n_tubes))]
+        return Glance(f"Robot {self.name}: {self.n_tubes} tubes{effects}", columns, rows, text_columns=2)
 
     @property
     def standard(self) -> "Robot":

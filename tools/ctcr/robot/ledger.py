@@ -59,15 +59,34 @@ def write(
     effects: Mapping[str, Mapping[str, Any]] | None = None,
     in_place: bool = False,
 ) -> Robot:
-    """Writes `robot`, as it was loaded, with the changes and one more entry of the ledger; returns the new robot.
+    """Writes `robot` as `changed` makes it, and returns it.
 
-    `effects` replaces that section; None leaves it. New homes leave the old ones as the recorded ones, so that tables
-    keep their meaning. Raises InputError where the target is the file the robot came from and not `in_place`, where the
-    new values make no possible robot, and where a source or the target cannot be used; nothing is written then.
+    Raises InputError where the target is the file the robot came from and not `in_place`, and where the target cannot
+    be used; nothing is written then.
     """
     source = robot._source
     if source and not in_place and os.path.realpath(target) == os.path.realpath(source.file):
         raise InputError(Problem("is the input: give another name to -o, or --in-place to change it", str(target)))
+    updated = changed(robot, changes, entry, effects=effects, file=str(target))
+    with _unchanged(source) if source and in_place else nullcontext(), atomic_writer(target) as file:
+        file.write(updated._source.text)
+    return updated
+
+
+def changed(
+    robot: Robot,
+    changes: Sequence[Change],
+    entry: Entry,
+    *,
+    effects: Mapping[str, Mapping[str, Any]] | None = None,
+    file: str | None = None,
+) -> Robot:
+    """The robot with the changes and one more entry of the ledger, as if it had been read from a file.
+
+    `effects` replaces that section; None leaves it. New homes leave the old ones as the recorded ones, so that tables
+    keep their meaning. Raises InputError where the new values make no possible robot, or a source cannot be read.
+    """
+    file = file or robot.file or robot.name
     yaml, document = robot_file.layout(robot)
     rows = [_apply(document, change) for change in changes]
     if effects is not None:
@@ -75,13 +94,10 @@ def write(
     document.setdefault("history", CommentedSeq()).append(_ledger_entry(entry, rows))
     text = robot_file.dumped(yaml, document)
     try:
-        updated = robot_file.parse(text.encode(), str(target))
+        return robot_file.parse(text.encode(), file)
     except InputError as error:
-        found = [Problem(f"the new value {p.message}", str(target), field=p.field) for p in error.problems]
+        found = [Problem(f"the new value {p.message}", file, field=p.field) for p in error.problems]
         raise InputError(found, error.omitted) from None
-    with _unchanged(source) if source and in_place else nullcontext(), atomic_writer(target) as file:
-        file.write(text)
-    return updated
 
 
 @contextmanager

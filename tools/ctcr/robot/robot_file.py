@@ -60,20 +60,21 @@ def save(robot: Robot, path: str | Path) -> None:
     """Writes a robot; where it was loaded from a file, only the values that changed differ from that file."""
     yaml, document = layout(robot)
     with atomic_writer(path) as file:
-        file.write(dumped(yaml, _updated(document, robot.model_dump(exclude_unset=True))))
+        file.write(dumped(yaml, document))
 
 
 def layout(robot: Robot) -> tuple[YAML, CommentedMap]:
     """The document of a robot with the comments and order of its file, and a writer that keeps indents and quotes."""
+    values = robot.model_dump(exclude_unset=True)
     yaml = YAML(typ="rt", pure=True)
     yaml.preserve_quotes = True
     yaml.width = LINE_WIDTH
     if robot._source is None:
-        return yaml, yaml.load(dumped(yaml, robot.model_dump(exclude_unset=True)))
+        return yaml, yaml.load(dumped(yaml, values))
     _, indent, offset = load_yaml_guess_indent(robot._source.text)
     if indent is not None:
         yaml.indent(mapping=2, sequence=indent, offset=offset or 0)
-    return yaml, yaml.load(robot._source.text)
+    return yaml, _updated(yaml.load(robot._source.text), values)
 
 
 def dumped(yaml: YAML, document: Any) -> str:

@@ -1,6 +1,5 @@
 """Parts of a report: one HTML page that needs nothing else, no network and no other file."""
 
-import html
 from collections.abc import Iterable, Sequence
 from datetime import date
 from importlib.resources import files
@@ -9,7 +8,7 @@ from typing import Any
 from plotly.offline import get_plotlyjs
 
 from ctcr.show.style import draw
-from ctcr.show.wording import visible
+from ctcr.show.wording import as_html
 
 
 def page(
@@ -45,11 +44,6 @@ def _drawn(drawing: str) -> str:
         f"<script>const drawing = {text};\n"
         'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
     )
-
-
-def as_html(text: str, bold: str = "") -> str:
-    """Plain text after a beginning in bold: here, and nowhere else, names of the user's become HTML."""
-    return (f"<b>{as_html(bold)}</b>" if bold else "") + html.escape(visible(text))
 
 
 def paragraph(text: str, kind: str = "", bold: str = "") -> str:

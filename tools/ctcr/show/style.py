@@ -36,17 +36,31 @@ STYLE = {
 }
 
 
-def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:
-    """SVG text of a picture, or None when there is nothing to draw."""
+class Picture(Figure):
+    """A figure in this style, which a notebook shows as it is."""
+
+    def _repr_svg_(self) -> str:
+        target = io.StringIO()
+        with matplotlib.rc_context(STYLE):
+            self.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
+        text = target.getvalue()
+        return text[text.index("<svg") :]
+
+
+def picture(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> Picture | None:
+    """A picture of `subject`, `width` by `height` inches, or None when there is nothing to draw."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = Picture(figsize=(width, height), layout="constrained")
         if plot(figure, subject) is False:
             return None
         _number_ticks(figure)
-        target = io.StringIO()
-        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": None})
-    text = target.getvalue()
-    return text[text.index("<svg") :]
+    return figure
+
+
+def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:
+    """SVG text of a picture, or None when there is nothing to draw."""
+    made = picture(plot, subject, width, height)
+    return made and made._repr_svg_()
 
 
 def _number_ticks(figure: Figure) -> None:

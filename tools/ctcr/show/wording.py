@@ -1,5 +1,6 @@
 """Numbers, names and lists as messages and pages show them."""
 
+import html
 from collections.abc import Sequence
 from math import isfinite, nan
 from typing import Any
@@ -19,6 +20,11 @@ def visible(text: str) -> str:
         return " " if letter.isspace() else letter.encode("unicode_escape").decode()
 
     return "".join(map(shown, text))
+
+
+def as_html(text: str, bold: str = "") -> str:
+    """Plain text after a beginning in bold: here, and nowhere else, names of the user's become HTML."""
+    return (f"<b>{as_html(bold)}</b>" if bold else "") + html.escape(visible(text))
 
 
 def sentence(text: str) -> str:

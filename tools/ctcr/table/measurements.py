@@ -7,17 +7,27 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING, Union
 
 import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.robot.description import MAX_TUBES
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
+from ctcr.show.result import Glance, Shown, frame
 from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
+from ctcr.table.frame_table import FrameTable
 from ctcr.table.sessions import Sessions
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Source = Union[str, PathLike[str], "DataFrame"]  # of a table
 
 JOINT_ORDER_SLACK_M = 1e-6  # rounding of recorded joints
 UNIT_QUATERNION_SLACK = 1e-3
@@ -30,11 +40,12 @@ QUANTITIES = {  # values outside the usual range are in another unit, or garbage
     "force": Quantity("N", usual=(1e-12, 1000)),
     "position": Quantity("m", usual=(1e-12, 20)),
 }
+Table = NumberTable | FrameTable
 _MAY_BE_EMPTY = ("t", "position", "quaternion")
 
 
-@dataclass(frozen=True)
-class Measurements:
+@dataclass(frozen=True, repr=False)
+class Measurements(Shown):
     """M readings of a robot with N tubes. Values that were not measured are NaN, or None where columns are absent."""
 
     t: Array  # (M,) [s]
@@ -48,6 +59,8 @@ class Measurements:
     warnings: list[Problem] = field(default_factory=list)
     sessions: Sessions | None = None  # what was taken out of each run; None: nothing, the runs are one session
     from_home: bool = True  # whether the robot came to the first row straight from home; else it was at rest there
+    file: str = ""  # that it was read from; empty: a DataFrame, or made by a program
+    refusal: InputError | None = None  # why it cannot be used as it is: only another convention makes it possible
 
     def __len__(self) -> int:
         return len(self.run)
@@ -85,6 +98,45 @@ class Measurements:
         return replace(self, **kept)
 
     @property
+    def n_tubes(self) -> int:
+        return self.beta.shape[1]
+
+    def to_frame(self) -> "DataFrame":
+        """The table as a DataFrame with the columns of the format, SI units: `read` takes it back."""
+        columns = {}
+        for name, names in group_columns(self.n_tubes).items():
+            values = getattr(self, name)
+            if values is not None:
+                columns |= dict(zip(names, values.reshape(len(self), -1).T, strict=True))
+        return frame(columns)
+
+    @property
+    def source(self) -> str:
+        """Where it comes from, in words."""
+        return self.file or "a table"
+
+    @property
+    def files(self) -> list[str]:
+        """For a ledger: the file, or none."""
+        return [self.file] if self.file else []
+
+    def glance(self) -> Glance:
+        runs = len(np.unique(self.run))
+        name = f"Measurements {self.file}".rstrip()
+        line = f"{name}: {len(self)} rows, {int(self.measured.sum())} with a pose, {runs} runs, {self.n_tubes} tubes"
+
+        def row(name: str, unit: str, values: Array) -> list[list[str]]:
+            known = values[np.isfinite(values)]
+            return [[name, unit, f"{known.min():.4g}", f"{known.max():.4g}"]] if len(known) else []
+
+        rows = [row(f"beta{i + 1}", "mm", 1e3 * values) for i, values in enumerate(self.beta.T)]
+        rows += [row(f"alpha{i + 1}", "deg", np.degrees(values)) for i, values in enumerate(self.alpha.T)]
+        rows += [row("force", "N", np.linalg.norm(self.force, axis=1)), row("time", "s", self.t)]
+        rows += [row(axis, "mm", 1e3 * values) for axis, values in zip("xyz", self.positions.T, strict=True)]
+        doubts = [*map(str, self.warnings), *(["Not possible as it is:", *self.refusal.lines] if self.refusal else [])]
+        return Glance(line, ["", "unit", "least", "most"], sum(rows, []), doubts, 2)
+
+    @property
     def joint_space(self) -> Array:
         """Joints as one vector (M, 2 N) [rad], in which distances are comparable."""
         return np.column_stack([self.beta / settings.JOINT_LEVER, self.alpha])
@@ -95,15 +147,49 @@ class Measurements:
         return np.column_stack([self.joint_space, self.force / settings.LOAD_LEVER])
 
 
+def read(source: Source, n_tubes: int | None = None) -> Measurements:
+    """Reads a table of measurements, or a plan, from a file or from a DataFrame with the columns of one.
+
+    n_tubes    of its robot; None: as many as its columns say
+    A table that only another convention makes possible, such as angles in degrees, comes with the error that refuses it
+    as `refusal`: a comparison then tells the convention. Raises InputError with row, column, value and unit.
+    """
+    table = _opened(source)
+    tubes = n_tubes or _tubes_of(table.columns)
+    try:
+        return _read(table, tubes)
+    except InputError as error:
+        refusal = error
+    try:
+        return replace(_read(table, tubes, plausible=False), refusal=refusal)
+    except InputError:
+        raise refusal from None
+
+
 def load(path: str | Path, n_tubes: int, *, plausible: bool = True) -> Measurements:
     """Reads a table for a robot of `n_tubes` tubes. Raises InputError with row, column, value and unit.
 
     plausible    whether values must be those of such a robot in the right units: else any finite numbers will do, from
                  which a wrong convention may be found
     """
-    table = open_table(path)
+    return _read(open_table(path), n_tubes, plausible)
+
+
+def _opened(source: Source) -> Table:
+    if isinstance(source, str | PathLike):
+        return open_table(source)
+    return FrameTable(source)
+
+
+def _tubes_of(columns: tuple[str, ...]) -> int:
+    """The largest number of a tube in the names of columns, as far as there are such robots."""
+    numbers = [int(found[1]) for name in columns if (found := re.match(r"(?:beta|alpha)([1-9])(?![0-9])", name))]
+    return min(max(numbers, default=1), MAX_TUBES)
+
+
+def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
     groups = _groups(table, n_tubes)
-    faults = Faults(str(path))
+    faults = Faults(str(table.path))
     data = {name: np.empty((table.n_rows, len(columns))) for name, columns in groups.items()}
     with Progress(f"reading {table.path.name}", table.end - table.start) as progress:
         for rows, numbers, size in table.blocks(faults):
@@ -113,6 +199,12 @@ def load(path: str | Path, n_tubes: int, *, plausible: bool = True) -> Measureme
             progress.advance(size)
     faults.raise_any()
     return _measurements(data, table)
+
+
+def check_tubes(table: Measurements, n_tubes: int) -> None:
+    """Raises InputError where a table is not of a robot with so many tubes."""
+    if table.n_tubes != n_tubes:
+        raise InputError(Problem(f"holds the joints of {table.n_tubes} tubes: the robot has {n_tubes}", table.source))
 
 
 def column_names(n_tubes: int) -> list[str]:
@@ -134,7 +226,7 @@ def group_columns(n_tubes: int) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _groups(table: NumberTable, n_tubes: int) -> dict[str, list[int]]:
+def _groups(table: Table, n_tubes: int) -> dict[str, list[int]]:
     """Indices of the columns of each group that is present; raises InputError with all faults of the header."""
     groups, file = group_columns(n_tubes), str(table.path)
     unknown = {column: _unknown(column, table.columns, n_tubes) for column in table.columns}
@@ -216,7 +308,7 @@ def _check_joint_order(beta: Array, rows: Integers, columns: list[str], faults: 
         faults.where(crossed, rows, columns[inner], "order", say)
 
 
-def _measurements(data: dict[str, Array], table: NumberTable) -> Measurements:
+def _measurements(data: dict[str, Array], table: Table) -> Measurements:
     absent = {"t": [[np.nan]], "run": [[0]], "force": [[0.0] * 3]}
     absent = {name: np.repeat(row, table.n_rows, axis=0) for name, row in absent.items()}
     data = absent | {"position": None, "quaternion": None} | data
@@ -224,7 +316,8 @@ def _measurements(data: dict[str, Array], table: NumberTable) -> Measurements:
     if data["quaternion"] is not None:
         data["quaternion"] /= np.linalg.norm(data["quaternion"], axis=1, keepdims=True)
     warnings = list(_warnings(data["t"], data["run"], str(table.path)))
-    return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings)
+    file = str(table.path) if isinstance(table, NumberTable) else ""
+    return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings, file=file)
 
 
 def _warnings(t: Array, run: Integers, file: str) -> Iterator[Problem]:

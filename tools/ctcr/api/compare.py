@@ -1,0 +1,44 @@
+"""How wrong a model is: `ctcr.compare`, and the command of that name."""
+
+from ctcr.api.reviewed import reviewed, without_repeated
+from ctcr.audit import missing_motion, spikes
+from ctcr.compare import analysis
+from ctcr.compare.analysis import Comparison
+from ctcr.conventions import Review
+from ctcr.diagnose import sessions
+from ctcr.fit.floors import floors
+from ctcr.model.table_poses import predict
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+
+def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
+    """Compares predicted poses with measured ones: the size of the error beside the noise, and what it depends on.
+
+    steps    integration steps per segment: more are slower and more accurate
+    First tests whether the table or the robot file follows another convention; where the table cannot be compared as it
+    is, the corrected one is. Raises InputError where no row can be compared.
+    """
+    source = f"{table.source} compared with the model of {robot.file or robot.name}"
+    found = reviewed(robot, table)
+    readings, corrected = table, []
+    if table.refusal:
+        robot, readings = found.robot, found.readings
+        corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
+    readings, repeated = without_repeated(readings, found)
+    own, floor = _fitted(robot, readings, found)
+    readings, excluded = spikes.left_out(robot, readings)
+    added: list[str] = []
+    if robot.effects:  # their state may depend on motions that the table leaves out
+        readings, added = missing_motion.completed(robot, readings)
+    notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
+    prediction = predict(robot, readings, steps=steps)
+    return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, source)
+
+
+def _fitted(robot: Robot, readings: Measurements, found: Review) -> tuple[list[str], dict[str, float]]:
+    """What a fit to the readings tells: sentences on what each run has of its own, and the floors of the error."""
+    said: list[str] = []
+    if not found.wrong:
+        readings, said = sessions.of_runs(robot, readings)
+    return said, floors(robot, readings).as_dict()

@@ -1,0 +1,56 @@
+"""Robot and table before any comparison or fit: the conventions they follow, and what a fit leaves out of the table."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ctcr.conventions import Review, review
+from ctcr.diagnose import sessions
+from ctcr.errors import InputError, Problem
+from ctcr.robot.description import Robot
+from ctcr.show.wording import sentence
+from ctcr.table.measurements import Measurements, check_tubes
+
+
+class WrongConventions(InputError):
+    """A table or a robot file that follows other conventions than the format says; `review` holds them."""
+
+    def __init__(self, found: Review, table: Measurements):
+        advice = "a fit would take that for physics: correct it first, or go on with --anyway (anyway=True)"
+        super().__init__([*(Problem(one.sentence, table.source) for one in found.wrong), Problem(advice)])
+        self.review = found
+
+
+def reviewed(robot: Robot, table: Measurements) -> Review:
+    """The review of the conventions. Raises InputError where none makes the table one of this robot."""
+    check_tubes(table, robot.n_tubes)
+    found = review(robot, table)
+    if table.refusal and not found.findings:
+        raise table.refusal
+    return replace(found, readings=replace(found.readings, refusal=None))
+
+
+def without_repeated(table: Measurements, found: Review) -> tuple[Measurements, list[str]]:
+    """The readings without poses that the tracker repeated, and sentences on that."""
+    rows = [row for one in found.frozen for row in one.rows]
+    said = [sentence(f"{one.text}: left out") for one in found.frozen]
+    return (table.without_poses(np.isin(table.row, rows)) if rows else table), said
+
+
+def to_fit(
+    robot: Robot, table: Measurements, *, anyway: bool = False, frame_per_run: bool | None = None
+) -> tuple[Measurements, list[str], Review]:
+    """The readings as a fit takes them, sentences on what was left out, and the review of the conventions.
+
+    Left out are poses that the tracker repeated, and where the runs are sessions, what each has of its own.
+    frame_per_run    whether each run has a frame of its own; None: where the readings say so
+    Raises WrongConventions where a convention is wrong, unless `anyway`.
+    """
+    found = reviewed(robot, table)
+    if found.wrong and not anyway:
+        raise WrongConventions(found, table)
+    if table.refusal:
+        raise table.refusal
+    readings, said = without_repeated(table, found)
+    readings, more = sessions.of_runs(robot, readings, frame_per_run)
+    return readings, [*said, *more], found

@@ -1,0 +1,61 @@
+"""The poses that a model predicts for the rows of a table, in their order, which effects may remember."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ctcr.frames import base_to_tracker
+from ctcr.model import effect_model
+from ctcr.model.model import Model, Prediction
+from ctcr.robot.description import Robot
+from ctcr.show.output import Progress
+from ctcr.table.measurements import Measurements, check_tubes
+
+CHUNK_ROWS = 1 << 16
+
+
+def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "base") -> Prediction:
+    """The poses of all rows, with the effects of the robot.
+
+    steps    integration steps per segment: more are slower and more accurate
+    frame    "base", or "tracker": as measured
+    """
+    if frame not in ("base", "tracker"):
+        raise ValueError(f"frame must be base or tracker, not {frame!r}")
+    parts = [answer for _, answer in predictions(robot, table, steps)]
+    names = ("position", "quaternion", "status", "stability")
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    if frame == "tracker":
+        columns["position"], columns["quaternion"] = base_to_tracker(
+            robot.tracker, columns["position"], columns["quaternion"]
+        )
+    return Prediction(**columns, jacobian=None, compliance=None)
+
+
+def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple[slice, Prediction]]:
+    """Yields (rows, their predicted poses) in chunks, so that a long table shows its progress and takes no memory.
+
+    Effects may have a history: they are predicted for all rows at once, in their order.
+    """
+    check_tubes(table, robot.n_tubes)
+    if table.refusal:
+        raise table.refusal
+    beta, alpha = robot.joints_of_table(table.beta, table.alpha)
+    model = None if robot.effects else Model(robot, steps=steps)
+    found = _with_history(robot, table, steps) if robot.effects else None
+    with Progress("predicting", len(table)) as progress:
+        for start in range(0, len(table), CHUNK_ROWS):
+            rows = slice(start, min(start + CHUNK_ROWS, len(table)))
+            if model:
+                yield rows, model.predict(beta[rows], alpha[rows], table.force[rows])
+            else:
+                names = ("position", "quaternion", "status", "stability")
+                yield rows, replace(found, **{name: getattr(found, name)[rows] for name in names})
+            progress.advance(rows.stop - start)
+
+
+def _with_history(robot: Robot, table: Measurements, steps: int) -> Prediction:
+    found = effect_model.readings(robot, table, steps)
+    unknown = np.full(len(table), np.nan)
+    return Prediction(found.position, found.quaternion, found.status, unknown, jacobian=None, compliance=None)

@@ -1,0 +1,94 @@
+"""How results show themselves: a line, a small table in a notebook, a DataFrame, a page, a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ctcr.errors import InputError, Problem
+from ctcr.show.output import write_text
+from ctcr.show.wording import as_html, visible
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from ctcr.show.style import Picture
+
+# Neither ink nor paper is named: a notebook has its own, light or dark.
+_CELL = "padding:.15em .8em;text-align:{};border-bottom:1px solid rgba(128,128,128,.35)"
+
+
+@dataclass(frozen=True)
+class Glance:
+    """A result at a glance: one line, and a small table whose first columns are text."""
+
+    line: str
+    columns: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    notes: Sequence[str] = ()
+    text_columns: int = 1
+
+
+class Shown:
+    """What shows itself at a glance."""
+
+    def glance(self) -> Glance:
+        """The line and the table that stand for it."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        return f"<{visible(self.glance().line)}>"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        shown = self.glance()
+        head = _row("th", shown.columns, shown.text_columns)
+        body = "".join(_row("td", row, shown.text_columns) for row in shown.rows)
+        table = f'<table style="border-collapse:collapse">{head}{body}</table>' if shown.rows else ""
+        notes = "".join(f"<div>{as_html(note)}</div>" for note in shown.notes)
+        return f"<div>{as_html('', bold=shown.line)}{table}{notes}</div>"
+
+
+class Result(Shown):
+    """What a comparison or a fit found. A subclass names the module of its page and its picture."""
+
+    PAGE: ClassVar[str] = ""  # page(result, source) is a function of this module below ctcr
+    PICTURE: ClassVar[tuple[str, str, float, float]]  # a module, its function, width and height [in]
+
+    @property
+    def source(self) -> str:
+        """What it is made from, for the foot of its page."""
+        raise NotImplementedError
+
+    def report(self, path: str | Path) -> None:
+        """Writes the page that the command's --report writes: one HTML file that needs no network."""
+        write_text(import_module(f"ctcr.{self.PAGE}").page(self, self.source), path)
+
+    def plot(self) -> Picture:
+        """Its main picture, a matplotlib figure; `savefig` writes it."""
+        module, function, width, height = self.PICTURE
+        made = import_module("ctcr.show.style").picture(
+            getattr(import_module(f"ctcr.{module}"), function), self, width, height
+        )
+        if made is None:
+            raise InputError(Problem("there is nothing to draw"))
+        return made
+
+
+def frame(columns: Mapping[str, Any]) -> DataFrame:
+    """A DataFrame. Raises InputError without pandas, which nothing else here needs."""
+    try:
+        import pandas
+    except ModuleNotFoundError:
+        raise InputError(Problem("a DataFrame needs pandas: install it, or ctcr with its extra `pandas`")) from None
+    return pandas.DataFrame(dict(columns))
+
+
+def _row(tag: str, cells: Sequence[str], text_columns: int) -> str:
+    side = ["left" if i < text_columns else "right" for i in range(len(cells))]
+    shown = (f'<{tag} style="{_CELL.format(s)}">{as_html(cell)}</{tag}>' for s, cell in zip(side, cells, strict=True))
+    return f"<tr>{''.join(shown)}</tr>"
