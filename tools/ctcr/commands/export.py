@@ -1,4 +1,4 @@
-"""`ctcr export`: a recording for other programs."""
+"""`ctcr export`: a robot for a controller, or a recording for other programs."""
 
 import click
 
@@ -6,20 +6,39 @@ from ctcr.commands import options
 
 
 @click.command(name="export")
-@click.argument("folder")
+@click.argument("source", type=options.read)
+@click.option("--cpp", type=options.written, metavar="FILE.hpp", help="Write the robot of SOURCE as a C++ header.")
+@click.option("--bench", type=options.read, metavar="BENCH.yaml", help="With --cpp: the bench whose limits it holds.")
+@options.setting("--namespace", str, "robot", "With --cpp: the namespace of what the header declares.")
 @click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="FILE.mcap", help="The file to write."
+    "-o", "--output", "target", type=options.written, metavar="FILE.mcap", help="Write the recording of SOURCE as MCAP."
 )
-def command(folder, target) -> None:
-    """Write a recording as MCAP.
+def command(source, cpp, bench, namespace, target) -> None:
+    """Write a robot as a C++ header, or a recording as MCAP.
 
-    FOLDER holds a recording of ctcr record or ctcr track --live. The channels /joints, /measurements and, for a
-    controlled robot, /reference hold one JSON message a row, with the columns of the recording; the names of the
-    columns carry their units. Needs the package mcap.
+    With --cpp SOURCE is a robot file. The header holds its tubes, homes, frames and effects as constants, where they
+    come from, the limits of a bench, and a function system() that makes the model for a controller. It needs the
+    headers of ctcr and Eigen alone.
 
-    Example: ctcr export recording -o recording.mcap
+    With -o SOURCE is the folder of a recording of ctcr record or ctcr track --live. The channels /joints,
+    /measurements and, for a controlled robot, /reference hold one JSON message a row, with the columns of the
+    recording; the names of the columns carry their units. Needs the package mcap.
+
+    Example: ctcr export robot.yaml --cpp robot.hpp
     """
+    if bool(cpp) == bool(target):
+        raise click.UsageError("give --cpp FILE.hpp for a robot, or -o FILE.mcap for a recording")
+    out = options.Output()
+    if cpp:
+        from ctcr.bench.devices import bench_file
+        from ctcr.export import cpp_header
+        from ctcr.robot import robot_file
+        from ctcr.show.output import write_text
+
+        robot = robot_file.load(source)
+        write_text(cpp_header(robot, namespace, bench_file.load(bench) if bench else None), cpp)
+        out.say(f"{namespace}::system(): {cpp}")
+        return
     from ctcr.track.recording import write_mcap
 
-    rows = [[channel, str(count)] for channel, count in write_mcap(folder, target).items()]
-    options.Output().table(target, ["channel", "messages"], rows)
+    out.table(target, ["channel", "messages"], [[name, str(n)] for name, n in write_mcap(source, target).items()])

@@ -9,7 +9,16 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from annotated_types import Len
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, WrapValidator, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PrivateAttr,
+    ValidationInfo,
+    WrapValidator,
+    field_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from ctcr.arrays import Array
@@ -32,7 +41,9 @@ def _each(value: Any, number: Callable[[Any], float]) -> Any:
     return [number(each) for each in value] if isinstance(value, list) else number(value)
 
 
-Each = Annotated[float, WrapValidator(_each)]  # one number for all, or a list of one for each
+Each = Annotated[
+    float, WrapValidator(_each), PlainSerializer(lambda value: value)
+]  # one number for all, or a list of one for each
 
 
 class Section(BaseModel):
