@@ -25,9 +25,7 @@ target_include_directories(_core PRIVATE tools/ctcr/_core)
 target_link_libraries(_core PRIVATE ctcr::calibration ctcr_flags)
 target_precompile_headers(_core PRIVATE <Eigen/Dense>)
 target_compile_definitions(_core PRIVATE CTCR_VERSION="${PROJECT_VERSION}")
-nanobind_add_stub(core_stub MODULE _core OUTPUT _core.pyi MARKER_FILE py.typed
-                  PYTHON_PATH $<TARGET_FILE_DIR:_core> DEPENDS _core)
+nanobind_add_stub(core_stub MODULE _core OUTPUT _core.pyi PYTHON_PATH $<TARGET_FILE_DIR:_core> DEPENDS _core)
 
 install(TARGETS _core LIBRARY DESTINATION ctcr COMPONENT python)
-install(FILES ${CMAKE_CURRENT_BINARY_DIR}/_core.pyi ${CMAKE_CURRENT_BINARY_DIR}/py.typed
-        DESTINATION ctcr COMPONENT python)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/_core.pyi DESTINATION ctcr COMPONENT python)

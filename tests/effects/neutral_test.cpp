@@ -22,6 +22,12 @@ struct Parts {
 static_assert(sizeof(Model<3>) == sizeof(Parts));
 static_assert(std::is_trivially_destructible_v<Model<3, Catalogue>>);
 
+// Effects of a list by their ids, in the order of the list.
+using SofteningAndFriction =
+    Catalogue::Those<[](std::string_view id) { return id == softening::info.id || id == friction::info.id; }>;
+static_assert(std::is_same_v<SofteningAndFriction, EffectList<Friction, Softening>>);
+static_assert(std::is_same_v<Catalogue::Those<[](std::string_view) { return false; }>, Standard>);
+
 template <class T>
 struct NeutralEffects : testing::Test {};
 using EffectTubeCounts = testing::Types<test::TubeCount<1>, test::TubeCount<2>, test::TubeCount<3>>;

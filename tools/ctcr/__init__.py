@@ -105,7 +105,8 @@ __all__ = [
 
 
 class _Package(ModuleType):
-    """Keeps its functions `compare`, `calibrate` and `diagnose` when the rooms of the same names are imported."""
+    """Keeps its functions `compare`, `calibrate` and `diagnose` when the rooms of the same names are imported; `from
+    ctcr.compare import analysis` still finds the rooms."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _NAMES and isinstance(value, ModuleType)):

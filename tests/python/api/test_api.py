@@ -246,6 +246,7 @@ def test_names():
     ]
     imported = {alias.asname for node in types.body if isinstance(node, ast.ImportFrom) for alias in node.names}
     assert imported == set(ctcr.__all__) and set(ctcr.__all__) <= set(dir(ctcr))
+    assert (Path(ctcr.__file__).parent / "py.typed").is_file()
     for name in ctcr.__all__:
         assert getattr(ctcr, name) is not None
     with pytest.raises(AttributeError):

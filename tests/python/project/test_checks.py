@@ -113,6 +113,12 @@ def test_rooms(tmp_path, low, high, found):
     assert len(said) == bool(found) and all(found in text for text in said)
 
 
+def test_package_names_its_rooms(tmp_path):
+    """The package's own file names what lies in rooms that import it, and closes no circle."""
+    package(tmp_path, __init__="from ctcr.low import a", low__a="from ctcr import settings", settings="")
+    assert not layers.python_problems(tmp_path)
+
+
 def test_room_without_row(tmp_path):
     """A folder that the table of rooms does not name is refused."""
     said = layers.python_problems(package(tmp_path, shed__x=""))
