@@ -176,6 +176,15 @@ struct Picked<picked, EffectList<Kept...>, E, Rest...>
   : Picked<picked,
            std::conditional_t<picked.template operator()<E<2, double>>(), EffectList<Kept..., E>, EffectList<Kept...>>,
            Rest...> {};
+
+/// Whether `wanted` holds for the id of an effect.
+template <auto wanted>
+struct HasId {
+  template <class Effect>
+  constexpr bool operator()() const noexcept {
+    return wanted(Effect::info.id);
+  }
+};
 }  // namespace detail
 
 /// Effects that act together, in their order.
@@ -200,7 +209,7 @@ struct EffectList {
   /// Those with some ids, in the same order.
   /// @tparam wanted  wanted(id), id a std::string_view: whether an effect is among them
   template <auto wanted>
-  using Those = typename detail::Picked<[]<class Effect> { return wanted(Effect::info.id); }, EffectList<>, E...>::List;
+  using Those = typename detail::Picked<detail::HasId<wanted>{}, EffectList<>, E...>::List;
 
   template <int N, class P = double>
   struct On {

@@ -150,6 +150,11 @@ def test_other_robot(robot, table):
     for function in (ctcr.compare, ctcr.calibrate, ctcr.diagnose, ctcr.predict):
         with pytest.raises(ctcr.InputError, match="3 tubes: the robot has 2"):
             function(two, table)
+        for wrong in ((robot, "table.csv"), ("robot.yaml", table), (table, robot)):
+            with pytest.raises(ctcr.InputError, match="is no (robot|table): ctcr"):
+                function(*wrong)
+    with pytest.raises(ctcr.InputError, match="is no table: ctcr.read"):
+        ctcr.add(robot, "friction", None)
 
 
 def test_wrong_convention(robot, table):

@@ -10,7 +10,7 @@ from ctcr.effects import catalogue
 from ctcr.effects.settings import found
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-from ctcr.table.measurements import Measurements
+from ctcr.table.measurements import Measurements, check_of
 
 
 def add(
@@ -34,6 +34,7 @@ def add(
     anyway           whether to go on where a convention is wrong
     Raises InputError, and WrongConventions unless `anyway`.
     """
+    check_of(robot, table)
     held: Mapping[str, float] = {}
     if isinstance(effects, Diagnosis):
         ids, held, values = found(effects.as_dict(), robot)

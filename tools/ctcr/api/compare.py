@@ -9,7 +9,7 @@ from ctcr.diagnose import sessions
 from ctcr.fit.floors import floors
 from ctcr.model.table_poses import predict
 from ctcr.robot.description import Robot
-from ctcr.table.measurements import Measurements
+from ctcr.table.measurements import Measurements, check_of
 
 
 def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
@@ -19,6 +19,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     First tests whether the table or the robot file follows another convention; where the table cannot be compared as it
     is, the corrected one is. Raises InputError where no row can be compared.
     """
+    check_of(robot, table)
     source = f"{table.source} compared with the model of {robot.file or robot.name}"
     found = reviewed(robot, table)
     readings, corrected = table, []

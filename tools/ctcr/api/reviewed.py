@@ -9,7 +9,7 @@ from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
 from ctcr.show.wording import sentence
-from ctcr.table.measurements import Measurements, check_tubes
+from ctcr.table.measurements import Measurements, check_of
 
 
 class WrongConventions(InputError):
@@ -23,7 +23,7 @@ class WrongConventions(InputError):
 
 def reviewed(robot: Robot, table: Measurements) -> Review:
     """The review of the conventions. Raises InputError where none makes the table one of this robot."""
-    check_tubes(table, robot.n_tubes)
+    check_of(robot, table)
     found = review(robot, table)
     if table.refusal and not found.findings:
         raise table.refusal

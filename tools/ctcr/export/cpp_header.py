@@ -157,7 +157,8 @@ def _effects(robot: Robot) -> Iterator[str]:
     known, order = catalogue.value_of(robot), catalogue.catalogue(robot.n_tubes)
     ids = [identity for identity in order if identity in robot.effects]
     asked = " || ".join(f'id == "{identity}"' for identity in ids)
-    yield f"using Effects = ctcr::Catalogue::Those<[](std::string_view id) {{ return {asked}; }}>;"
+    yield f"constexpr bool has_effect(std::string_view id) noexcept {{ return {asked}; }}"
+    yield "using Effects = ctcr::Catalogue::Those<has_effect>;"
     yield "inline constexpr std::array<double, std::size_t(Effects::On<tube_count>::count)> effect_values{"
     for identity in ids:
         for parameter in order[identity].parameters:

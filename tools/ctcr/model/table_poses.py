@@ -10,7 +10,7 @@ from ctcr.model import effect_model
 from ctcr.model.model import Model, Prediction
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
-from ctcr.table.measurements import Measurements, check_tubes
+from ctcr.table.measurements import Measurements, check_of
 
 CHUNK_ROWS = 1 << 16
 
@@ -38,7 +38,7 @@ def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple
 
     Effects may have a history: they are predicted for all rows at once, in their order.
     """
-    check_tubes(table, robot.n_tubes)
+    check_of(robot, table)
     if table.refusal:
         raise table.refusal
     beta, alpha = robot.joints_of_table(table.beta, table.alpha)

@@ -16,7 +16,7 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, did_you_mean
-from ctcr.robot.description import MAX_TUBES
+from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
 from ctcr.show.result import Glance, Shown, frame
@@ -201,10 +201,15 @@ def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
     return _measurements(data, table)
 
 
-def check_tubes(table: Measurements, n_tubes: int) -> None:
-    """Raises InputError where a table is not of a robot with so many tubes."""
-    if table.n_tubes != n_tubes:
-        raise InputError(Problem(f"holds the joints of {table.n_tubes} tubes: the robot has {n_tubes}", table.source))
+def check_of(robot: Robot, table: Measurements) -> None:
+    """Raises InputError where these are not a robot and a table of one with as many tubes."""
+    kinds = (robot, Robot, "robot: ctcr.load(path)"), (table, Measurements, "table: ctcr.read(path or DataFrame)")
+    for value, kind, wanted in kinds:
+        if not isinstance(value, kind):
+            raise InputError(Problem(f"a value of type {type(value).__name__} is no {wanted} gives one"))
+    if table.n_tubes != robot.n_tubes:
+        text = f"holds the joints of {table.n_tubes} tubes: the robot has {robot.n_tubes}"
+        raise InputError(Problem(text, table.source))
 
 
 def column_names(n_tubes: int) -> list[str]:
