@@ -34,12 +34,14 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
     readings, repeated = options.without_repeated(readings, conventions)
     own, floor = _fitted(loaded, readings, conventions)
-    readings, excluded = spikes.left_out(loaded, readings)
+    predicted = _predict(loaded.standard, readings, steps)
+    readings, excluded = spikes.left_out(loaded, readings, predicted.position)
     added: list[str] = []
     if loaded.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(loaded, readings)
+        predicted = _predict(loaded, readings, steps)
     notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
-    result = compare(loaded, readings, _predict(loaded, readings, steps), notices, conventions.findings, own, floor)
+    result = compare(loaded, readings, predicted, notices, conventions.findings, own, floor)
     out.write_report("compare.report", result, f"{measurements} compared with the model of {robot}")
     out.write_json(result.as_dict())
     terminal.show(out.console, result)
