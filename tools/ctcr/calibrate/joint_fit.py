@@ -144,7 +144,7 @@ def calibrate(
     lever = checks.start(robot, readings)
     usable, repeated = checks.usable_rows(readings)
     frame = [name for name in names if name.startswith("tracker.")]
-    few = folds.evenly_of(usable, settings.CROSS_VALIDATION_ROWS)
+    few = folds.part_of(usable, settings.CROSS_VALIDATION_ROWS)
     many = np.sum(few) < np.sum(usable)
     table, rows = _part(robot, readings, few) if many else (readings, usable)
     split, judged = _held_out_parts(table, lever, hold_out)

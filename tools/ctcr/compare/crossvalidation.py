@@ -142,7 +142,7 @@ def segments(run: Integers) -> Integers:
 
 
 def group_quantiles(values: Array, label: Integers, part: float) -> Array:
-    """Quantile (G,) of each group of the values (K,), linear between them; label (K,) 0..G-1, each of which is there."""
+    """Quantile (G,) of each group of the values (K,), linear between two; label (K,) 0..G-1, each of which is there."""
     count = np.bincount(label)
     ordered, first = values[np.lexsort((values, label))], np.cumsum(count) - count
     place = part * (count - 1)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask, evenly
+from ctcr.arrays import Array, Integers, Mask, evenly, scattered
 from ctcr.compare.sample import Sample
 
 SAME, OPPOSITE, MIXED = 1, -1, 0
@@ -131,7 +131,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[Integers, Integers]:
     tree = cKDTree(scaled)
     probe = evenly(len(scaled), 500)
     typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
-    queries = evenly(len(scaled), int(settings.MOST_NEIGHBOURS / typical))
+    queries = scattered(len(scaled), int(settings.MOST_NEIGHBOURS / typical))
     found = tree.query_ball_point(scaled[queries], reach)
     sizes = np.fromiter(map(len, found), np.int64, len(found))
     flat = np.concatenate([np.asarray(item, np.int64) for item in found])
