@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Array", "ArrayLike", "Integers", "Mask", "evenly"]
+__all__ = ["Array", "ArrayLike", "Integers", "Mask", "evenly", "scattered"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -13,3 +13,11 @@ Integers = NDArray[np.int64]  # indices, labels, numbers of runs and rows
 def evenly(count: int, most: int) -> Integers:
     """Indices of at most `most` of `count` rows, evenly spread."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.int64))
+
+
+def scattered(count: int, most: int) -> Integers:
+    """As `evenly`, but at another place of each stretch, by the golden ratio: no period of the rows is favoured."""
+    if count <= most:
+        return np.arange(count)
+    stretch = np.arange(most)
+    return np.unique(((stretch + stretch * 0.5 * (5**0.5 - 1) % 1) * count / most).astype(np.int64))

@@ -49,7 +49,7 @@ PASS_APART = 0.25  # usual joint steps by which two passes through the same join
 PASS_APART_BOUNDS = (0.1e-3, 0.5e-3)  # [m] ... but no less than the first and no more than the second
 LONGEST_LINK = 3.0  # usual joint steps over which errors are interpolated at most,
 LONGEST_LINK_TURN = 0.2  # ... and part of the lever arm: about 0.2 rad of rotation
-MOST_NEIGHBOURS = 4_000_000  # pairs of visits that are looked up: memory
+MOST_NEIGHBOURS = 1_000_000  # pairs of visits that are looked up: their RMS is known to 0.1 %; memory
 FEWEST_PAIRS = 5  # of visits from the same direction, below which the noise floor is taken from elsewhere
 FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the noise floor
 NOTABLE = 1.5  # difference of visits over the stated jitter, below which it is not reported
@@ -83,6 +83,7 @@ FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are t
 # ---- Joint fit
 
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
+FEW_PART = 0.1  # of very many rows, fitted before all of them: for a tenth of the cost of each step that it spares
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
 COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart
 ITERATIONS = 50  # by which a fit has converged, or never will
@@ -116,7 +117,7 @@ EXCHANGES = 12  # exchanges of held-out groups, at most
 # ---- Calibration command
 
 NEARLY_EXPLAINED = 1.5  # reduced chi-square up to which the smooth field error is still accepted as the noise
-CROSS_VALIDATION_ROWS = 5000  # rows beyond which one fold is held out instead of each in turn: to save time
+CROSS_VALIDATION_ROWS = 5000  # of more rows so many judge noises, held-out errors and halves: to save time
 HALVES_ROWS = 400  # rows at which the models of two halves are compared
 HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives is then known to 15 %
 

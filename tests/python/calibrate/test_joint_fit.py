@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import cli, frames
+from ctcr import cli, frames, settings
 from ctcr.calibrate import joint_fit, report
 from ctcr.errors import InputError
 from ctcr.fit import folds
@@ -91,6 +91,19 @@ def test_written_file(calibration, readings, tmp_path):
     figures = written.history[0]["figures"]["rms_mm"]
     assert figures["held_out"] == pytest.approx(calibration.held_out.error.rms_mm, rel=1e-6)
     assert list(figures) == ["nominal", "frame_alone", "calibrated", "held_out", "noise_floor"]
+
+
+@pytest.mark.parametrize("effects", [{}, {"backlash_rotation": {"play": [0.001, 0.001, 0.001]}}])
+def test_many_rows(robot, readings, effects, monkeypatch):
+    """Where a part of the rows judges noise and held-out runs, all of them are fitted as before."""
+    bench = robot.with_effects(effects)
+    at_once = joint_fit.calibrate(bench, readings, FEW, noise="jitter", halves=False)
+    monkeypatch.setattr(settings, "CROSS_VALIDATION_ROWS", 60)
+    parted = joint_fit.calibrate(bench, readings, FEW, noise="jitter")
+    assert parted.n_readings == at_once.n_readings > 60 >= parted.held_out.readings > 50
+    np.testing.assert_array_less(np.abs(parted.fit.values - at_once.fit.values), 0.05 * at_once.fit.sd)
+    assert parted.held_out.error.rms_mm == pytest.approx(at_once.held_out.error.rms_mm, rel=0.3)
+    assert parted.halves.rms_mm < 5 * parted.halves.noise_mm
 
 
 def test_fixed_point(calibration, readings):

@@ -30,14 +30,26 @@ def test_held_out_sums(seed):
     label = np.sort(random.integers(0, 6, 90))
     design, target = random.normal(size=(90, 3)), random.normal(size=(90, 2))
     folds = cv.make_folds(np.unique(label, return_inverse=True)[1], trials=12, seed=seed)
-    sums = cv.unexplained(design, target, folds)
+    regression = cv.Regression(design, folds)
+    sums = regression.unexplained(target)
     assert len(sums) == 13
     for signs, value in zip(folds.signs, sums, strict=True):
         flipped = target * signs[folds.label][:, None]
         expected = min(plain_held_out(design, flipped, label, ridge) for ridge in settings.RIDGES)
         assert value == pytest.approx(expected, rel=1e-9)
-    left = target - cv.held_out_prediction(design, target, folds)
+    left = target - regression.predicted(target)
     assert np.sum(left**2) == pytest.approx(sums[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_group_quantiles(seed):
+    """Quantiles of groups, of one value too, are those of each group alone."""
+    random = np.random.default_rng(seed)
+    label = np.concatenate([np.arange(7), random.integers(0, 6, 90)])
+    values = random.normal(size=97).round(1)
+    for part in (0.0, 0.3, 0.95, 1.0):
+        alone = [np.quantile(values[label == group], part) for group in range(7)]
+        np.testing.assert_allclose(cv.group_quantiles(values, label, part), alone, rtol=1e-12)
 
 
 def test_chance():
@@ -54,7 +66,7 @@ def test_p_values():
         label = np.repeat(np.arange(10), 8)
         folds = cv.make_folds(label, trials=99, seed=seed)
         target = random.normal(size=(80, 3))
-        gain = np.sum(target**2) - cv.unexplained(random.normal(size=(80, 2)), target, folds)
+        gain = np.sum(target**2) - cv.Regression(random.normal(size=(80, 2)), folds).unexplained(target)
         below += cv.chance(gain[0], gain[1:]) <= 0.2
     assert below <= 200 * 0.2 + 4 * np.sqrt(200 * 0.2 * 0.8)
 

@@ -106,6 +106,24 @@ def test_thinned_search(monkeypatch):
     assert result.revisits.miss.max() <= np.clip(settings.PASS_APART * np.median(step), *settings.PASS_APART_BOUNDS)
 
 
+def test_thinned_periods(monkeypatch):
+    """Where every run goes through the same stops, a thinned search sees all of them, and so the same hysteresis."""
+    random = np.random.default_rng(8)
+    joints, run, t = stop_and_go(random, runs=100, stops=10, shared=True)
+
+    def error(joints, t, run):  # grows along each run
+        return 5e-5 * (np.arange(len(run)) % 20)[:, None] * [1.0, 0.0, 0.0]
+
+    measured = bench(random, (joints, run, t), error)
+    complete = compare(*measured).direction
+    near = 210  # visits that a search finds near each one
+    for visits in (400, 200, 100, 101):  # every fifth, tenth and 20th: parts of the period of the runs
+        monkeypatch.setattr("ctcr.settings.MOST_NEIGHBOURS", near * visits)
+        thinned = compare(*measured).direction
+        assert thinned.pairs < visits
+        assert thinned.rms_mm == pytest.approx(complete.rms_mm, rel=0.1)
+
+
 def test_directions():
     """Directions follow the joints and stay through rests."""
     random = np.random.default_rng(7)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ctcr import settings
 from ctcr.errors import InputError
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
 from ctcr.fit.result import Priors
 from ctcr.frames import base_to_tracker, product, quaternion_from_rotation_vector
 from ctcr.model import parameters
@@ -376,6 +376,22 @@ def test_many_rows(monkeypatch):
     from_a_part = joint.fit(nominal, readings, noise=NOISE)
     assert from_a_part.starts and from_a_part.evaluations < at_once.evaluations
     np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)
+
+
+def test_growing_parts(monkeypatch):
+    """Where ever larger parts of very many rows start one another, outliers among them, the fit of all is the same."""
+    nominal = robot()
+    readings = table(nominal, rows=1500)
+    strays = np.random.default_rng(1).choice(1500, 40, replace=False)
+    readings.position[strays] += 2e-3
+    at_once = joint.fit(nominal, readings, noise=NOISE, starts=1)
+    monkeypatch.setattr(settings, "FEW_ROWS", 50)
+    parts = [int(np.sum(part)) for part in folds.growing(np.ones(1500, bool))]
+    assert len(parts) == 3 and parts == sorted(parts) and parts[-1] == 1500
+    grown = joint.fit(nominal, readings, noise=NOISE, starts=1)
+    np.testing.assert_array_less(np.abs(grown.values - at_once.values), 0.05 * at_once.sd + 1e-12)
+    np.testing.assert_allclose(grown.sd, at_once.sd, rtol=0.01)
+    assert set(np.flatnonzero(grown.weights[:, 0] < settings.OUTLIER_WEIGHT)) == set(strays)
 
 
 def test_frame_first():

@@ -28,12 +28,13 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
     readings, repeated = without_repeated(readings, found)
     own, floor = _fitted(robot, readings, found)
-    readings, excluded = spikes.left_out(robot, readings)
+    prediction = predict(robot.standard, readings, steps=steps)
+    readings, excluded = spikes.left_out(robot, readings, prediction.position)
     added: list[str] = []
     if robot.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(robot, readings)
+        prediction = predict(robot, readings, steps=steps)
     notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
-    prediction = predict(robot, readings, steps=steps)
     return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, source)
 
 

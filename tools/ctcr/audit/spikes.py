@@ -10,13 +10,15 @@ from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
 
 
-def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The table without the poses of spikes, and a notice if there are any.
+def left_out(
+    robot: Robot, measurements: Measurements, predicted: Array | None = None
+) -> tuple[Measurements, list[str]]:
+    """The table without the poses of spikes, and a notice if there are any. `predicted` as of `leaps`.
 
     An effect of the robot shows in more than one reading along a path, or moves the tip no farther than its joints and
     load do. The model is that of the robot file: no fit selects the readings by which it is judged.
     """
-    leap = leaps(robot, measurements)
+    leap = leaps(robot, measurements, predicted)
     spikes = np.isfinite(leap)
     if not spikes.any():
         return measurements, []
@@ -29,14 +31,19 @@ def left_out(robot: Robot, measurements: Measurements) -> tuple[Measurements, li
     return measurements.without_poses(spikes), [notice]
 
 
-def leaps(robot: Robot, measurements: Measurements) -> Array:
-    """Distance (M,) [m] that each spike leaps; NaN for other readings."""
+def leaps(robot: Robot, measurements: Measurements, predicted: Array | None = None) -> Array:
+    """Distance (M,) [m] that each spike leaps; NaN for other readings.
+
+    `predicted` positions (M, 3) of all rows by the standard model, base frame, where they are known already.
+    """
     leap, jitter = np.full(len(measurements), np.nan), robot.tracker.jitter_mm
     if measurements.position is None or not jitter:
         return leap
     read = np.flatnonzero(np.isfinite(measurements.position).all(axis=1))
-    beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
-    predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
+    if predicted is None:
+        beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
+        predicted = Model(robot.standard).predict(beta, alpha, measurements.force).position
+    predicted = predicted[read]
     measured, run = measurements.position[read], measurements.run[read]
     step = np.diff(measurements.load_space[read], axis=0)
     measured_step, predicted_step = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (measured, predicted))

@@ -64,11 +64,11 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
     return readings.row[small.any(axis=1)].tolist()
 
 
-def notices(robot: Robot, readings: Measurements, fit: Fit) -> list[str]:
-    """What the user should know of a fit, in sentences."""
+def notices(robot: Robot, readings: Measurements, fit: Fit, few: Fit) -> list[str]:
+    """What the user should know of a fit, in sentences; `few`: the same to some of its rows, if they are many."""
     said_as_doubts = "prior standard deviations"
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
-    explained = not unexplained or floors.explains(fit, noise_of_readings(robot, readings))
+    explained = not unexplained or floors.explains(few, noise_of_readings(robot, readings))
     said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
     said += [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
     if not fit.converged:

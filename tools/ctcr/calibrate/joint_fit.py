@@ -19,7 +19,7 @@ from ctcr.fit import folds, joint, widening
 from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import placed
-from ctcr.model import fields
+from ctcr.model import effect_model, fields
 from ctcr.model.fields import Fitted
 from ctcr.model.noise import Noise, noise_of_readings
 from ctcr.model.sessions import without_frame
@@ -184,33 +184,39 @@ def calibrate(
     lever = checks.start(robot, readings)
     usable, repeated = checks.usable_rows(readings)
     frame = [name for name in names if name.startswith("tracker.")]
-    split, judged = _held_out_parts(readings, lever, hold_out)
-    both = folds.parts_of(readings, lever, 2) if halves else None
+    few = folds.part_of(usable, settings.CROSS_VALIDATION_ROWS)
+    many = np.sum(few) < np.sum(usable)
+    table, rows = _part(robot, readings, few) if many else (readings, usable)
+    split, judged = _held_out_parts(table, lever, hold_out)
+    both = folds.parts_of(table, lever, 2) if halves else None
     prior_sd = fields.in_si(sd or {}, robot)
-    with Progress("fitting", 3 + len(judged) + 2 * (both is not None)) as progress:
+    with Progress("fitting", 4 + len(judged) + 2 * (both is not None)) as progress:
 
-        def fitted(only: Sequence[str], rows: Array | bool = True, **options) -> Fit:
-            found = joint.fit(robot, readings, only, rows=usable & rows, sd=prior_sd, **options)
+        def fitted(only: Sequence[str], of: Measurements, chosen: Mask, **options) -> Fit:
+            found = joint.fit(robot, of, only, rows=chosen, sd=prior_sd, **options)
             progress.advance(1)
             return found
 
-        def refitted(like: Fit, rows: Array) -> Fit:
-            return fitted(
-                names, rows=rows, noise=like.noise, inflation=like.inflation, scales=like.priors.scales, starts=1
-            )
+        def refitted(like: Fit, chosen: Mask) -> Fit:
+            options = {"noise": like.noise, "inflation": like.inflation, "scales": like.priors.scales}
+            return fitted(names, table, rows & chosen, starts=1, **options)
 
-        tried = _explaining(fitted(names, noise=one) for one in _noises(robot, readings, noise))
+        tried = _explaining(fitted(names, table, rows, noise=one) for one in _noises(robot, readings, noise))
         fit, held_out = tried[-1], None
         if judged:
             errors = [
-                _held_out([(refitted(one, split.part != k), usable & (split.part == k)) for k in judged], split.kind)
+                _held_out([(refitted(one, split.part != k), rows & (split.part == k)) for k in judged], split.kind)
                 for one in tried
             ]
             fit, held_out = min(zip(tried, errors, strict=True), key=lambda pair: pair[1].error.rms_mm)
+        pair = [refitted(fit, both.part == part) for part in range(2)] if both else []
+        likely = fit
+        if many:
+            fit = fitted(names, readings, usable, noise=fit.noise)
         stages = [_stage("nominal", fit.nominal_residual[usable])]
         if frame and len(frame) < len(names):
-            stages.append(_stage("frame alone", fitted(frame, noise=fit.noise, starts=1).residual[usable]))
-        pair = [refitted(fit, both.part == part) for part in range(2)] if both else []
+            alone = fitted(frame, readings, few, noise=fit.noise, starts=1)
+            stages.append(_stage("frame alone", alone.residual[usable]))
     return Calibration(
         before=given,
         after=placed(fit.apply(robot), readings.sessions),
@@ -221,8 +227,8 @@ def calibrate(
         held_out=held_out,
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
         floors=floor,
-        halves=compare_halves(robot, readings, *pair, both.kind) if pair else None,
-        notices=[*map(sentence, notices), *repeated, *checks.notices(robot, readings, fit)],
+        halves=compare_halves(robot, table, *pair, both.kind) if pair else None,
+        notices=[*map(sentence, notices), *repeated, *checks.notices(robot, readings, fit, likely)],
     )
 
 
@@ -239,14 +245,22 @@ def _change(c: Calibration) -> tuple[list[ledger.Change], ledger.Entry, dict[str
     return changes, entry, effects
 
 
+def _part(robot: Robot, readings: Measurements, few: Mask) -> tuple[Measurements, Mask]:
+    """A table of the chosen rows (M,) alone, and all its rows; the whole one and those rows, where its other rows are
+    part of the path that effects of the robot remember."""
+    if effect_model.of_the_path(robot):
+        return readings, few
+    return readings.rows(few), np.ones(np.sum(few), bool)
+
+
 def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> tuple[folds.Split | None, list[int]]:
-    """How the table is split, and the parts that are held out: each in turn, `count` runs, or one part of many rows."""
+    """How the table is split, and the parts that are held out: each in turn, or `count` runs."""
     if count:
         return folds.runs_left_out(readings, count), [1]
     split = folds.parts_of(readings, lever, settings.FOLDS) if count is None else None
     if split is None:
         return None, []
-    return split, [1] if len(readings) > settings.CROSS_VALIDATION_ROWS else list(range(split.parts))
+    return split, list(range(split.parts))
 
 
 def _noises(robot: Robot, readings: Measurements, noise: str) -> list[Noise]:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, Integers
 from ctcr.compare.covariates import fixed_names, has_speed
-from ctcr.compare.crossvalidation import group_means, make_folds, split
+from ctcr.compare.crossvalidation import group_means, group_quantiles, make_folds, split
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
@@ -233,22 +233,34 @@ def _in_one_frame(sample: Sample) -> Sample:
 
 
 def _spread(values: Array) -> Spread | None:
-    """Mean, RMS, 95th percentile and maximum of the finite values (K,); None without any."""
-    known = values[np.isfinite(values)]
-    if not len(known):
-        return None
-    rms, p95 = np.sqrt(np.mean(known**2)), np.percentile(known, 95)
-    return Spread(len(known), float(known.mean()), float(rms), float(p95), float(known.max()))
+    """Of all finite values (K,); None without any."""
+    return _spreads(values, np.zeros(len(values), np.int64), 1)[0]
+
+
+def _spreads(values: Array, label: Integers, groups: int) -> list[Spread | None]:
+    """Mean, RMS, 95th percentile and maximum of the finite values (K,) of each group; None without any."""
+    known = np.isfinite(values)
+    there, label = np.unique(label[known], return_inverse=True)
+    values, count = values[known], np.bincount(label)
+    found: list[Spread | None] = [None] * groups
+    largest = np.zeros(len(there))
+    np.maximum.at(largest, label, values)
+    mean, square = (np.bincount(label, power) / count for power in (values, values**2))
+    columns = (count, mean, np.sqrt(square), group_quantiles(values, label, 0.95), largest)
+    for group, *numbers in zip(there, *columns, strict=True):
+        found[group] = Spread(*(one.item() for one in numbers))
+    return found
 
 
 def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:
     """Errors of each run; length [mm] and angle [deg] (K,) of all readings."""
-    found = []
-    for run in np.unique(sample.run):
-        rows = sample.run == run
-        mean = tuple(sample.error[rows].mean(axis=0) * 1e3)
-        found.append(RunErrors(int(run), _spread(length[rows]), mean, _spread(angle[rows])))
-    return found
+    runs, label = np.unique(sample.run, return_inverse=True)
+    spreads = (_spreads(values, label, len(runs)) for values in (length, angle))
+    means = map(tuple, 1e3 * group_means(sample.error, label))
+    return [
+        RunErrors(int(run), of_length, mean, of_angle)
+        for run, of_length, of_angle, mean in zip(runs, *spreads, means, strict=True)
+    ]
 
 
 def _number(value: float | None) -> float:

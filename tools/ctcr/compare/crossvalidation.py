@@ -7,6 +7,8 @@ block and destroys only the structure that repeats from block to block, which th
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -38,55 +40,62 @@ def make_folds(label: Integers, trials: int, seed: int = 0) -> Folds:
     return Folds(label, np.vstack([np.ones((1, count)), flips]))
 
 
-def unexplained(design: Array, target: Array, folds: Folds) -> Array:
-    """Held-out sum of squares (1 + T,) of target (K, C) predicted linearly from design (K, P).
+@dataclass(frozen=True)
+class Regression:
+    """Prediction of held-out blocks by a linear form: all that does not depend on the target is computed once."""
 
-    The first value belongs to the data, the others to the sign patterns of chance.
-    """
-    gram, cross = block_products(design, target, folds)
-    energy = float(np.sum(target**2))
-    forms = [_quadratic_form(gram, cross, ridge) for ridge in settings.RIDGES]
-    return energy + np.min([np.sum((folds.signs @ form) * folds.signs, axis=1) for form in forms], axis=0)
+    design: Array  # (K, P)
+    folds: Folds
 
+    @cached_property
+    def gram(self) -> Array:
+        """Normal matrix X'X of every block (G, P, P)."""
+        return self._products(self.design)
 
-def block_products(design: Array, target: Array, folds: Folds) -> tuple[Array, Array]:
-    """Normal equations of every block: X'X (G, P, P) and X'y (G, P, C)."""
-    bounds = np.searchsorted(folds.label, np.arange(folds.count + 1))
-    parts = [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
-    # einsum, not BLAS: its threads make these thousands of small products far slower when another core is busy
-    gram = np.stack([np.einsum("kp,kq->pq", design[part], design[part]) for part in parts])
-    cross = np.stack([np.einsum("kp,kc->pc", design[part], target[part]) for part in parts])
-    return gram, cross
+    @cached_property
+    def inverses(self) -> list[Array]:
+        """Of each ridge, inverse normal matrices (G, P, P) without each block in turn."""
+        total = self.gram.sum(axis=0)
+        square = np.diagonal(total)
+        least = 1e-12 * max(square.max(), 1e-300)
+        return [np.linalg.inv(total - self.gram + np.diag(ridge * square + least)) for ridge in settings.RIDGES]
 
+    def unexplained(self, target: Array) -> Array:
+        """Held-out sum of squares (1 + T,) of a target (K, C).
 
-def _quadratic_form(gram: Array, cross: Array, ridge: float) -> Array:
-    """Matrix Q (G, G) so that signs s of the blocks change the held-out sum of squares by s' Q s.
+        The first value belongs to the data, the others to the sign patterns of chance.
+        """
+        cross, signs = self._products(target), self.folds.signs
+        forms = [self._quadratic_form(inverse, cross) for inverse in self.inverses]
+        return float(np.sum(target**2)) + np.min([np.sum((signs @ form) * signs, axis=1) for form in forms], axis=0)
 
-    The coefficients without block g are linear in the signs of the others, c_g = H_g sum_h s_h X_h'y_h, so the
-    residual that they leave in block g, c_g' X_g'X_g c_g - 2 s_g c_g' X_g'y_g, is quadratic in the signs.
-    """
-    groups = len(gram)
-    parts = np.einsum("gpq,hqc->ghpc", _inverses(gram, ridge), cross)
-    parts[np.arange(groups), np.arange(groups)] = 0.0
-    fitted = np.einsum("gpq,ghqc->ghpc", gram, parts)
-    by_source = parts.transpose(1, 0, 2, 3).reshape(groups, -1)
-    square = by_source @ fitted.transpose(1, 0, 2, 3).reshape(groups, -1).T
-    return square - 2 * np.einsum("ghpc,gpc->hg", parts, cross)
+    def predicted(self, target: Array) -> Array:
+        """Prediction (K, C) of every row of a target from the blocks it does not belong to."""
+        cross = self._products(target)
+        inverse = min(self.inverses, key=lambda inverse: self._quadratic_form(inverse, cross).sum())
+        coefficients = inverse @ (cross.sum(axis=0) - cross)
+        return np.einsum("kp,kpc->kc", self.design, coefficients[self.folds.label])
 
+    def _products(self, target: Array) -> Array:
+        """X'y of every block (G, P, C)."""
+        ends = np.searchsorted(self.folds.label, np.arange(self.folds.count + 1))
+        parts = [slice(a, b) for a, b in pairwise(ends)]
+        return np.stack([self.design[part].T @ target[part] for part in parts])
 
-def _inverses(gram: Array, ridge: float) -> Array:
-    """Inverse normal matrices (G, P, P) without each block in turn; the ridge is relative to the column's square."""
-    diagonal = np.diagonal(gram.sum(axis=0))
-    penalty = np.diag(ridge * diagonal + 1e-12 * max(diagonal.max(), 1e-300))
-    return np.linalg.inv(gram.sum(axis=0) - gram + penalty)
+    def _quadratic_form(self, inverse: Array, cross: Array) -> Array:
+        """Matrix Q (G, G) so that signs s of the blocks change the held-out sum of squares by s' Q s.
 
-
-def held_out_prediction(design: Array, target: Array, folds: Folds) -> Array:
-    """Prediction (K, C) of every row from the blocks it does not belong to."""
-    gram, cross = block_products(design, target, folds)
-    ridge = settings.RIDGES[int(np.argmin([_quadratic_form(gram, cross, ridge).sum() for ridge in settings.RIDGES]))]
-    coefficients = _inverses(gram, ridge) @ (cross.sum(axis=0) - cross)
-    return np.einsum("kp,kpc->kc", design, coefficients[folds.label])
+        The coefficients without block g are linear in the signs of the others, c_g = H_g sum_h s_h X_h'y_h, so the
+        residual that they leave in block g, c_g' X_g'X_g c_g - 2 s_g c_g' X_g'y_g, is quadratic in the signs.
+        """
+        groups, width, axes = cross.shape
+        parts = (inverse @ cross.transpose(1, 0, 2).reshape(width, -1)).reshape(groups, width, groups, axes)
+        own = np.arange(groups)
+        parts[own, :, own] = 0.0
+        fitted = (self.gram @ parts.reshape(groups, width, -1)).reshape(parts.shape)
+        by_source = parts.transpose(2, 0, 1, 3).reshape(groups, -1)
+        square = by_source @ fitted.transpose(2, 0, 1, 3).reshape(groups, -1).T
+        return square - 2 * np.sum(parts * cross[:, :, None, :], axis=(1, 3)).T
 
 
 def chance(observed: float, trials: Array) -> float:
@@ -130,6 +139,16 @@ def segments(run: Integers) -> Integers:
     names, label = np.unique(run, return_inverse=True)
     in_time = np.arange(len(run)) * settings.PATH_SEGMENTS // max(len(run), 1)
     return label if len(names) >= settings.FEWEST_BLOCKS else in_time
+
+
+def group_quantiles(values: Array, label: Integers, part: float) -> Array:
+    """Quantile (G,) of each group of the values (K,), linear between two; label (K,) 0..G-1, each of which is there."""
+    count = np.bincount(label)
+    ordered, first = values[np.lexsort((values, label))], np.cumsum(count) - count
+    place = part * (count - 1)
+    below = np.floor(place).astype(np.int64)
+    low, high = ordered[first + below], ordered[first + np.minimum(below + 1, count - 1)]
+    return low + (place - below) * (high - low)
 
 
 def block_error(values: Array, blocks: Integers) -> float:

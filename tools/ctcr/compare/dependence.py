@@ -13,7 +13,7 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Integers
 from ctcr.compare.covariates import Covariate, covariates, has_speed
-from ctcr.compare.crossvalidation import Folds, chance, held_out_prediction, make_folds, split, unexplained
+from ctcr.compare.crossvalidation import Folds, Regression, chance, make_folds, split
 from ctcr.compare.sample import Sample
 
 FRAME_NAMES = {
@@ -32,18 +32,13 @@ class Form:
     label: str
     frame: str  # key of FRAME_NAMES
     axes: Array  # (K, 3, 3) of the frame as columns, base frame; zero where it is not defined
-    design: Array  # (K, P), or (3K, P) when it couples the three components
-    covariate: Covariate | None = None  # judged beyond a constant vector in the same frame
+    regression: Regression  # of a design (K, P), or (3K, P) when it couples the three components
+    covariate: Covariate | None = None  # judged beyond a constant vector in the same frame, the first column
 
     @property
     def coupled(self) -> bool:
         """Whether one coefficient acts on all three components."""
-        return len(self.design) > len(self.axes)
-
-    @property
-    def columns(self) -> Array:
-        """Design with the constant, where the form is judged beyond it."""
-        return np.hstack([np.ones((len(self.design), 1)), self.design]) if self.covariate else self.design
+        return len(self.regression.design) > len(self.axes)
 
     def local(self, error: Array) -> Array:
         """Error (K, 3), base frame, as the target of the design."""
@@ -55,7 +50,9 @@ class Form:
 
     def fitted(self, error: Array) -> Array:
         """Least-squares fit of `local(error)`, slightly damped, without its constant part."""
-        design = self.design - self.design.mean(axis=0) if self.covariate else self.design
+        design = self.regression.design
+        if self.covariate:
+            design = design[:, 1:] - design[:, 1:].mean(axis=0)
         gram = design.T @ design
         damping = 1e-3 * np.diag(np.diagonal(gram)) + 1e-300 * np.eye(len(gram))
         return design @ np.linalg.lstsq(gram + damping, design.T @ self.local(error), rcond=None)[0]
@@ -129,10 +126,10 @@ def rank(sample: Sample, base_error: Array, alpha: float) -> Ranking:
     folds = make_folds(label, settings.SIGN_TRIALS)
     frames = local_frames(sample, rows)
     enough = folds.count >= settings.FEWEST_BLOCKS
-    total = float(unexplained(np.ones((len(error), 1)), error, folds)[0]) if enough else 0.0
+    total = float(Regression(np.ones((len(error), 1)), folds).unexplained(error)[0]) if enough else 0.0
     if total == 0:
         return Ranking([], [], np.nan, 0.0, error, rows, folds.count, kind, frames)
-    forms = all_forms(sample, rows, covariates(sample), frames)
+    forms = all_forms(sample, rows, covariates(sample), frames, folds)
     alone, by_chance = _judge(forms, error, folds, total)
     chosen, left, best = [], error, alone
     while len(chosen) < settings.MOST_DEPENDENCES and best:
@@ -140,8 +137,7 @@ def rank(sample: Sample, base_error: Array, alpha: float) -> Ranking:
             break
         chosen += _with_rivals(best[:1], best, left)
         form = best[0].form
-        target = form.local(left)
-        left = left - form.in_base(held_out_prediction(form.columns, target, folds.of(target)))
+        left = left - form.in_base(form.regression.predicted(form.local(left)))
         names = {item.name for item in chosen}
         best = [item for item in _judge(forms, left, folds, total)[0] if item.name not in names]
     explained = 1 - float(np.sum(left**2)) / total
@@ -150,7 +146,9 @@ def rank(sample: Sample, base_error: Array, alpha: float) -> Ranking:
     return Ranking(alone, chosen, chance_share, explained, error, rows, folds.count, kind, frames)
 
 
-def all_forms(sample: Sample, rows: Integers, items: list[Covariate], frames: dict[str, Array]) -> list[Form]:
+def all_forms(
+    sample: Sample, rows: Integers, items: list[Covariate], frames: dict[str, Array], folds: Folds
+) -> list[Form]:
     """Every form tried: each quantity in three frames, and the few that are not functions of one quantity."""
     position = sample.base_position[rows]
     lever = position - position.mean(axis=0)
@@ -165,11 +163,14 @@ def all_forms(sample: Sample, rows: Integers, items: list[Covariate], frames: di
     ]
     if has_speed(sample) and np.any(velocity):
         special.append(("lag", "velocity of the tip (a delay)", "base", velocity.reshape(-1, 1)))
-    forms = [Form(name, label, frame, frames[frame], design) for name, label, frame, design in special]
+    forms = [
+        Form(name, label, frame, frames[frame], Regression(design, folds.of(design)))
+        for name, label, frame, design in special
+    ]
     for item in items:
         for design in replace(item, value=item.value[rows]).bases():
-            design = np.nan_to_num(design)
-            forms += [Form(item.name, item.label, f, frames[f], design, item) for f in ("base", "tip", "axis")]
+            regression = Regression(np.hstack([ones, np.nan_to_num(design)]), folds)
+            forms += [Form(item.name, item.label, f, frames[f], regression, item) for f in ("base", "tip", "axis")]
     return forms
 
 
@@ -201,7 +202,7 @@ def _unit(vectors: Array) -> Array:
 
 def _judge(forms: list[Form], error: Array, folds: Folds, total: float) -> tuple[list[Dependence], Array]:
     """Dependences, strongest first, each in its best frame, and the best gains (T,) by chance."""
-    constant: dict[str, Array] = {}  # frame -> squared error that a constant leaves
+    one, constant = Regression(np.ones((len(error), 1)), folds), {}  # frame -> squared error that a constant leaves
     gains: dict[str, tuple[Form, float]] = {}
     best = np.full(folds.signs.shape[0] - 1, -np.inf)
     for form in forms:
@@ -209,9 +210,9 @@ def _judge(forms: list[Form], error: Array, folds: Folds, total: float) -> tuple
         without = np.sum(target**2)
         if form.covariate:
             if form.frame not in constant:
-                constant[form.frame] = unexplained(np.ones((len(error), 1)), target, folds)
+                constant[form.frame] = one.unexplained(target)
             without = constant[form.frame]
-        gain = without - unexplained(form.columns, target, folds.of(target))
+        gain = without - form.regression.unexplained(target)
         best = np.maximum(best, gain[1:])
         if form.name not in gains or gain[0] > gains[form.name][1]:
             gains[form.name] = (form, gain[0])

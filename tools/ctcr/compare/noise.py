@@ -7,7 +7,7 @@ from scipy import stats
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
-from ctcr.compare.crossvalidation import block_error, segments
+from ctcr.compare.crossvalidation import block_error, group_quantiles, segments
 from ctcr.compare.visits import OPPOSITE, SAME, Revisits, Stops
 
 
@@ -167,7 +167,7 @@ def rms_mm(square: Array) -> float:
 
 
 def _block_quartiles(values: Array, blocks: Integers) -> Array:
-    return np.array([np.percentile(values[blocks == block], 75) for block in np.unique(blocks)])
+    return group_quantiles(values, np.unique(blocks, return_inverse=True)[1], 0.75)
 
 
 def beyond(square: Array, axis: float, blocks: Integers) -> float:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
-from ctcr.compare.crossvalidation import Folds, chance, group_means, segments, unexplained
+from ctcr.compare.crossvalidation import Folds, Regression, chance, group_means, segments
 from ctcr.compare.noise import NoiseFloor, beyond, rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import SAME, Revisits, Stops
@@ -64,7 +64,7 @@ class RunOffsets:
 def find_shift(error: Array, folds: Folds) -> Shift:
     """Constant error of (K, 3) vectors [m], judged on held-out blocks; sign flips of blocks give chance."""
     square = float(np.sum(error**2))
-    gains = square - unexplained(np.ones((len(error), 1)), error, folds)
+    gains = square - Regression(np.ones((len(error), 1)), folds).unexplained(error)
     mean = error.mean(axis=0) * 1e3
     share = float(gains[0]) / max(square, 1e-300)
     return Shift(tuple(mean), float(np.linalg.norm(mean)), share, chance(gains[0], gains[1:]))

@@ -159,7 +159,10 @@ def _directions(path: list[float], band: float) -> list[int]:
     low = high = path[0]
     sign, signs = 0, []
     for value in path:
-        low, high = min(low, value), max(high, value)
+        if value < low:
+            low = value
+        elif value > high:
+            high = value
         if sign >= 0 and value < high - band:
             sign, low = -1, value
         elif sign <= 0 and value > low + band:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask, evenly
+from ctcr.arrays import Array, Integers, Mask, evenly, scattered
 from ctcr.compare.sample import Sample
 
 SAME, OPPOSITE, MIXED = 1, -1, 0
@@ -71,12 +71,16 @@ class Revisits:
 def find_stops(sample: Sample) -> Stops:
     """Join the rows of one run that stay within REST of the first of them."""
     scaled, run, error = sample.motion.scaled, sample.run, sample.error
-    moved = np.append(True, np.linalg.norm(np.diff(scaled, axis=0), axis=1) > 0.05 * settings.REST)
+    step, last = np.diff(scaled, axis=0), -1
+    linked = np.append(False, run[1:] == run[:-1])
+    rests = linked & np.append(False, np.linalg.norm(step, axis=1) <= 0.05 * settings.REST)
+    near = np.append(False, np.abs(step).max(axis=1, initial=0.0) <= settings.REST)
     first: list[int] = []
-    for i in range(len(run)):
-        same_run = first and run[i] == run[first[-1]]
-        if not (same_run and (not moved[i] or np.abs(scaled[i] - scaled[first[-1]]).max() <= settings.REST)):
+    for i in np.flatnonzero(~rests).tolist():
+        alike = near[i] if last == i - 1 else np.abs(scaled[i] - scaled[last]).max() <= settings.REST
+        if not (linked[i] and alike):
             first.append(i)
+            last = i
     start = np.array(first, dtype=np.int64)
     size = np.diff(np.append(start, len(run)))
 
@@ -127,8 +131,7 @@ def _neighbours(scaled: Array, reach: float) -> tuple[Integers, Integers]:
     tree = cKDTree(scaled)
     probe = evenly(len(scaled), 500)
     typical = np.mean(tree.query_ball_point(scaled[probe], reach, return_length=True))
-    stride = int(np.ceil(typical * len(scaled) / settings.MOST_NEIGHBOURS))
-    queries = np.arange(0, len(scaled), stride)
+    queries = scattered(len(scaled), int(settings.MOST_NEIGHBOURS / typical))
     found = tree.query_ball_point(scaled[queries], reach)
     sizes = np.fromiter(map(len, found), np.int64, len(found))
     flat = np.concatenate([np.asarray(item, np.int64) for item in found])

@@ -82,11 +82,16 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
 
 
 def _may_win(engine: Engine, one: Fit) -> bool:
-    """Whether small moves of each run's frame, and with them of the calibration, are likelier than none."""
+    """Whether moves of each run's frame, and with them of the calibration, could explain enough, and small ones are
+    likelier than none."""
     table = Sessions.alike(engine.robot, engine.measurements).taken_out(engine.measurements)
     recorded = user_recording.recording_of(engine.robot, table)
     columns = recorded.columns(one.residual.ravel()).reshape(*one.residual.shape, -1)
     linear, columns = engine.linear(one), one.whiten(columns)
+    free = np.hstack([linear.jacobian, columns])  # without priors: tables that contradict the robot end here
+    most = free @ np.linalg.lstsq(free, linear.residual, rcond=None)[0]
+    if np.sum(most**2) - columns.shape[1] < settings.EXPLAINED * unexplained(one):
+        return False
     gains = (linear.gain(part * columns).log_evidence for part in settings.SESSION_PARTS)
     return max(gains) > settings.DECISIVE
 

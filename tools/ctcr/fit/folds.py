@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask
+from ctcr.arrays import Array, Integers, Mask, scattered
 from ctcr.compare.crossvalidation import split
 from ctcr.compare.sample import follow
 from ctcr.errors import InputError, Problem
@@ -39,6 +39,22 @@ def few_of(rows: Mask, least: int | None = None) -> Mask | None:
     few = np.zeros_like(rows)
     few[chosen[::every]] = True
     return few
+
+
+def part_of(rows: Mask, most: int) -> Mask:
+    """At most `most` of some rows (M,), spread over all of them and over every part of the runs."""
+    chosen = np.flatnonzero(rows)
+    few = np.zeros_like(rows)
+    few[chosen[scattered(len(chosen), most)]] = True
+    return few
+
+
+def growing(rows: Mask) -> list[Mask]:
+    """Rows (M,) that are fitted one after another, each from where the fit before ended: of many rows a few, of very
+    many tenths of them too, at last all."""
+    most = int(settings.FEW_PART * np.sum(rows))
+    few = part_of(rows, most) if most >= 2 * settings.FEW_ROWS else few_of(rows)
+    return [rows] if few is None else [*growing(few), rows]
 
 
 def parts_of(readings: Measurements, lever: float, parts: int) -> Split | None:

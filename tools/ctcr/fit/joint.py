@@ -43,6 +43,7 @@ class FitOptions:
 
     start: Array | None = None  # (n,); the priors' mean by default
     weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
+    first_weights: Array | None = None  # (M, 2) with which outliers begin to be found
     inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
     scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
     # Log evidences of models can be compared at the same weights, inflation and scales.
@@ -107,7 +108,7 @@ def fit_joint(
     """Fits a model to its readings, which the sensor took at `positions` (M, 3) [m], tracker frame.
 
     rows       (M,) that are fitted, all by default
-    few_first  whether, of many rows, a fit to a few finds the start and compares the starts
+    few_first  whether, of many rows, fits to a few find the start and compare the starts
     options    those of FitOptions
     Raises NoFit where none is possible.
     """
@@ -115,16 +116,19 @@ def fit_joint(
     rows = np.ones(len(positions), bool) if rows is None else rows
     if how.weights is not None:
         rows = rows & (how.weights > 0).any(axis=1)
-    few = folds.few_of(rows) if few_first else None
-    if few is None:
-        model.activate(rows.tolist())
-        return _fit_widened(*arguments, how)
-    model.activate(few.tolist())
-    first = _fit_widened(*arguments, replace(how, tolerance=settings.COARSE))
+    *parts, rows = folds.growing(rows) if few_first else [rows]
+    compared = None
+    for part in parts:
+        model.activate(part.tolist())
+        fitted = _fit_widened(*arguments, replace(how, tolerance=settings.COARSE))
+        how = replace(how, start=fitted.values, starts=1, scales=fitted.priors.scales)
+        compared = compared or fitted.starts
     model.activate(rows.tolist())
-    how = replace(how, start=first.values, starts=1, scales=first.priors.scales)
+    if parts and how.weights is None:
+        residual = np.where(rows[:, None], model.residual(how.start)[0].reshape(-1, 6), nan)
+        how = replace(how, first_weights=_still(residual, noise, positions, inflation=how.inflation).weights)
     fitted = _fit_widened(*arguments, how)
-    return replace(fitted, starts=first.starts)
+    return replace(fitted, starts=compared or fitted.starts)
 
 
 def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: Array, how: FitOptions) -> Fit:
@@ -153,7 +157,7 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
     start = np.asarray(priors.mean if how.start is None else how.start, dtype=float)
     try:
         moved = model.solve_friction(start)
-        evidence, found, few = -np.inf, None, settings.FRICTION_PATH_ITERATIONS
+        evidence, found, few = -np.inf, how.first_weights, settings.FRICTION_PATH_ITERATIONS
         alternates = moved > 0 and how.tolerance < settings.COARSE
         for left in reversed(range(settings.FRICTION_PATH_ROUNDS if alternates else 1)):
             to_the_end = not left or moved < settings.FRICTION_PATH_CHANGE
@@ -278,14 +282,19 @@ def tracker_error(fit: Fit, noise: Noise) -> tuple[float, float]:
     """RMS of position [mm] and rotation [deg] that the tracker alone leaves of a right model: its jitter as stated, and
     its smooth field error as the residual of the fitted readings shows it."""
     used = np.repeat((fit.weights > 0) & np.isfinite(fit.residual[:, ::3]), 3, axis=1)
-    residual, zero = np.where(used, fit.residual, nan).ravel(), np.zeros(1)
-    still = LinearModel(residual, np.zeros((residual.size, 1)), zero, zero)  # one parameter without any effect
-    priors = Priors(["nothing"], zero, zero + 1, zero - 1, zero + 1)
-    options = {"weights": fit.weights, "inflation": np.ones(2), "few_first": False}
-    field = fit_joint(still, priors, noise, fit.positions, **options).field
+    still = _still(np.where(used, fit.residual, nan), noise, fit.positions, weights=fit.weights, inflation=np.ones(2))
+    field = still.field
     smooth = [rms(np.where(used, field, nan)[:, kind : kind + 3]) for kind in (0, 3)]
     error = np.hypot(np.sqrt(3) * np.array([noise.position_jitter, noise.rotation_jitter]), np.nan_to_num(smooth))
     return 1e3 * float(error[0]), float(np.rad2deg(error[1])) if used[:, 3:].any() else nan
+
+
+def _still(residual: Array, noise: Noise, positions: Array, **options: ArrayLike | None) -> Fit:
+    """The noise of a residual (M, 6) that stays as it is: a fit of one parameter without any effect."""
+    zero = np.zeros(1)
+    model = LinearModel(residual.ravel(), np.zeros((residual.size, 1)), zero, zero)
+    priors = Priors(["nothing"], zero, zero + 1, zero - 1, zero + 1)
+    return fit_joint(model, priors, noise, positions, few_first=False, **options)
 
 
 def sensor_positions(robot: Robot, measurements: Measurements) -> Array:

@@ -53,8 +53,11 @@ public:
     }
   }
 
+  /// z itself where it keeps them: a prediction there stays known.
   [[nodiscard]] Eigen::VectorXd clamped(const Eigen::VectorXd& z) const {
-    return inverse_ * (T_ * z).cwiseMax(low_).cwiseMin(high_);
+    const Eigen::VectorXd y = T_ * z, within = y.cwiseMax(low_).cwiseMin(high_);
+    if (within == y) return z;
+    return inverse_ * within;
   }
   /// The step from z (which keeps the bounds) to the minimum within the bounds of a quadratic function with this gradient
   /// there and this positive definite Hessian. Active set: goes towards the free minimum up to the first bound, and

@@ -12,12 +12,14 @@ public:
       if ((use.row(i).array() > 0).any()) rows_.push_back(i);
     for (const Eigen::Index i : rows_)
       for (Eigen::Index entry = 6 * i; entry < 6 * i + 6; ++entry) entries_.push_back(entry);
+    all_ = Eigen::Index(rows_.size()) == use.rows();
   }
 
   /// `predict` restricted to these rows; refers to it and to this.
   [[nodiscard]] Predictor predictor(const Predictor& predict) const {
     return [this, &predict, residual = Eigen::VectorXd(), jacobian = Eigen::MatrixXd()](
                const Eigen::VectorXd& x, Eigen::VectorXd& selected, Eigen::MatrixXd* selected_jacobian) mutable {
+      if (all_) return predict(x, selected, selected_jacobian);
       if (!predict(x, residual, selected_jacobian ? &jacobian : nullptr)) return false;
       selected = of(residual);
       if (selected_jacobian) *selected_jacobian = of(jacobian);
@@ -39,6 +41,7 @@ public:
 
 private:
   std::vector<Eigen::Index> rows_, entries_;
+  bool all_ = false;  ///< every row is fitted
 };
 
 }  // namespace ctcr::detail
