@@ -166,15 +166,16 @@ def to_fit(robot, readings, conventions, frame_per_run: bool | None):
     return readings, [*said, *more]
 
 
-def load_right(robot: str, table: str, anyway: bool, frame_per_run: bool | None):
+def load_right(robot: str, table: str, anyway: bool, frame_per_run: bool | None, finds: tuple[str, ...] = ()):
     """As `load`, of a table `to_fit`, with its sentences. Raises InputError where a convention is wrong, unless
-    `anyway`."""
+    `anyway`, or it is of a kind that the command `finds` itself."""
     from ctcr.errors import InputError, Problem
 
     loaded, readings, found, refusal = reviewed(robot, table)
-    if found.wrong and not anyway:
+    wrong = [one for one in found.wrong if one.kind not in finds]
+    if wrong and not anyway:
         advice = Problem("a fit would take that for physics: correct it first, or go on with --anyway")
-        raise InputError([*(Problem(one.sentence, table) for one in found.wrong), advice])
+        raise InputError([*(Problem(one.sentence, table) for one in wrong), advice])
     if refusal:
         raise refusal
     return loaded, *to_fit(loaded, readings, found, frame_per_run)

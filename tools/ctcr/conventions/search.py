@@ -181,7 +181,7 @@ def _frame_in_words(robot: Robot) -> str:
     position, rotation = numbers(tracker.position_mm, 3), numbers(tracker.rotation_vector_rad, 5)
     return (
         f"set tracker.position_mm to {position} and tracker.rotation_vector_rad to {rotation}, "
-        "or measure it: ctcr calibrate registration -o NEW.yaml"
+        "or let it be found: ctcr calibrate frame ROBOT TABLE -o NEW.yaml"
     )
 
 
