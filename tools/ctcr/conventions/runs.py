@@ -57,11 +57,16 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
 
 
 def _log_error(fit: Calibrated, rows: Array) -> float:
-    return float(fit.log_error[rows].mean())
+    return float(_log(fit.error[rows], fit).mean())
+
+
+def _log(error: Array, like: Calibrated) -> Array:
+    missed = np.where(np.isfinite(error), error, settings.CONVENTION_UNSOLVED)
+    return 0.5 * np.log(missed**2 + max(like.floor, settings.CONVENTION_FINEST) ** 2)
 
 
 def _typical(error: Array, like: Calibrated) -> float:
-    return Calibrated(like.robot, error, like.floor).typical
+    return float(np.exp(_log(error, like).mean()))
 
 
 def _moved(robot: Robot, readings: Measurements) -> Array:

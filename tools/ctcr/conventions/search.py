@@ -1,73 +1,108 @@
-"""The search: every hypothesis is predicted, the likely ones are calibrated, the clearest is applied, and again."""
+"""The search: every hypothesis and pair is predicted, the likely ones are calibrated, the likeliest is applied."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
+from ctcr.conventions.likelihood import Likelihood
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
+Wrong = tuple[Hypothesis, ...]
+
 
 @dataclass(frozen=True)
 class Case:
-    """A robot and readings as they stand after the conventions found so far, with their calibration."""
+    """A robot and readings where some hypotheses hold, with their calibration."""
 
     robot: Robot
     readings: Measurements
     fit: Calibrated
+    wrong: Wrong = ()
     changes: tuple[Change, ...] = ()  # that made these readings of those of the table
 
+    @property
+    def residual(self) -> Array:
+        """(K, 3) [m] of the readings as given; where there is no prediction, from the mean of all."""
+        position = self.readings.position
+        residual = np.where(self.fit.solved[:, None], self.fit.residual, position - position.mean(axis=0))
+        return residual / self.scale
 
-@dataclass(frozen=True)
-class Tried:
-    """A hypothesis, and the case that it makes."""
+    @property
+    def scale(self) -> float:
+        """Of positions in m over those of the table."""
+        return float(np.prod([one.scale for one in self.wrong]))
 
-    hypothesis: Hypothesis
-    case: Case
-    rivals: Sequence[Hypothesis] = ()  # of another kind, which explain the readings as well
+    def log_odds(self, likelihood: Likelihood, n_hypotheses: int) -> float:
+        """Log evidence of these hypotheses, with the prior of so many that may hold."""
+        jitter = max(self.fit.floor / np.sqrt(3), settings.CONVENTION_FINEST) / self.scale
+        prior = len(self.wrong) * (settings.DECISIVE + np.log(n_hypotheses))
+        return likelihood(self.residual, jitter) - self.fit.improbable - prior
 
 
 def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding]]:
-    """The case after all clear findings, one at a time, and these.
+    """The case after all findings, and these.
 
-    `readings` are a sample of the table, `of_runs` some of each run. Where a frame for each run explains more than a
-    hypothesis on joints, loads or positions does, the runs are not one session, and it is not clear.
+    `readings` are a sample of the table, `of_runs` some of each run. Where a frame for each run explains more than
+    hypotheses on joints, loads or positions do, the runs are not one session, and nothing is found.
     """
     case, found = Case(robot, readings, calibrated(robot, readings)), []
-    while len(found) < settings.MOST_CONVENTIONS and (better := _clearest(case)):
-        whole = better.hypothesis.frame or better.hypothesis.registers
-        if not whole and _with_run_frames(case, of_runs) < better.case.fit.typical:
+    while len(found) < settings.MOST_CONVENTIONS and (better := _likeliest(case)):
+        whole = any(one.frame or one.registers for one in better.wrong)
+        if not whole and _with_run_frames(case, of_runs) < better.fit.typical:
             break
-        found.append(_finding(case, better))
-        case = better.case
+        found += _findings(case, better)
+        case = replace(better, wrong=())
     return case, found
 
 
-def _clearest(case: Case) -> Tried | None:
-    """The hypothesis that leaves far less error than the table as it is and than every other one; None without any."""
-    before = case.fit
-    if _is_noise(before):
+def _likeliest(case: Case) -> Case | None:
+    """The case with further hypotheses that is likelier than this one; None without any."""
+    if case.fit.is_noise:
         return None
-    tried = [Tried(one, _applied(case, one)) for one in _likely(case)]
-    tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one)]
-    if not tried:
+    every = hypotheses(case.robot, case.readings)
+    tried = [case, *(_applied(case, some) for some in _candidates(case, every))]
+    tried = [one for one in tried if one is case or (np.isfinite(one.fit.typical) and _is_jump(one))]
+
+    def ranked(likelihood: Likelihood) -> tuple[Case, dict[int, float]]:
+        odds = {id(one): one.log_odds(likelihood, len(every)) for one in tried}
+        most = max(odds.values())
+        alike = [one for one in tried if odds[id(one)] > most - settings.TIE]
+        return min(alike, key=lambda one: (sum(h.doubts for h in one.wrong), -odds[id(one)])), odds
+
+    best, _ = ranked(Likelihood(case.readings))
+    best, odds = ranked(Likelihood(case.readings, _ordinary(best)))
+    if best is case:
         return None
-    least = min(one.case.fit.typical for one in tried)
-    alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    best = min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
-    if best.hypothesis.offset:
-        exact = offset_by(best.hypothesis, offset_of(best), case.robot.n_tubes)
-        best = Tried(exact, _applied(case, exact))
-    rivals = [one.hypothesis for one in alike if one.hypothesis.kind != best.hypothesis.kind]
-    return replace(best, rivals=[one for one in rivals if not one.offset and not one.registers])
+    rivals = [one for one in tried if len(one.wrong) == len(best.wrong) and odds[id(one)] > odds[id(best)] - settings.TIE]
+    wrong = tuple(replace(one, rivals=_instead(one, best, rivals)) for one in best.wrong)
+    exact = tuple(offset_by(one, offset_of(one, best), case.robot.n_tubes) if one.offset else one for one in wrong)
+    return _applied(case, exact)
+
+
+def _ordinary(case: Case) -> Array:
+    """Rows (K,) that are no outliers."""
+    size = np.linalg.norm(case.residual, axis=1)
+    return size < settings.CONVENTION_OUTLIER * np.median(size)
+
+
+def _instead(one: Hypothesis, best: Case, rivals: Iterable[Case]) -> list[Hypothesis]:
+    """Hypotheses of another kind that explain the readings as well in place of one."""
+    rest, found = {id(other) for other in best.wrong if other is not one}, []
+    for rival in rivals:
+        others = [other for other in rival.wrong if id(other) not in rest]
+        if len(others) == 1 and others[0].kind != one.kind and not (others[0].offset or others[0].registers):
+            found += others
+    return found
 
 
 def _with_run_frames(case: Case, of_runs: Measurements) -> float:
@@ -80,90 +115,123 @@ def _with_run_frames(case: Case, of_runs: Measurements) -> float:
         freedom = 3 * np.sum(rows) - FRAME
         left = aligned(positions[rows], of_runs.position[rows])[2]
         error[rows] = left * np.sqrt(3 * np.sum(rows) / freedom) if freedom > 0 else np.inf
-    return Calibrated(case.robot, error, case.fit.floor).typical
+    return float(np.nanmedian(error)) if np.isfinite(error).any() else np.inf
 
 
-def _is_noise(fit: Calibrated) -> bool:
-    return fit.typical < settings.CONVENTION_AT_FLOOR * max(fit.floor, settings.CONVENTION_FINEST)
+def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[Wrong]:
+    """The hypotheses and pairs of them that leave the least error before any calibration."""
+    few = case.readings.rows(slice(None, None, settings.CONVENTION_EVERY))
+    joints = [(one,) for one in every if one.of_prediction]
+    places = [(), *_placements(every)]
+    given, rough = _rough(case.robot, few, (), [()])[0], []
+
+    def look(some: Sequence[Wrong]) -> list[float]:
+        """Least error of each in the frame of the file and in the best one; all goes to `rough`."""
+        least = []
+        for one in some:
+            errors = _rough(case.robot, few, one, places)
+            rough.extend((error, (*one, *place)) for error, place in zip(errors, places, strict=True))
+            least.append(min(errors))
+        return least
+
+    least = look([(), *joints])[1:]
+    first = [joints[i] for i in np.argsort(least, kind="stable")[: settings.CONVENTION_LIKELY]]
+    look([(*one, other) for one in first for (other,) in joints if not {*one[0].columns} & {*other.columns}])
+    for count in (1, 2, 3):
+        kept: dict[tuple, Wrong] = {}
+        for error, some in sorted((pair for pair in rough if len(pair[1]) == count), key=lambda pair: pair[0]):
+            alike = tuple((one.kind, one.columns, bool(one.offset) or id(one)) for one in some)
+            if np.isfinite(error) and error < settings.CONVENTION_ROUGH * given and alike not in kept:
+                kept[alike] = some
+                if len(kept) == settings.CONVENTION_LIKELY:
+                    break
+        yield from kept.values()
 
 
-def _is_clear(before: Calibrated, after: Calibrated) -> bool:
-    return (
-        after.solved.mean() > settings.CONVENTION_SOLVED and after.typical < settings.CONVENTION_CLEAR * before.typical
-    )
+def _placements(every: Sequence[Hypothesis]) -> list[Wrong]:
+    """Hypotheses on positions and the frame, and pairs of a unit and another."""
+    units = [one for one in every if one.scale != 1]
+    others = [one for one in every if not one.of_prediction and one.scale == 1]
+    return [*((one,) for one in (*units, *others)), *((unit, other) for unit in units for other in others)]
 
 
-def _likely(case: Case) -> Iterator[Hypothesis]:
-    """The hypotheses that leave the least error before any calibration: in the file's frame, and in the best one."""
-    every, few = hypotheses(case.robot, case.readings), case.readings.rows(slice(None, None, settings.CONVENTION_EVERY))
-    rough = np.array([_rough(one.robot(case.robot), one.change(few)) for one in every])
-    given = settings.CONVENTION_ROUGH * np.array(_rough(case.robot, few))
-    chosen = np.unique(np.argsort(rough, axis=0, kind="stable")[: settings.CONVENTION_LIKELY])
-    return (every[i] for i in chosen if np.isfinite(rough[i]).all() and (rough[i] <= given).any())
+def _rough(robot: Robot, readings: Measurements, joints: Wrong, places: Sequence[Wrong]) -> list[float]:
+    """Median errors [m], as given, where hypotheses on joints and loads hold and one of several on places too."""
+    for one in joints:
+        readings = one.change(readings)
+    predicted, found = tips.predicted(robot, readings), []
+    if np.isfinite(predicted).all(axis=1).mean() < settings.CONVENTION_SOLVED:
+        return [np.inf] * len(places)
+    for place in places:
+        moved, described = readings, robot
+        for one in place:
+            moved, described = one.change(moved), one.robot(described)
+        if any(one.registers for one in place):
+            error = aligned(predicted, moved.position)[2]
+        else:
+            error = tips.errors(described, moved, predicted)
+        found.append(float(np.nanmedian(error)) / np.prod([one.scale for one in place]))
+    return found
 
 
-def _rough(robot: Robot, readings: Measurements) -> tuple[float, float]:
-    """Median error [m] in the frame of the robot, and in the one that fits best."""
-    predicted = tips.predicted(robot, readings)
-    solved = np.isfinite(predicted).all(axis=1)
-    if solved.mean() < settings.CONVENTION_SOLVED:
-        return np.inf, np.inf
-    here = tips.errors(robot, readings, predicted)
-    return float(np.nanmedian(here)), float(np.nanmedian(aligned(predicted, readings.position)[2]))
-
-
-def _applied(case: Case, hypothesis: Hypothesis) -> Case:
-    robot, readings = hypothesis.robot(case.robot), hypothesis.change(case.readings)
-    if hypothesis.registers:
+def _applied(case: Case, wrong: Wrong) -> Case:
+    robot, readings = case.robot, case.readings
+    for one in wrong:
+        robot, readings = one.robot(robot), one.change(readings)
+    if any(one.registers for one in wrong):
         rotation, origin, _ = aligned(tips.predicted(robot, readings), readings.position)
         robot = with_frame(robot, rotation, origin)
-    fit = calibrated(robot, readings, free=hypothesis.frees, to_beat=case.fit.typical)
-    return Case(robot, readings, fit, (*case.changes, hypothesis.change))
+    scale = np.prod([one.scale for one in wrong])
+    free = [one.frees for one in wrong if one.frees]
+    fit = calibrated(robot, readings, free=free, to_beat=case.fit.typical * scale)
+    return Case(robot, readings, fit, wrong, (*case.changes, *(one.change for one in wrong)))
 
 
-def _is_jump(tried: Tried) -> bool:
-    """Whether an offset, where it is one, moves a home farther than calibration would: by right angles, or so that only
-    noise is left. A physical effect may ask for another offset, but it leaves more.
-    """
-    if not tried.hypothesis.offset:
-        return True
-    kind, tube, _ = tried.hypothesis.offset
-    uncertainty, size = tried.case.robot.uncertainty, offset_of(tried)
-    sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
-    if kind == "beta":
-        sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
-    right = kind == "alpha" and size % (np.pi / 2) == 0
-    return abs(size) > jump(tried.hypothesis.frees, sd) and (right or _is_noise(tried.case.fit))
+def _is_jump(case: Case) -> bool:
+    """Whether each offset moves a home farther than calibration would."""
+    for one in case.wrong:
+        if one.offset:
+            kind, tube, _ = one.offset
+            uncertainty = case.robot.uncertainty
+            sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
+            if kind == "beta":
+                sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
+            if abs(offset_of(one, case)) <= jump(one.frees, sd):
+                return False
+    return True
 
 
-def offset_of(tried: Tried) -> float:
+def offset_of(hypothesis: Hypothesis, case: Case) -> float:
     """The offset of a home that fits best, SI: that of the hypothesis and what calibration adds to it.
 
     A right angle is taken for one, where the fit is as near to it as homes are known.
     """
-    kind, tube, size = tried.hypothesis.offset
+    kind, tube, size = hypothesis.offset
     home, factor = ("home_rotation_deg", np.pi / 180) if kind == "alpha" else ("home_translation_mm", 1e-3)
-    old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
+    old, new = (getattr(robot.actuation, home)[tube] for robot in (case.robot, case.fit.robot))
     size += factor * (new - old)
     right = np.pi / 2 * round(size / (np.pi / 2))
-    near = 3 * np.deg2rad(tried.case.robot.uncertainty.of("rotation_offset_deg", tube))
+    near = 3 * np.deg2rad(case.robot.uncertainty.of("rotation_offset_deg", tube))
     return right if kind == "alpha" and right and abs(size - right) < near else size
 
 
-def _finding(case: Case, tried: Tried) -> Finding:
-    one, text, fix = tried.hypothesis, tried.hypothesis.text, tried.hypothesis.fix
-    if one.offset:
-        text, fix = _offset_in_words(tried)
-    if one.frame or one.registers:
-        fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
-    errors = (case.fit.rms_mm, tried.case.fit.rms_mm)
-    rivals = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in tried.rivals]
-    return Finding(one.kind, text, one.columns, fix, rms_mm=errors, rivals=rivals)
+def _findings(before: Case, after: Case) -> Iterator[Finding]:
+    """A finding of each hypothesis, with the error where all others hold but this."""
+    for one in after.wrong:
+        others = tuple(other for other in after.wrong if other is not one)
+        without = _applied(before, others) if others else before
+        text, fix = one.text, one.fix
+        if one.offset:
+            text, fix = _offset_in_words(one, after.robot)
+        if one.frame or one.registers:
+            fix = _frame_in_words(after.fit.robot if one.registers else after.robot)
+        errors = (without.fit.rms_mm, after.fit.rms_mm)
+        rivals = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in one.rivals]
+        yield Finding(one.kind, text, one.columns, fix, rms_mm=errors, rivals=rivals)
 
 
-def _offset_in_words(tried: Tried) -> tuple[str, str]:
-    kind, tube, size = tried.hypothesis.offset
-    robot, name = tried.case.robot, tried.hypothesis.columns[0]
+def _offset_in_words(hypothesis: Hypothesis, robot: Robot) -> tuple[str, str]:
+    kind, tube, size = hypothesis.offset
     key, unit, factor = (
         ("home_rotation_deg", "deg", 180 / np.pi) if kind == "alpha" else ("home_translation_mm", "mm", 1e3)
     )
@@ -171,7 +239,7 @@ def _offset_in_words(tried: Tried) -> tuple[str, str]:
     old = list(getattr(robot.actuation, key))
     recorded = getattr(robot.actuation, f"recorded_{key}") or old
     new = [home + size * (i == tube) for i, home in enumerate(old)]
-    text = f"{name} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
+    text = f"{hypothesis.columns[0]} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
     fix = f"set actuation.{key} to {numbers(new)} and actuation.recorded_{key} to {numbers(recorded)}"
     return text, fix
 
