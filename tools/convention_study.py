@@ -45,10 +45,11 @@ class Answer:
 
 
 def oracle_case(random: np.random.Generator):
-    """A right session of the oracle."""
+    """A right session of the oracle; None where it finds no equilibrium."""
     from benches import ROBOTS
     from ctcr.robot import robot_file
     from ctcr.table import measurements
+    from kernel import NoEquilibriumError
     from make_set import NOISES, Order, write_set
     from wrong_conventions import Case
 
@@ -62,7 +63,10 @@ def oracle_case(random: np.random.Generator):
         wrong_sheet=bool(random.random() < 0.25),
     )
     with TemporaryDirectory() as folder:
-        write_set(order, Path(folder) / "set", Path(folder) / "truth.yaml")
+        try:
+            write_set(order, Path(folder) / "set", Path(folder) / "truth.yaml")
+        except NoEquilibriumError:
+            return None
         robot = robot_file.load(Path(folder) / "set" / "robot.yaml")
         return Case(robot, measurements.load(Path(folder) / "set" / "measurements.csv", robot.n_tubes), str(order))
 
@@ -73,11 +77,9 @@ def judge(seed: int) -> Answer:
     from wrong_conventions import DRAWN, faults, mended, right_case, spoiled
 
     random, number, kinds = np.random.default_rng([31, seed]), seed // 2 % 3, [*DRAWN]
-    draw = right_case if random.random() > FROM_ORACLE else oracle_case
-    case = draw(random)
-    first = kinds[seed // 6 % len(kinds)]
-    while number and not faults(random, case, [first]):  # the case has no room for it
-        case = draw(random)
+    draw, first = right_case if random.random() > FROM_ORACLE else oracle_case, kinds[seed // 6 % len(kinds)]
+    while (case := draw(random)) is None or (number and not faults(random, case, [first])):
+        pass  # no equilibrium, or no room for this fault
     others = random.permutation([kind for kind in kinds if kind != first]).tolist()
     wrong = faults(random, case, [first, *others])[:number]
     bad = spoiled(case, wrong)

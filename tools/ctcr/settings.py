@@ -234,6 +234,7 @@ CONVENTION_SETTLED = 0.1  # [log posterior] that a step gains at least
 CONVENTION_UNSOLVED = 1.0  # [m] error of a reading that the model cannot solve: as large as a robot
 CONVENTION_FINEST = 1e-6  # [m] smallest error that counts, where the tracker states no jitter
 CONVENTION_EVERY = 2  # of these readings, every second in a first look at each hypothesis
+CONVENTION_EVERY_PAIR = 8  # ... and every eighth in that at each pair
 CONVENTION_ROUGH = 1.5  # error at this first look over that of the table as it is, above which none is looked at again
 CONVENTION_LIKELY = 5  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
 CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve

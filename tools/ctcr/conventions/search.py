@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array
@@ -13,7 +14,6 @@ from ctcr.conventions.calibrated import Calibrated, calibrated, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.conventions.likelihood import Likelihood
-from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -49,39 +49,36 @@ class Case:
         return likelihood(self.residual, jitter) - self.fit.improbable - prior
 
 
-def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding]]:
-    """The case after all findings, and these.
-
-    `readings` are a sample of the table, `of_runs` some of each run. Where a frame for each run explains more than
-    hypotheses on joints, loads or positions do, the runs are not one session, and nothing is found.
-    """
+def corrected(robot: Robot, readings: Measurements) -> tuple[Case, list[Finding]]:
+    """The case after all findings, and these, of a sample of the table."""
     case, found = Case(robot, readings, calibrated(robot, readings)), []
     while len(found) < settings.MOST_CONVENTIONS and (better := _likeliest(case)):
-        whole = any(one.frame or one.registers for one in better.wrong)
-        if not whole and _with_run_frames(case, of_runs) < better.fit.typical:
-            break
         found += _findings(case, better)
         case = replace(better, wrong=())
     return case, found
 
 
 def _likeliest(case: Case) -> Case | None:
-    """The case with further hypotheses that is likelier than this one; None without any."""
+    """The case with further hypotheses that is likelier than this one, and than one where each run has a frame of its
+    own; None without any."""
     if case.fit.is_noise:
         return None
-    every = hypotheses(case.robot, case.readings)
-    tried = [case, *(_applied(case, some) for some in _candidates(case, every))]
-    tried = [one for one in tried if one is case or (np.isfinite(one.fit.typical) and _is_jump(one))]
+    every, tried = hypotheses(case.robot, case.readings), [case, _with_run_frames(case)]
+    for some in _candidates(case, every):
+        found = [_applied(case, wrong) for wrong in some]
+        tried += [one for one in found if np.isfinite(one.fit.typical) and _is_jump(case, one)]
+        if any(one.fit.is_noise for one in found):
+            break
 
-    def ranked(likelihood: Likelihood) -> tuple[Case, dict[int, float]]:
+    def ranked(rows: Array) -> tuple[Case, dict[int, float]]:
+        likelihood = Likelihood(case.readings, rows)
         odds = {id(one): one.log_odds(likelihood, len(every)) for one in tried}
-        most = max(odds.values())
-        alike = [one for one in tried if odds[id(one)] > most - settings.TIE]
+        alike = [one for one in tried if odds[id(one)] > max(odds.values()) - settings.TIE]
         return min(alike, key=lambda one: (sum(h.doubts for h in one.wrong), -odds[id(one)])), odds
 
-    best, _ = ranked(Likelihood(case.readings))
-    best, odds = ranked(Likelihood(case.readings, _ordinary(best)))
-    if best is case:
+    best, _ = ranked(np.ones(len(case.readings), bool))
+    best, odds = ranked(_ordinary(best))
+    if not best.wrong:
         return None
     rivals = [one for one in tried if len(one.wrong) == len(best.wrong) and odds[id(one)] > odds[id(best)] - settings.TIE]
     wrong = tuple(replace(one, rivals=_instead(one, best, rivals)) for one in best.wrong)
@@ -105,47 +102,60 @@ def _instead(one: Hypothesis, best: Case, rivals: Iterable[Case]) -> list[Hypoth
     return found
 
 
-def _with_run_frames(case: Case, of_runs: Measurements) -> float:
-    """Typical error [m] of a case in which each run has the frame that fits it best."""
-    for change in case.changes:
-        of_runs = change(of_runs)
-    positions, error = tips.predicted(case.fit.robot, of_runs), np.full(len(of_runs), np.nan)
-    for run in np.unique(of_runs.run):
-        rows = of_runs.run == run
-        freedom = 3 * np.sum(rows) - FRAME
-        left = aligned(positions[rows], of_runs.position[rows])[2]
-        error[rows] = left * np.sqrt(3 * np.sum(rows) / freedom) if freedom > 0 else np.inf
-    return float(np.nanmedian(error)) if np.isfinite(error).any() else np.inf
+def _with_run_frames(case: Case) -> Case:
+    """The case in which each run has the frame that fits it best: near that of all, as sessions have."""
+    tip = tips.predicted(case.fit.robot, case.readings)
+    tip = tip @ case.fit.robot.tracker.rotation.T + case.fit.robot.tracker.position
+    residual, improbable = case.fit.residual.copy(), case.fit.improbable
+    uncertainty, wider = case.robot.uncertainty, settings.SESSION_PRIOR_WIDER
+    sd = wider * np.array([1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))])
+    for run in np.unique(case.readings.run):
+        rows = (case.readings.run == run) & case.fit.solved
+        if rows.sum() > 2:
+            rotation, shift, distance = aligned(tip[rows], case.readings.position[rows])
+            centre = tip[rows].mean(axis=0)
+            moved = rotation @ centre + shift - centre, Rotation.from_matrix(rotation).as_rotvec()
+            lever = np.sqrt(np.mean(np.sum((tip[rows] - centre) ** 2, axis=1)))
+            left = np.median(distance) / np.array([1.0, max(lever, settings.CONVENTION_FINEST)])
+            improbable += sum(0.5 * m @ m / s**2 + 1.5 * np.log1p(s**2 / e**2) for m, s, e in zip(moved, sd, left, strict=True))
+            residual[rows] = case.readings.position[rows] - tip[rows] @ rotation.T - shift
+    return replace(case, fit=replace(case.fit, residual=residual, improbable=improbable))
 
 
-def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[Wrong]:
-    """The hypotheses and pairs of them that leave the least error before any calibration."""
-    few = case.readings.rows(slice(None, None, settings.CONVENTION_EVERY))
+def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]]:
+    """Hypotheses that leave the least error before any calibration: first single ones and those of places beside one of
+    the prediction, then pairs of those."""
     joints = [(one,) for one in every if one.of_prediction]
-    places = [(), *_placements(every)]
-    given, rough = _rough(case.robot, few, (), [()])[0], []
+    places, rough = [(), *_placements(every)], []
 
-    def look(some: Sequence[Wrong]) -> list[float]:
-        """Least error of each in the frame of the file and in the best one; all goes to `rough`."""
-        least = []
+    def look(some: Sequence[Wrong], every_nth: int) -> list[float]:
+        """Least error of each in the frame of the file and in others; all goes to `rough`."""
+        least, few = [], case.readings.rows(slice(None, None, every_nth))
         for one in some:
             errors = _rough(case.robot, few, one, places)
             rough.extend((error, (*one, *place)) for error, place in zip(errors, places, strict=True))
             least.append(min(errors))
         return least
 
-    least = look([(), *joints])[1:]
+    def likely(counts: Sequence[int]) -> list[Wrong]:
+        """Of each number of hypotheses some; of an offset its best size alone."""
+        found = []
+        for count in counts:
+            kept: dict[tuple, Wrong] = {}
+            for error, some in sorted((pair for pair in rough if len(pair[1]) == count), key=lambda pair: pair[0]):
+                alike = tuple((one.kind, one.columns, bool(one.offset) or id(one)) for one in some)
+                if error < settings.CONVENTION_ROUGH * given and len(kept) < settings.CONVENTION_LIKELY:
+                    kept.setdefault(alike, some)
+            found += kept.values()
+        return found
+
+    least = look([(), *joints], settings.CONVENTION_EVERY)[1:]
+    given = rough[0][0] if np.isfinite(rough[0][0]) else np.finfo(float).max
+    yield likely([1, 2, 3])
     first = [joints[i] for i in np.argsort(least, kind="stable")[: settings.CONVENTION_LIKELY]]
-    look([(*one, other) for one in first for (other,) in joints if not {*one[0].columns} & {*other.columns}])
-    for count in (1, 2, 3):
-        kept: dict[tuple, Wrong] = {}
-        for error, some in sorted((pair for pair in rough if len(pair[1]) == count), key=lambda pair: pair[0]):
-            alike = tuple((one.kind, one.columns, bool(one.offset) or id(one)) for one in some)
-            if np.isfinite(error) and error < settings.CONVENTION_ROUGH * given and alike not in kept:
-                kept[alike] = some
-                if len(kept) == settings.CONVENTION_LIKELY:
-                    break
-        yield from kept.values()
+    rough.clear()
+    look([(*one, other) for one in first for (other,) in joints if not {*one[0].columns} & {*other.columns}], settings.CONVENTION_EVERY_PAIR)
+    yield likely([2, 3])
 
 
 def _placements(every: Sequence[Hypothesis]) -> list[Wrong]:
@@ -187,16 +197,19 @@ def _applied(case: Case, wrong: Wrong) -> Case:
     return Case(robot, readings, fit, wrong, (*case.changes, *(one.change for one in wrong)))
 
 
-def _is_jump(case: Case) -> bool:
-    """Whether each offset moves a home farther than calibration would."""
+def _is_jump(before: Case, case: Case) -> bool:
+    """Whether each offset moves a home, and another frame the tracker, farther than a calibration would."""
+    uncertainty = case.robot.uncertainty
     for one in case.wrong:
         if one.offset:
-            kind, tube, _ = one.offset
-            uncertainty = case.robot.uncertainty
-            sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
-            if kind == "beta":
-                sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
-            if abs(offset_of(one, case)) <= jump(one.frees, sd):
+            key, unit = ("rotation_offset_deg", np.pi / 180) if one.offset[0] == "alpha" else ("translation_offset_mm", 1e-3)
+            if abs(offset_of(one, case)) <= jump(one.frees, unit * uncertainty.of(key, one.offset[1])):
+                return False
+        if one.registers:
+            old, new = before.robot.tracker, case.fit.robot.tracker
+            moved = np.linalg.norm(new.position - old.position), np.arccos(np.clip((np.trace(new.rotation @ old.rotation.T) - 1) / 2, -1, 1))
+            sds = 1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))
+            if all(m <= jump(kind, sd) for m, kind, sd in zip(moved, ("position", "rotation"), sds, strict=True)):
                 return False
     return True
 
