@@ -23,7 +23,7 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """What may be wrong, and the table or the robot file as it should be."""
 

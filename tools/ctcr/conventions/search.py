@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, Mask
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
@@ -20,7 +20,7 @@ from ctcr.table.measurements import Measurements
 Wrong = tuple[Hypothesis, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """A robot and readings where some hypotheses hold, with their calibration."""
 
@@ -42,8 +42,22 @@ class Case:
         """Of positions in m over those of the table."""
         return float(np.prod([one.scale for one in self.wrong]))
 
-    def log_odds(self, likelihood: Likelihood, n_hypotheses: int) -> float:
-        """Log evidence of these hypotheses, with the prior of so many that may hold."""
+    @property
+    def ordinary(self) -> Mask:
+        """Rows (K,) that are no outliers."""
+        size = np.linalg.norm(self.residual, axis=1)
+        return size < settings.CONVENTION_OUTLIER * np.median(size)
+
+    def gain(self, other: "Case", n_hypotheses: int) -> float:
+        """Log odds of this case against another one, where each of so many hypotheses may hold.
+
+        Rows that are outliers in both do not count.
+        """
+        likelihood = Likelihood(self.readings, self.ordinary | other.ordinary)
+        mine, its = (one._log_evidence(likelihood, n_hypotheses) for one in (self, other))
+        return mine - its
+
+    def _log_evidence(self, likelihood: Likelihood, n_hypotheses: int) -> float:
         jitter = max(self.fit.floor / np.sqrt(3), settings.CONVENTION_FINEST) / self.scale
         prior = len(self.wrong) * (settings.DECISIVE + np.log(n_hypotheses))
         return likelihood(self.residual, jitter) - self.fit.improbable - prior
@@ -70,26 +84,15 @@ def _likeliest(case: Case) -> Case | None:
         if any(one.fit.is_noise for one in found):
             break
 
-    def ranked(rows: Array) -> tuple[Case, dict[int, float]]:
-        likelihood = Likelihood(case.readings, rows)
-        odds = {id(one): one.log_odds(likelihood, len(every)) for one in tried}
-        alike = [one for one in tried if odds[id(one)] > max(odds.values()) - settings.TIE]
-        return min(alike, key=lambda one: (sum(h.doubts for h in one.wrong), -odds[id(one)])), odds
-
-    best, _ = ranked(np.ones(len(case.readings), bool))
-    best, odds = ranked(_ordinary(best))
+    gain = {one: one.gain(case, len(every)) for one in tried}
+    alike = [one for one in tried if gain[one] > max(gain.values()) - settings.TIE]
+    best = min(alike, key=lambda one: (sum(h.doubts for h in one.wrong), -gain[one]))
     if not best.wrong:
         return None
-    rivals = [one for one in tried if len(one.wrong) == len(best.wrong) and odds[id(one)] > odds[id(best)] - settings.TIE]
+    rivals = [one for one in alike if len(one.wrong) == len(best.wrong)]
     wrong = tuple(replace(one, rivals=_instead(one, best, rivals)) for one in best.wrong)
     exact = tuple(offset_by(one, offset_of(one, best), case.robot.n_tubes) if one.offset else one for one in wrong)
     return _applied(case, exact)
-
-
-def _ordinary(case: Case) -> Array:
-    """Rows (K,) that are no outliers."""
-    size = np.linalg.norm(case.residual, axis=1)
-    return size < settings.CONVENTION_OUTLIER * np.median(size)
 
 
 def _instead(one: Hypothesis, best: Case, rivals: Iterable[Case]) -> list[Hypothesis]:
@@ -125,17 +128,15 @@ def _with_run_frames(case: Case) -> Case:
 def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]]:
     """Hypotheses that leave the least error before any calibration: first single ones and those of places beside one of
     the prediction, then pairs of those."""
-    joints = [(one,) for one in every if one.of_prediction]
-    places, rough = [(), *_placements(every)], []
+    joints, rough = [(one,) for one in every if one.of_prediction], []
 
-    def look(some: Sequence[Wrong], every_nth: int) -> list[float]:
-        """Least error of each in the frame of the file and in others; all goes to `rough`."""
-        least, few = [], case.readings.rows(slice(None, None, every_nth))
-        for one in some:
-            errors = _rough(case.robot, few, one, places)
-            rough.extend((error, (*one, *place)) for error, place in zip(errors, places, strict=True))
-            least.append(min(errors))
-        return least
+    def look(some: Sequence[Wrong], places: Sequence[Wrong], every_nth: int) -> Array:
+        """Errors by hypotheses on the prediction, and places; all go to `rough`."""
+        few = case.readings.rows(slice(None, None, every_nth))
+        placed = [_Placed(case.robot, few, place) for place in places]
+        errors = np.array([_rough(case.robot, few, one, placed) for one in some])
+        rough.extend((error, (*one, *place)) for one, row in zip(some, errors, strict=True) for place, error in zip(places, row, strict=True))
+        return errors
 
     def likely(counts: Sequence[int]) -> list[Wrong]:
         """Of each number of hypotheses some; of an offset its best size alone."""
@@ -149,12 +150,17 @@ def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]
             found += kept.values()
         return found
 
-    least = look([(), *joints], settings.CONVENTION_EVERY)[1:]
-    given = rough[0][0] if np.isfinite(rough[0][0]) else np.finfo(float).max
-    yield likely([1, 2, 3])
-    first = [joints[i] for i in np.argsort(least, kind="stable")[: settings.CONVENTION_LIKELY]]
+    def best(some: Sequence[Wrong], errors: Array) -> list[Wrong]:
+        return [some[i] for i in np.argsort(errors, kind="stable")[: settings.CONVENTION_LIKELY]]
+
+    places = [(), *_placements(every)]
+    errors = look([(), *joints], places, settings.CONVENTION_EVERY)
+    given = np.nan_to_num(errors[0, 0], posinf=np.finfo(float).max)
+    fitted = _rough_of(case.fit.robot, case.readings.rows(slice(None, None, settings.CONVENTION_EVERY)), joints)
+    yield list(dict.fromkeys([*likely([1, 2, 3]), *best(joints, fitted)]))
     rough.clear()
-    look([(*one, other) for one in first for (other,) in joints if not {*one[0].columns} & {*other.columns}], settings.CONVENTION_EVERY_PAIR)
+    pairs = [(*one, other) for one in best(joints, errors[1:].min(axis=1)) for (other,) in joints if not {*one[0].columns} & {*other.columns}]
+    look(pairs, best(places, errors.min(axis=0)), settings.CONVENTION_EVERY_PAIR)
     yield likely([2, 3])
 
 
@@ -165,23 +171,38 @@ def _placements(every: Sequence[Hypothesis]) -> list[Wrong]:
     return [*((one,) for one in (*units, *others)), *((unit, other) for unit in units for other in others)]
 
 
-def _rough(robot: Robot, readings: Measurements, joints: Wrong, places: Sequence[Wrong]) -> list[float]:
-    """Median errors [m], as given, where hypotheses on joints and loads hold and one of several on places too."""
+class _Placed:
+    """Readings and tracker where hypotheses on places hold."""
+
+    def __init__(self, robot: Robot, readings: Measurements, place: Wrong):
+        for one in place:
+            robot, readings = one.robot(robot), one.change(readings)
+        self._position, self._rotation, self._origin = readings.position, robot.tracker.rotation, robot.tracker.position
+        self._scale = float(np.prod([one.scale for one in place]))
+        self._registers = any(one.registers for one in place)
+
+    def error(self, predicted: Array) -> float:
+        """Median distance [m], as given, of positions (K, 3) that are predicted in the base frame."""
+        if self._registers:
+            size = aligned(predicted, self._position)[2]
+        else:
+            size = np.linalg.norm(self._position - predicted @ self._rotation.T - self._origin, axis=1)
+        return float(np.median(size[np.isfinite(size)])) / self._scale
+
+
+def _rough_of(robot: Robot, readings: Measurements, some: Sequence[Wrong]) -> Array:
+    """Errors where each of some hypotheses on joints and loads holds."""
+    placed = [_Placed(robot, readings, ())]
+    return np.array([_rough(robot, readings, one, placed)[0] for one in some])
+
+
+def _rough(robot: Robot, readings: Measurements, joints: Wrong, placed: Sequence[_Placed]) -> list[float]:
+    """Errors where hypotheses on joints and loads hold, and several on places."""
     for one in joints:
         readings = one.change(readings)
-    predicted, found = tips.predicted(robot, readings), []
-    if np.isfinite(predicted).all(axis=1).mean() < settings.CONVENTION_SOLVED:
-        return [np.inf] * len(places)
-    for place in places:
-        moved, described = readings, robot
-        for one in place:
-            moved, described = one.change(moved), one.robot(described)
-        if any(one.registers for one in place):
-            error = aligned(predicted, moved.position)[2]
-        else:
-            error = tips.errors(described, moved, predicted)
-        found.append(float(np.nanmedian(error)) / np.prod([one.scale for one in place]))
-    return found
+    predicted = tips.predicted(robot, readings)
+    solved = np.isfinite(predicted).all(axis=1).mean() >= settings.CONVENTION_SOLVED
+    return [place.error(predicted) if solved else np.inf for place in placed]
 
 
 def _applied(case: Case, wrong: Wrong) -> Case:
