@@ -1,7 +1,7 @@
 """How likely the residual of a hypothesis is, where the model is not perfect: one likelihood for all hypotheses.
 
-What a model misses changes smoothly along a run: it is a Gaussian process in joint space, each run for itself, beside
-white noise. Both sizes are those that make the residual likeliest. Thousands of rows that err alike count as few.
+What a model misses changes smoothly in joint space, and along the way of the joints where it depends on their history: it
+is a Gaussian process, in each run for itself, beside white noise. Both sizes are those that make the residual likeliest. Thousands of rows that err alike count as few.
 """
 
 import numpy as np
@@ -20,10 +20,12 @@ class Likelihood:
     def __init__(self, readings: Measurements, rows: Mask | None = None):
         """`rows` (K,) that count, all by default."""
         self._blocks, joints = [], readings.joint_space
+        way = np.cumsum(np.linalg.norm(np.diff(joints, axis=0, prepend=joints[:1]), axis=1))[:, None]
         for run in np.unique(readings.run):
             mine = np.flatnonzero((readings.run == run) & (True if rows is None else rows))
-            square = np.sum((joints[mine, None] - joints[mine]) ** 2, axis=2)
-            self._blocks.append((mine, *np.linalg.eigh(np.exp(-0.5 * square / settings.CONVENTION_LENGTH**2))))
+            squares = (np.sum((at[mine, None] - at[mine]) ** 2, axis=2) for at in (joints, way))
+            kernel = sum(0.5 * np.exp(-0.5 * square / settings.CONVENTION_LENGTH**2) for square in squares)
+            self._blocks.append((mine, *np.linalg.eigh(kernel)))
         self._smooth = np.concatenate([np.maximum(block[1], 0.0) for block in self._blocks])
 
     def __call__(self, residual: Array, jitter: float) -> float:

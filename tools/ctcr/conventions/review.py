@@ -52,18 +52,16 @@ def review(robot: Robot, readings: Measurements) -> Review:
     right = _applied(readings, [*case.changes, change])
 
     # Runs need some readings of each, which a large table has.
-    fit, of_runs = case.fit, right.rows(of_runs)
-    if len(of_runs) != len(case.readings):
-        fit = calibrated(case.robot, of_runs)
+    of_runs = right.rows(of_runs)
+    case = search.Case(case.robot, of_runs, calibrated(case.robot, of_runs))
     for _ in range(settings.MOST_CONVENTIONS):
-        homed = runs.homed_elsewhere(fit, of_runs)
+        homed = runs.homed_elsewhere(case)
         if homed is None:
             break
-        finding, change = homed
-        of_runs, right, before = change(of_runs), change(right), fit
-        fit = calibrated(case.robot, of_runs)
-        found.append(finding.with_errors(before.rms_mm, fit.rms_mm))
+        finding, change, case = homed
+        found, right = [*found, finding], change(right)
 
+    fit = case.fit
     if still := frozen.stood_still(fit.robot, right):
         finding, rows = still
         found.append(finding.with_errors(_with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows), fit.rms_mm))

@@ -48,12 +48,12 @@ class Case:
         size = np.linalg.norm(self.residual, axis=1)
         return size < settings.CONVENTION_OUTLIER * np.median(size)
 
-    def gain(self, other: "Case", n_hypotheses: int) -> float:
+    def gain(self, other: "Case", n_hypotheses: int = 1) -> float:
         """Log odds of this case against another one, where each of so many hypotheses may hold.
 
         Rows that are outliers in both do not count.
         """
-        likelihood = Likelihood(self.readings, self.ordinary | other.ordinary)
+        likelihood = Likelihood(other.readings, self.ordinary | other.ordinary)
         mine, its = (one._log_evidence(likelihood, n_hypotheses) for one in (self, other))
         return mine - its
 
@@ -77,7 +77,7 @@ def _likeliest(case: Case) -> Case | None:
     own; None without any."""
     if case.fit.is_noise:
         return None
-    every, tried = hypotheses(case.robot, case.readings), [case, _with_run_frames(case)]
+    every, tried = hypotheses(case.robot, case.readings), [case, with_run_frames(case, np.unique(case.readings.run))]
     for some in _candidates(case, every):
         found = [_applied(case, wrong) for wrong in some]
         tried += [one for one in found if np.isfinite(one.fit.typical) and _is_jump(case, one)]
@@ -105,14 +105,14 @@ def _instead(one: Hypothesis, best: Case, rivals: Iterable[Case]) -> list[Hypoth
     return found
 
 
-def _with_run_frames(case: Case) -> Case:
-    """The case in which each run has the frame that fits it best: near that of all, as sessions have."""
+def with_run_frames(case: Case, runs: Iterable[int]) -> Case:
+    """The case in which each of some runs has the frame that fits it best: near that of all, as sessions have."""
     tip = tips.predicted(case.fit.robot, case.readings)
     tip = tip @ case.fit.robot.tracker.rotation.T + case.fit.robot.tracker.position
     residual, improbable = case.fit.residual.copy(), case.fit.improbable
     uncertainty, wider = case.robot.uncertainty, settings.SESSION_PRIOR_WIDER
     sd = wider * np.array([1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))])
-    for run in np.unique(case.readings.run):
+    for run in runs:
         rows = (case.readings.run == run) & case.fit.solved
         if rows.sum() > 2:
             rotation, shift, distance = aligned(tip[rows], case.readings.position[rows])
@@ -155,7 +155,7 @@ def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]
 
     places = [(), *_placements(every)]
     errors = look([(), *joints], places, settings.CONVENTION_EVERY)
-    given = np.nan_to_num(errors[0, 0], posinf=np.finfo(float).max)
+    given = np.nan_to_num(errors[0, 0], posinf=1e300)
     fitted = _rough_of(case.fit.robot, case.readings.rows(slice(None, None, settings.CONVENTION_EVERY)), joints)
     yield list(dict.fromkeys([*likely([1, 2, 3]), *best(joints, fitted)]))
     rough.clear()
@@ -228,9 +228,10 @@ def _is_jump(before: Case, case: Case) -> bool:
                 return False
         if one.registers:
             old, new = before.robot.tracker, case.fit.robot.tracker
-            moved = np.linalg.norm(new.position - old.position), np.arccos(np.clip((np.trace(new.rotation @ old.rotation.T) - 1) / 2, -1, 1))
-            sds = 1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))
-            if all(m <= jump(kind, sd) for m, kind, sd in zip(moved, ("position", "rotation"), sds, strict=True)):
+            turn = Rotation.from_matrix(new.rotation @ old.rotation.T).as_rotvec()
+            far = [jump("position", 1e-3 * uncertainty.of("tracker_frame_mm", axis)) for axis in range(3)]
+            turned = [jump("rotation", np.deg2rad(uncertainty.of("tracker_frame_deg", axis))) for axis in range(3)]
+            if (np.abs([*(new.position - old.position), *turn]) <= [*far, *turned]).all():
                 return False
     return True
 
