@@ -64,6 +64,19 @@ def tracker_to_base(tracker, position: ArrayLike, quaternion: ArrayLike) -> tupl
     return turned, product(conjugate(_frame(tracker)), product(quaternion, conjugate(_roll(tracker))))
 
 
+def rigid_motion(source: Array, target: Array, weight: Array | None = None) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) that carry source (K, 3) to target (K, 3) with least squares (Kabsch 1976),
+    of weights (K,).
+
+    Points on a line, which leave a rotation undetermined, give one of the best, and never a reflection.
+    """
+    part = np.full((len(source), 1), 1 / len(source)) if weight is None else weight[:, None] / weight.sum()
+    a, b = np.sum(part * source, axis=0), np.sum(part * target, axis=0)
+    left, _, right = np.linalg.svd((part * (target - b)).T @ (source - a))
+    rotation = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right)) or 1.0]) @ right
+    return rotation, b - rotation @ a
+
+
 def _frame(tracker) -> Array:
     return quaternion_from_rotation_vector(tracker.rotation_vector_rad)
 

@@ -6,9 +6,8 @@ from compare_bench import bench, stop_and_go, stream
 from ctcr import settings
 from ctcr.compare import crossvalidation as cv
 from ctcr.compare.dependence import local_frames
-from ctcr.compare.offsets import rigid_motion
 from ctcr.compare.sample import take_sample
-from ctcr.frames import matrix_from_rotation_vector
+from ctcr.frames import matrix_from_rotation_vector, rigid_motion
 
 
 def plain_held_out(design, target, label, ridge):

@@ -60,19 +60,27 @@ def design(random: np.random.Generator, n_tubes: int) -> Robot:
     )
 
 
-def session(robot: Robot, random: np.random.Generator, noise: str = "jitter", hidden=None) -> Measurements:
+def session(
+    robot: Robot,
+    random: np.random.Generator,
+    noise: str = "jitter",
+    hidden=None,
+    runs: int = RUNS,
+    stops: int = STOPS,
+    weight: float = 0.1,
+) -> Measurements:
     """Readings of a robot that differs from its description as real ones do, along straight lines out and back.
 
-    `hidden`: a function of the robot as built that gives it effects.
+    `hidden`: a function of the robot as built that gives it effects. `weight` [N] hangs in every second run.
     """
     n, rows = robot.n_tubes, []
     home = 1e-3 * np.array(robot.actuation.home_translation_mm)
     retraction = 0.03 * np.linspace(1.0, 0.6, n)
-    for run in range(RUNS):
+    for run in range(runs):
         ends = [np.r_[home - random.uniform(0.1, 1) * retraction, random.uniform(-np.pi, np.pi, n)] for _ in range(2)]
-        part = 1 - abs(1 - 2 * np.linspace(0, 1, STOPS))
-        weight = [0.0, -0.1 * (run % 2), 0.0]
-        rows += [[run, *(ends[0] + k * (ends[1] - ends[0])), *weight] for k in part]
+        part = 1 - abs(1 - 2 * np.linspace(0, 1, stops))
+        hung = [0.0, -weight * (run % 2), 0.0]
+        rows += [[run, *(ends[0] + k * (ends[1] - ends[0])), *hung] for k in part]
     table = np.array(rows)
     plan = Measurements(
         t=2.0 * np.arange(len(table)),

@@ -1,10 +1,11 @@
 """Robot and table before any comparison or fit: the conventions they follow, and what a fit leaves out of the table."""
 
+from collections.abc import Container
 from dataclasses import replace
 
 import numpy as np
 
-from ctcr.conventions import Review, review
+from ctcr.conventions import Finding, Review, review
 from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
@@ -15,9 +16,9 @@ from ctcr.table.measurements import Measurements, check_of
 class WrongConventions(InputError):
     """A table or a robot file that follows other conventions than the format says; `review` holds them."""
 
-    def __init__(self, found: Review, table: Measurements):
+    def __init__(self, found: Review, wrong: list[Finding], table: Measurements):
         advice = "a fit would take that for physics: correct it first, or go on with --anyway (anyway=True)"
-        super().__init__([*(Problem(one.sentence, table.source) for one in found.wrong), Problem(advice)])
+        super().__init__([*(Problem(one.sentence, table.source) for one in wrong), Problem(advice)])
         self.review = found
 
 
@@ -38,17 +39,24 @@ def without_repeated(table: Measurements, found: Review) -> tuple[Measurements, 
 
 
 def to_fit(
-    robot: Robot, table: Measurements, *, anyway: bool = False, frame_per_run: bool | None = None
+    robot: Robot,
+    table: Measurements,
+    *,
+    anyway: bool = False,
+    frame_per_run: bool | None = None,
+    finds: Container[str] = (),
 ) -> tuple[Measurements, list[str], Review]:
     """The readings as a fit takes them, sentences on what was left out, and the review of the conventions.
 
     Left out are poses that the tracker repeated, and where the runs are sessions, what each has of its own.
     frame_per_run    whether each run has a frame of its own; None: where the readings say so
+    finds            kinds of wrong conventions that the fit itself corrects
     Raises WrongConventions where a convention is wrong, unless `anyway`.
     """
     found = reviewed(robot, table)
-    if found.wrong and not anyway:
-        raise WrongConventions(found, table)
+    wrong = [one for one in found.wrong if one.kind not in finds]
+    if wrong and not anyway:
+        raise WrongConventions(found, wrong, table)
     if table.refusal:
         raise table.refusal
     readings, said = without_repeated(table, found)

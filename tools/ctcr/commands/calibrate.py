@@ -62,9 +62,16 @@ def _run(procedure: str, table: str, robot, target, in_place, out, **chosen) -> 
     target = outcome.check_target(loaded, target, in_place)
     data = tables.read(table, getattr(procedures, procedure.upper()))
     found = getattr(procedures, procedure)(data, loaded, **chosen)
+    _give(found, loaded, target, in_place, called, table, out)
+
+
+def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
+    """Gives an Outcome back: robot file, report, JSON, text."""
+    from ctcr.calibrate import outcome
+
     if target:
-        outcome.write_robot(found, loaded, target, called, table, in_place)
-    out.write_report("calibrate.outcome", found, table, command=called, robot=loaded)
+        outcome.write_robot(found, robot, target, called, table, in_place)
+    out.write_report("calibrate.outcome", found, table, command=called, robot=robot)
     out.write_json(found.as_dict())
     outcome.show(out.console, found)
     if target:
@@ -130,6 +137,34 @@ def registration(points, robot, placement_sd_mm, live, bench, readings, folder, 
             raise click.UsageError("--live needs --cad")
         point_table(points, tables.read(cad, CAD_POINTS), _desk(bench, folder, out), readings, rounds)
     _run("registration", points, robot, out=out, placement_sd_mm=placement_sd_mm, **target)
+
+
+@command.command(name="frame")
+@options.robot
+@options.measurements
+@options.anyway
+@options.new_robot
+@options.outputs
+def frame(robot, measurements, anyway, target, in_place, out) -> None:
+    """The tracker frame T_ref from poses of the tip alone, wherever ROBOT says that the tracker is.
+
+    A registration in closed form of the predicted tips on those of MEASUREMENTS gives a start; then a fit finds
+    position_mm and rotation_vector_rad, with homes and tubes as uncertain as the robot file says. Says what the
+    readings do not tell. Stops where another convention is wrong, as `ctcr compare` says.
+
+    Example: ctcr calibrate frame robot.yaml measurements.csv -o new.yaml
+    """
+    from ctcr.api.reviewed import to_fit
+    from ctcr.calibrate import outcome
+    from ctcr.calibrate.frame import tracker_frame
+
+    loaded, table = options.load_any(robot, measurements)
+    finds = ("frame_inverse", "frame_wrong")
+    readings, said, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=False, finds=finds)
+    target = outcome.check_target(loaded, target, in_place)
+    found = tracker_frame(loaded, readings, measurements)
+    found.notices[:0] = said
+    _give(found, loaded, target, in_place, "ctcr calibrate frame", measurements, out)
 
 
 @command.command(name="home")

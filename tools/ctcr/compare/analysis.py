@@ -13,11 +13,12 @@ from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.crossvalidation import group_means, group_quantiles, make_folds, split
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
-from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn, rigid_motion
+from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.conventions import Finding as Convention
 from ctcr.errors import InputError, Problem
+from ctcr.frames import rigid_motion
 from ctcr.show.result import Glance, Result, frame
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from ctcr.compare.crossvalidation import Folds, Regression, chance, group_means,
 from ctcr.compare.noise import NoiseFloor, beyond, rms_mm
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import SAME, Revisits, Stops
+from ctcr.frames import rigid_motion
 
 
 @dataclass(frozen=True)
@@ -68,17 +69,6 @@ def find_shift(error: Array, folds: Folds) -> Shift:
     mean = error.mean(axis=0) * 1e3
     share = float(gains[0]) / max(square, 1e-300)
     return Shift(tuple(mean), float(np.linalg.norm(mean)), share, chance(gains[0], gains[1:]))
-
-
-def rigid_motion(source: Array, target: Array) -> tuple[Array, Array]:
-    """Rotation (3, 3) and translation (3,) that carry source (K, 3) to target (K, 3) with least squares (Kabsch 1976).
-
-    Points on a line, which leave a rotation undetermined, give one of the best, and never a reflection.
-    """
-    a, b = source.mean(axis=0), target.mean(axis=0)
-    left, _, right = np.linalg.svd((target - b).T @ (source - a))
-    turn = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right)) or 1.0]) @ right
-    return turn, b - turn @ a
 
 
 def find_turn(predicted: Array, measured: Array, folds: Folds) -> FrameTurn:

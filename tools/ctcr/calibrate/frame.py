@@ -1,0 +1,83 @@
+"""The tracker frame T_ref from poses of the tip, with no start: a registration in closed form, then a joint fit."""
+
+from math import pi
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.arrays import Array
+from ctcr.calibrate.outcome import Outcome, Row, in_file
+from ctcr.conventions import tips
+from ctcr.conventions.alignment import aligned
+from ctcr.conventions.hypotheses import with_frame
+from ctcr.errors import InputError, Problem
+from ctcr.fit import joint
+from ctcr.frames import matrix_from_quaternion
+from ctcr.model.model import Model
+from ctcr.robot.description import Robot
+from ctcr.table.measurements import Measurements
+
+AXES = "xyz"
+ANYWHERE = {"position": 10.0, "rotation": pi}  # [m], [rad] prior standard deviations: nothing is known of the frame
+
+
+def tracker_frame(robot: Robot, readings: Measurements, file: str) -> Outcome:
+    """T_ref where the frame may be anywhere, and homes and tubes as far off as the robot file's uncertainty says.
+
+    `file` names the table in errors. Raises InputError where fewer than three positions can be predicted.
+    """
+    start = registered(robot, readings, file)
+    names = [f"tracker.{kind}.{axis}" for kind in ANYWHERE for axis in AXES]
+    fit = joint.fit(start, readings, "standard", sd={name: ANYWHERE[name.split(".")[1]] for name in names})
+    own = [fit.names.index(name) for name in names]
+    found, covariance = fit.apply(robot=start).tracker, fit.covariance[np.ix_(own, own)]
+    after = with_frame(robot, found.rotation, found.position)
+    rows, sd = [], np.sqrt(np.diag(covariance))
+    for field, text, unit, values, widths in (
+        ("position_mm", "origin of the base frame", "mm", found.position_mm, 1e3 * sd[:3]),
+        ("rotation_vector_rad", "rotation vector", "rad", found.rotation_vector_rad, sd[3:]),
+    ):
+        for i, axis in enumerate(AXES):
+            path = ("tracker", field, i)
+            rows.append(Row(f"{text}, {axis}", unit, float(values[i]), float(widths[i]), in_file(robot, path), path))
+    before_mm, after_mm = (rms_mm(one, readings) for one in (robot, after))
+    rows.append(Row("error of the tip, RMS", "mm", after_mm, old=before_mm))
+    rows.append(Row("error with homes and tubes fitted too, RMS", "mm", fit.rms_mm()))
+    figures = {
+        "rms_mm": {"before": before_mm, "after": after_mm, "calibrated": fit.rms_mm()},
+        "rotation_sd_deg": np.degrees(sd[3:]).tolist(),
+    }
+    return Outcome("Tracker frame", rows, [*unknown(covariance), *fit.warnings], figures)
+
+
+def registered(robot: Robot, readings: Measurements, file: str) -> Robot:
+    """The robot in the frame that carries the predicted tips, and where measured their tangents, to the readings."""
+    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
+    tip = Model(robot.standard).predict(beta, alpha, readings.force)
+    predicted, measured = np.where(tip.solved[:, None], tip.position, np.nan), readings.positions
+    count = int(np.isfinite(predicted + measured).all(axis=1).sum())
+    if count < 3:
+        text = f"the model predicts {count} of the measured positions: a tracker frame needs three or more"
+        raise InputError(Problem(text, file))
+    ahead = [
+        place + settings.JOINT_LEVER * matrix_from_quaternion(turn)[:, :, 2]
+        for place, turn in ((predicted, tip.quaternion), (measured, readings.quaternions))
+    ]
+    points = (np.concatenate(pair) for pair in zip((predicted, measured), ahead, strict=True))
+    return with_frame(robot, *aligned(*points)[:2])
+
+
+def rms_mm(robot: Robot, readings: Measurements) -> float:
+    """RMS error of the positions."""
+    return 1e3 * float(np.sqrt(np.nanmean(tips.errors(robot, readings) ** 2)))
+
+
+def unknown(covariance: Array) -> list[str]:
+    """Sentences on the directions of position and rotation (6, 6) of which the readings say nothing."""
+    said = []
+    for part, kind, what in ((slice(0, 3), "position", "the shift along"), (slice(3, 6), "rotation", "the turn about")):
+        variance, axes = np.linalg.eigh(covariance[part, part])
+        for axis in axes.T[np.sqrt(variance) > settings.SAYS_NOTHING * ANYWHERE[kind]]:
+            words = ", ".join(f"{x + 0.0:.2f}" for x in axis)
+            said.append(f"the readings do not tell {what} ({words}) in the tracker's axes: any value is as good")
+    return said
