@@ -7,7 +7,7 @@ before, and only the reading is recorded. By the table it came from the other si
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import wilcoxon
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
@@ -22,7 +22,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     A reading at the end of a long step, whose joints were visited from both sides before in its run, agrees with one
     of these two visits, wherever they differ. If the readings agree with the visits from the other side than that of
     the recorded motion, the robot followed the path of these visits from its last turn on. This compares
-    readings, not a model.
+    readings, not a model; by a signed-rank test, as a reading that fits neither visit well says little.
     """
     jitter, returns = robot.tracker.jitter_mm, _returns(measurements)
     if measurements.position is None or not jitter or not returns:
@@ -33,9 +33,8 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     loop = p[other] - p[same]
     size = np.sum(loop**2, axis=1)
     visible = (np.sqrt(size) > settings.VISITS_DIFFER * noise) & np.isfinite(p[here]).all(axis=1)
-    part = np.sum((p[here] - p[same]) * loop, axis=1)[visible] / size[visible]
-    agree = int(np.sum(part > 0.5))
-    if not visible.any() or binomtest(agree, len(part), alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
+    nearer = (np.linalg.norm(p[here] - p[same], axis=1) - np.linalg.norm(p[here] - p[other], axis=1))[visible]
+    if not visible.any() or wilcoxon(nearer, alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     notice = (

@@ -172,26 +172,32 @@ class Selection:
 
 
 def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
-    """The effects that explain the fitted readings. Of many readings a part decides rounds whose outcome is sure."""
-    chosen = Selection(engine)
+    """The effects that explain the fitted readings. Of many readings a part decides rounds whose outcome is sure; fits
+    that decide need not be converged, only those that are returned."""
+    coarse = replace(engine, tolerance=settings.COARSE)
+    chosen = Selection(coarse)
     few = folds.few_of(engine.fitted)
     start_plain, start = {}, {}
     if few is not None:
         engine.progress("a part of the readings first")
-        chosen.engine = replace(engine, rows=few, tolerance=settings.COARSE)
+        chosen.engine = replace(coarse, rows=few)
         chosen.fit = chosen.calibrate([], {})
         start_plain = values_of(chosen.fit)
         chosen.grow(pool, more=np.sum(engine.fitted) / np.sum(few))
         start = values_of(chosen.fit)
-        engine.measurements, chosen.engine = chosen.engine.measurements, engine
+        coarse.measurements, chosen.engine = chosen.engine.measurements, coarse
     chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
     if chosen.accepted:
-        engine.robust = True
+        coarse.robust = True
         chosen.fit = chosen.calibrate(chosen.fits, start)
     if not chosen.finished:
         chosen.grow(pool)
     if len(chosen.accepted) > 1:
         chosen.eliminate()
+    engine.measurements, chosen.engine = coarse.measurements, engine
+    chosen.calibrated, start = chosen.calibrate([], values_of(chosen.calibrated)), values_of(chosen.fit)
+    engine.robust = coarse.robust
+    chosen.fit = chosen.calibrate(chosen.fits, start) if chosen.accepted else chosen.calibrated
     return chosen
 
 
