@@ -37,6 +37,12 @@ if(NOT MSVC)
     "$<$<BOOL:${CTCR_ARCH}>:-march=${CTCR_ARCH}>")
 endif()
 
+# Tests and examples are compiled more often than they run: a fifth of the compile time of -O3.
+add_library(ctcr_fast_compile INTERFACE)
+target_link_libraries(ctcr_fast_compile INTERFACE ctcr_flags)
+target_compile_definitions(ctcr_fast_compile INTERFACE CTCR_FAST_COMPILE)
+target_compile_options(ctcr_fast_compile INTERFACE $<$<CONFIG:Release>:-O1>)
+
 if(PROJECT_IS_TOP_LEVEL)
   set(CMAKE_CXX_EXTENSIONS OFF)
   find_program(CCACHE_PROGRAM ccache)

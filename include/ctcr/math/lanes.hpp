@@ -9,7 +9,13 @@ inline constexpr int lane_count = 4;
 
 #if defined(__GNUC__) && !defined(CTCR_SCALAR_LANES)
 #define CTCR_VECTOR_LANES
+// The kernels are straight code from one end to the other. A program that defines CTCR_FAST_COMPILE, in all of its files,
+// leaves it to the compiler what to inline: half the compile time, and up to 1.4 times the instructions.
+#if defined(CTCR_FAST_COMPILE)
+#define CTCR_INLINE inline
+#else
 #define CTCR_INLINE inline __attribute__((always_inline))
+#endif
 #define CTCR_NOINLINE __attribute__((noinline))
 #if defined(__AVX__) || !(defined(__x86_64__) || defined(__i386__))
 typedef double LaneVector __attribute__((vector_size(32)));
