@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ctcr.errors import InputError
 from ctcr.model import parameters
-from ctcr.robot import robot_file, yaml_document
+from ctcr.robot import defaults, ledger, new_file, robot_file, yaml_document
 from ctcr.robot.description import Robot
 
 ROOT = Path(__file__).parents[3]
@@ -152,7 +152,7 @@ def test_misspelt_field(key, misspelt, hint):
         assert len(problems) == 1
 
 
-@pytest.mark.parametrize("field", sorted(set(re.findall(r"^[ -]*(\w+):", TEXT, re.M))))
+@pytest.mark.parametrize("field", sorted({*re.findall(r"^[ -]*(\w+):", TEXT, re.M)} - {*defaults.SAID}))
 def test_missing_field(field):
     text = re.sub(rf"\b{field}:", f"zz{field[::-1]}:", TEXT, count=1)
     assert any(problem.field.endswith(field) and "missing" in problem.message for problem in faults(text))
@@ -255,3 +255,21 @@ def test_shared_robots():
         with open(path.with_name("measurements.csv"), encoding="utf-8") as table:
             columns = table.readline().split(",")
         assert robot_file.load(path).n_tubes == sum(name.startswith("beta") for name in columns), path
+
+
+@pytest.mark.parametrize("n", range(1, 5))
+@pytest.mark.parametrize("absent", ["", "actuation: null\ntracker:\nuncertainty: null\n"])
+def test_sections_left_out(n, absent, tmp_path):
+    """Sections that a file leaves out, or leaves at null, are those that `ctcr init` writes; each is said, and a change
+    of a value in one of them is written."""
+    stated = new_file.text(new_file.example(n))
+    short = stated[: stated.index("actuation:")] + absent
+    whole, robot = robot_file.parse(stated.encode()), robot_file.parse(short.encode())
+    assert robot.model_dump() == whole.model_dump()
+    assert {"actuation", "tracker", "uncertainty"} <= {doubt.field for doubt in robot_file.warnings(robot)}
+    change = ledger.Change(("tracker", "position_mm", 0), "mm", 3.5)
+    changed = ledger.write(robot, tmp_path / "new.yaml", [change], ledger.Entry("ctcr calibrate frame"))
+    assert changed.tracker.position_mm == [3.5, 0, 0] and changed.actuation == whole.actuation
+    assert not {"actuation", "tracker", "uncertainty"} & {doubt.field for doubt in robot_file.warnings(changed)}
+    robot_file.save(robot, tmp_path / "saved.yaml")
+    assert robot_file.load(tmp_path / "saved.yaml").uncertainty == whole.uncertainty

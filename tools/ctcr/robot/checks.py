@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ctcr.errors import Problem, did_you_mean, shown
+from ctcr.robot import defaults
 from ctcr.robot.description import Robot, Section
 from ctcr.robot.units import LARGEST
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
@@ -44,6 +45,8 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
 def doubts(robot: Robot) -> Iterator[Fault]:
     """Values that are possible but look wrong, and unknown ones that the model could use."""
     yield from robot.unusual()
+    if robot._source:
+        yield from (((name,), defaults.SAID[name]) for name in defaults.absent(robot._source.data))
     for i, tube in enumerate(robot.tubes):
         if (strain := tube.straightened_strain) > _MAX_STRAIN:
             text = f"straightening this tube strains it by {100 * strain:.1f} %: it yields"

@@ -2,10 +2,21 @@
 
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import Any
 
 from ctcr.errors import InputError, Problem, suggestion
+from ctcr.robot.defaults import TRACKER, UNCERTAINTY
 
 NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY = 60.0, 0.3, 6450.0
+
+_TRACKER = {
+    "sensor_on_tube": "1: the innermost",
+    "jitter_mm": "default; standard deviation of one reading per axis, of a sensor at rest. Fits need it",
+    "jitter_deg": "default",
+    "accuracy_95_mm": "95 % figures of the maker; null: no smooth error of the tracker is assumed",
+    "position_mm": "default: both frames agree; `ctcr calibrate frame` finds it",
+    "sensor_roll": "about the tip's axis; known: its x axis is that of the tip",
+}
 
 
 @dataclass
@@ -108,27 +119,10 @@ def text(robot: NewRobot) -> str:
         f"  home_rotation_deg: {_list([0.0] * n)}  # alpha at home\n"
         "\n"
         "# The sensor, and the base frame as the tracker sees it: x_tracker = R x_base + position.\n"
-        "tracker:\n"
-        f"  sensor_on_tube: {robot.sensor_on_tube}  # 1: the innermost\n"
-        "  rate_Hz: null\n"
-        "  jitter_mm: 0.1  # default; standard deviation of one reading per axis, of a sensor at rest. Fits need it\n"
-        "  jitter_deg: 0.1  # default\n"
-        "  accuracy_95_mm: null  # 95 % figures of the maker; null: no smooth error of the tracker is assumed\n"
-        "  accuracy_95_deg: null\n"
-        "  position_mm: [0.0, 0.0, 0.0]  # default: both frames agree; `ctcr calibrate registration` measures it\n"
-        "  rotation_vector_rad: [0.0, 0.0, 0.0]\n"
-        "  sensor_roll: unknown  # about the tip's axis; known: its x axis is that of the tip\n"
+        f"tracker:\n{_section(TRACKER | {'sensor_on_tube': robot.sensor_on_tube}, _TRACKER)}"
         "\n"
         "# How far the true values may be from those above: one standard deviation. All defaults.\n"
-        "uncertainty:\n"
-        "  tracker_frame_mm: 5.0\n"
-        "  tracker_frame_deg: 3.0\n"
-        "  rotation_offset_deg: 5.0\n"
-        "  translation_offset_mm: 1.0\n"
-        "  length_mm: 1.0\n"
-        "  curved_length_mm: 2.5\n"
-        "  curvature_percent: 10.0\n"
-        "  youngs_modulus_percent: 20.0\n"
+        f"uncertainty:\n{_section(UNCERTAINTY, {})}"
     )
 
 
@@ -145,6 +139,14 @@ def _tube(tube: NewTube) -> str:
         f"    youngs_modulus_GPa: {tube.youngs_modulus_GPa:.10g}{default}\n"
         f"    poisson_ratio: {tube.poisson_ratio:.10g}\n"
         f"    density_kg_m3: {tube.density_kg_m3:.10g}\n"
+    )
+
+
+def _section(values: dict[str, Any], notes: dict[str, str]) -> str:
+    written = {key: _list(value) if isinstance(value, list) else value for key, value in values.items()}
+    return "".join(
+        f"  {key}: {'null' if value is None else value}{f'  # {notes[key]}' if key in notes else ''}\n"
+        for key, value in written.items()
     )
 
 

@@ -15,7 +15,7 @@ from ruamel.yaml.util import load_yaml_guess_indent
 
 from ctcr import _core
 from ctcr.errors import InputError, Problem, suggestion
-from ctcr.robot import checks, yaml_document
+from ctcr.robot import checks, defaults, yaml_document
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
@@ -41,7 +41,7 @@ def _robot(document: YamlDocument) -> Robot:
         text = f"does not describe a robot: no fields such as name, tubes, tracker{hint}"
         raise InputError(Problem(text, document.file))
     try:
-        robot, errors = Robot.model_validate(document.data), []
+        robot, errors = Robot.model_validate(_filled(document.data)), []
     except ValidationError as error:
         robot, errors = None, error.errors(include_url=False)
     faults = checks.faults(document.data, errors) + _unknown_effects(document.data)
@@ -82,6 +82,14 @@ def dumped(yaml: YAML, document: Any) -> str:
     text = io.StringIO()
     yaml.dump(document, text)
     return text.getvalue()
+
+
+def _filled(data: dict[str, Any]) -> dict[str, Any]:
+    """A parsed file with the defaults of the sections that it leaves out."""
+    listed = data.get("tubes")
+    lengths = [tube.get("length_mm") for tube in listed if isinstance(tube, dict)] if isinstance(listed, list) else []
+    known = [length if isinstance(length, int | float) else 0.0 for length in lengths]  # others are faults of their own
+    return data | {name: defaults.section(name, known) for name in defaults.absent(data)}
 
 
 def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
