@@ -72,7 +72,7 @@ inline constexpr std::array<double, 3> tracker_position{  // of the base frame i
     0.02,
     -0.18,
 };
-inline constexpr std::array<double, 3> tracker_rotation{  // the same as a rotation vector [rad]
+inline constexpr std::array<double, 3> tracker_rotation{  // its rotation vector there [rad]
     0.0,
     1.2,
     0.3,

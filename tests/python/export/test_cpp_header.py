@@ -186,12 +186,15 @@ def test_bench_limits():
     np.testing.assert_allclose([float(value) for value in low], expected)
 
 
-def test_refusals():
+def test_refusals(monkeypatch):
     """What a controller cannot do without, effects written in Python, and names that are none."""
     robot = robot_file.load(TABLE2)
     robot.actuation.translation_mm_per_rev = None
     with pytest.raises(InputError, match="translation_mm_per_rev: is not known"):
         cpp_header(robot)
+    monkeypatch.setitem(robot_file.user_effects, "mine", None)
+    with pytest.raises(InputError, match="mine is written in Python"):
+        cpp_header(robot_file.load(TABLE2).with_effects({"mine": {}}))
     for name in ("std", "ctcr::x", "a b", "", "1x", "x;int y", "é"):
         with pytest.raises(InputError, match="no name"):
             cpp_header(robot_file.load(TABLE2), name)

@@ -70,17 +70,17 @@ class Diagnosis(Result):
         """A row an effect that was tried in a round: log evidence gained, linearised and in the joint fit (NaN: not
         fitted), fraction of the unexplained chi-square, and whether it was accepted or is as likely."""
         rows = [(number, one, r) for number, r in enumerate(self.rounds, start=1) for one in r.best]
-        known = {"linear": "linear", "fit": "refit", "explained": "explained"}
-        columns: dict[str, list] = {"round": [n for n, _, _ in rows], "effect": [one.id for _, one, _ in rows]}
-        for name, attribute in known.items():
-            fitted = [one.refit is not None or name == "linear" for _, one, _ in rows]
-            columns[name] = [
-                float(getattr(one, attribute)) if there else np.nan
-                for (_, one, _), there in zip(rows, fitted, strict=True)
-            ]
-        columns["accepted"] = [one is r.accepted for _, one, r in rows]
-        columns["as_likely"] = [one.id in r.ids for _, one, r in rows]
-        return frame(columns)
+        return frame(
+            {
+                "round": [number for number, _, _ in rows],
+                "effect": [one.id for _, one, _ in rows],
+                "linear": [one.linear for _, one, _ in rows],
+                "fit": [np.nan if one.refit is None else one.refit for _, one, _ in rows],
+                "explained": [np.nan if one.refit is None else one.explained for _, one, _ in rows],
+                "accepted": [one is r.accepted for _, one, r in rows],
+                "as_likely": [one.id in r.ids for _, one, r in rows],
+            }
+        )
 
     def glance(self) -> Glance:
         found = " and ".join(" or ".join(a.ids) for a in self.accepted)

@@ -143,7 +143,7 @@ def _devices(robot: Robot, known: dict[str, float]) -> Iterator[str]:
     yield from vector("home_translation", "actuation.home_translation", "beta where the motors are at 0 [m]")
     yield from vector("home_rotation", "actuation.home_rotation", "alpha where the motors are at 0 [rad]")
     yield from vector("tracker_position", "tracker.position", "of the base frame in the tracker frame [m]")
-    yield from vector("tracker_rotation", "tracker.rotation", "the same as a rotation vector [rad]")
+    yield from vector("tracker_rotation", "tracker.rotation", "its rotation vector there [rad]")
     roll = "" if robot.tracker.roll_known else "; not known"
     tube = robot.tracker.sensor_on_tube - 1
     yield f"inline constexpr int sensor_tube = {tube};  // whose tip carries the sensor, from 0"
