@@ -81,9 +81,11 @@ def right_case(random: np.random.Generator, n_tubes: int | None = None) -> Case:
 
 
 def wrong_sheet(case: Case, random: np.random.Generator) -> Case:
-    """A robot file that is wrong by many of its standard deviations: curvature 18 %, E 30 %, homes 8 deg, frame 8 mm."""
+    """A robot file that is wrong by many of its standard deviations: curvature 18 %, E 30 %, homes 8 deg, frame 8 mm
+    and 5 deg."""
     robot, readings = case.robot, case.readings
-    curvature, modulus, home = random.uniform(0.5, 1, (3, robot.n_tubes)) * random.choice([-1, 1], (3, robot.n_tubes))
+    signs = random.choice([-1, 1], (5, max(3, robot.n_tubes)))
+    curvature, modulus, home, place, tilt = signs * random.uniform(0.5, 1, signs.shape)
     tubes = [
         tube.model_copy(
             update={
@@ -93,9 +95,9 @@ def wrong_sheet(case: Case, random: np.random.Generator) -> Case:
         )
         for i, tube in enumerate(robot.tubes)
     ]
-    turn = Rotation.from_rotvec(np.deg2rad(2) * random.normal(size=3)).as_matrix()
-    moved = with_frame(robot, turn @ robot.tracker.rotation, robot.tracker.position + 5e-3 * random.normal(size=3))
-    turned = replace(readings, alpha=readings.alpha + np.deg2rad(8) * home)
+    turn = Rotation.from_rotvec(np.deg2rad(3) * tilt[:3]).as_matrix()
+    moved = with_frame(robot, turn @ robot.tracker.rotation, robot.tracker.position + 5e-3 * place[:3])
+    turned = replace(readings, alpha=readings.alpha + np.deg2rad(8) * home[: robot.n_tubes])
     return Case(moved.model_copy(update={"tubes": tubes}), turned, f"{case.about}, wrong sheet")
 
 

@@ -11,7 +11,7 @@ from ctcr.conventions import orientation, tips
 from ctcr.conventions.calibrated import calibrated
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, changed, joints
-from ctcr.conventions.search import Case, with_run_frames
+from ctcr.conventions.search import PRIOR, Case, with_run_frames
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show.wording import short
@@ -53,7 +53,7 @@ def homed_elsewhere(case: Case) -> tuple[Finding, Change, Case] | None:
     runs = np.unique(case.readings.run)
     if len(runs) < settings.FEWEST_RUNS:
         return None
-    prior, odds = settings.DECISIVE + np.log(len(runs)), np.log(2 * case.robot.n_tubes)
+    prior, odds = PRIOR + np.log(len(runs)), np.log(2 * case.robot.n_tubes)
     estimates = _estimates(case, runs)
     tried = [one for run in _suspects(estimates, runs, prior + odds) for one in _tried(case, int(run), prior + odds)]
     if not tried:
@@ -67,6 +67,8 @@ def homed_elsewhere(case: Case) -> tuple[Finding, Change, Case] | None:
     )
     if max(gains) + settings.TIE < max(settings.TIE, *rivals):
         return None
+    if abs(offset.size) < _stated(case.robot, offset):
+        return None  # no more than homing differs
     mine = case.readings.run == offset.run
     given, turned = (orientation.error_deg(moved.fit.robot, one.readings.rows(mine)) for one in (case, moved))
     if turned > settings.CONVENTION_ALIKE * given:
@@ -76,6 +78,13 @@ def homed_elsewhere(case: Case) -> tuple[Finding, Change, Case] | None:
         offset = replace(offset, size=offset.size + fit.offset)
     after = replace(case, readings=offset.change(case.readings), fit=fit)
     return offset.finding(case, after), offset.change, after
+
+
+def _stated(robot: Robot, offset: Offset) -> float:
+    """Standard deviation of a home as the robot file states it, SI."""
+    if offset.kind == "beta":
+        return 1e-3 * robot.uncertainty.of("translation_offset_mm", offset.tube)
+    return np.deg2rad(robot.uncertainty.of("rotation_offset_deg", offset.tube))
 
 
 def _fitted(case: Case, offset: Offset):
@@ -123,7 +132,7 @@ def _suspects(estimates: Estimates, runs: Array, needed: float) -> Array:
     """The runs of which an offset explains most, if that may be so much."""
     explained = estimates.chi_square.max(axis=(1, 2))
     order = np.argsort(-explained)[: settings.CONVENTION_LIKELY]
-    return runs[order[explained[order] > 2 * needed]]
+    return runs[order[explained[order] > needed]]
 
 
 def _with_every_offset(case: Case, runs: Array, offset: Offset, estimates: Estimates) -> Case:

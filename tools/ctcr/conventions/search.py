@@ -18,6 +18,7 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 Wrong = tuple[Hypothesis, ...]
+PRIOR = settings.DECISIVE + settings.UNASKED  # [log odds] against a wrong convention of any kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class Case:
 
     def _log_evidence(self, likelihood: Likelihood, n_hypotheses: int) -> float:
         jitter = max(self.fit.floor / np.sqrt(3), settings.CONVENTION_FINEST) / self.scale
-        prior = len(self.wrong) * (settings.DECISIVE + np.log(n_hypotheses))
+        prior = len(self.wrong) * (PRIOR + np.log(n_hypotheses))
         return likelihood(self.residual, jitter) - self.fit.improbable - prior
 
 
@@ -80,7 +81,7 @@ def _likeliest(case: Case) -> Case | None:
     every, tried = hypotheses(case.robot, case.readings), [case, with_run_frames(case, np.unique(case.readings.run))]
     for some in _candidates(case, every):
         found = [_applied(case, wrong) for wrong in some]
-        tried += [one for one in found if np.isfinite(one.fit.typical) and _is_jump(case, one)]
+        tried += [one for one in found if one.fit.typical < case.fit.typical * one.scale and _is_jump(case, one)]
         if any(one.fit.is_noise for one in found):
             break
 
