@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Union
+from typing import TYPE_CHECKING, ClassVar, Union
 
 import numpy as np
 
@@ -62,13 +62,14 @@ class Measurements(Shown):
     file: str = ""  # that it was read from; empty: a DataFrame, or made by a program
     refusal: InputError | None = None  # why it cannot be used as it is: only another convention makes it possible
 
+    COLUMNS: ClassVar = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")  # one value a row
+
     def __len__(self) -> int:
         return len(self.run)
 
     def rows(self, chosen: Mask | Integers | slice) -> "Measurements":
         """The readings of some rows."""
-        columns = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")
-        kept = {name: getattr(self, name) for name in columns}
+        kept = {name: getattr(self, name) for name in self.COLUMNS}
         return replace(self, **{name: old if old is None else old[chosen] for name, old in kept.items()})
 
     @property

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -32,8 +32,8 @@ def joined(tables: Sequence[Measurements], starts: Sequence[float | None]) -> Me
         parts = [getattr(table, name) for table in moved]
         return None if any(part is None for part in parts) else np.concatenate(parts)
 
-    columns = [f.name for f in fields(Measurements) if f.name not in ("warnings", "from_home")]
-    return Measurements(**{name: column(name) for name in columns}, from_home=tables[0].from_home)
+    columns = {name: column(name) for name in Measurements.COLUMNS}
+    return Measurements(**columns, from_home=tables[0].from_home)
 
 
 def start_of(table: str | Path) -> float | None:
