@@ -102,6 +102,20 @@ TEST(Descent, ShortensAStepThatCannotBePredicted) {
   EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
+// To the last bit, so that a prediction made there need not be made again; what lies outside comes to their edge.
+TEST(Descent, KeepsAStartWithinItsBounds) {
+  for (int seed = 0; seed < 40; ++seed) {
+    test::Random random{std::uint64_t(seed)};
+    constexpr Eigen::Index n = 5;
+    std::vector<LinearBound> within;
+    for (int k = 0; k < 3; ++k) within.push_back({"edge", normals(n, random), -10});
+    const detail::Bounds bounds(std::vector<FreeParameter>(n, {"p", 0, 1}), within, Eigen::VectorXd::Ones(n));
+    const Eigen::VectorXd inside = normals(n, random), outside = bounds.clamped(100 * inside);
+    EXPECT_TRUE(bounds.clamped(inside) == inside) << seed;
+    for (const LinearBound& bound : within) EXPECT_GE(bound.change.dot(outside), bound.low - 1e-6) << seed;
+  }
+}
+
 /// The cost of readings whose noise is 1, in parameters scaled by their prior sd.
 struct UnitNoise {
   UnitNoise(const Predictor& predict, const std::vector<FreeParameter>& parameters, Eigen::Index rows)

@@ -96,7 +96,7 @@ def test_noise(robot, plan, seed):
 def test_unexplained_chi_square(noise):
     """Noise leaves none unexplained; an error adds its square; rows that were fitted do not count."""
     engine, fit, _ = noise
-    unexplained = held_out.unexplained_of(engine, fit, ~engine.rows)
+    unexplained = held_out.unexplained_of(fit, ~engine.rows)
     unseen = int(6 * np.sum(~engine.rows))
     assert unexplained(fit.residual) < 3 * np.sqrt(2 * unseen)
     off = np.zeros_like(fit.residual)

@@ -378,6 +378,21 @@ def test_many_rows(monkeypatch):
     np.testing.assert_array_less(np.abs(from_a_part.values - at_once.values), 0.05 * at_once.sd + 1e-12)
 
 
+def test_only_some_rows():
+    """A linearised fit of some rows alone is that of the table without the others, and whitens alike."""
+    nominal = robot()
+    readings = table(nominal, rows=60)
+    fit = joint.fit(nominal, readings, noise=noise_of(nominal), starts=1)
+    some = readings.run < 3
+    alone = joint.linear_fit(fit, only=some, inflation=np.ones(2))
+    among = joint.linear_fit(fit, rows=some, inflation=np.ones(2))
+    assert len(alone.weights) == np.sum(some) and alone.observations == among.observations
+    assert alone.log_evidence == pytest.approx(among.log_evidence, abs=0.05)
+    np.testing.assert_array_less(np.abs(alone.values - among.values), 0.05 * among.sd + 1e-12)
+    square = [np.sum(a.whiten(x) ** 2) for a, x in ((alone, fit.residual[some]), (among, fit.residual))]
+    assert square[0] == pytest.approx(square[1], rel=0.02)
+
+
 def test_growing_parts(monkeypatch):
     """Where ever larger parts of very many rows start one another, outliers among them, the fit of all is the same."""
     nominal = robot()

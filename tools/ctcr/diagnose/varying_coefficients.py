@@ -81,7 +81,7 @@ class VaryingModel:
 
     def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
         """Whether it leaves far less of the held-out runs than effects do."""
-        unexplained = unexplained_of(engine, calibrated, ~engine.rows)
+        unexplained = unexplained_of(calibrated, ~engine.rows)
         return unexplained(self.residual) < settings.VARYING_OUTDOES * unexplained(with_effects.residual)
 
     @property
@@ -138,14 +138,14 @@ class _Trials:
 
 def may_outdo(engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
     """Whether effects leave enough of the held-out runs for a varying-coefficient model to explain far more."""
-    unexplained = unexplained_of(engine, calibrated, ~engine.rows)
+    unexplained = unexplained_of(calibrated, ~engine.rows)
     return unexplained(with_effects.residual) > settings.VARYING_RIVAL * unexplained(calibrated.residual)
 
 
 def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | None:
     """The model that explains most of the residual of a fit, by forward selection; None unless that holds on the
     held-out runs."""
-    unexplained = unexplained_of(engine, fit, ~engine.rows)
+    unexplained = unexplained_of(fit, ~engine.rows)
     thin, at = engine.thinned(fit, settings.VARYING_ROWS)
     if at is not fit:  # that is the optimum for all readings, not for these
         at = thin.linear_fit(at, **at.frozen)

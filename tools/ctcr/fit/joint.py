@@ -247,20 +247,23 @@ def linear_fit(
     *,
     noise: Noise | None = None,
     rows: Mask | None = None,
+    only: Mask | None = None,
     more: ArrayLike = 0.0,
     weights: Array | None = None,
     **options,
 ) -> Fit:
     """As fit_joint() with the parameters of a fit, but of the model linearised there: other noise, rows (M,) or weights
     (M, 2) are cheap. Weights of 0 leave rows out, so that `rows` count only without any. `more` (M, 6) is added to the
-    residual."""
-    residual = at.residual + more
+    residual. The fit has the rows `only` (M,) alone, and then weights are of these."""
+    residual, jacobian, positions = at.residual + more, at.jacobian_all, at.positions
     if weights is None and rows is not None:
         residual = np.where(rows[:, None], residual, nan)
-    model = LinearModel(residual.ravel(), at.jacobian_all, at.values, at.prior_mean)
+    if only is not None:
+        residual, positions, jacobian = residual[only], positions[only], jacobian[np.repeat(only, 6)]
+    model = LinearModel(residual.ravel(), jacobian, at.values, at.prior_mean)
     priors = replace(at.priors, gauges=(), limits=())
     options |= {"start": at.values, "few_first": False, "scales": priors.scales}
-    return fit_joint(model, priors, noise or at.noise, at.positions, weights=weights, **options)
+    return fit_joint(model, priors, noise or at.noise, positions, weights=weights, **options)
 
 
 def rejects(fit: Fit) -> bool:
