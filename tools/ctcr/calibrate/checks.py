@@ -38,7 +38,7 @@ def start(robot: Robot, readings: Measurements) -> float:
             Problem(
                 f"the measured tips lie {1e3 * usual:.0f} mm from those predicted, more than the robot is long: the "
                 f"tracker frame (tracker.position_mm, rotation_vector_rad) or its unit is wrong; find it with "
-                f"`ctcr calibrate registration`"
+                f"`ctcr calibrate frame`"
             )
         )
     return max(float(np.sqrt(np.nanmean(np.sum(answer.position[answer.solved, :2] ** 2, axis=1)))), 1e-3)

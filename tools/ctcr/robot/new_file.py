@@ -115,7 +115,7 @@ def text(robot: NewRobot) -> str:
         "  jitter_deg: 0.1  # default\n"
         "  accuracy_95_mm: null  # 95 % figures of the maker; null: no smooth error of the tracker is assumed\n"
         "  accuracy_95_deg: null\n"
-        "  position_mm: [0.0, 0.0, 0.0]  # default: both frames agree; `ctcr calibrate registration` measures it\n"
+        "  position_mm: [0.0, 0.0, 0.0]  # default: both frames agree; `ctcr calibrate frame` finds it\n"
         "  rotation_vector_rad: [0.0, 0.0, 0.0]\n"
         "  sensor_roll: unknown  # about the tip's axis; known: its x axis is that of the tip\n"
         "\n"
