@@ -1,8 +1,8 @@
 """How often `ctcr compare` names wrong conventions right, and none where there is none, on random robots.
 
-Sessions of the model and of the oracle: robots with one to four tubes, with and without smooth errors of the field, hidden effects, loads, wrong data
-sheets and orientations, in few and many rows. Of three one has no fault, one has one, one has two. Even seeds are for
-tuning, odd ones for reporting. Writes docs/convention_study.md with --keep.
+Sessions of the model and of the oracle: robots with one to four tubes, with and without smooth errors of the field,
+hidden effects, loads, wrong data sheets and orientations, in few and many rows. Of three one has no fault, one has one,
+one has two. Even seeds are for tuning, odd ones for reporting. Writes docs/convention_study.md with --keep.
 """
 
 import argparse
@@ -96,7 +96,11 @@ def study(seeds: Iterable[int], tell=print) -> Iterator[Answer]:
     for seed in seeds:
         answer = judge(seed)
         if not answer.right:
-            tell(f"{seed}: {answer.about}; error of the corrected table x {answer.mended:.2f}", *answer.said, sep="\n    ")
+            tell(
+                f"{seed}: {answer.about}; error of the corrected table x {answer.mended:.2f}",
+                *answer.said,
+                sep="\n    ",
+            )
         yield answer
 
 
@@ -114,7 +118,10 @@ def summary(answers: list[Answer]) -> str:
         mine = [one for one in answers if one.seed % 2 == part]
         lines += ["", f"## {half.capitalize()} half", "", "| wrong | named | named and corrected |", "|---|---|---|"]
         groups = {"nothing": [one for one in mine if not one.wrong]}
-        groups |= {"one": [one for one in mine if len(one.wrong) == 1], "two": [one for one in mine if len(one.wrong) == 2]}
+        groups |= {
+            "one": [one for one in mine if len(one.wrong) == 1],
+            "two": [one for one in mine if len(one.wrong) == 2],
+        }
         for kind in sorted({kind for one in mine for kind in one.wrong}):
             groups[f"`{kind}`, alone or with another"] = [one for one in mine if kind in one.wrong]
         for name, group in groups.items():

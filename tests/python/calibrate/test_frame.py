@@ -61,7 +61,7 @@ def test_too_few():
 
 
 def test_command(run, tmp_path):
-    """The new robot file has the frame and its uncertainty, and fits the table; a second wrong convention is an error."""
+    """The new robot file has the frame and its sd, and fits the table; another wrong convention is an error."""
     random = np.random.default_rng(6)
     robot = design(random, 2)
     readings = session(robot, random)

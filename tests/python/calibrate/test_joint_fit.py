@@ -243,7 +243,7 @@ def test_few_rows(robot, readings):
 
 def test_frame_refused(robot, readings):
     """A frame that is metres off is refused."""
-    with pytest.raises(InputError, match="the measured tips lie [0-9]+ mm from those predicted.*registration"):
+    with pytest.raises(InputError, match="the measured tips lie [0-9]+ mm from those predicted.*calibrate frame"):
         outcome(robot, replace(readings, position=readings.position + [2.0, 0, 0]))
 
 

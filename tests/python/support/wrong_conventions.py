@@ -107,7 +107,9 @@ def faults(random: np.random.Generator, case: Case, kinds: Sequence[str]) -> lis
     for kind in kinds:
         if any({kind, one.kind} <= alike for one in found for alike in UNDO):
             continue
-        drawn = next((one for _ in range(20) if (one := DRAWN[kind](random, case)) and not taken & {*one.columns}), None)
+        drawn = next(
+            (one for _ in range(20) if (one := DRAWN[kind](random, case)) and not taken & {*one.columns}), None
+        )
         if drawn:
             found.append(drawn)
             taken |= {*drawn.columns} if kind.startswith("joint") or kind == "run_offset" else set()
@@ -158,12 +160,16 @@ def _joint_offset(random, case):
         return None  # of a single tube it is the tracker frame that turned
     tube, size = int(random.integers(n)), np.deg2rad(random.choice([90, 180, -90, random.uniform(40, 140)]))
     return Fault(
-        "joint_offset", _names("alpha", [tube]), in_table(lambda m: replace(m, alpha=m.alpha - size * (np.arange(n) == tube)))
+        "joint_offset",
+        _names("alpha", [tube]),
+        in_table(lambda m: replace(m, alpha=m.alpha - size * (np.arange(n) == tube))),
     )
 
 
 def _joint_unit(random, case):
-    kind, factor = [("alpha", 180 / np.pi), ("alpha", 1 / (2 * np.pi)), ("beta", 1e3), ("beta", 1e2)][random.integers(4)]
+    kind, factor = [("alpha", 180 / np.pi), ("alpha", 1 / (2 * np.pi)), ("beta", 1e3), ("beta", 1e2)][
+        random.integers(4)
+    ]
     return Fault("joint_unit", _names(kind, range(case.robot.n_tubes)), in_table(scaled(kind, factor)))
 
 
@@ -230,7 +236,9 @@ def _time_unit(random, case):
 def _run_offset(random, case):
     runs, n = np.unique(case.readings.run), case.robot.n_tubes
     kind, tube, run = str(random.choice(["alpha", "beta"])), int(random.integers(n)), int(random.choice(runs))
-    size = random.choice([-1, 1]) * (random.uniform(2e-3, 8e-3) if kind == "beta" else np.deg2rad(random.uniform(8, 90)))
+    size = random.choice([-1, 1]) * (
+        random.uniform(2e-3, 8e-3) if kind == "beta" else np.deg2rad(random.uniform(8, 90))
+    )
 
     def spoil(m):
         off = np.where((m.run == run)[:, None], size * (np.arange(n) == tube), 0.0)

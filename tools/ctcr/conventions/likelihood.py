@@ -1,7 +1,8 @@
 """How likely the residual of a hypothesis is, where the model is not perfect: one likelihood for all hypotheses.
 
-What a model misses changes smoothly in joint space, and along the way of the joints where it depends on their history: it
-is a Gaussian process, in each run for itself, beside white noise. Both sizes are those that make the residual likeliest. Thousands of rows that err alike count as few.
+What a model misses changes smoothly in joint space, and along the way of the joints where it depends on their history:
+it is a Gaussian process, in each run for itself, beside white noise. Any size of either is as probable as another.
+Thousands of rows that err alike count as few.
 """
 
 import numpy as np

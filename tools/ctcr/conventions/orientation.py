@@ -27,7 +27,9 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None) -> tup
     predicted = _predicted(fit.robot, readings.rows(use))
     roll_known = fit.robot.tracker.roll_known
     mirrors = (None,) if axis is None else (axis, None)
-    forms = {(form, mirrored): _in_form(given[use], *form, mirrored) for form in np.ndindex(2, 2) for mirrored in mirrors}
+    forms = {
+        (form, mirrored): _in_form(given[use], *form, mirrored) for form in np.ndindex(2, 2) for mirrored in mirrors
+    }
     errors = {form: _error_deg(predicted, quaternion, roll_known) for form, quaternion in forms.items()}
     best = min(errors, key=lambda form: errors[form])
     if errors[best] > settings.CONVENTION_CLEAR * errors[(0, 0), best[1]]:

@@ -71,7 +71,7 @@ def homed_elsewhere(case: Case) -> tuple[Finding, Change, Case] | None:
         return None  # no more than homing differs
     mine = case.readings.run == offset.run
     given, turned = (orientation.error_deg(moved.fit.robot, one.readings.rows(mine)) for one in (case, moved))
-    if turned > settings.CONVENTION_ALIKE * given:
+    if given < settings.CONVENTION_CLEAR * turned:
         return None  # the orientations deny it
     for _ in range(2):
         fit = _fitted(case, offset)
@@ -140,7 +140,9 @@ def _with_every_offset(case: Case, runs: Array, offset: Offset, estimates: Estim
     i = ("beta", "alpha").index(offset.kind)
     size, information = estimates.size[:, i, offset.tube], estimates.information[:, i, offset.tube]
     width = max(float(np.sqrt(np.mean(size**2))), np.finfo(float).tiny ** 0.5)
-    residual = case.fit.residual - estimates.by[:, :, i, offset.tube] * size[np.searchsorted(runs, case.readings.run), None]
+    residual = (
+        case.fit.residual - estimates.by[:, :, i, offset.tube] * size[np.searchsorted(runs, case.readings.run), None]
+    )
     more = 0.5 * np.sum(np.log1p(information * width**2) + (size / width) ** 2)
     return replace(case, fit=replace(case.fit, residual=residual, improbable=case.fit.improbable + more))
 

@@ -47,7 +47,7 @@ class Case:
     def ordinary(self) -> Mask:
         """Rows (K,) that are no outliers."""
         size = np.linalg.norm(self.residual, axis=1)
-        return size < settings.CONVENTION_OUTLIER * np.median(size)
+        return size < settings.SURPRISE * np.median(size)
 
     def gain(self, other: "Case", n_hypotheses: int = 1) -> float:
         """Log odds of this case against another one, where each of so many hypotheses may hold.
@@ -112,7 +112,9 @@ def with_run_frames(case: Case, runs: Iterable[int]) -> Case:
     tip = tip @ case.fit.robot.tracker.rotation.T + case.fit.robot.tracker.position
     residual, improbable = case.fit.residual.copy(), case.fit.improbable
     uncertainty, wider = case.robot.uncertainty, settings.SESSION_PRIOR_WIDER
-    sd = wider * np.array([1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))])
+    sd = wider * np.array(
+        [1e-3 * uncertainty.of("tracker_frame_mm", 0), np.deg2rad(uncertainty.of("tracker_frame_deg", 0))]
+    )
     for run in runs:
         rows = (case.readings.run == run) & case.fit.solved
         if rows.sum() > 2:
@@ -121,7 +123,9 @@ def with_run_frames(case: Case, runs: Iterable[int]) -> Case:
             moved = rotation @ centre + shift - centre, Rotation.from_matrix(rotation).as_rotvec()
             lever = np.sqrt(np.mean(np.sum((tip[rows] - centre) ** 2, axis=1)))
             left = np.median(distance) / np.array([1.0, max(lever, settings.CONVENTION_FINEST)])
-            improbable += sum(0.5 * m @ m / s**2 + 1.5 * np.log1p(s**2 / e**2) for m, s, e in zip(moved, sd, left, strict=True))
+            improbable += sum(
+                0.5 * m @ m / s**2 + 1.5 * np.log1p(s**2 / e**2) for m, s, e in zip(moved, sd, left, strict=True)
+            )
             residual[rows] = case.readings.position[rows] - tip[rows] @ rotation.T - shift
     return replace(case, fit=replace(case.fit, residual=residual, improbable=improbable))
 
@@ -136,7 +140,11 @@ def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]
         few = case.readings.rows(slice(None, None, every_nth))
         placed = [_Placed(case.robot, few, place) for place in places]
         errors = np.array([_rough(case.robot, few, one, placed) for one in some])
-        rough.extend((error, (*one, *place)) for one, row in zip(some, errors, strict=True) for place, error in zip(places, row, strict=True))
+        rough.extend(
+            (error, (*one, *place))
+            for one, row in zip(some, errors, strict=True)
+            for place, error in zip(places, row, strict=True)
+        )
         return errors
 
     def likely(counts: Sequence[int]) -> list[Wrong]:
@@ -160,7 +168,12 @@ def _candidates(case: Case, every: Sequence[Hypothesis]) -> Iterator[list[Wrong]
     fitted = _rough_of(case.fit.robot, case.readings.rows(slice(None, None, settings.CONVENTION_EVERY)), joints)
     yield list(dict.fromkeys([*likely([1, 2, 3]), *best(joints, fitted)]))
     rough.clear()
-    pairs = [(*one, other) for one in best(joints, errors[1:].min(axis=1)) for (other,) in joints if not {*one[0].columns} & {*other.columns}]
+    pairs = [
+        (*one, other)
+        for one in best(joints, errors[1:].min(axis=1))
+        for (other,) in joints
+        if not {*one[0].columns} & {*other.columns}
+    ]
     look(pairs, best(places, errors.min(axis=0)), settings.CONVENTION_EVERY_PAIR)
     yield likely([2, 3])
 
@@ -224,7 +237,9 @@ def _is_jump(before: Case, case: Case) -> bool:
     uncertainty = case.robot.uncertainty
     for one in case.wrong:
         if one.offset:
-            key, unit = ("rotation_offset_deg", np.pi / 180) if one.offset[0] == "alpha" else ("translation_offset_mm", 1e-3)
+            key, unit = (
+                ("rotation_offset_deg", np.pi / 180) if one.offset[0] == "alpha" else ("translation_offset_mm", 1e-3)
+            )
             if abs(offset_of(one, case)) <= jump(one.frees, unit * uncertainty.of(key, one.offset[1])):
                 return False
         if one.registers:
@@ -275,7 +290,8 @@ def _offset_in_words(hypothesis: Hypothesis, robot: Robot) -> tuple[str, str]:
     old = list(getattr(robot.actuation, key))
     recorded = getattr(robot.actuation, f"recorded_{key}") or old
     new = [home + size * (i == tube) for i, home in enumerate(old)]
-    text = f"{hypothesis.columns[0]} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
+    where = "plane" if kind == "alpha" else "place"
+    text = f"{hypothesis.columns[0]} counts from another {where}: {size:+g} {unit} are missing"
     fix = f"set actuation.{key} to {numbers(new)} and actuation.recorded_{key} to {numbers(recorded)}"
     return text, fix
 
