@@ -79,6 +79,19 @@ def test_completed(robot, left_out):
     assert not nothing
 
 
+def test_stuck_readings(robot, left_out):
+    """Readings that stay where the recorded motion would leave them, if the visits differ least there, do not hide what
+    the others say."""
+    table, whole = left_out
+    direct, beyond, again = (np.arange(RUNS) * (2 * STOPS) + k for k in (STOPS // 2, STOPS + 2, 2 * STOPS - 1))
+    position = table.position.copy()
+    stuck = np.argsort(np.linalg.norm(position[direct] - position[beyond], axis=1))[:2]
+    position[again[stuck]] = position[direct[stuck]]
+    found, said = missing_motion.completed(robot, replace(table, position=position))
+    assert len(said) == 1
+    assert len(found) == len(whole)
+
+
 def test_fit(robot, left_out):
     """A fit comes near the noise and near that of the whole table; without the detours, readings at their end miss by
     millimetres."""

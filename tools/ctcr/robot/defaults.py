@@ -30,7 +30,7 @@ SAID = {
     "uncertainty": f"not given: taken to be {UNCERTAINTY['tracker_frame_mm']:g} mm and "
     f"{UNCERTAINTY['tracker_frame_deg']:g} deg for the tracker frame, {UNCERTAINTY['rotation_offset_deg']:g} deg and "
     f"{UNCERTAINTY['translation_offset_mm']:g} mm for the homes, {UNCERTAINTY['length_mm']:g} mm for lengths, "
-    f"{UNCERTAINTY['curvature_percent']:g} % for curvatures and {UNCERTAINTY['youngs_modulus_percent']:g} % for Young's "
+    f"{UNCERTAINTY['curvature_percent']:g} % for curvatures and {UNCERTAINTY['youngs_modulus_percent']:g} % for the "
     "moduli",
 }
 
