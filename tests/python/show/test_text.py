@@ -131,7 +131,7 @@ DOORS = {
     r"\bclick\.(prompt|confirm)\(": {"bench/devices/person.py", "commands/init.py"},
     r"(?<![\w.])print\(|\bstd(out|err)\.write\(": {"show/output.py"},  # its JSON
     r"\bmarkup=|\bfrom_markup\(": {"show/output.py"},
-    r"\bfrom html import\b|\bimport html\b": {"show/html_page.py"},
+    r"\bfrom html import\b|\bimport html\b": {"show/wording.py"},
 }
 
 
