@@ -108,7 +108,7 @@ TEST(Descent, KeepsAStartWithinItsBounds) {
     test::Random random{std::uint64_t(seed)};
     constexpr Eigen::Index n = 5;
     std::vector<LinearBound> within;
-    for (int k = 0; k < 3; ++k) within.push_back({"edge", normals(n, random), -10});
+    for (int k = 0; k < 3; ++k) within.push_back({"edge", normals(n, random), -100});
     const detail::Bounds bounds(std::vector<FreeParameter>(n, {"p", 0, 1}), within, Eigen::VectorXd::Ones(n));
     const Eigen::VectorXd inside = normals(n, random), outside = bounds.clamped(100 * inside);
     EXPECT_TRUE(bounds.clamped(inside) == inside) << seed;
