@@ -1,6 +1,6 @@
 """Motion that a table leaves out is found where readings return to joints, and only there."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -43,11 +43,6 @@ def sweeps(plan: Measurements) -> tuple[Measurements, np.ndarray]:
     ), hidden
 
 
-def rows_of(table: Measurements, kept: np.ndarray) -> Measurements:
-    columns = {f.name: getattr(table, f.name) for f in fields(table) if f.name not in ("warnings", "from_home")}
-    return replace(table, **{name: None if old is None else old[kept] for name, old in columns.items()})
-
-
 @pytest.fixture(scope="module")
 def rubbing(robot):
     return catalogue.with_values(robot, ["friction"], FRICTION)
@@ -58,7 +53,7 @@ def left_out(rubbing, plan):
     """Readings of a robot with friction whose detours were not recorded, and the whole table."""
     whole, hidden = sweeps(plan)
     made = simulation.simulate(rubbing, whole, "realistic", seed=2)
-    return rows_of(made, ~hidden), made
+    return made.rows(~hidden), made
 
 
 def test_completed(robot, left_out):
@@ -115,14 +110,14 @@ def test_diagnosis(robot, left_out):
 def test_direct_motion(robot, rubbing, plan, noise):
     """Readings that were reached directly stay."""
     whole, hidden = sweeps(plan)
-    table = simulation.simulate(rubbing, rows_of(whole, ~hidden), noise, seed=3)
+    table = simulation.simulate(rubbing, whole.rows(~hidden), noise, seed=3)
     assert missing_motion.completed(robot, table) == (table, [])
 
 
 def test_without_history(robot, plan):
     """A robot without history shows no missing motion."""
     whole, hidden = sweeps(plan)
-    table = rows_of(simulation.simulate(robot, whole, "realistic", seed=4), ~hidden)
+    table = simulation.simulate(robot, whole, "realistic", seed=4).rows(~hidden)
     assert missing_motion.completed(robot, table) == (table, [])
 
 

@@ -74,6 +74,6 @@ def test_command(run, tmp_path):
     assert robot_file.load(new).tracker.position_mm == pytest.approx([row["value"] for row in found["values"][:3]])
     assert json.loads(run("compare", new, table, "--json", "-")[1])["conventions"] == []
     simulation.write(replace(readings, alpha=readings.alpha * [1, -1]), table, 2)
-    code, _, error = run("calibrate", "frame", wrong, table)
+    code, _, error = run("calibrate", "frame", new, table)
     assert code != 0
     assert "alpha2 counts the other way" in error

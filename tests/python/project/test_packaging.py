@@ -42,7 +42,8 @@ def declared(extras: list[str]) -> set[str]:
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_imported_package_is_declared(folder):
     sources = [*(ROOT / folder).rglob("*.py")]
-    own = {"ctcr", *(path.stem for path in [*sources, *(ROOT / "tools").rglob("*.py")])}
+    ours = [*sources, *(ROOT / "tools").rglob("*.py"), *(ROOT / "tests" / "python" / "support").glob("*.py")]
+    own = {"ctcr", *(path.stem for path in ours)}
     known = declared(FOLDERS[folder]) | own | TRIED | set(sys.stdlib_module_names)
     missing = {
         f"{path.relative_to(ROOT)}: {name}"

@@ -1,8 +1,6 @@
 """The error of a hypothesis after all that a calibration may move: a short robust fit to few readings."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -19,29 +17,23 @@ class Calibrated:
     """A robot fitted to K readings, and the error that it leaves."""
 
     robot: Robot
-    residual: Array  # (K, 3) [m] measured minus predicted, tracker axes; NaN where the model has no solution
+    error: Array  # (K,) [m] distance of each reading from its prediction; NaN where the model has no solution
     floor: float  # [m] distance that jitter alone makes; 0: not stated
-    improbable: float  # minus the log prior density of the fitted values, over that of values known as well as now
-    offset: float = 0.0  # SI, of a home in some rows
-
-    @cached_property
-    def error(self) -> Array:
-        """Distance (K,) [m] of each reading from its prediction."""
-        return np.linalg.norm(self.residual, axis=1)
 
     @property
     def solved(self) -> Mask:
         return np.isfinite(self.error)
 
     @property
-    def typical(self) -> float:
-        """Median of the error [m]; infinite where the model solves hardly any."""
-        known = self.solved.mean() > settings.CONVENTION_SOLVED
-        return max(float(np.nanmedian(self.error)), settings.CONVENTION_FINEST) if known else np.inf
+    def log_error(self) -> Array:
+        """Logarithm of the error (K,), in which a few outliers weigh little; jitter bounds it below."""
+        missed = np.where(self.solved, self.error, settings.CONVENTION_UNSOLVED)
+        return 0.5 * np.log(missed**2 + max(self.floor, settings.CONVENTION_FINEST) ** 2)
 
     @property
-    def is_noise(self) -> bool:
-        return self.typical < settings.CONVENTION_AT_FLOOR * max(self.floor, settings.CONVENTION_FINEST)
+    def typical(self) -> float:
+        """Geometric mean of the error [m]: what decides."""
+        return float(np.exp(self.log_error.mean()))
 
     @property
     def rms_mm(self) -> float:
@@ -49,42 +41,27 @@ class Calibrated:
         return 1e3 * float(np.sqrt(np.mean(self.error[self.solved] ** 2))) if self.solved.any() else np.inf
 
 
-def calibrated(
-    robot: Robot,
-    readings: Measurements,
-    *,
-    free: Sequence[str] = (),
-    offset: tuple[str, float, Mask] | None = None,
-    to_beat: float = np.inf,
-) -> Calibrated:
+def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None, to_beat: float = np.inf) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
     Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
-    name begins with one of `free` say nothing.
-    `offset`: a home that is another in some rows (K,) by a small amount, which has this standard deviation.
+    name begins with `free` say nothing.
     Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
     gives up where it does not soon fall below an error `to_beat` [m].
     """
     names, mean, sd, low, high = _priors(robot)
     if free:
-        chosen = np.array([name.startswith(tuple(free)) for name in names])
+        chosen = np.array([name.startswith(free) for name in names])
         anywhere = np.array([np.pi if "rotation" in name else settings.CONVENTION_ANYWHERE for name in names])
         sd = np.where(chosen, anywhere, sd)
         low, high = np.where(chosen, mean - anywhere, low), np.where(chosen, mean + anywhere, high)
     table = recording.recording_of(robot, readings, names)
-    if offset:
-        home, width, own = names.index(offset[0]), offset[1], offset[2][:, None]
-        mean, sd, low, high = np.r_[mean, 0.0], np.r_[sd, width], np.r_[low, -width], np.r_[high, width]
-    n = len(names)
     values, floor = mean.copy(), np.sqrt(3) * 1e-3 * (robot.tracker.jitter_mm or 0.0)
-    damping, found, improbable = settings.CONVENTION_DAMPING, None, 0.0
+    damping, found = settings.CONVENTION_DAMPING, None
     for iteration in range(settings.CONVENTION_ITERATIONS):
         if found is None:
-            residual, jacobian, _ = table.residual(values[:n], True)
+            residual, jacobian, _ = table.residual(values, True)
             residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
-            if offset:
-                jacobian = np.concatenate([jacobian, (own * jacobian[:, :, home])[:, :, None]], axis=2)
-                residual = residual + jacobian[:, :, n] * values[n]
             error = np.linalg.norm(residual, axis=1)
             solved = np.isfinite(error)
             if not solved.any():
@@ -93,31 +70,25 @@ def calibrated(
             if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
                 break
             found = _cost(error, solved, size, (values - mean) / sd)
-            weight = 1 / (size**2 + error[solved] ** 2)
-            a = jacobian[solved] * np.sqrt(3 * weight)[:, None, None]
-            a, b = a.reshape(-1, len(mean)), (residual[solved] * np.sqrt(3 * weight)[:, None]).ravel()
-            information = a.T @ a + np.diag(1 / sd**2)
-            determinant = np.linalg.slogdet(sd[:, None] * information * sd)[1]
-            improbable = 0.5 * float(np.sum(((values - mean) / sd) ** 2) + determinant)
+        weight = 1 / (size**2 + error[solved] ** 2)
+        a = jacobian[solved] * np.sqrt(3 * weight)[:, None, None]
+        a, b = a.reshape(-1, len(names)), (residual[solved] * np.sqrt(3 * weight)[:, None]).ravel()
+        information = a.T @ a + np.diag(1 / sd**2)
         scaled = damping * np.diag(np.diag(information))
         step = np.linalg.solve(information + scaled, a.T @ b + (values - mean) / sd**2)
         tried = np.clip(values - step, low, high)
-        left = table.residual(tried[:n])[0].reshape(-1, 6)[:, :3]
-        if offset:
-            left = left + jacobian[:, :, n] * tried[n]
-        missed = np.linalg.norm(left, axis=1)
+        missed = np.linalg.norm(table.residual(tried)[0].reshape(-1, 6)[:, :3], axis=1)
         cost = _cost(missed, solved, size, (tried - mean) / sd)
         if cost < found:
             settled = found - cost < settings.CONVENTION_SETTLED
-            values, residual, found, damping = tried, left, None, damping / 10
+            values, error, found, damping = tried, missed, None, damping / 10
             if settled:
                 break
         else:
             damping *= 10
             if damping > settings.CONVENTION_MOST_DAMPING:
                 break
-    fitted = parameters.applied(robot, names, values[:n])
-    return Calibrated(fitted, residual, floor, improbable, float(values[n]) if offset else 0.0)
+    return Calibrated(parameters.applied(robot, names, values), error, floor)
 
 
 def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:

@@ -29,7 +29,7 @@ def wrong_unit(readings: Measurements, rms_mm: float) -> tuple[Finding, Change] 
 
     unit = min(UNITS, key=lambda name: unlikely(UNITS[name]))
     factor = UNITS[unit]
-    if unlikely(1.0) - unlikely(factor) < settings.TIE:
+    if unlikely(1.0) - unlikely(factor) < settings.CONVENTION_ODDS:
         return None
     text = f"times are in {unit}, not in s: joints would move at {speed:.1g} rad/s, and so move at {speed / factor:.1g}"
     found = Finding("time_unit", text, ("t_s",), f"ctcr import --unit t={unit}", rms_mm=(rms_mm, rms_mm))

@@ -1,6 +1,6 @@
 """The hypotheses on joints, loads, positions and the tracker frame: each a change that would make them right."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
@@ -23,7 +23,7 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Hypothesis:
     """What may be wrong, and the table or the robot file as it should be."""
 
@@ -36,13 +36,6 @@ class Hypothesis:
     registers: bool = False  # the tracker frame is taken from the readings
     offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
-    scale: float = 1.0  # positions in m over those of the table
-    rivals: Sequence["Hypothesis"] = ()  # of another kind, which explain the readings as well
-
-    @property
-    def of_prediction(self) -> bool:
-        """Whether it changes what the model predicts, and not where or in which unit the tracker reads it."""
-        return self.kind.startswith(("joint", "force"))
 
     @property
     def frees(self) -> str | None:
@@ -190,7 +183,7 @@ def _forces(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     for unit, factor in OTHER_UNITS["position"]:
         text, fix = f"positions are in {unit}, not in m", f"ctcr import --unit position={unit}"
-        yield Hypothesis("position_unit", text, POSE, fix, changed("position", lambda p, f=factor: p * f), scale=factor)
+        yield Hypothesis("position_unit", text, POSE, fix, changed("position", lambda p, f=factor: p * f))
     for axis, name in enumerate("xyz"):
         sign = np.ones(3)
         sign[axis] = -1.0

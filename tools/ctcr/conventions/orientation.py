@@ -16,29 +16,38 @@ SCALAR_LAST = ("quaternion_order", "the quaternion columns hold x, y, z, w", "ct
 INVERSE = ("quaternion_inverse", "the quaternions are those of the inverse rotation", "ctcr import --invert-quaternion")
 
 
-def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None) -> tuple[list[Finding], Change, bool]:
-    """What is wrong with the quaternions of readings whose positions fit, the change that corrects them, and whether
-    they are mirrored along an axis of the tracker, as positions are; None: these are not.
-    """
+def wrong_form(fit: Calibrated, readings: Measurements) -> tuple[list[Finding], Change]:
+    """What is wrong with the quaternions of readings whose positions fit, and the change that corrects them."""
     given = readings.quaternions
     use = fit.solved & readings.oriented
     if not use.any():
-        return [], lambda m: m, False
+        return [], lambda m: m
     predicted = _predicted(fit.robot, readings.rows(use))
     roll_known = fit.robot.tracker.roll_known
-    mirrors = (None,) if axis is None else (axis, None)
-    forms = {
-        (form, mirrored): _in_form(given[use], *form, mirrored) for form in np.ndindex(2, 2) for mirrored in mirrors
-    }
-    errors = {form: _error_deg(predicted, quaternion, roll_known) for form, quaternion in forms.items()}
-    best = min(errors, key=lambda form: errors[form])
-    if errors[best] > settings.CONVENTION_CLEAR * errors[(0, 0), best[1]]:
-        best = min((((0, 0), mirrored) for mirrored in mirrors), key=lambda form: errors[form])
-    (last, inverse), mirrored = best
+    errors = {form: _error_deg(predicted, _in_form(given[use], *form), roll_known) for form in np.ndindex(2, 2)}
+    last, inverse = best = min(errors, key=lambda form: errors[form])
+    before, after = errors[0, 0], errors[best]
+    if not any(best) or after > settings.CONVENTION_CLEAR * before:
+        return [], lambda m: m
     wrong = [SCALAR_LAST] * last + [INVERSE] * inverse
-    deg = (errors[(0, 0), mirrored], errors[best])
-    found = [Finding(*one[:2], QUATERNION, one[2], rms_mm=(fit.rms_mm, fit.rms_mm), rms_deg=deg) for one in wrong]
-    return found, changed("quaternion", lambda q: _in_form(q, last, inverse, mirrored)), mirrored is not None
+    found = [
+        Finding(kind, text, QUATERNION, fix, rms_mm=(fit.rms_mm, fit.rms_mm), rms_deg=(before, after))
+        for kind, text, fix in wrong
+    ]
+    return found, changed("quaternion", lambda q: _in_form(q, last, inverse))
+
+
+def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
+    """Whether quaternions are mirrored along an axis of the tracker as the positions were."""
+    use = fit.solved & readings.oriented
+    if not use.any():
+        return False
+    predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
+    options = [
+        min(_error_deg(predicted, _in_form(q, *form), fit.robot.tracker.roll_known) for form in np.ndindex(2, 2))
+        for q in (given, mirror(given, axis))
+    ]
+    return options[1] < options[0]
 
 
 def error_deg(robot: Robot, readings: Measurements) -> float:
@@ -54,10 +63,9 @@ def mirror(quaternion: Array, axis: int) -> Array:
     return quaternion * sign
 
 
-def _in_form(quaternion: Array, last: int, inverse: int, axis: int | None) -> Array:
+def _in_form(quaternion: Array, last: int, inverse: int) -> Array:
     moved = np.roll(quaternion, 1, axis=-1) if last else quaternion
-    turned = conjugate(moved) if inverse else moved
-    return turned if axis is None else mirror(turned, axis)
+    return conjugate(moved) if inverse else moved
 
 
 def _predicted(robot: Robot, readings: Measurements) -> Array:

@@ -9,7 +9,7 @@ from ctcr.arrays import Array, Integers, Mask, evenly
 from ctcr.conventions import clock, frozen, orientation, runs, search, tips
 from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
-from ctcr.conventions.hypotheses import Change
+from ctcr.conventions.hypotheses import Change, changed
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -43,25 +43,28 @@ def review(robot: Robot, readings: Measurements) -> Review:
     few = np.flatnonzero(located)
     of_runs = _of_every_run(readings, located)
     sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
-    case, found = search.corrected(robot, sample)
+    case, found = search.corrected(robot, sample, readings.rows(of_runs))
+    changes = [*case.changes]
 
     # Orientations are judged where positions are right.
-    axes = ["xyz".index(one.columns[0][0]) for one in found if one.kind == "mirrored"]
-    wrong, change, mirrored = orientation.wrong_form(case.fit, case.readings, axes[0] if axes else None)
-    found = [*(_with_quaternion(one, case, mirrored) for one in found), *wrong]
-    right = _applied(readings, [*case.changes, change])
+    found = [_with_quaternion(one, case, changes) for one in found]
+    wrong, change = orientation.wrong_form(case.fit, _applied(case.readings, changes[len(case.changes) :]))
+    found += wrong
+    right = _applied(readings, [*changes, change])
 
     # Runs need some readings of each, which a large table has.
-    of_runs = right.rows(of_runs)
-    case = search.Case(case.robot, of_runs, calibrated(case.robot, of_runs))
+    fit, of_runs = case.fit, right.rows(of_runs)
+    if len(of_runs) != len(case.readings):
+        fit = calibrated(case.robot, of_runs)
     for _ in range(settings.MOST_CONVENTIONS):
-        homed = runs.homed_elsewhere(case)
+        homed = runs.homed_elsewhere(fit, of_runs)
         if homed is None:
             break
-        finding, change, case = homed
-        found, right = [*found, finding], change(right)
+        finding, change = homed
+        of_runs, right, before = change(of_runs), change(right), fit
+        fit = calibrated(case.robot, of_runs)
+        found.append(finding.with_errors(before.rms_mm, fit.rms_mm))
 
-    fit = case.fit
     if still := frozen.stood_still(fit.robot, right):
         finding, rows = still
         found.append(finding.with_errors(_with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows), fit.rms_mm))
@@ -79,13 +82,15 @@ def _applied(readings: Measurements, changes: list[Change]) -> Measurements:
     return readings
 
 
-def _with_quaternion(finding: Finding, case: search.Case, mirrored: bool) -> Finding:
-    """A mirror with words on the quaternions, which may be mirrored too."""
+def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change]) -> Finding:
+    """A mirror with words on the quaternions, which may be mirrored too: then that joins the changes."""
     if finding.kind != "mirrored":
         return finding
     [column] = finding.columns
-    fix, rivals = f"ctcr import --mirror {column[0]}", finding.rivals
-    if not mirrored and case.readings.oriented.any():
+    axis, fix, rivals = "xyz".index(column[0]), f"ctcr import --mirror {column[0]}", finding.rivals
+    if orientation.mirrored(case.fit, case.readings, axis):
+        changes.append(changed("quaternion", lambda q: orientation.mirror(q, axis)))
+    elif case.readings.oriented.any():
         fix = f"negate {column}"
         rivals = ()  # joints that count the other way would mirror the orientations too
     return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)
