@@ -37,7 +37,7 @@ if(NOT MSVC)
     "$<$<BOOL:${CTCR_ARCH}>:-march=${CTCR_ARCH}>")
 endif()
 
-# Tests and examples are compiled more often than they run: a fifth of the compile time of -O3.
+# Tests and examples are compiled more often than they run.
 add_library(ctcr_fast_compile INTERFACE)
 target_link_libraries(ctcr_fast_compile INTERFACE ctcr_flags)
 target_compile_definitions(ctcr_fast_compile INTERFACE CTCR_FAST_COMPILE)

@@ -16,7 +16,8 @@ def evenly(count: int, most: int) -> Integers:
 
 
 def scattered(count: int, most: int) -> Integers:
-    """As `evenly`, but at another place of each stretch, by the golden ratio: no period of the rows is favoured."""
+    """As `evenly`, but the place within each stretch follows the golden ratio, so that no period of the rows is in step
+    with the choice."""
     if count <= most:
         return np.arange(count)
     stretch = np.arange(most)

@@ -83,7 +83,7 @@ FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are t
 # ---- Joint fit
 
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
-FEW_PART = 0.1  # of very many rows, fitted before all of them: for a tenth of the cost of each step that it spares
+FEW_PART = 0.1  # of very many rows, fitted before all of them: its steps cost a tenth
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
 COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart
 ITERATIONS = 50  # by which a fit has converged, or never will
@@ -117,7 +117,7 @@ EXCHANGES = 12  # exchanges of held-out groups, at most
 # ---- Calibration command
 
 NEARLY_EXPLAINED = 1.5  # reduced chi-square up to which the smooth field error is still accepted as the noise
-CROSS_VALIDATION_ROWS = 5000  # of more rows so many judge noises, held-out errors and halves: to save time
+CROSS_VALIDATION_ROWS = 5000  # rows that judge noises, held-out errors and halves at most: to save time
 HALVES_ROWS = 400  # rows at which the models of two halves are compared
 HALVES_DRAWS, HALVES_SEED = 24, 1  # of the posterior: the RMS that noise gives is then known to 15 %
 

@@ -29,7 +29,7 @@ def test_found(n_tubes):
         robot = design(random, n_tubes)
         measured = simulation.simulate(robot, session(robot, random), seed=seed)
         readings = replace(measured, quaternion=None) if seed == 2 else measured
-        found = tracker_frame(somewhere(robot, random), readings, "table.csv")
+        found = tracker_frame(somewhere(robot, random), readings)
         value, sd = np.array([(row.value, row.sd) for row in found.rows[:6]]).T
         turn = Rotation.from_rotvec(value[3:]) * Rotation.from_matrix(robot.tracker.rotation).inv()
         errors.append(np.r_[value[:3] - robot.tracker.position_mm, turn.as_rotvec()] / sd)
@@ -46,7 +46,7 @@ def test_unknown_turn():
     robot = robot.model_copy(update={"tubes": [straight], "gravity": [0.0, 0.0, 0.0]})
     plan = session(robot, random, weight=0.0)
     readings = simulation.simulate(robot, replace(plan, alpha=0 * plan.alpha))
-    [said] = tracker_frame(somewhere(robot, random), replace(readings, quaternion=None), "table.csv").notices[:1]
+    [said] = tracker_frame(somewhere(robot, random), replace(readings, quaternion=None)).notices[:1]
     axis = np.array([float(part) for part in said.split("(")[1].split(")")[0].split(", ")])
     assert "the turn about" in said
     np.testing.assert_allclose(abs(axis @ robot.tracker.rotation[:, 2]), 1, atol=0.02)
@@ -57,7 +57,7 @@ def test_too_few():
     random = np.random.default_rng(5)
     robot = design(random, 2)
     with pytest.raises(InputError, match="2 of the measured positions"):
-        tracker_frame(robot, session(robot, random).rows([0, 1]), "table.csv")
+        tracker_frame(robot, session(robot, random).rows([0, 1]))
 
 
 def test_command(run, tmp_path):

@@ -44,9 +44,8 @@ def add(
         ids = list(dict.fromkeys(catalogue.get(name, robot.n_tubes).id for name in names))
     if not ids:
         raise InputError(Problem("nothing was found to add" if isinstance(effects, Diagnosis) else "name an effect"))
-    names = [name.strip() for name in (free.split(",") if isinstance(free, str) else free)]
     readings, said, _ = to_fit(robot, table, anyway=anyway, frame_per_run=frame_per_run)
     fixed = {**held, **(fixed or {})}
-    added = effects_added.add(robot, readings, ids, fixed=fixed, start=start, free=names)
+    added = effects_added.add(robot, readings, ids, fixed=fixed, start=start, free=free)
     added.notices[:0] = said
     return added

@@ -35,8 +35,7 @@ def calibrate(
     """
     if noise not in ("auto", "jitter", "field"):
         raise ValueError(f"noise must be auto, jitter or field, not {noise!r}")
-    names = [name.strip() for name in (free.split(",") if isinstance(free, str) else free) if name.strip()]
     readings, said, _ = to_fit(robot, table, anyway=anyway, frame_per_run=frame_per_run)
-    found = joint_fit.calibrate(robot, readings, names, hold_out=hold_out, halves=halves, noise=noise, sd=sd)
+    found = joint_fit.calibrate(robot, readings, free, hold_out=hold_out, halves=halves, noise=noise, sd=sd)
     found.notices[:0] = said
     return found

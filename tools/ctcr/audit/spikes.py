@@ -41,9 +41,10 @@ def leaps(robot: Robot, measurements: Measurements, predicted: Array | None = No
         return leap
     read = np.flatnonzero(np.isfinite(measurements.position).all(axis=1))
     if predicted is None:
-        beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-        predicted = Model(robot.standard).predict(beta, alpha, measurements.force).position
-    predicted = predicted[read]
+        beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
+        predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
+    else:
+        predicted = predicted[read]
     measured, run = measurements.position[read], measurements.run[read]
     step = np.diff(measurements.load_space[read], axis=0)
     measured_step, predicted_step = (np.linalg.norm(np.diff(p, axis=0), axis=1) for p in (measured, predicted))

@@ -65,7 +65,7 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
 
 
 def notices(robot: Robot, readings: Measurements, fit: Fit, few: Fit) -> list[str]:
-    """What the user should know of a fit, in sentences; `few`: the same to some of its rows, if they are many."""
+    """What the user should know of a fit, in sentences; `few`: the fit to a part of its rows, where they are many."""
     said_as_doubts = "prior standard deviations"
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
     explained = not unexplained or floors.explains(few, noise_of_readings(robot, readings))

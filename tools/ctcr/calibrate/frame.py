@@ -1,7 +1,5 @@
 """The tracker frame T_ref from poses of the tip, with no start: a registration in closed form, then a joint fit."""
 
-from math import pi
-
 import numpy as np
 
 from ctcr import settings
@@ -13,22 +11,24 @@ from ctcr.conventions.hypotheses import with_frame
 from ctcr.errors import InputError, Problem
 from ctcr.fit import joint
 from ctcr.frames import matrix_from_quaternion
+from ctcr.model import parameters
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
+from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 
 AXES = "xyz"
-ANYWHERE = {"position": 10.0, "rotation": pi}  # [m], [rad] prior standard deviations: nothing is known of the frame
+SD = {"position": settings.CONVENTION_ANYWHERE, "rotation": parameters.ANYWHERE}  # [m], [rad] about the registration
 
 
-def tracker_frame(robot: Robot, readings: Measurements, file: str) -> Outcome:
+def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
     """T_ref where the frame may be anywhere, and homes and tubes as far off as the robot file's uncertainty says.
 
-    `file` names the table in errors. Raises InputError where fewer than three positions can be predicted.
+    Raises InputError where fewer than three positions can be predicted.
     """
-    start = registered(robot, readings, file)
-    names = [f"tracker.{kind}.{axis}" for kind in ANYWHERE for axis in AXES]
-    fit = joint.fit(start, readings, "standard", sd={name: ANYWHERE[name.split(".")[1]] for name in names})
+    start = registered(robot, readings)
+    names = [f"tracker.{kind}.{axis}" for kind in SD for axis in AXES]
+    fit = joint.fit(start, readings, "standard", sd={name: SD[name.split(".")[1]] for name in names})
     own = [fit.names.index(name) for name in names]
     found, covariance = fit.apply(robot=start).tracker, fit.covariance[np.ix_(own, own)]
     after = with_frame(robot, found.rotation, found.position)
@@ -47,10 +47,10 @@ def tracker_frame(robot: Robot, readings: Measurements, file: str) -> Outcome:
         "rms_mm": {"before": before_mm, "after": after_mm, "calibrated": fit.rms_mm()},
         "rotation_sd_deg": np.degrees(sd[3:]).tolist(),
     }
-    return Outcome("Tracker frame", rows, [*unknown(covariance), *fit.warnings], figures)
+    return Outcome("Tracker frame", rows, [*map(sentence, [*unknown(covariance), *fit.warnings])], figures)
 
 
-def registered(robot: Robot, readings: Measurements, file: str) -> Robot:
+def registered(robot: Robot, readings: Measurements) -> Robot:
     """The robot in the frame that carries the predicted tips, and where measured their tangents, to the readings."""
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     tip = Model(robot.standard).predict(beta, alpha, readings.force)
@@ -58,7 +58,7 @@ def registered(robot: Robot, readings: Measurements, file: str) -> Robot:
     count = int(np.isfinite(predicted + measured).all(axis=1).sum())
     if count < 3:
         text = f"the model predicts {count} of the measured positions: a tracker frame needs three or more"
-        raise InputError(Problem(text, file))
+        raise InputError(Problem(text, readings.source))
     ahead = [
         place + settings.JOINT_LEVER * matrix_from_quaternion(turn)[:, :, 2]
         for place, turn in ((predicted, tip.quaternion), (measured, readings.quaternions))
@@ -77,7 +77,7 @@ def unknown(covariance: Array) -> list[str]:
     said = []
     for part, kind, what in ((slice(0, 3), "position", "the shift along"), (slice(3, 6), "rotation", "the turn about")):
         variance, axes = np.linalg.eigh(covariance[part, part])
-        for axis in axes.T[np.sqrt(variance) > settings.SAYS_NOTHING * ANYWHERE[kind]]:
+        for axis in axes.T[np.sqrt(variance) > settings.SAYS_NOTHING * SD[kind]]:
             words = ", ".join(f"{x + 0.0:.2f}" for x in axis)
             said.append(f"the readings do not tell {what} ({words}) in the tracker's axes: any value is as good")
     return said

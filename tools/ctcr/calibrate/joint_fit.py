@@ -157,7 +157,7 @@ class Calibration(Result):
 def calibrate(
     robot: Robot,
     readings: Measurements,
-    free: Sequence[str],
+    free: str | Sequence[str],
     *,
     hold_out: int | None = None,
     halves: bool = True,
@@ -176,7 +176,7 @@ def calibrate(
     """
     floor, given = floors(robot, readings), robot
     robot, readings, notices = sensor_roll.usable(robot, readings)
-    names = without_frame(sensor_roll.with_roll(list(free), robot), readings)
+    names = without_frame(sensor_roll.with_roll(free, robot), readings)
     if not names:
         raise InputError(
             Problem("the frames of the runs are fitted by themselves: name other parameters in --free too")

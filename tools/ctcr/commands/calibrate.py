@@ -162,7 +162,7 @@ def frame(robot, measurements, anyway, target, in_place, out) -> None:
     finds = ("frame_inverse", "frame_wrong")
     readings, said, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=False, finds=finds)
     target = outcome.check_target(loaded, target, in_place)
-    found = tracker_frame(loaded, readings, measurements)
+    found = tracker_frame(loaded, readings)
     found.notices[:0] = said
     _give(found, loaded, target, in_place, "ctcr calibrate frame", measurements, out)
 

@@ -138,7 +138,7 @@ def add(
     *,
     fixed: Mapping[str, float] | None = None,
     start: Mapping[str, float] | None = None,
-    free: Sequence[str] = ("standard",),
+    free: str | Sequence[str] = "standard",
 ) -> Added:
     """Fits the effects `ids` to the readings, jointly with the parameters `free` and the effects that the robot has.
 
@@ -264,7 +264,7 @@ def _path(text: str) -> tuple[str | int, ...]:
 class _Fitter:
     """Fits of one recording with more and more parameters free."""
 
-    def __init__(self, robot: Robot, readings: Measurements, free: Sequence[str], fixed: Mapping[str, float]):
+    def __init__(self, robot: Robot, readings: Measurements, free: str | Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.fixed = robot, fixed
         if not readings.measured.any():
             raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))

@@ -30,7 +30,7 @@ class Engine:
     robust: bool = True  # whether outliers count for little
     threads: int = 0
     progress: Progress = lambda _: None  # is told each step
-    free: Sequence[str] = ("standard",)  # calibration parameters that are fitted, as in parameters.expand
+    free: str | Sequence[str] = "standard"  # calibration parameters that are fitted, as in parameters.expand
     tolerance: float = settings.TOLERANCE  # of log evidence, in fits for which no other is given
     steps: int = field(init=False)  # of integration
     positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
@@ -40,7 +40,7 @@ class Engine:
 
     def __post_init__(self) -> None:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
-        self.base = without_frame(parameters.expand(list(self.free), self.robot), self.measurements)
+        self.base = without_frame(parameters.expand(self.free, self.robot), self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, settings.INTEGRATION_ERROR_COARSE)
 
     @property

@@ -50,8 +50,8 @@ def part_of(rows: Mask, most: int) -> Mask:
 
 
 def growing(rows: Mask) -> list[Mask]:
-    """Rows (M,) that are fitted one after another, each from where the fit before ended: of many rows a few, of very
-    many tenths of them too, at last all."""
+    """Growing parts of some rows (M,), the last all of them: the fit to each starts where the fit to the part before
+    ended. Few rows are one part."""
     most = int(settings.FEW_PART * np.sum(rows))
     few = part_of(rows, most) if most >= 2 * settings.FEW_ROWS else few_of(rows)
     return [rows] if few is None else [*growing(few), rows]

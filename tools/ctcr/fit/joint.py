@@ -43,7 +43,7 @@ class FitOptions:
 
     start: Array | None = None  # (n,); the priors' mean by default
     weights: Array | None = None  # (M, 2) robust ones of another fit; by default outliers are found. 0: not fitted
-    first_weights: Array | None = None  # (M, 2) with which outliers begin to be found
+    first_weights: Array | None = None  # (M, 2) from which the search for outliers starts
     inflation: ArrayLike | None = None  # (2,) of another fit; by default of what the model misses beyond the noise.
     scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
     # Log evidences of models can be compared at the same weights, inflation and scales.

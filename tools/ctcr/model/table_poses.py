@@ -12,7 +12,8 @@ from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
 from ctcr.table.measurements import Measurements, check_of
 
-CHUNK_ROWS = 1 << 16
+CHUNK_ROWS = 1 << 16  # solved at once: a few MB of poses
+PER_ROW = ("position", "quaternion", "status", "stability")
 
 
 def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "base") -> Prediction:
@@ -24,8 +25,7 @@ def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "
     if frame not in ("base", "tracker"):
         raise ValueError(f"frame must be base or tracker, not {frame!r}")
     parts = [answer for _, answer in predictions(robot, table, steps)]
-    names = ("position", "quaternion", "status", "stability")
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in PER_ROW}
     if frame == "tracker":
         columns["position"], columns["quaternion"] = base_to_tracker(
             robot.tracker, columns["position"], columns["quaternion"]
@@ -50,8 +50,7 @@ def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple
             if model:
                 yield rows, model.predict(beta[rows], alpha[rows], table.force[rows])
             else:
-                names = ("position", "quaternion", "status", "stability")
-                yield rows, replace(found, **{name: getattr(found, name)[rows] for name in names})
+                yield rows, replace(found, **{name: getattr(found, name)[rows] for name in PER_ROW})
             progress.advance(rows.stop - start)
 
 

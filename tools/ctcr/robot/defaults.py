@@ -25,13 +25,11 @@ UNCERTAINTY = {
 }
 SAID = {
     "actuation": "not given: the ratios of the motors are not known, at home all tips are flush with the front plate",
-    "tracker": f"not given: taken to read the tip of tube 1 in the base frame, with a jitter of "
+    "tracker": f"not given: the sensor reads the tip of tube 1, tracker and base frame agree, and the jitter is "
     f"{TRACKER['jitter_mm']:g} mm and {TRACKER['jitter_deg']:g} deg",
-    "uncertainty": f"not given: taken to be {UNCERTAINTY['tracker_frame_mm']:g} mm and "
-    f"{UNCERTAINTY['tracker_frame_deg']:g} deg for the tracker frame, {UNCERTAINTY['rotation_offset_deg']:g} deg and "
-    f"{UNCERTAINTY['translation_offset_mm']:g} mm for the homes, {UNCERTAINTY['length_mm']:g} mm for lengths, "
-    f"{UNCERTAINTY['curvature_percent']:g} % for curvatures and {UNCERTAINTY['youngs_modulus_percent']:g} % for the "
-    "moduli",
+    "uncertainty": f"not given: {UNCERTAINTY['tracker_frame_mm']:g} mm of the tracker frame, "
+    f"{UNCERTAINTY['rotation_offset_deg']:g} deg of the homes, {UNCERTAINTY['curvature_percent']:g} % of curvatures "
+    "and so on, as `ctcr init` writes",
 }
 
 

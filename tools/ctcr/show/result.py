@@ -33,7 +33,7 @@ class Glance:
 
 
 class Shown:
-    """What shows itself at a glance."""
+    """Base of what has a line as its repr, and a small table in notebooks."""
 
     def glance(self) -> Glance:
         """The line and the table that stand for it."""

@@ -53,7 +53,7 @@ public:
     }
   }
 
-  /// z itself where it keeps them: a prediction there stays known.
+  /// z moved to within the bounds; to the last bit z where it is there already, as the descent keeps its prediction.
   [[nodiscard]] Eigen::VectorXd clamped(const Eigen::VectorXd& z) const {
     const Eigen::VectorXd y = T_ * z, within = y.cwiseMax(low_).cwiseMin(high_);
     if (within == y) return z;
