@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from statistics import quantiles
 
@@ -119,6 +120,31 @@ def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[
     return [*head, "|---|---|---|---|---|", *rows]
 
 
+def claims(said: dict, truth: dict) -> list[tuple[float, bool]]:
+    """Probability and truth of each claim of a diagnosis: each effect that it names, or else its verdict."""
+    nothing = not truth["classes"] and truth["verdict"] == "nothing_missing"
+    unseen = bool(truth["classes"]) and truth["chi_square_after_calibration"] < VISIBLE
+    if said["verdict"] == "nothing_missing":
+        return [(said["probability"], nothing or unseen)]
+    if said["verdict"] in ("stand_in", "not_in_catalogue"):
+        return [(said["probability"], truth["verdict"] == "not_in_catalogue")]
+    return [(one["probability"], not set(truth["classes"]).isdisjoint(one["class"])) for one in said["effects"]]
+
+
+def reliability(made: list[tuple[float, bool]]) -> list[str]:
+    """Table of how often claims of a probability are right, and the Brier and the logarithmic score of all."""
+    edges = (0.0, 0.5, 0.7, 0.9, 0.97, 0.99, 1.0)
+    rows = ["| probability said | claims | mean | right, 95 % Wilson interval |", "|---|---|---|---|"]
+    for low, high in pairwise(edges):
+        here = [(p, right) for p, right in made if low <= p < high or p == high == 1.0]
+        if here:
+            mean, right = sum(p for p, _ in here) / len(here), sum(right for _, right in here)
+            rows.append(f"| {low:g} to {high:g} | {len(here)} | {mean:.3f} | {wilson(right, len(here))} |")
+    brier = sum((p - right) ** 2 for p, right in made) / len(made)
+    log = -sum(math.log(max(p if right else 1 - p, 1e-6)) for p, right in made) / len(made)
+    return [*rows, "", f"Brier score {brier:.4f}, logarithmic score {log:.4f} (0: perfect)."]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--suite", type=lambda text: Path(text).resolve(), default=ROOT / "build" / "suite")
@@ -167,6 +193,7 @@ def report(chosen: list[str], said: dict[str, dict | None], truths: dict[str, di
         f"| {score} | {noise} | {wilson(hits[score, noise], count)} |"
         for (score, noise), count in sorted(counts.items())
     ]
+    lines += ["", *reliability([claim for name in chosen if said[name] for claim in claims(said[name], truths[name])])]
     lines += ["", *locked_errors(chosen, said, truths)]
     lines += ["", "| sets | hidden | named |", "|---|---|---|"]
     lines += [f"| {count} | {hidden} | {named} |" for (hidden, named), count in sorted(confusion.items())]

@@ -83,10 +83,11 @@ optional_packages() {
 
 pip_install() { quietly .venv/bin/python -m pip install --disable-pip-version-check --no-input "$@"; }
 
-build_requirements() {
+# requirements KEY...: the list that stands there in pyproject.toml, one a line.
+requirements() {
   .venv/bin/python -c '
-import tomllib
-print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")'
+import functools, sys, tomllib
+print(*functools.reduce(dict.get, sys.argv[1:], tomllib.load(open("pyproject.toml", "rb"))), sep="\n")' "$@"
 }
 
 # install_project [OPTION...] -e WHAT: Python sources are used from the tree, the extension is compiled (again).
@@ -109,12 +110,12 @@ stamped() {
 
 environment() {
   system_packages
-  local python requirements
+  local python packages
   python=$(find_python) || { echo "Python 3.11 or newer is needed, with venv and its C headers" >&2; return 1; }
   say "Python packages into .venv"
   .venv/bin/python -m pip --version >/dev/null 2>&1 || "$python" -m venv --clear .venv
-  mapfile -t requirements < <(build_requirements)
-  pip_install "${requirements[@]}"
+  mapfile -t packages < <(requirements build-system requires)
+  pip_install "${packages[@]}"
   stamped extension_hash install_project -e '.[dev]'
   # Programs of others that the simulated devices are tested with; the tests say what they skip without them.
   pip_install ndicapi scikit-surgerynditracker kickcat >/dev/null 2>&1 || echo "not installed: ndicapi and others"

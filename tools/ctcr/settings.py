@@ -196,21 +196,26 @@ CLUSTER_COSINE, CLUSTER_CHANCE = 0.5, 0.25  # between errors of neighbours that 
 CLUSTER_SIGNIFICANCE = 1e-3  # p-value below which outliers that agree with their neighbours are no chance
 CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least
 
-# ---- Diagnosis: verdict and varying-coefficient model, in fractions of unexplained chi-square of held-out runs
+# ---- Diagnosis: probabilities of explanations
+
+FORM_ERROR = 0.15  # part of an effect's signal that its form errs by: lumped laws follow full mechanics to 10 to 20 %
+FORM_MENDED = 0.1  # mean share of what is left that an effect explains which mends the form of another
+OUTSIDE_CATALOGUE = 0.1  # prior odds of a cause outside the catalogue
+SECOND_CAUSE = 0.5  # prior odds of a second cause beside the first
+IMPLAUSIBLE = 0.02  # probability that the values of a cause lie beyond their soft bounds by two standard deviations
+REJECTION_MISSED = 0.1  # probability that the test of the residual does not see a cause that is missing
+SURE = 0.9  # probability from which effects are called identified
+
+# ---- Diagnosis: held-out runs and varying-coefficient model, in fractions of unexplained chi-square of held-out runs
 
 TURNS = 2  # quarters that are held out in turn where nothing was found and the held-out one has new errors
 MOST_UNCERTAIN = 1.5  # expected square error of a held-out run over that of fitted ones, above which it judges nothing
 RUN_UNEXPLAINED = 1.0  # chi-square beyond noise over that of noise, from which a run says how much effects explain
-NOT_SPURIOUS = 0.75  # explained by effects in the median run, below which they are spurious,
-MOSTLY = 0.8  # ... and from which they are identified though the residual is more than noise
-MISLED = 2.0  # mean square error beyond noise over that without effects, from which effects predict worse than none
 DEPENDENCE_SIGNIFICANCE = 0.01  # p-value below which the residual depends on a quantity
 VARYING_ROWS = 400  # rows of the model where there are twice as many or more
 VARYING_MOST = 4  # variations, one found after the other
 VARYING_EXPLAINED = 0.3  # that all variations must explain together
 VARYING_NEGLIGIBLE = 0.05  # for which no further variation is named
-VARYING_RIVAL = 0.15  # left by effects, below which no varying-coefficient model can outdo them
-VARYING_OUTDOES = 0.25  # chi-square left by a varying-coefficient model over that of effects: below, it outdoes them
 VARYING_AT_ONCE = 2_000_000  # numbers that are made at a time: memory
 MOST_TEETH = 24  # of a wheel whose errors are tried
 

@@ -116,14 +116,6 @@ def test_part_of_the_rows(robot, recorded, monkeypatch):
     assert (first.parameter, first.covariate.name) == ("actuation.home_rotation.1", "length1")
 
 
-def test_outdone(twist):
-    """A model of what varies outdoes effects that explain nothing, and not those that explain everything."""
-    engine, fit, found = twist
-    assert varying_coefficients.may_outdo(engine, fit, fit) and found.outdoes(engine, fit, fit)
-    right = with_residual(engine, fit, 0 * fit.residual)
-    assert not varying_coefficients.may_outdo(engine, fit, right) and not found.outdoes(engine, fit, right)
-
-
 def with_residual(engine, fit, residual):
     """The fit with another residual (M, 6)."""
     same = {"weights": fit.weights, "inflation": fit.inflation, "max_iterations": 0}

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from ctcr import settings
 from ctcr.conventions.review import Review
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, paragraph
@@ -13,15 +14,33 @@ ADVICE = "Correct this first, then diagnose again; --anyway goes on without."
 
 def as_diagnosis(review: Review) -> dict[str, Any]:
     """For JSON, with the members that every diagnosis has."""
-    first = review.findings[0]
-    before, after = first.rms_mm
+    before, after = review.findings[0].rms_mm
+    explanations = _explanations(review)
     return {
         "verdict": VERDICT,
+        "probability": explanations[0]["probability"],
         "effects": [],
+        "explanations": explanations,
         "leftover": {"structured": True, "depends_on": []},
         "rms_mm": {"calibrated": before, "corrected": after},
         "conventions": [one.as_dict() for one in review.findings],
     }
+
+
+def _explanations(review: Review) -> list[dict[str, Any]]:
+    """What is found together, the same with a rival in place of one finding, which explains the readings as well, and a
+    cause that is no convention, with the prior odds of one outside the catalogue: the errors tell it from none."""
+    texts = [one.text for one in review.findings]
+    sets = [texts]
+    for k, one in enumerate(review.findings):
+        sets += [[*texts[:k], rival.text, *texts[k + 1 :]] for rival in one.rivals]
+    total = len(sets) + settings.OUTSIDE_CATALOGUE
+    weighed = [("; ".join(own), False, 1 / total) for own in sets]
+    weighed.append(("no convention", True, settings.OUTSIDE_CATALOGUE / total))
+    return [
+        {"effects": [], "outside_catalogue": outside, "text": text, "probability": round(probability, 6)}
+        for text, outside, probability in weighed
+    ]
 
 
 def show(console: Any, review: Review) -> None:

@@ -89,7 +89,8 @@ def unexplained_of(fit: joint.Fit, rows: Mask, *, positions_alone: bool = False)
 def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dict[str, float]:
     """Fraction of the unexplained chi-square of positions that `after` explains, by the name of each held-out run.
 
-    Runs that noise explains under `before` are left out.
+    Runs that noise explains under `before` are left out. Where it explains all, they are judged together: effects must
+    not make them worse by more than three standard deviations of their chi-square.
     """
     table = engine.measurements
     group, fractions = folds.groups(table), {}
@@ -102,4 +103,9 @@ def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dic
             is_run = len(run) == 1 and not np.any((table.run == run[0]) & (group != k))
             name = f"run {run[0]}" if is_run else f"rows {lines.min()} to {lines.max()}"
             fractions[name] = 1 - unexplained(after.residual) / to_explain
+    every = ~engine.rows & table.measured
+    if not fractions and every.any():
+        unexplained, scatter = unexplained_of(after, every, positions_alone=True), np.sqrt(6 * np.sum(every))
+        worse = max(unexplained(after.residual) - 3 * scatter, 0.0)
+        fractions = {"the held-out runs": 1 - worse / max(unexplained(before.residual), scatter)} if worse else {}
     return fractions

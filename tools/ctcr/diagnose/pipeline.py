@@ -14,12 +14,13 @@ from ctcr.conventions import Finding
 from ctcr.diagnose import outliers, segment_delays, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, Progress, values_of
+from ctcr.diagnose.explanations import probability
 from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
 from ctcr.diagnose.round import Round, outlier_fraction, parameters_of
 from ctcr.diagnose.selection import Accepted, select_effects
 from ctcr.diagnose.starts import rows_around
-from ctcr.diagnose.varying_coefficients import VaryingModel, may_outdo, varying_model
+from ctcr.diagnose.varying_coefficients import VaryingModel, varying_model
 from ctcr.diagnose.verdict import Verdict, judge
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint, one_sided
@@ -144,10 +145,17 @@ class Diagnosis(Result):
     def as_dict(self) -> dict[str, Any]:
         return {
             "verdict": self.verdict.word,
+            "probability": round(self.verdict.probability, 6),
             "effects": [
-                {"class": a.ids, "parameters": self.parameters(a), "delta_log_evidence": round(a.log_evidence, 3)}
+                {
+                    "class": a.ids,
+                    "parameters": self.parameters(a),
+                    "delta_log_evidence": round(a.log_evidence, 3),
+                    "probability": round(probability(self.verdict.explanations, [a.ids]), 6),
+                }
                 for a in self.accepted
             ],
+            "explanations": [one.as_dict() for one in self.verdict.explanations],
             "leftover": {"structured": self.residual.structured, "depends_on": self.depends_on},
             "widened": [vars(wider) for wider in self.widened],
             "rms_mm": {name: round(value, 5) for name, value in self.rms_mm.items()},
@@ -258,14 +266,7 @@ def _diagnose(
     explained = explained_by_run(engine, calibrated, with_effects) if accepted else {}
     isolated = outliers.isolated(engine.measurements, with_effects, held_out)
 
-    # The rival of the effects: calibration parameters that vary.
-    rival = None
-    if residual.rejected and accepted and may_outdo(engine, calibrated, with_effects):
-        progress("parameters that are not constant")
-        rival = varying_model(engine, chosen.calibrated, residual.sample)
-    outdone = rival is not None and rival.outdoes(engine, calibrated, with_effects)
-
-    verdict = judge(calibrated, with_effects, accepted, residual, held_out & ~isolated, explained, outdone)
+    verdict = judge(chosen.rounds, accepted, residual, explained)
     floor_noise = fit.noise
 
     # A smooth field error explains many causes that have nothing to do with the field: only beside a distorted field.
@@ -278,8 +279,8 @@ def _diagnose(
         residual = residual_of(engine, chosen.calibrated, corrected, corrections)
 
     # What would have to vary to explain a residual that is more than noise.
-    varying = rival if residual.rejected and verdict.names_no_cause else None
-    if residual.rejected and varying is None:
+    varying = None
+    if residual.rejected:
         progress("parameters that are not constant")
         varying = varying_model(engine, chosen.calibrated if verdict.names_no_cause else fit, residual.sample)
 

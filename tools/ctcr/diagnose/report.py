@@ -13,7 +13,7 @@ from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, cards, figure, paragraph, table
-from ctcr.show.wording import sentence, short
+from ctcr.show.wording import most, sentence, short
 
 MOST_ARROWS = 800
 
@@ -21,7 +21,7 @@ MOST_ARROWS = 800
 def page(d: Diagnosis, source: str) -> str:
     """The whole HTML text; `source` says what was diagnosed."""
     title = f"Diagnosis: {d.robot.name}"
-    parts = [_found, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
+    parts = [_found, _explanations, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
     return html_page.page(title, sections, source, "ctcr diagnose", scene(d))
 
@@ -54,6 +54,12 @@ def _found(d: Diagnosis) -> str:
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
     return f"<h2>{heading}</h2>" + _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
+
+
+def _explanations(d: Diagnosis) -> str:
+    rows = [[one.text, most(one.probability)] for one in d.verdict.likeliest]
+    about = "Posterior probability of each, from the fits and the held-out runs; all others together are less likely"
+    return table(about, ["what acts", "probability"], rows, 1)
 
 
 def _errors(d: Diagnosis) -> str:

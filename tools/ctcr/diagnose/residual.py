@@ -16,12 +16,17 @@ from ctcr.show.wording import listed
 
 @dataclass(frozen=True)
 class Residual:
-    rejected: bool  # whether the noise as stated does not explain it
+    p_value: float  # of the noise as stated
     clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
     before: Ranking  # of quantities on which the residual depends, before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
     corrections: list[str] = field(default_factory=list)  # nuisance errors for which the errors are corrected
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the noise as stated does not explain it."""
+        return self.p_value < settings.SIGNIFICANCE
 
     @property
     def structured(self) -> bool:
@@ -55,7 +60,7 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    return Residual(joint.rejects(fit), clusters, ranked, after, sample, corrections)
+    return Residual(joint.p_value(fit), clusters, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:

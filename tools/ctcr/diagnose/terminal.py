@@ -13,7 +13,7 @@ from ctcr.diagnose.round import Round
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
 from ctcr.show import output
-from ctcr.show.wording import deviation, number, sentence
+from ctcr.show.wording import deviation, most, number, sentence
 
 CANDIDATES = 8  # of a round
 ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest
@@ -39,6 +39,7 @@ def show(console: Any, result: Diagnosis) -> None:
 
     console.print(result.verdict.word.upper().replace("_", " "), style="bold")
     say(*result.verdict.sentences, "")
+    console.print(_explanations(result))
     console.print(_errors(result))
     for number_, round_ in enumerate(result.rounds, start=1):
         if round_.tried:
@@ -55,6 +56,11 @@ def show(console: Any, result: Diagnosis) -> None:
         say(ADVICE, f"What to measure next: {result.varying.measure[0]}")
     say(*map(sentence, result.notices))
     say(*(f"Not tested: {identity}: {reason}." for identity, reason in result.not_testable.items()))
+
+
+def _explanations(result: Diagnosis) -> Any:
+    rows = [[one.text, most(one.probability)] for one in result.verdict.likeliest]
+    return output.table("Explanations that were weighed", ["what acts", "probability"], rows, text=(0,))
 
 
 def _errors(result: Diagnosis) -> Any:

@@ -79,11 +79,6 @@ class VaryingModel:
         """What to measure next, each once."""
         return list(dict.fromkeys(v.measure for v in self.variations))
 
-    def outdoes(self, engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
-        """Whether it leaves far less of the held-out runs than effects do."""
-        unexplained = unexplained_of(calibrated, ~engine.rows)
-        return unexplained(self.residual) < settings.VARYING_OUTDOES * unexplained(with_effects.residual)
-
     @property
     def depends_on(self) -> list[str]:
         """Ids of the quantities."""
@@ -134,12 +129,6 @@ class _Trials:
             beside = alone - overlap[index] @ imitation[index].transpose(0, 2, 1)
             found[which] = laplace(beside, gradient[index])[0]
         return found
-
-
-def may_outdo(engine: Engine, calibrated: Fit, with_effects: Fit) -> bool:
-    """Whether effects leave enough of the held-out runs for a varying-coefficient model to explain far more."""
-    unexplained = unexplained_of(calibrated, ~engine.rows)
-    return unexplained(with_effects.residual) > settings.VARYING_RIVAL * unexplained(calibrated.residual)
 
 
 def varying_model(engine: Engine, fit: Fit, sample: Sample) -> VaryingModel | None:

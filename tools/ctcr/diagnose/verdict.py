@@ -1,21 +1,42 @@
-"""The verdict: one word for programs, plain sentences for people."""
+"""The verdict: one word for programs, plain sentences for people. Both follow from the probabilities of explanations.
 
+| word | where |
+|---|---|
+| `nothing_missing` | noise alone is the most probable explanation |
+| `not_in_catalogue` | a cause outside the catalogue is, and no effect was accepted |
+| `stand_in` | a cause outside the catalogue is, which the accepted effects imitate |
+| `ambiguous` | effects are, and the data cannot tell some of them apart |
+| `identified` | effects are, and act with a probability of SURE without a cause outside the catalogue |
+| `probable` | effects are, with less |
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Mask
+from ctcr.diagnose.explanations import Explanation, probability, weighed
 from ctcr.diagnose.residual import Residual
+from ctcr.diagnose.round import Round
 from ctcr.diagnose.selection import Accepted
-from ctcr.fit import joint
-from ctcr.show.wording import listed
+from ctcr.show.wording import join, listed, most
+
+SHOWN = 0.99  # probability of all explanations that are shown, together
 
 
 @dataclass
 class Verdict:
     word: str  # nothing_missing, identified, probable, ambiguous, stand_in, not_in_catalogue
+    probability: float  # that it is right
+    explanations: list[Explanation]  # all that were weighed, the most probable first
     sentences: list[str] = field(default_factory=list)
+
+    @property
+    def likeliest(self) -> list[Explanation]:
+        """Those that people look at: the most probable ones, together nearly certain."""
+        before = np.cumsum([0.0, *(one.probability for one in self.explanations)])[:-1]
+        return [one for one, sum_ in zip(self.explanations, before, strict=True) if sum_ < SHOWN]
 
     @property
     def names_no_cause(self) -> bool:
@@ -23,50 +44,38 @@ class Verdict:
         return self.word in ("stand_in", "not_in_catalogue")
 
 
-def judge(
-    calibrated: joint.Fit,
-    with_effects: joint.Fit,
-    accepted: list[Accepted],
-    residual: Residual,
-    judged: Mask,
-    explained: dict[str, float],
-    outdone: bool,
-) -> Verdict:
+def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, explained: Mapping[str, float]) -> Verdict:
     """
-    judged     (M,) held-out rows that count
-    explained  fraction of the unexplained chi-square that effects explain, by held-out run (held_out.explained_by_run).
-               The median run says whether they are spurious: one may be off for reasons of its own
-    outdone    whether a varying-coefficient model without effects explains far more
+    explained    fraction of the unexplained chi-square that effects explain, by held-out run (explained_by_run)
     """
-    jitter = np.sqrt(3) * 1e3 * with_effects.noise.position_jitter
-    before, after = (max(fit.rms_mm(judged) ** 2 - jitter**2, 1e-12) for fit in (calibrated, with_effects))
-    if not accepted:
-        if not residual.structured:
-            return Verdict("nothing_missing", ["Calibration and the tracker's noise explain these measurements."])
+    every = weighed(rounds, accepted, residual, explained.values())
+    classes = [a.ids for a in accepted]
+    outside = sum(one.probability for one in every if one.outside)
+    likeliest = every[0]
+    if likeliest.outside and not likeliest.effects:
+        if accepted:
+            names = join([a.id for a in accepted])
+            imitated = f"{names} can explain a part of the error, but a cause outside the catalogue is likelier"
+            return Verdict("stand_in", outside, every, [f"{imitated} ({most(likeliest.probability)})."])
         missing = "Something is missing that no effect of the catalogue explains."
-        return Verdict("not_in_catalogue", [missing, *residual.about_clusters])
-    first = accepted[0]
-    typical = float(np.median([*explained.values()])) if explained else first.explained
-    if residual.rejected and typical < settings.NOT_SPURIOUS:
-        return Verdict("stand_in", [f"Adding {first.id} removes part of the error, but much of it stays."])
-    if outdone:
-        return Verdict("stand_in", [f"Calibration that is not constant explains far more than {first.id} does."])
-    if after > max(settings.MISLED * before, jitter**2):
-        return Verdict("stand_in", [f"With {first.id} the prediction of held-out runs is worse."])
-    if any(a.best.implausible for a in accepted):
-        return Verdict("stand_in", ["The data ask for implausible values.", *first.best.implausible])
-    if any(len(a.ids) > 1 for a in accepted):
-        return Verdict("ambiguous", ["These data cannot tell some effects apart."])
-    if any(a.margin < settings.DECISIVE for a in accepted):
-        return Verdict("probable", ["Another effect is nearly as likely."])
-    names = " and ".join(a.id for a in accepted)
+        return Verdict("not_in_catalogue", outside, every, [missing, *residual.about_clusters])
+    if not accepted:
+        noise = "Calibration and the tracker's noise explain these measurements."
+        return Verdict("nothing_missing", every[0].probability, every, [noise])
+    present, alone = probability(every, classes), probability(every, classes, outside=False)
+    names = join([" or ".join(ids) for ids in classes])
     verb = "explains" if len(accepted) == 1 else "explain"
-    odd = [run for run, fraction in explained.items() if fraction < settings.NOT_SPURIOUS]
-    if residual.rejected and (typical < settings.MOSTLY or odd):
-        stays = [f"Much of the error in {listed(odd)} stays."] if odd else []
-        most = (
-            f"In the median held-out run {names} {verb} {typical:.0%} of the chi-square that noise leaves unexplained."
-        )
-        more = "The residual is more than noise: the constitutive law may be another one, or something else acts too."
-        return Verdict("probable", [most, *stays, more])
-    return Verdict("identified", [f"Given this catalogue, {names} {verb} the error."])
+    sentences = [f"Given this catalogue, {names} {verb} the error (probability {most(alone)})."]
+    odd = [text for a in accepted for text in a.best.implausible]
+    if odd:
+        sentences.append(f"The data ask for implausible values: {listed(odd)}.")
+    if residual.rejected:
+        odd = [run for run, share in explained.items() if share < 1 - (2 * settings.FORM_ERROR) ** 2]
+        sentences += [f"More than noise is left{f', most of it in {listed(odd)}' if odd else ''}."]
+    if any(len(ids) > 1 for ids in classes):
+        return Verdict("ambiguous", present, every, ["These data cannot tell some effects apart.", *sentences])
+    word = "identified" if alone >= settings.SURE else "probable"
+    rival = next((one for one in every if not one.has(classes) or one.outside), None)
+    if word == "probable" and rival:
+        sentences.append(f"The next explanation is {rival.text} ({most(rival.probability)}).")
+    return Verdict(word, present, every, sentences)

@@ -266,11 +266,17 @@ def linear_fit(
     return fit_joint(model, priors, noise or at.noise, positions, weights=weights, **options)
 
 
-def rejects(fit: Fit) -> bool:
-    """Whether the noise of a fit as stated, whatever model error had to be admitted, does not explain the residual."""
+def p_value(fit: Fit) -> float:
+    """Probability that the noise of a fit as stated, whatever model error had to be admitted, leaves such a
+    residual or a larger one; 0 where the noise had to be inflated much."""
     if np.max(fit.inflation) > settings.INFLATION_EXPLAINED:
-        return True
-    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value < settings.SIGNIFICANCE
+        return 0.0
+    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value
+
+
+def rejects(fit: Fit) -> bool:
+    """Whether the noise as stated does not explain the residual of a fit."""
+    return p_value(fit) < settings.SIGNIFICANCE
 
 
 def likeliest_field(fit: Fit) -> Noise:

@@ -1,0 +1,142 @@
+"""Posterior probabilities of all explanations of a table that a diagnosis weighed.
+
+An explanation is noise alone, a set of effects, or a cause that no effect of the catalogue describes, alone or beside
+effects. Four likelihoods weigh them:
+
+- the log evidence of the joint fits. The form of an effect is known only to a part of its signal, so differences
+  smaller than what an error of the form makes decide nothing: they are divided by 1 + FORM_ERROR^2 times the evidence;
+- the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
+  FORM_ERROR if nothing else acts, uniform if something does;
+- the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
+  for an imitation (2 (1 - s)), and exponential with mean FORM_MENDED for one that only mends the form of another;
+- the test of the residual against the noise as stated.
+"""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ctcr import settings
+from ctcr.diagnose.residual import Residual
+from ctcr.diagnose.round import CandidateFit, Round
+from ctcr.diagnose.selection import Accepted
+from ctcr.show.wording import join
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects, perhaps none, and whether a cause outside the catalogue acts too."""
+
+    effects: frozenset[str]
+    outside: bool
+    probability: float
+
+    @property
+    def text(self) -> str:
+        outside = "a cause outside the catalogue" if self.outside else ""
+        return join([*sorted(self.effects), *filter(None, [outside])]) or "noise alone"
+
+    def has(self, classes: Collection[Collection[str]]) -> bool:
+        """Whether it holds an effect of each class."""
+        return all(not self.effects.isdisjoint(alike) for alike in classes)
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "effects": sorted(self.effects),
+            "outside_catalogue": self.outside,
+            "text": self.text,
+            "probability": round(self.probability, 6),
+        }
+
+
+def weighed(
+    rounds: list[Round], accepted: list[Accepted], residual: Residual, explained: Collection[float]
+) -> list[Explanation]:
+    """All explanations, the most probable first; their probabilities add up to 1.
+
+    explained    fraction of the unexplained chi-square that the accepted effects explain, of each held-out run
+    """
+    none: frozenset[str] = frozenset()
+    found = frozenset(a.id for a in accepted)
+    cost = math.log(max(len({one.id for one in rounds[0].tried}), 2))  # of one effect among all
+    rejects = math.log(1 - settings.REJECTION_MISSED if residual.structured else settings.REJECTION_MISSED)
+    left = 1.0 if residual.structured else 0.0  # amplitude that is left of the unexplained signal
+    if accepted:
+        share = float(np.median([*explained])) if residual.structured and explained else 1.0
+        left = math.sqrt(min(max(1 - share, 0.0), 1.0))
+        complete = _form(left)
+    else:
+        complete = _noise(residual)
+    values = sum(_plausible(a.best) for a in accepted)
+    weights = {(found, False): complete + values}
+
+    def weigh(effects: frozenset[str], weight: float, outside: bool = False) -> None:
+        weights[effects, outside] = max(weights.get((effects, outside), -np.inf), weight)
+
+    accepts = {round_.accepted.id: round_ for round_ in rounds if round_.accepted}
+    for a in accepted:
+        refitted = _refitted(accepts[a.id])
+        own, others = refitted[a.id].score, complete + values - _plausible(a.best)
+        for rival in (one for one in refitted.values() if one.id not in found):  # in place of it
+            behind = 0.0 if rival.id in a.ids else max(own - rival.score, 0.0)
+            tempered = behind / (1 + settings.FORM_ERROR**2 * max(own, 0.0))
+            weigh(found - {a.id} | {rival.id}, others - tempered + _plausible(rival))
+        mends = _mends(a.explained) if len(accepted) > 1 else np.inf
+        weigh(found - {a.id}, others - min(a.log_evidence - cost, mends))
+    for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
+        gain, remains = further.score - cost, left * math.sqrt(1 - min(max(further.explained, 0.0), 1.0))
+        gain = min(gain, _mends(further.explained)) if accepted else min(gain, 0.0)
+        weigh(found | {further.id}, rejects + gain + _form(remains) + values + _plausible(further))
+
+    outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects
+    shares = [1 - left**2, *(a.explained for a in accepted[1:])] if accepted else []
+    weigh(none, outside + sum(_density(1 - s) for s in shares), True)
+    if accepted:
+        weigh(found, outside + math.log(settings.SECOND_CAUSE) + values + sum(map(_density, shares)), True)
+    most = max(weights.values())
+    total = sum(math.exp(w - most) for w in weights.values())
+    every = [Explanation(*what, math.exp(w - most) / total) for what, w in weights.items()]
+    return sorted(every, key=lambda one: -one.probability)
+
+
+def probability(
+    explanations: list[Explanation], classes: Collection[Collection[str]], *, outside: bool = True
+) -> float:
+    """That an effect of each class acts; outside: whether a cause outside the catalogue may act too."""
+    return sum(one.probability for one in explanations if one.has(classes) and (outside or not one.outside))
+
+
+def _refitted(round_: Round) -> dict[str, CandidateFit]:
+    """The best fit of each effect, by its id."""
+    return {one.id: one for one in sorted(round_.tried, key=lambda one: one.score) if one.refit is not None}
+
+
+def _noise(residual: Residual) -> float:
+    """Log Bayes factor of noise over what is missing, at most: -e p log p. Ref: Sellke, Bayarri & Berger 2001,
+    "Calibration of p values for testing precise null hypotheses"."""
+    p = min(max(residual.p_value, 1e-300), settings.CLUSTER_SIGNIFICANCE if residual.clusters else 1.0)
+    return math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
+
+
+def _form(left: float) -> float:
+    """Log density of the amplitude that an error of the form leaves."""
+    z = left / settings.FORM_ERROR
+    return math.log(2 / (settings.FORM_ERROR * math.sqrt(2 * math.pi))) - z * z / 2
+
+
+def _density(share: float) -> float:
+    """Log density of the share that a cause explains of what was left before it."""
+    return math.log(2 * min(max(share, 1e-3), 1 - 1e-3))
+
+
+def _mends(share: float) -> float:
+    """Log Bayes factor of a cause, by the share that it explains, over one that mends the form of another effect."""
+    return _density(share) + math.log(settings.FORM_MENDED) + min(max(share, 0.0), 1.0) / settings.FORM_MENDED
+
+
+def _plausible(one: CandidateFit) -> float:
+    """Log probability that a cause has values such as these."""
+    return math.log(settings.IMPLAUSIBLE) if one.implausible else 0.0
