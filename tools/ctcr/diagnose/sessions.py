@@ -11,8 +11,9 @@ import numpy as np
 from ctcr import settings
 from ctcr.audit import sensor_roll
 from ctcr.diagnose.candidates import candidates
-from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.round import Refits, fraction_explained, screen, unexplained, worth_a_refit
+from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.round import fraction_explained, unexplained
+from ctcr.diagnose.selection import Selection
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
 from ctcr.fit import joint
@@ -97,7 +98,7 @@ def _may_win(engine: Engine, one: Fit) -> bool:
 
 
 def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
-    """Whether a frame for each run is likelier than one frame, wherever that lies, and than any effect beside it."""
+    """Whether a frame for each run is likelier than one frame, wherever that lies, and than any effects beside it."""
     own = framed.fit_like(one, start={})
     frame = [name for name in one.names if name not in own.names]
     evidence, numbers = own.log_evidence + _cost(own), len(frame) * len(framed.measurements.sessions.run)
@@ -110,10 +111,10 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     if evidence < elsewhere.log_evidence + settings.DECISIVE:
         return False
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
-    near = [rival for rival in screen(*engine.thinned(one), pool, {}) if rival.linear > settings.NEAR * beyond]
-    refits = Refits(engine, one, {})
-    rivals = refits.of_all(refits.in_reach(worth_a_refit(near))) if near else []
-    return all(beyond > rival.score + settings.DECISIVE for rival in rivals)
+    chosen = Selection(replace(engine), fit=one)
+    chosen.grow(pool)
+    own = framed.fit_with_field([], values_of(own))
+    return own.log_evidence + _cost(own) > chosen.fit.log_evidence + settings.DECISIVE
 
 
 def _cost(own: Fit) -> float:
