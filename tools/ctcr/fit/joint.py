@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ctcr import _core, settings
 from ctcr.arrays import Array, Mask
-from ctcr.audit import sensor_roll
+from ctcr.audit import sensor_pose
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, one_sided
 from ctcr.fit.result import Fit, Priors, rms
@@ -27,7 +27,7 @@ from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
-from ctcr.model.sessions import without_frame
+from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
@@ -69,12 +69,12 @@ def fit(
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
-    noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
+    noise    of the tracker; `noise_of_readings` by default. What is uncertain of the sensor's pose is always free
     Other options as in `FitOptions`. Raises NoFit where none is possible.
     """
     began = perf_counter()
-    robot, measurements, said = sensor_roll.usable(robot, measurements)
-    names = without_frame(sensor_roll.with_roll(free, robot), measurements)
+    robot, measurements, said = sensor_pose.usable(robot, measurements)
+    names = told(sensor_pose.with_pose(free, robot), measurements)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
