@@ -87,6 +87,7 @@ class Engine:
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
+        options["row"] = self.measurements.row
         fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
         if table.friction_is_solved:
             self._friction_path = table
