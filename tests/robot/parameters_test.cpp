@@ -21,7 +21,7 @@ void expect_one_to_one() {
     EXPECT_TRUE(names.emplace(std::string_view(P::name(p))).second);
   }
   EXPECT_EQ(P::robot_count, 9 * N + 3);
-  EXPECT_EQ(P::count, P::robot_count + 2 + 2 * N + 7);
+  EXPECT_EQ(P::count, P::robot_count + 2 + 2 * N + 12);
 }
 
 TEST(Parameters, HaveOnePlaceAndOneName) {

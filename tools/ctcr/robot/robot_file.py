@@ -97,9 +97,10 @@ def _filled(data: dict[str, Any]) -> dict[str, Any]:
 def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
     """A parsed file with the pose of the sensor instead of its roll about the tip's axis, which older files have."""
     tracker, uncertainty = data["tracker"], data["uncertainty"]
-    roll = tracker.get("sensor_roll", "known") if isinstance(tracker, dict) else None
-    degrees = tracker.get("sensor_roll_deg") if roll in ("known", "unknown") else "no section, or a fault of its own"
-    if not isinstance(degrees, int | float | None) or "sensor_rotation_vector_rad" in tracker:
+    if not isinstance(tracker, dict) or "sensor_rotation_vector_rad" in tracker:
+        return data
+    roll, degrees = tracker.get("sensor_roll", "known"), tracker.get("sensor_roll_deg")
+    if roll not in ("known", "unknown") or not isinstance(degrees, int | float | None):  # faults of their own
         return data
     kept = {key: value for key, value in tracker.items() if not key.startswith("sensor_roll")}
     if degrees is not None or roll == "unknown":
