@@ -226,7 +226,7 @@ PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that 
 
 # ---- Conventions of a table, before any physics
 
-SENSOR_JUMP = 0.02, 0.35  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
+SENSOR_JUMP = 0.01, 0.2  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
 CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )
