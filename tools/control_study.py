@@ -11,7 +11,7 @@ import numpy as np
 from ctcr.diagnose import add, diagnose
 from ctcr.effects import catalogue, settings
 from ctcr.fit import joint
-from ctcr.frames import base_to_tracker, tracker_to_base
+from ctcr.frames import points_to_base, points_to_tracker
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
@@ -53,14 +53,6 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     return known, f"{result.verdict.word}: {' + '.join(a.id for a in result.accepted) or 'nothing'}"
 
 
-def upright(points: np.ndarray) -> np.ndarray:
-    return np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
-
-
-def in_tracker(robot: Robot, points: np.ndarray) -> np.ndarray:
-    return base_to_tracker(robot.tracker, points, upright(points))[0]
-
-
 def closed_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> list[np.ndarray]:
     """Distances of the tip from the path [mm], the corner near the obstacle left out, of each run that reaches it."""
     known, real = runs.system_values(controller), runs.system_values(plant)
@@ -73,8 +65,8 @@ def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.nd
     path, obstacle = plan.trajectory, plan.obstacle
 
     def seen(points_mm):  # by a controller whose T_ref is another one
-        there = in_tracker(plant, 1e-3 * np.atleast_2d(points_mm))
-        return (1e3 * tracker_to_base(controller.tracker, there, upright(there))[0]).tolist()
+        there = points_to_tracker(plant.tracker, 1e-3 * np.atleast_2d(points_mm))
+        return (1e3 * points_to_base(controller.tracker, there)).tolist()
 
     own = plan.model_copy(
         update={
@@ -100,7 +92,7 @@ def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.nd
         from_home=False,  # as the controller planned: at rest at the start of the path
     )
     read = simulation.simulate(plant, replay, "none")
-    return 1e3 * np.linalg.norm(read.position - in_tracker(controller, run.wanted), axis=1)[run.far]
+    return 1e3 * np.linalg.norm(read.position - points_to_tracker(controller.tracker, run.wanted), axis=1)[run.far]
 
 
 def row(name: str, open_: np.ndarray, closed: list[np.ndarray]) -> str:

@@ -107,9 +107,10 @@ Free free_parameters(const Eigen::VectorXd& nominal_values, const std::vector<in
 }
 std::vector<int> usual_parameters() {
   std::vector<int> index;
-  for (const Parameter kind : {Parameter::youngs_modulus, Parameter::length, Parameter::curved_length,
-                               Parameter::curvature, Parameter::home_translation, Parameter::home_rotation,
-                               Parameter::tracker_position, Parameter::tracker_rotation, Parameter::sensor_roll})
+  for (const Parameter kind :
+       {Parameter::youngs_modulus, Parameter::length, Parameter::curved_length, Parameter::curvature,
+        Parameter::home_translation, Parameter::home_rotation, Parameter::tracker_position, Parameter::tracker_rotation,
+        Parameter::sensor_position, Parameter::sensor_rotation})
     for (int i = 0; i < P::size(kind); ++i) index.push_back(P::index(kind, i));
   return index;
 }
@@ -132,7 +133,8 @@ TEST(Recording, HasTheSlopesOfItsDifferences) {
   const Table table = path(bench(), bench(), 9, random);
   Recording<2> readings(bench(), table.rows, table.measured, all, pool);
   Eigen::VectorXd x = readings.nominal();
-  x.segment<3>(P::index(Parameter::tracker_rotation)) << 0.3, -0.2, 0.5;  // a turn that is not small
+  x.segment<3>(P::index(Parameter::tracker_rotation)) << 0.3, -0.2, 0.5;  // turns that are not small
+  x.segment<3>(P::index(Parameter::sensor_rotation)) << -0.4, 0.6, 0.2;
   x[P::index(Parameter::length)] += 1e-3;
   Eigen::VectorXd residual;
   Eigen::MatrixXd jacobian;

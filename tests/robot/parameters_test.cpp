@@ -21,7 +21,7 @@ void expect_one_to_one() {
     EXPECT_TRUE(names.emplace(std::string_view(P::name(p))).second);
   }
   EXPECT_EQ(P::robot_count, 9 * N + 3);
-  EXPECT_EQ(P::count, P::robot_count + 2 + 2 * N + 7);
+  EXPECT_EQ(P::count, P::robot_count + 2 + 2 * N + 12);
 }
 
 TEST(Parameters, HaveOnePlaceAndOneName) {
@@ -39,7 +39,7 @@ TEST(Parameters, NamesSayTubeOrAxis) {
   EXPECT_EQ(name(Parameter::rotation_ratio, 0), "actuation.rotation_ratio");
   EXPECT_EQ(name(Parameter::home_translation, 1), "actuation.home_translation.2");
   EXPECT_EQ(name(Parameter::tracker_rotation, 0), "tracker.rotation.x");
-  EXPECT_EQ(name(Parameter::sensor_roll, 0), "tracker.sensor_roll");
+  EXPECT_EQ(name(Parameter::sensor_rotation, 2), "tracker.sensor_rotation.z");
 }
 
 TEST(Parameters, RangesAreRanges) {

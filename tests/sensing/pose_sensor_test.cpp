@@ -23,13 +23,12 @@ TEST(PoseSensor, ReadsTheTubeThatCarriesIt) {
   std::array<Pose, 3> tips;
   for (Pose& tip : tips) tip = random_pose(random);
   for (int tube = 0; tube < 3; ++tube) {
-    const PoseSensor sensor{random_pose(random), tube, test::uniform(random, -3, 3)};
+    const PoseSensor sensor{random_pose(random), tube, random_pose(random)};
     const Pose tip = tips[std::size_t(tube)], read = reading(sensor, tips);
     EXPECT_LE((tip_of(sensor, read).rotation - tip.rotation).norm(), 1e-14);
     EXPECT_LE((tip_of(sensor, read).position - tip.position).norm(), 1e-14);
     const Vec3 point(0.1, 0.2, 0.3);  // of the sensor, in both ways to the tracker
-    const double c = std::cos(sensor.roll), s = std::sin(sensor.roll);
-    const Vec3 of_tip(c * point.x() - s * point.y(), s * point.x() + c * point.y(), point.z());
+    const Vec3 of_tip = sensor.T_tip_sensor.rotation * point + sensor.T_tip_sensor.position;
     const Vec3 in_base = tip.rotation * of_tip + tip.position;
     EXPECT_LE((read.rotation * point + read.position -
                (sensor.T_tracker_base.rotation * in_base + sensor.T_tracker_base.position))
@@ -41,18 +40,22 @@ TEST(PoseSensor, ReadsTheTubeThatCarriesIt) {
 TEST(PoseSensor, DerivativesAreThoseOfTheReading) {
   test::Random random(2);
   for (int n = 0; n < 50; ++n) {
-    const PoseSensor sensor{random_pose(random), 0, test::uniform(random, -3, 3)};
+    const PoseSensor sensor{random_pose(random), 0, random_pose(random)};
     const std::array<Pose, 1> tip{random_pose(random)};
-    const Mat6 by_tip = reading_by_tip(sensor), by_frame = reading_by_frame(sensor, reading(sensor, tip));
-    const auto at_roll = [&](double t) { return reading(PoseSensor{sensor.T_tracker_base, 0, sensor.roll + t}, tip); };
-    EXPECT_LE((test::slope(at_roll, 1e-2) - reading_by_roll(reading(sensor, tip))).norm(), 1e-8);
+    const Pose read = reading(sensor, tip);
+    const Mat6 by_tip = reading_by_tip(sensor, read), by_frame = reading_by_frame(sensor, read),
+               by_mount = reading_by_mount(sensor, read);
     for (int j = 0; j < 6; ++j) {
       const auto at_tip = [&](double t) { return reading(sensor, std::array{displaced(tip[0], t * Vec6::Unit(j))}); };
       const auto at_frame = [&](double t) {
-        return reading(PoseSensor{moved_frame(sensor.T_tracker_base, t * Vec6::Unit(j)), 0, sensor.roll}, tip);
+        return reading(PoseSensor{moved_frame(sensor.T_tracker_base, t * Vec6::Unit(j)), 0, sensor.T_tip_sensor}, tip);
+      };
+      const auto at_mount = [&](double t) {
+        return reading(PoseSensor{sensor.T_tracker_base, 0, displaced(sensor.T_tip_sensor, t * Vec6::Unit(j))}, tip);
       };
       EXPECT_LE((test::slope(at_tip, 1e-2) - by_tip.col(j)).norm(), 1e-8);
       EXPECT_LE((test::slope(at_frame, 1e-2) - by_frame.col(j)).norm(), 1e-8);
+      EXPECT_LE((test::slope(at_mount, 1e-2) - by_mount.col(j)).norm(), 1e-8);
     }
   }
 }

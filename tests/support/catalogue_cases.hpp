@@ -56,8 +56,9 @@ Recorded<N> random_recording(const Catalogue::On<N>& effects, int tube, Random& 
     VecN<N> home;
     for (int i = 0; i < N; ++i) home[i] = uniform(random, -0.2, 0.2);
     const Transmission<N> transmission{uniform(random, 2e-4, 5e-4), -uniform(random, 0.5, 2), 0.1 * home, home};
-    const PoseSensor sensor{
-        {rotation_matrix(random_vector(random, 3)), random_vector(random, 0.3)}, tube, uniform(random, -3, 3)};
+    const PoseSensor sensor{{rotation_matrix(random_vector(random, 3)), random_vector(random, 0.3)},
+                            tube,
+                            {rotation_matrix(random_vector(random, 3)), random_vector(random, 0.05)}};
     Recorded<N> recorded{{transmission,
                           Model<N, Catalogue>(c.robot, effects),
                           sensor,

@@ -30,7 +30,7 @@ Command<N> random_command(bool loaded, int tube, test::Random& random) {
                                      -0.1 * VecN<N>::Random().cwiseAbs(), VecN<N>::Random()};
   const PoseSensor sensor{{rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.5)},
                           tube,
-                          test::uniform(random, -3, 3)};
+                          {rotation_matrix(test::random_vector(random, 3)), test::random_vector(random, 0.05)}};
   return {{transmission, Model<N>(c.robot), sensor, {.tolerance = 1e-12, .steps = 20, .accuracy = test::as_told}},
           motor_angles(transmission, c.q),
           c.load};
@@ -56,9 +56,10 @@ TEST(Predict, Reading) {
     const Solution<3> solution = test::solved<Derivatives::none>(robot, p.q, load, system.settings.steps);
     const Pose& T_ref = system.sensor.T_tracker_base;
     const Pose& tip = solution.tube_tips[std::size_t(system.sensor.tube)];
-    EXPECT_LE((p.reading.position - (T_ref.rotation * tip.position + T_ref.position)).norm(), 1e-10);
-    EXPECT_LE((p.reading.rotation - T_ref.rotation * tip.rotation * rotation_matrix({0, 0, system.sensor.roll})).norm(),
-              1e-9);
+    const Pose& T_tip_sensor = system.sensor.T_tip_sensor;
+    const Vec3 place = tip.rotation * T_tip_sensor.position + tip.position;
+    EXPECT_LE((p.reading.position - (T_ref.rotation * place + T_ref.position)).norm(), 1e-10);
+    EXPECT_LE((p.reading.rotation - T_ref.rotation * tip.rotation * T_tip_sensor.rotation).norm(), 1e-9);
   }
 }
 

@@ -50,18 +50,38 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> Array:
 
 
 def base_to_tracker(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
-    """Poses (..., 3), (..., 4) of the tip, base frame, as the sensor reads them: x_tracker = T_ref x_base.
+    """Poses (..., 3), (..., 4) of the tip, base frame, as the sensor reads them: T_ref T_base_tip T_tip_sensor.
 
-    `tracker` is the robot file's section, which holds T_ref and the roll of the sensor.
+    `tracker` is the robot file's section, which holds T_ref and the pose of the sensor.
     """
-    turned = np.asarray(position, dtype=float) @ tracker.rotation.T + tracker.position
-    return turned, product(_frame(tracker), product(quaternion, _roll(tracker)))
+    position, quaternion = of_sensor(tracker, position, quaternion)
+    return points_to_tracker(tracker, position), product(_frame(tracker), quaternion)
 
 
 def tracker_to_base(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
     """The inverse of `base_to_tracker`."""
-    turned = (np.asarray(position, dtype=float) - tracker.position) @ tracker.rotation
-    return turned, product(conjugate(_frame(tracker)), product(quaternion, conjugate(_roll(tracker))))
+    turned = product(conjugate(_frame(tracker)), product(quaternion, conjugate(_mount(tracker))))
+    return points_to_base(tracker, position) - rotated(turned, tracker.sensor_position), turned
+
+
+def of_sensor(tracker, position: ArrayLike, quaternion: ArrayLike) -> tuple[Array, Array]:
+    """Poses (..., 3), (..., 4) of the sensor where its tip has these, in the same frame."""
+    return position + rotated(quaternion, tracker.sensor_position), product(quaternion, _mount(tracker))
+
+
+def points_to_tracker(tracker, points: ArrayLike) -> Array:
+    """Points (..., 3) of the base frame in the tracker frame."""
+    return np.asarray(points, dtype=float) @ tracker.rotation.T + tracker.position
+
+
+def points_to_base(tracker, points: ArrayLike) -> Array:
+    """Points (..., 3) of the tracker frame in the base frame."""
+    return (np.asarray(points, dtype=float) - tracker.position) @ tracker.rotation
+
+
+def rotated(quaternion: ArrayLike, vector: ArrayLike) -> Array:
+    """A vector (3,) turned by unit quaternions (..., 4)."""
+    return matrix_from_quaternion(quaternion) @ np.asarray(vector, dtype=float)
 
 
 def rigid_motion(source: Array, target: Array, weight: Array | None = None) -> tuple[Array, Array]:
@@ -72,14 +92,19 @@ def rigid_motion(source: Array, target: Array, weight: Array | None = None) -> t
     """
     part = np.full((len(source), 1), 1 / len(source)) if weight is None else weight[:, None] / weight.sum()
     a, b = np.sum(part * source, axis=0), np.sum(part * target, axis=0)
-    left, _, right = np.linalg.svd((part * (target - b)).T @ (source - a))
-    rotation = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right)) or 1.0]) @ right
+    rotation = nearest_rotation((part * (target - b)).T @ (source - a))
     return rotation, b - rotation @ a
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """The rotation (3, 3) nearest to a matrix, such as the mean of rotations."""
+    left, _, right = np.linalg.svd(matrix)
+    return left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right)) or 1.0]) @ right
 
 
 def _frame(tracker) -> Array:
     return quaternion_from_rotation_vector(tracker.rotation_vector_rad)
 
 
-def _roll(tracker) -> Array:
-    return quaternion_from_rotation_vector([0.0, 0.0, tracker.roll])
+def _mount(tracker) -> Array:
+    return quaternion_from_rotation_vector(tracker.sensor_rotation_vector)

@@ -26,7 +26,10 @@ PROFILE_STEPS = 16  # integration steps per segment, at least, of tubes with pro
 
 # ---- Audit of a table, before any physics
 
-ONE_ROLL = 0.8  # mean length of the unit vectors of the rolls, from which one roll describes all readings
+ONE_ROTATION = 0.8  # mean cosine of the angles by which readings miss the best rotation of the sensor, from which it
+# describes them all
+SENSOR_BESIDE = 0.05  # [m] standard deviation of the place of a sensor of which nothing is known: a body of markers is
+# some centimetres large
 SPIKE_LEAP = 2.0  # leap of a spike over the distance that the model moves the tip there
 SPIKE_RETURN = 0.5  # distance between the readings before and after a spike, over its leap
 SPIKE_VISIBLE = 10.0  # leap of a spike over the noise of a difference of readings
@@ -228,6 +231,7 @@ PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that 
 
 # ---- Conventions of a table, before any physics
 
+SENSOR_JUMP = 0.01, 0.2  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
 CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )

@@ -169,6 +169,7 @@ private:
     for (Window window; window.first < lanes_; window.first += window.size) {
       const auto seed = variables_.seeding(window);
       Frame<S> tip = frame_of<S>(T_base_tip), T_ref = frame_of<S>(T_tracker_base);
+      Frame<S> mount = frame_of<S>({Mat3::Identity(), system_.sensor.T_tip_sensor.position});
       for (int g = 0; g < Window::groups; ++g) {
         const auto twist = [&](int first) {
           const int at = window.first / lane_count + g;
@@ -180,18 +181,21 @@ private:
         };
         const Lanes3 v = R_tip_base * twist(unknowns), w = R_tip_base * twist(unknowns + 3);
         const Lanes3 shift = R_base_tracker * seeds(Parameter::tracker_position),
-                     turn = R_base_tracker * seeds(Parameter::tracker_rotation);
+                     turn = R_base_tracker * seeds(Parameter::tracker_rotation),
+                     offset = seeds(Parameter::sensor_position);
         for (std::size_t i = 0; i < 3; ++i) {
           tip.translation_twist[i][g] = v[i];
           tip.rotation_twist[i][g] = w[i];
           T_ref.translation_twist[i][g] = shift[i];
           T_ref.rotation_twist[i][g] = turn[i];
+          mount.translation_twist[i][g] = offset[i];
         }
       }
-      Frame<S> reading = composed(T_ref, tip);
+      Frame<S> reading = composed(composed(T_ref, tip), mount);
       effects<typename Fx::OnReading>(window).sense(row_.at, reading);
-      for (int g = 0; g < Window::groups; ++g)
-        reading.rotation_twist[2][g] += seed(0, V::index(Parameter::sensor_roll)).d[g];
+      for (int g = 0; g < Window::groups; ++g)  // the turn from these axes to those of the sensor comes last
+        for (int i = 0; i < 3; ++i)
+          reading.rotation_twist[i][g] += seed(0, V::index(Parameter::sensor_rotation, i)).d[g];
       const Mat3 R = reading.rotation();
       variables_.for_each_in(window, [&](int lane, int j) {
         const int g = (lane - window.first) / lane_count, i = (lane - window.first) % lane_count;

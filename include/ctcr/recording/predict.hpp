@@ -93,9 +93,9 @@ CTCR_NOINLINE Status predict(const System<N, Fx>& system, const RecordedRow<N>& 
   else
     (void)solve(out.model, out.q, out.load, ws, out.solution, system.settings);
   Frame<double> reading =
-      frame_of<double>(system.sensor.T_tracker_base * out.solution.tube_tips[std::size_t(system.sensor.tube)]);
+      frame_of<double>(seat(system.sensor, out.solution.tube_tips[std::size_t(system.sensor.tube)]));
   effects.sense(row.at, reading);
-  out.reading = mounted(system.sensor, pose_of(reading));
+  out.reading = seated(system.sensor, pose_of(reading));
   if (!(effects.finite() && out.reading.position.allFinite() && out.reading.rotation.allFinite())) {
     out.solution = Solution<N>{};
     out.solution.status = Status::not_finite;

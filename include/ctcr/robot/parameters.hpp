@@ -28,7 +28,8 @@ enum class Parameter : int {
   home_rotation,
   tracker_position,
   tracker_rotation,
-  sensor_roll
+  sensor_position,
+  sensor_rotation
 };
 
 /// What is known of a kind of parameter before any robot is.
@@ -41,9 +42,9 @@ struct ParameterKind {
          highest = std::numeric_limits<double>::infinity();  ///< possible
 };
 
-/// The tracker frame is T_ref, from base to tracker coordinates. Its rotation is a turn about the tracker's axes that
-/// leaves the base frame's origin where it is: T_ref becomes {exp(turn) R, p}.
-inline constexpr std::array<ParameterKind, 17> parameter_kinds{{
+/// The tracker frame is T_ref, from base to tracker coordinates, and the sensor's pose is T_tip_sensor. Rotations of both
+/// are turns that leave the origin where it is: {exp(turn) R, p}, about the axes of the tracker and of the tip.
+inline constexpr std::array<ParameterKind, 18> parameter_kinds{{
     {"tubes.#.youngs_modulus", "Pa", 1e9, 250e9, &Tube::youngs_modulus, 0},
     {"tubes.#.poisson_ratio", "", 0.2, 0.5, &Tube::poisson_ratio, -0.9, 0.5},
     {"tubes.#.density", "kg/m^3", 800, 20000, &Tube::density, 0},
@@ -60,7 +61,8 @@ inline constexpr std::array<ParameterKind, 17> parameter_kinds{{
     {"actuation.home_rotation.#", "rad", 0, 6.3},
     {"tracker.position.*", "m", 0, 5},
     {"tracker.rotation.*", "rad", 0, 6.3},
-    {"tracker.sensor_roll", "rad", 0, 6.3},
+    {"tracker.sensor_position.*", "m", 0, 0.1},
+    {"tracker.sensor_rotation.*", "rad", 0, 6.3},
 }};
 
 /// A full name such as "tubes.2.length".

@@ -7,36 +7,52 @@
 
 namespace ctcr {
 
-/// A tracker that reads the pose of one tube's tip in its own frame: x_tracker = T_ref x_base.
-/// Ref: Boyer et al., Section V.
+/// A tracker that reads the pose of a sensor at one tube's tip in its own frame: T_ref T_base_tip T_tip_sensor.
+/// Ref: Boyer et al., Section V, where the sensor is the tip.
 struct PoseSensor {
   Pose T_tracker_base;  ///< T_ref
   int tube = 0;         ///< whose tip carries the sensor, 0 is the innermost
-  double roll = 0;      ///< of the sensor's axes against those of the tip, about their common z axis [rad]
+  Pose T_tip_sensor{};
 };
 
-/// The sensor's pose where its tube's tip has the pose `tip`, in the same frame. Real time: yes.
-[[nodiscard]] inline Pose mounted(const PoseSensor& sensor, const Pose& tip) noexcept {
-  return {tip.rotation * rotation_matrix({0, 0, sensor.roll}), tip.position};
+/// Where the sensor is, in the axes of the tip instead of its own; tracker frame. Real time: yes.
+[[nodiscard]] inline Pose seat(const PoseSensor& sensor, const Pose& T_base_tip) noexcept {
+  return sensor.T_tracker_base * T_base_tip * Pose{Mat3::Identity(), sensor.T_tip_sensor.position};
+}
+
+/// The sensor's pose in such a seat, same frame. Real time: yes.
+[[nodiscard]] inline Pose seated(const PoseSensor& sensor, const Pose& seat) noexcept {
+  return {seat.rotation * sensor.T_tip_sensor.rotation, seat.position};
 }
 
 /// What the sensor reads of the tubes' tips T_base_tip. Real time: yes.
 template <std::size_t N>
 [[nodiscard]] Pose reading(const PoseSensor& sensor, const std::array<Pose, N>& tube_tips) noexcept {
-  return mounted(sensor, sensor.T_tracker_base * tube_tips[std::size_t(sensor.tube)]);
+  return seated(sensor, seat(sensor, tube_tips[std::size_t(sensor.tube)]));
 }
 
 /// T_base_tip of the tube that carries the sensor, from what that reads. Real time: yes.
 [[nodiscard]] inline Pose tip_of(const PoseSensor& sensor, const Pose& reading) noexcept {
-  const Pose tip = sensor.T_tracker_base.inverse() * reading;
-  return {tip.rotation * rotation_matrix({0, 0, -sensor.roll}), tip.position};
+  return sensor.T_tracker_base.inverse() * reading * sensor.T_tip_sensor.inverse();
+}
+
+/// Derivative of a reading, tracker axes, by the sensor's position [m] and a turn [rad] that leaves it in place, both in
+/// the tip's axes: by the parameters tracker.sensor_position and tracker.sensor_rotation. Real time: yes.
+[[nodiscard]] inline Mat6 reading_by_mount(const PoseSensor& sensor, const Pose& reading) noexcept {
+  Mat6 D = Mat6::Zero();
+  D.topLeftCorner<3, 3>() = reading.rotation * sensor.T_tip_sensor.rotation.transpose();
+  D.bottomRightCorner<3, 3>() = D.topLeftCorner<3, 3>();
+  return D;
 }
 
 /// Derivative of a reading's position [m] and rotation [rad], tracker axes, by those of the tip, base axes.
 /// Real time: yes.
-[[nodiscard]] inline Mat6 reading_by_tip(const PoseSensor& sensor) noexcept {
+[[nodiscard]] inline Mat6 reading_by_tip(const PoseSensor& sensor, const Pose& reading) noexcept {
+  const Mat3& R = sensor.T_tracker_base.rotation;
+  const Vec3 arm = reading.rotation * sensor.T_tip_sensor.rotation.transpose() * sensor.T_tip_sensor.position;
   Mat6 D = Mat6::Zero();
-  D.topLeftCorner<3, 3>() = D.bottomRightCorner<3, 3>() = sensor.T_tracker_base.rotation;
+  D.topLeftCorner<3, 3>() = D.bottomRightCorner<3, 3>() = R;
+  for (int j = 0; j < 3; ++j) D.block<3, 1>(0, 3 + j) = R.col(j).cross(arm);
   return D;
 }
 
@@ -53,13 +69,6 @@ template <std::size_t N>
   Mat6 D = Mat6::Identity();
   for (int j = 0; j < 3; ++j) D.block<3, 1>(0, 3 + j) = Vec3::Unit(j).cross(arm);
   return D;
-}
-
-/// Derivative of a reading, tracker axes, by the sensor's roll: by the parameter tracker.sensor_roll. Real time: yes.
-[[nodiscard]] inline Vec6 reading_by_roll(const Pose& reading) noexcept {
-  Vec6 d;
-  d << Vec3::Zero(), reading.rotation.col(2);
-  return d;
 }
 
 }  // namespace ctcr

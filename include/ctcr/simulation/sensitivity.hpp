@@ -129,9 +129,10 @@ private:
     const auto tips = around_.solve({four[0].robot, four[1].robot, four[2].robot, four[3].robot});
     for (std::size_t i = 0; i < std::size_t(count); ++i) {
       evaluations += tips[i].evaluations;
-      const Pose& T = four[i].system->sensor.T_tracker_base;
-      if (tips[i].solved)
-        four[i].out->add((T.rotation * tips[i].position + T.position - right_).norm());
+      const PoseSensor& sensor = four[i].system->sensor;
+      const Pose tip{Mat3::Identity(), tips[i].position};  // no rotation is known of it
+      if (tips[i].solved && sensor.T_tip_sensor.position.isZero(0))
+        four[i].out->add((seat(sensor, tip).position - right_).norm());
       else
         add_alone(*four[i].system, four[i].robot.q, *four[i].out);
     }

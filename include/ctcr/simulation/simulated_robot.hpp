@@ -54,9 +54,9 @@ public:
 
   /// Without noise: T_tracker_sensor.
   [[nodiscard]] Pose exact_reading() const noexcept {
-    Frame<double> frame = frame_of<double>(system_.sensor.T_tracker_base * tip());
+    Frame<double> frame = frame_of<double>(seat(system_.sensor, tip()));
     if constexpr (!Fx::none) live_.effects().sense(live_.occasion(), frame);
-    return mounted(system_.sensor, pose_of(frame));
+    return seated(system_.sensor, pose_of(frame));
   }
   /// In its true base frame, in the tip that carries the sensor.
   [[nodiscard]] const Pose& tip() const noexcept { return solution_.tube_tips[std::size_t(system_.sensor.tube)]; }

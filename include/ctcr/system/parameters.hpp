@@ -29,7 +29,7 @@ struct SystemParameters {
     return text;
   }
 
-  /// The values of a system; tracker.rotation is the turn since `frame`, which counts as 0.
+  /// The values of a system; turns count from its own frames, so they are 0.
   [[nodiscard]] static Eigen::VectorXd values(const System<N, Fx>& system) {
     Eigen::VectorXd x = Eigen::VectorXd::Zero(count);
     ctcr::Robot<N> robot = system.model.robot();
@@ -40,8 +40,7 @@ struct SystemParameters {
     return x;
   }
 
-  /// The system with the values `x`, as values() gives them; tracker.rotation turns the frame of `nominal` by
-  /// exp(x) about the tracker's axes.
+  /// The system with the values `x`, as values() gives them; turns are those of the frames of `nominal`.
   template <class X>
   [[nodiscard]] static System<N, Fx> with_values(const System<N, Fx>& nominal, const X& x) noexcept {
     ctcr::Robot<N> robot = nominal.model.robot();
@@ -49,14 +48,17 @@ struct SystemParameters {
     PoseSensor sensor = nominal.sensor;
     Effects effects = nominal.model.effects();
     for_each(robot, transmission, sensor, effects, [&](int index, double& value) { value = x[index]; });
-    const int turn = Robot::index(Parameter::tracker_rotation);
-    sensor.T_tracker_base.rotation =
-        rotation_matrix({x[turn], x[turn + 1], x[turn + 2]}) * nominal.sensor.T_tracker_base.rotation;
+    const auto turn = [&](Parameter kind, Mat3& rotation) {
+      const int first = Robot::index(kind);
+      rotation = (rotation_matrix({x[first], x[first + 1], x[first + 2]}) * rotation).eval();
+    };
+    turn(Parameter::tracker_rotation, sensor.T_tracker_base.rotation);
+    turn(Parameter::sensor_rotation, sensor.T_tip_sensor.rotation);
     return {transmission, Model<N, Fx>(robot, effects), sensor, nominal.settings};
   }
 
 private:
-  /// Calls f(index, value) for every parameter but tracker.rotation, with the number that holds it.
+  /// Calls f(index, value) for every parameter but the turns, with the number that holds it.
   static void for_each(ctcr::Robot<N>& robot, Transmission<N>& transmission, PoseSensor& sensor, Effects& effects,
                        const auto& f) noexcept {
     const auto each = [&](Parameter kind, auto& numbers) {
@@ -71,7 +73,7 @@ private:
     each(Parameter::home_translation, transmission.home_translation);
     each(Parameter::home_rotation, transmission.home_rotation);
     each(Parameter::tracker_position, sensor.T_tracker_base.position);
-    f(Robot::index(Parameter::sensor_roll), sensor.roll);
+    each(Parameter::sensor_position, sensor.T_tip_sensor.position);
     effects.for_each([&](auto& effect, int first) {
       for (std::size_t k = 0; k < effect.values.size(); ++k) f(Robot::count + first + int(k), effect.values[k]);
     });

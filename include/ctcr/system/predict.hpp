@@ -1,7 +1,8 @@
 #pragma once
 // The whole system, from what is commanded to what is measured, and its derivative along the same way:
 //
-//   motor angles theta --transmission--> joints q --model--> tube tips --T_ref--> reading --> residual
+//   motor angles theta --transmission--> joints q --model--> tube tips --T_ref, T_tip_sensor--> reading -->
+//   residual
 #include "ctcr/derivatives/parameters.hpp"
 #include "ctcr/sensing/residual.hpp"
 #include "ctcr/system/system.hpp"
@@ -45,7 +46,9 @@ Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const
   Status status = prediction.solution.status;
   TipDerivatives<N> tip;
   if (has_equilibrium(status)) status = differentiate_tip(system.model, ws, system.sensor.tube, tip);
-  const Mat6 by_tip = reading_by_tip(system.sensor), by_frame = reading_by_frame(system.sensor, prediction.reading);
+  const Mat6 by_tip = reading_by_tip(system.sensor, prediction.reading),
+             by_frame = reading_by_frame(system.sensor, prediction.reading),
+             by_mount = reading_by_mount(system.sensor, prediction.reading);
   const Eigen::Matrix<double, 6, N> by_beta = by_tip * tip.by_joints.template leftCols<N>();
   const Eigen::Matrix<double, 6, N> by_alpha = by_tip * tip.by_joints.template rightCols<N>();
   out.by_motors << by_beta * transmission.translation_ratio, by_alpha * transmission.rotation_ratio;
@@ -56,7 +59,8 @@ Status differentiate(const System<N>& system, const MotorAngles<N>& theta, const
   columns(Parameter::home_rotation) = by_alpha;
   columns(Parameter::tracker_position) = by_frame.leftCols<3>();
   columns(Parameter::tracker_rotation) = by_frame.rightCols<3>();
-  columns(Parameter::sensor_roll) = reading_by_roll(prediction.reading);
+  columns(Parameter::sensor_position) = by_mount.leftCols<3>();
+  columns(Parameter::sensor_rotation) = by_mount.rightCols<3>();
   return status;
 }
 

@@ -173,9 +173,11 @@ def test_no_orientation(robot, readings):
 
 
 @pytest.fixture(scope="module")
-def loose(robot):
-    """The robot before anyone has found how its sensor is glued in."""
-    return robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"sensor_roll": "unknown"})})
+def loose():
+    """The robot before anyone has found how its sensor is glued in, by a file that says so of its roll alone."""
+    text = ROBOT.read_text()
+    assert text.count("tracker:\n") == 1
+    return robot_file.parse(text.replace("tracker:\n", "tracker:\n  sensor_roll: unknown\n").encode())
 
 
 def spun(readings, roll):
@@ -190,14 +192,16 @@ def test_unknown_roll(robot, loose, readings, roll_deg, tmp_path):
     """The fit finds an unknown sensor roll and writes it to the robot file."""
     plain, turned = outcome(robot, readings), spun(readings, np.radians(roll_deg))
     found = outcome(loose, turned)
-    (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_roll")
-    assert abs((roll.value - roll_deg + 180) % 360 - 180) < 3 * roll.sd < 2 and roll.ratio < 0.01
-    assert "roll is unknown" in said(found) and found.fit.observations == plain.fit.observations
+    (roll,) = (item for item in found.fitted if item.name == "tracker.sensor_rotation.z")
+    x, y, z = np.degrees(found.after.tracker.sensor_rotation_vector)
+    assert x == y == 0 and abs((z - roll_deg + 180) % 360 - 180) < 3 * roll.sd < 2 and roll.ratio < 0.01
+    assert "pose is unknown" in said(found) and found.fit.observations == plain.fit.observations
     others = [item for item in found.fitted if item is not roll]
     assert max(abs(a.value - b.value) / a.sd for a, b in zip(others, plain.fitted, strict=True)) < 1
     found.save(tmp_path / "new.yaml")
     written = robot_file.load(tmp_path / "new.yaml")
-    assert written.tracker.sensor_roll_deg == pytest.approx(roll.value, abs=1e-4) and written.tracker.roll_known
+    assert written.tracker.sensor_rotation_vector_rad[2] == pytest.approx(np.radians(z), abs=1e-6)
+    assert "sensor_roll" not in (tmp_path / "new.yaml").read_text().split("history:")[0]
     again = outcome(written, turned)
     assert again.stages[0].rms_deg == pytest.approx(found.stages[-1].rms_deg, abs=1e-4)
 
@@ -209,7 +213,7 @@ def test_varying_roll(loose, readings):
     assert "differs from reading to reading" in said(found) and np.isnan(found.stages[-1].rms_deg)
     assert found.fit.observations == 3 * len(readings) and np.max(np.abs(found.fit.shift)) < 4
     found = outcome(loose, replace(readings, quaternion=None))
-    assert "roll" not in said(found) and np.isnan(found.stages[-1].rms_deg)
+    assert "rotation is unknown" not in said(found) and np.isnan(found.stages[-1].rms_deg)
 
 
 def test_constant_joints(robot, readings):

@@ -40,14 +40,19 @@ def test_angle():
 
 
 def test_tracker_frame():
-    """base_to_tracker applies T_ref, and tracker_to_base inverts it."""
-    vector, offset = RNG.normal(size=3), RNG.normal(size=3)
-    rotation = Rotation.from_rotvec(vector)
-    tracker = SimpleNamespace(rotation=rotation.as_matrix(), position=offset, rotation_vector_rad=vector, roll=0.4)
+    """base_to_tracker applies T_ref and T_tip_sensor, and tracker_to_base inverts it."""
+    vector, offset, beside, turn = RNG.normal(size=(4, 3))
+    rotation, mount = Rotation.from_rotvec(vector), Rotation.from_rotvec(turn)
+    tracker = SimpleNamespace(
+        rotation=rotation.as_matrix(),
+        position=offset,
+        rotation_vector_rad=vector,
+        sensor_position=beside,
+        sensor_rotation_vector=turn,
+    )
     position, orientation = RNG.normal(size=(50, 3)), Rotation.from_rotvec(RNG.normal(size=(50, 3)))
     quaternion = orientation.as_quat(scalar_first=True)
     moved, turned = frames.base_to_tracker(tracker, position, quaternion)
-    np.testing.assert_allclose(moved, rotation.apply(position) + offset, atol=1e-14)
-    rolled = orientation * Rotation.from_rotvec([0, 0, 0.4])
-    expected = (rotation * rolled).as_quat(scalar_first=True)
+    np.testing.assert_allclose(moved, rotation.apply(position + orientation.apply(beside)) + offset, atol=1e-14)
+    expected = (rotation * orientation * mount).as_quat(scalar_first=True)
     assert frames.angle_between(turned, expected) == pytest.approx(0, abs=1e-14)

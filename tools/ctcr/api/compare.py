@@ -1,7 +1,7 @@
 """How wrong a model is: `ctcr.compare`, and the command of that name."""
 
 from ctcr.api.reviewed import reviewed, without_repeated
-from ctcr.audit import missing_motion, spikes
+from ctcr.audit import missing_motion, sensor_pose, spikes
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
 from ctcr.conventions import Review
@@ -27,6 +27,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         robot, readings = found.robot, found.readings
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
     readings, repeated = without_repeated(readings, found)
+    robot, placed = sensor_pose.placed(robot, readings)
     own, floor = _fitted(robot, readings, found)
     prediction = predict(robot.standard, readings, steps=steps)
     readings, excluded = spikes.left_out(robot, readings, prediction.position)
@@ -34,7 +35,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     if robot.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
-    notices = [f"{said}." for said in (*corrected, *excluded, *added)] + repeated
+    notices = [f"{said}." for said in (*corrected, *placed, *excluded, *added)] + repeated
     return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, source)
 
 

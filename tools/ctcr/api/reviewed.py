@@ -9,7 +9,7 @@ from ctcr.conventions import Finding, Review, review
 from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
 from ctcr.robot.description import Robot
-from ctcr.show.wording import sentence
+from ctcr.show.wording import listed, sentence
 from ctcr.table.measurements import Measurements, check_of
 
 
@@ -38,6 +38,15 @@ def without_repeated(table: Measurements, found: Review) -> tuple[Measurements, 
     return (table.without_poses(np.isin(table.row, rows)) if rows else table), said
 
 
+def without_pose(table: Measurements) -> list[str]:
+    """A sentence on the rows of a table in which nothing was measured."""
+    rows = table.row[~table.measured]
+    if not len(rows) or len(rows) == len(table):
+        return []
+    count = "1 row holds" if len(rows) == 1 else f"{len(rows)} rows hold"
+    return [f"{count} no pose ({listed(rows)}): the robot moves through them, and nothing is fitted there."]
+
+
 def to_fit(
     robot: Robot,
     table: Measurements,
@@ -60,5 +69,6 @@ def to_fit(
     if table.refusal:
         raise table.refusal
     readings, said = without_repeated(table, found)
+    said += without_pose(table)
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
     return readings, [*said, *more], found

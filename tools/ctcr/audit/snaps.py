@@ -11,7 +11,7 @@ from ctcr.table.measurements import Measurements
 
 
 def other_tips(robot: Robot, measurements: Measurements, index: int) -> Array:
-    """Where else the tip of the sensor's tube may rest (E, 3) [m], tracker frame, in the reading `index` of the table.
+    """Where else the sensor may rest (E, 3) [m], tracker frame, in the reading `index` of the table.
 
     Effects that depend on how the joints were reached are left out, as every equilibrium has a history of its own.
     """
@@ -20,4 +20,6 @@ def other_tips(robot: Robot, measurements: Measurements, index: int) -> Array:
     end = robot.tubes[tube].length + beta[tube]
     others = Model(without_the_path(robot)).all_shapes(beta, alpha, measurements.force[index])[1:]
     position = np.reshape([shape.position_at(end) for shape in others], (-1, 3))
-    return base_to_tracker(robot.tracker, position, np.tile([1.0, 0, 0, 0], (len(others), 1)))[0]
+    along = [shape.tube_quaternion(tube) for shape in others]
+    turned = np.reshape([there[np.isfinite(there).all(axis=1)][-1] for there in along], (-1, 4))
+    return base_to_tracker(robot.tracker, position, turned)[0]

@@ -11,9 +11,10 @@ from ctcr.fit.widening import widened
 from ctcr.frames import base_to_tracker
 from ctcr.model.model import Model
 from ctcr.model.noise import noise_of_readings
+from ctcr.model.parameters import field_of
 from ctcr.robot.description import Robot
 from ctcr.show import wording
-from ctcr.show.wording import listed, sentence
+from ctcr.show.wording import listed, numbers, sentence
 from ctcr.table.measurements import Measurements
 
 LISTED = 12
@@ -56,6 +57,22 @@ def usable_rows(readings: Measurements) -> tuple[Mask, list[str]]:
         return usable, []
     repeated = readings.row[~usable]
     return usable, [f"{_rows(repeated)} repeat earlier rows exactly and are left out: they are no new measurements."]
+
+
+def of_sensor(robot: Robot, fit: Fit) -> list[str]:
+    """Where a fit found the sensor of its robot, in the frame of the tip, in a sentence; none where that was known."""
+    sd, said = dict(zip(fit.names, fit.sd, strict=True)), []
+    for kind, words, values, unit in (
+        ("position", "position", 1e3 * robot.tracker.sensor_position, "mm"),
+        ("rotation", "rotation vector", robot.tracker.sensor_rotation_vector, "rad"),
+    ):
+        names = [f"tracker.sensor_{kind}.{axis}" for axis in "xyz"]
+        if sd.keys() & names:
+            widths = numbers((field_of(name).factor * sd.get(name, 0.0) for name in names), 3)
+            said.append(f"{words} {numbers(values, 3)} {unit} ± {widths} {field_of(names[0]).unit}")
+    if len(said) == 1 and not np.isfinite(fit.residual[:, 3:]).any():
+        said.append("no rotation, as no orientation was measured")
+    return [f"Found of the sensor, in the frame of the tip: {'; '.join(said)}."] if said else []
 
 
 def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:

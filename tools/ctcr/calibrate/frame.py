@@ -4,13 +4,14 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
+from ctcr.audit import sensor_pose
 from ctcr.calibrate.outcome import Outcome, Row, in_file
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.errors import InputError, Problem
 from ctcr.fit import joint
-from ctcr.frames import matrix_from_quaternion
+from ctcr.frames import matrix_from_quaternion, nearest_rotation, of_sensor
 from ctcr.model import parameters
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
@@ -18,7 +19,8 @@ from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 
 AXES = "xyz"
-SD = {"position": settings.CONVENTION_ANYWHERE, "rotation": parameters.ANYWHERE}  # [m], [rad] about the registration
+ROUNDS = 5  # of placing sensor and frame in turn: only a start
+SD = parameters.ANYWHERE | {"position": settings.CONVENTION_ANYWHERE}  # [m], [rad] about the registration
 
 
 def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
@@ -31,7 +33,7 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
     fit = joint.fit(start, readings, "standard", sd={name: SD[name.split(".")[1]] for name in names})
     own = [fit.names.index(name) for name in names]
     found, covariance = fit.apply(robot=start).tracker, fit.covariance[np.ix_(own, own)]
-    after = with_frame(robot, found.rotation, found.position)
+    before, after = sensor_pose.placed(robot, readings)[0], robot.model_copy(update={"tracker": found})
     rows, sd = [], np.sqrt(np.diag(covariance))
     for field, text, unit, values, widths in (
         ("position_mm", "origin of the base frame", "mm", found.position_mm, 1e3 * sd[:3]),
@@ -40,7 +42,7 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
         for i, axis in enumerate(AXES):
             path = ("tracker", field, i)
             rows.append(Row(f"{text}, {axis}", unit, float(values[i]), float(widths[i]), in_file(robot, path), path))
-    before_mm, after_mm = (rms_mm(one, readings) for one in (robot, after))
+    before_mm, after_mm = (rms_mm(one, readings) for one in (before, after))
     rows.append(Row("error of the tip, RMS", "mm", after_mm, old=before_mm))
     rows.append(Row("error with homes and tubes fitted too, RMS", "mm", fit.rms_mm()))
     figures = {
@@ -51,20 +53,47 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
 
 
 def registered(robot: Robot, readings: Measurements) -> Robot:
-    """The robot in the frame that carries the predicted tips, and where measured their tangents, to the readings."""
+    """The robot in the frame that carries the predicted sensor, and where measured its z axis, to the readings; with a
+    pose of the sensor where its file does not know it."""
     beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
     tip = Model(robot.standard).predict(beta, alpha, readings.force)
-    predicted, measured = np.where(tip.solved[:, None], tip.position, np.nan), readings.positions
-    count = int(np.isfinite(predicted + measured).all(axis=1).sum())
+    place, measured = np.where(tip.solved[:, None], tip.position, np.nan), readings.positions
+    count = int(np.isfinite(place + measured).all(axis=1).sum())
     if count < 3:
         text = f"the model predicts {count} of the measured positions: a tracker frame needs three or more"
         raise InputError(Problem(text, readings.source))
-    ahead = [
-        place + settings.JOINT_LEVER * matrix_from_quaternion(turn)[:, :, 2]
-        for place, turn in ((predicted, tip.quaternion), (measured, readings.quaternions))
-    ]
-    points = (np.concatenate(pair) for pair in zip((predicted, measured), ahead, strict=True))
-    return with_frame(robot, *aligned(*points)[:2])
+
+    def carrying(robot: Robot) -> Robot:
+        predicted = of_sensor(robot.tracker, place, tip.quaternion)
+        ahead = [
+            there + settings.JOINT_LEVER * matrix_from_quaternion(turn)[:, :, 2]
+            for there, turn in (predicted, (measured, readings.quaternions))
+        ]
+        points = (np.concatenate(pair) for pair in zip((predicted[0], measured), ahead, strict=True))
+        return with_frame(robot, *aligned(*points)[:2])
+
+    tracker, oriented = robot.tracker, tip.solved & readings.oriented
+    if tracker.sensor_position_mm is not None and tracker.sensor_rotation_known:
+        return carrying(robot)
+    framed = carrying(robot)
+    if not tracker.sensor_rotation_known and oriented.any():
+        turn = world_rotation(*(matrix_from_quaternion(q[oriented]) for q in (tip.quaternion, readings.quaternions)))
+        framed = with_frame(robot, turn, np.nanmean(measured - place @ turn.T, axis=0))
+    for _ in range(ROUNDS):
+        found = carrying(sensor_pose.placed(framed, readings)[0])
+        framed = with_frame(robot, found.tracker.rotation, found.tracker.position)
+    return found
+
+
+def world_rotation(tips: Array, seen: Array) -> Array:
+    """R_tracker_base (3, 3) from rotations (K, 3, 3) of tips, base frame, and of the sensor on them, tracker frame.
+
+    Both it and R_tip_sensor are unknown: seen = R_tracker_base tips R_tip_sensor, linear in the products of their
+    entries. Ref: Shah, "Solving the robot-world/hand-eye calibration problem using the Kronecker product", 2013.
+    """
+    both = np.einsum("kij,klm->iljm", tips, seen).reshape(9, 9)
+    first = np.linalg.svd(both)[0][:, 0].reshape(3, 3).T
+    return nearest_rotation(first * np.sign(np.linalg.det(first)))
 
 
 def rms_mm(robot: Robot, readings: Measurements) -> float:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from ctcr import settings
 from ctcr.arrays import Array, Integers, evenly
 from ctcr.fit.result import Fit, rms
-from ctcr.frames import base_to_tracker
+from ctcr.frames import base_to_tracker, points_to_base
 from ctcr.model import effect_model
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
@@ -62,7 +62,7 @@ def compare_halves(robot: Robot, readings: Measurements, first: Fit, second: Fit
     solved = np.isfinite(tips[0]).all(axis=1) & np.isfinite(tips[1]).all(axis=1) & np.isfinite(square)
     if not solved.any():
         return None
-    base = (tips[0] - models[0].tracker.position) @ models[0].tracker.rotation
+    base = points_to_base(models[0].tracker, tips[0])
     return Halves(kind, readings.row[rows[solved]], base[solved], (tips[1] - tips[0])[solved], np.sqrt(square[solved]))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Mask
-from ctcr.audit import sensor_roll
+from ctcr.audit import sensor_pose
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
 from ctcr.errors import InputError, Problem
@@ -22,7 +22,7 @@ from ctcr.fit.sessions import placed
 from ctcr.model import effect_model, fields
 from ctcr.model.fields import Fitted
 from ctcr.model.noise import Noise, noise_of_readings
-from ctcr.model.sessions import without_frame
+from ctcr.model.sessions import told
 from ctcr.robot import ledger
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
@@ -175,8 +175,8 @@ def calibrate(
     not exist, a prior of zero width, too few rows.
     """
     floor, given = floors(robot, readings), robot
-    robot, readings, notices = sensor_roll.usable(robot, readings)
-    names = without_frame(sensor_roll.with_roll(free, robot), readings)
+    robot, readings, notices = sensor_pose.usable(robot, readings)
+    names = told(sensor_pose.with_pose(free, robot), readings)
     if not names:
         raise InputError(
             Problem("the frames of the runs are fitted by themselves: name other parameters in --free too")
@@ -228,7 +228,12 @@ def calibrate(
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
         floors=floor,
         halves=compare_halves(robot, table, *pair, both.kind) if pair else None,
-        notices=[*map(sentence, notices), *repeated, *checks.notices(robot, readings, fit, likely)],
+        notices=[
+            *map(sentence, notices),
+            *repeated,
+            *checks.of_sensor(fit.apply(robot), fit),
+            *checks.notices(robot, readings, fit, likely),
+        ],
     )
 
 

@@ -15,6 +15,7 @@ from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import InputError, Problem
+from ctcr.frames import points_to_base
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show.wording import listed
@@ -111,7 +112,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         turned = np.diff(angle)
         forward = (np.append(turned[:1], turned) if direction is None else direction) > 0
         if fit.in_base_frame:
-            position = (position - robot.tracker.position) @ robot.tracker.rotation
+            position = points_to_base(robot.tracker, position)
         circles.append(figures_of.Circle(name, position, ratio * angle, forward, fit))
         details[f"tube_{tube}"] = {
             "centre_mm": 1e3 * np.asarray(fit.centre),

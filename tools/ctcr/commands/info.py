@@ -1,7 +1,5 @@
 """`ctcr info`: what a robot file says, and what looks wrong in it."""
 
-from math import degrees
-
 import click
 
 from ctcr.commands import options
@@ -62,16 +60,23 @@ def _tube_rows(robot) -> tuple[list[str], list[list[str]]]:
 
 
 def _bench_rows(robot) -> list[list[str]]:
+    from ctcr.model import parameters
+
     def text(value) -> str:
         if value is None:
             return "not known"
         return ", ".join(f"{v:g}" for v in value) if isinstance(value, list) else f"{value:g}"
 
     tracker, actuation = robot.tracker, robot.actuation
+    sd = {kind: "" for kind in parameters.ANYWHERE}
+    for name in parameters.of_sensor(robot)[::-1]:
+        field, (_, width, _, _) = parameters.field_of(name), parameters.priors(robot, [name])
+        sd[name.split(".")[1].removeprefix("sensor_")] = f" ± {field.factor * width[0]:.3g} {field.unit}"
     return [
         ["gravity in the base frame", text(robot.gravity), "m/s^2"],
         ["sensor on tube", text(tracker.sensor_on_tube), ""],
-        ["its roll about the tip's axis", text(degrees(tracker.roll) if tracker.roll_known else None), "deg"],
+        ["its position in the tip's frame", text(tracker.sensor_position_mm) + sd["position"], "mm"],
+        ["its rotation vector there", text(tracker.sensor_rotation_vector_rad) + sd["rotation"], "rad"],
         ["base frame in the tracker frame", text(tracker.position_mm), "mm"],
         ["its rotation vector", text(tracker.rotation_vector_rad), "rad"],
         ["readings", text(tracker.rate_Hz), "Hz"],

@@ -59,7 +59,7 @@ class Comparison(Result):
     position_mm: Spread
     percent_of_length: Spread
     angle_deg: Spread | None  # None where no orientation was measured
-    angle_kind: str  # "orientation", or "tip direction" where the sensor's roll is unknown
+    angle_kind: str  # "orientation", or "tip direction" where the sensor's rotation is unknown
     runs: list[RunErrors]
     noise: NoiseFloor
     direction: DirectionDifference | None
@@ -198,7 +198,7 @@ def compare(
         position_mm=_spread(length),
         percent_of_length=_spread(length * 0.1 / np.maximum(sample.deployed, 1e-6)),
         angle_deg=_spread(angle),
-        angle_kind="orientation" if sample.roll_known else "tip direction",
+        angle_kind="orientation" if sample.rotation_known else "tip direction",
         runs=_run_errors(headline, length, angle),
         noise=noise,
         direction=direction,

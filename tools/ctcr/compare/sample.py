@@ -1,6 +1,6 @@
 """The readings that can be compared, with their errors (measured minus predicted) and the motion of joints and tip.
 
-The model predicts poses in the base frame; T_ref carries them over to the tracker frame (x_tracker = T_ref x_base).
+The model predicts poses of the tip in the base frame; T_ref and T_tip_sensor make them readings in the tracker frame.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Sample:
     tip_step: Array  # (K, 3) predicted tip motion since the previous row, base frame
     rotation: Array  # (3, 3) R_tracker_base
     rotation_error: Array | None  # (K, 3) rotation vector in the tracker frame, NaN rows if not measured
-    roll_known: bool
+    rotation_known: bool  # of the sensor
     deployed: Array  # (K,) arc length of the sensor's tip in front of the plate
     tube_lengths: Array  # (N,)
     screw_pitch: float  # [m] of travel by a turn of a motor; 0: unknown
@@ -80,7 +80,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
     predicted, orientation = base_to_tracker(tracker, position, prediction.quaternion)
     rotation_error = None
     if m.quaternion is not None:
-        rotation_error = _rotation_error(m.quaternion[keep], orientation[keep], tracker.roll_known)
+        rotation_error = _rotation_error(m.quaternion[keep], orientation[keep], tracker.sensor_rotation_known)
     velocity, step = _tip_motion(position, m.t, m.run, solved)
     arrays = {name: np.asarray(getattr(m, name)) for name in ("row", "t", "run", "beta", "alpha", "force")}
     arrays |= {"measured": m.positions, "predicted": predicted, "base_position": position}
@@ -91,7 +91,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
         tip_rotation=matrix_from_quaternion(prediction.quaternion[keep]),
         rotation=np.asarray(tracker.rotation),
         rotation_error=rotation_error,
-        roll_known=tracker.roll_known,
+        rotation_known=tracker.sensor_rotation_known,
         tube_lengths=lengths,
         screw_pitch=robot.actuation.screw_pitch,
         lever=lever,
@@ -101,12 +101,12 @@ def take_sample(robot, measurements, prediction) -> Sample:
     )
 
 
-def _rotation_error(measured: Array, predicted: Array, roll_known: bool) -> Array:
+def _rotation_error(measured: Array, predicted: Array, known: bool) -> Array:
     """Rotation vector (K, 3) from the predicted to the measured orientation, tracker frame.
 
-    With the sensor's roll unknown it is the smallest rotation between the two tip tangents (z axes).
+    With the sensor's rotation unknown it is the smallest rotation between the two tip tangents (z axes).
     """
-    if roll_known:
+    if known:
         turn = product(measured, conjugate(predicted))
         turn = turn * np.where(turn[:, :1] < 0, -1.0, 1.0)
         axis = turn[:, 1:]

@@ -246,7 +246,7 @@ def limits(c: Comparison) -> Iterator[str]:
     if c.angle_deg is None:
         yield "No orientation was measured."
     elif c.angle_kind != "orientation":
-        yield "The sensor's roll is unknown: only the direction of the tip is compared, not its roll."
+        yield "The sensor's rotation differs from reading to reading: only the direction of the tip is compared."
     if not c.ranking.alone:
         yield (
             f"The readings fall into {c.ranking.blocks} independent parts, too few to judge a constant offset or "

@@ -41,7 +41,9 @@ class Calibrated:
         return 1e3 * float(np.sqrt(np.mean(self.error[self.solved] ** 2))) if self.solved.any() else np.inf
 
 
-def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None, to_beat: float = np.inf) -> Calibrated:
+def calibrated(
+    robot: Robot, readings: Measurements, *, free: str | tuple[str, ...] | None = None, to_beat: float = np.inf
+) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
     Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
@@ -49,7 +51,7 @@ def calibrated(robot: Robot, readings: Measurements, *, free: str | None = None,
     Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
     gives up where it does not soon fall below an error `to_beat` [m].
     """
-    names, mean, sd, low, high = _priors(robot)
+    names, mean, sd, low, high = _priors(robot, free)
     if free:
         chosen = np.array([name.startswith(free) for name in names])
         anywhere = np.array([np.pi if "rotation" in name else settings.CONVENTION_ANYWHERE for name in names])
@@ -97,15 +99,17 @@ def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:
     return 1.5 * float(np.sum(np.log1p((missed / size) ** 2))) + 0.5 * float(np.sum(shift**2))
 
 
-def _priors(robot: Robot) -> tuple[list[str], Array, Array, Array, Array]:
-    """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly.
+def _priors(robot: Robot, free: str | tuple[str, ...] | None) -> tuple[list[str], Array, Array, Array, Array]:
+    """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly, and
+    of those whose name begins with `free`.
 
     Beyond CONVENTION_JUMP lies no data sheet, but another convention.
     """
-    found = []
-    for name in parameters.expand(parameters.STANDARD, robot):
+    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if free and name.startswith(free)}
+    for name in parameters.expand([parameters.STANDARD, *chosen], robot):
+        sd = {name: np.inf} if name in chosen else None
         try:
-            found.append((name, *(float(part[0]) for part in parameters.priors(robot, [name]))))
+            found.append((name, *(float(part[0]) for part in parameters.priors(robot, [name], sd))))
         except InputError:  # known exactly
             continue
     names = [name for name, *_ in found]

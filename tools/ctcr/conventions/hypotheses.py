@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array
+from ctcr.audit import sensor_pose
+from ctcr.model import parameters
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join
 from ctcr.table.measurements import Measurements, group_columns
@@ -20,6 +22,7 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
     "beta": (("mm", 1e-3), ("cm", 1e-2)),
     "position": (("mm", 1e-3), ("cm", 1e-2)),
 }
+FRAME_NAMES = ("tracker.position.", "tracker.rotation.")
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
@@ -34,26 +37,32 @@ class Hypothesis:
     change: Change = lambda m: m
     frame: tuple[Array, Array] | None = None  # R_tracker_base and origin [m] instead of the file's
     registers: bool = False  # the tracker frame is taken from the readings
+    sensor: Array | None = None  # (3,) [m] of the sensor in the frame of the tip instead of the file's
     offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
 
     @property
-    def frees(self) -> str | None:
+    def frees(self) -> str | tuple[str, ...] | None:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:
-            return "tracker."
+            return FRAME_NAMES
+        if self.sensor is not None:
+            return "tracker.sensor_position."
         if self.offset:
             kind, tube, _ = self.offset
             return f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
         return None
 
     def robot(self, robot: Robot) -> Robot:
+        if self.sensor is not None:
+            tracker = robot.tracker.model_copy(update={"sensor_position_mm": (1e3 * self.sensor).tolist()})
+            return robot.model_copy(update={"tracker": tracker})
         return with_frame(robot, *self.frame) if self.frame else robot
 
 
 def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
     """All that the table and the robot have room for."""
-    parts = (_signs, _zeros, _offsets, _units, _orders, _forces, _positions, _frames)
+    parts = (_signs, _zeros, _offsets, _units, _orders, _forces, _positions, _frames, _sensor)
     return [one for part in parts for one in part(robot, readings)]
 
 
@@ -196,3 +205,10 @@ def _frames(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     text = "the tracker frame in the robot file is the inverse one, of the tracker in the base frame"
     yield Hypothesis("frame_inverse", text, (), "", frame=(rotation.T, -rotation.T @ origin))
     yield Hypothesis("frame_wrong", "the tracker frame in the robot file is wrong", (), "", registers=True, doubts=3)
+
+
+def _sensor(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """The sensor beside where the file has it, unless that says itself that it does not know."""
+    if not any(name.startswith("tracker.sensor_position.") for name in parameters.of_sensor(robot)):
+        place = sensor_pose.position(robot, readings)
+        yield Hypothesis("sensor_position", "the sensor is not where the robot file has it", (), "", sensor=place)

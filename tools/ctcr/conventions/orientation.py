@@ -1,17 +1,20 @@
 """Orientations in another form: quaternions scalar last, or of the inverse rotation, found once positions are right."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.conventions.calibrated import Calibrated
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import QUATERNION, Change, changed
-from ctcr.frames import base_to_tracker, conjugate, matrix_from_quaternion
+from ctcr.frames import angle_between, base_to_tracker, conjugate, matrix_from_quaternion, nearest_rotation, product
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
+from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
 
+TURNED = "sensor_rotation"
 SCALAR_LAST = ("quaternion_order", "the quaternion columns hold x, y, z, w", "ctcr import --quaternion xyzw")
 INVERSE = ("quaternion_inverse", "the quaternions are those of the inverse rotation", "ctcr import --invert-quaternion")
 
@@ -23,10 +26,14 @@ def wrong_form(fit: Calibrated, readings: Measurements) -> tuple[list[Finding], 
     if not use.any():
         return [], lambda m: m
     predicted = _predicted(fit.robot, readings.rows(use))
-    roll_known = fit.robot.tracker.roll_known
-    errors = {form: _error_deg(predicted, _in_form(given[use], *form), roll_known) for form in np.ndindex(2, 2)}
+    known = fit.robot.tracker.sensor_rotation_known
+    errors = {form: _error_deg(predicted, _in_form(given[use], *form), known) for form in np.ndindex(2, 2)}
     last, inverse = best = min(errors, key=lambda form: errors[form])
     before, after = errors[0, 0], errors[best]
+    turn = _turn_between(predicted, given[use])
+    turned = _error_deg(predicted, given[use], False)
+    if known and turned < min(after, settings.CONVENTION_CLEAR * before) and turn.magnitude() > settings.SENSOR_JUMP[1]:
+        return [_turned(fit, turn, (before, turned))], lambda m: m
     if not any(best) or after > settings.CONVENTION_CLEAR * before:
         return [], lambda m: m
     wrong = [SCALAR_LAST] * last + [INVERSE] * inverse
@@ -43,8 +50,9 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     if not use.any():
         return False
     predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
+    known = fit.robot.tracker.sensor_rotation_known
     options = [
-        min(_error_deg(predicted, _in_form(q, *form), fit.robot.tracker.roll_known) for form in np.ndindex(2, 2))
+        min(_error_deg(predicted, _in_form(q, *form), known) for form in np.ndindex(2, 2))
         for q in (given, mirror(given, axis))
     ]
     return options[1] < options[0]
@@ -53,7 +61,8 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
 def error_deg(robot: Robot, readings: Measurements) -> float:
     """RMS error of the orientations; NaN where none was measured."""
     some = readings.rows(readings.oriented)
-    return _error_deg(_predicted(robot, some), some.quaternions, robot.tracker.roll_known) if len(some) else np.nan
+    known = robot.tracker.sensor_rotation_known
+    return _error_deg(_predicted(robot, some), some.quaternions, known) if len(some) else np.nan
 
 
 def mirror(quaternion: Array, axis: int) -> Array:
@@ -74,11 +83,22 @@ def _predicted(robot: Robot, readings: Measurements) -> Array:
     return base_to_tracker(robot.tracker, tips.position, tips.quaternion)[1]
 
 
-def _error_deg(predicted: Array, measured: Array, roll_known: bool) -> float:
-    """RMS angle between orientations (K, 4), or between tip directions where the roll is unknown."""
-    a, b = matrix_from_quaternion(predicted), matrix_from_quaternion(measured)
-    cosine = np.sum(a[..., 2] * b[..., 2], axis=1)
-    if roll_known:
-        cosine = (np.einsum("kij,kij->k", a, b) - 1) / 2
-    angle = np.arccos(np.clip(cosine, -1, 1))
+def _error_deg(predicted: Array, measured: Array, known: bool) -> float:
+    """RMS angle between orientations (K, 4), but for a turn of the sensor where its rotation is not known."""
+    turn = Rotation.identity() if known else _turn_between(predicted, measured)
+    angle = angle_between(product(predicted, turn.as_quat(scalar_first=True)), measured)
     return float(np.degrees(np.sqrt(np.nanmean(angle**2))))
+
+
+def _turn_between(predicted: Array, measured: Array) -> Rotation:
+    """The turn of the sensor that predicted orientations (K, 4) lack most."""
+    turns = matrix_from_quaternion(product(conjugate(predicted), measured))
+    return Rotation.from_matrix(nearest_rotation(np.nanmean(turns, axis=0)))
+
+
+def _turned(fit: Calibrated, turn: Rotation, error_deg: tuple[float, float]) -> Finding:
+    """That the sensor is turned against what the robot file says."""
+    vector = (Rotation.from_rotvec(fit.robot.tracker.sensor_rotation_vector) * turn).as_rotvec()
+    text = f"the sensor is turned by {np.degrees(turn.magnitude()):.0f} deg against what the robot file says"
+    fix = f"set tracker.sensor_rotation_vector_rad to {numbers(vector, 3)}, or to null: ctcr calibrate fit finds it"
+    return Finding(TURNED, text, QUATERNION, fix, rms_mm=(fit.rms_mm, fit.rms_mm), rms_deg=error_deg)

@@ -13,6 +13,7 @@ from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
+from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
 
 
@@ -63,6 +64,8 @@ def _clearest(case: Case) -> Tried | None:
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
     best = min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
+    if best.hypothesis.sensor is not None and not _is_far(case.robot, best.case.fit.robot):
+        return None
     if best.hypothesis.offset:
         exact = offset_by(best.hypothesis, offset_of(best), case.robot.n_tubes)
         best = Tried(exact, _applied(case, exact))
@@ -121,6 +124,12 @@ def _applied(case: Case, hypothesis: Hypothesis) -> Case:
     return Case(robot, readings, fit, (*case.changes, hypothesis.change))
 
 
+def _is_far(before: Robot, after: Robot) -> bool:
+    """Whether the sensor is farther from its place than an error of mounting, which is an effect, leaves it."""
+    move = after.tracker.sensor_position - before.tracker.sensor_position
+    return float(np.linalg.norm(move)) > settings.SENSOR_JUMP[0]
+
+
 def _is_jump(tried: Tried) -> bool:
     """Whether an offset, where it is one, moves a home farther than calibration would: by right angles, or so that only
     noise is left. A physical effect may ask for another offset, but it leaves more.
@@ -154,6 +163,9 @@ def _finding(case: Case, tried: Tried) -> Finding:
     one, text, fix = tried.hypothesis, tried.hypothesis.text, tried.hypothesis.fix
     if one.offset:
         text, fix = _offset_in_words(tried)
+    if one.sensor is not None:
+        place = numbers(tried.case.fit.robot.tracker.sensor_position_mm, 1)
+        fix = f"set tracker.sensor_position_mm to {place}, or to null: ctcr calibrate fit finds it"
     if one.frame or one.registers:
         fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
     errors = (case.fit.rms_mm, tried.case.fit.rms_mm)
@@ -183,8 +195,3 @@ def _frame_in_words(robot: Robot) -> str:
         f"set tracker.position_mm to {position} and tracker.rotation_vector_rad to {rotation}, "
         "or let it be found: ctcr calibrate frame ROBOT TABLE -o NEW.yaml"
     )
-
-
-def numbers(values, digits: int = 6) -> str:
-    """A list as a robot file holds it."""
-    return "[" + ", ".join(f"{round(float(value), digits) + 0.0:.10g}" for value in values) + "]"

@@ -6,8 +6,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-
 from ctcr.arrays import Array
 from ctcr.bench.devices import bench_file
 from ctcr.bench.record.folder import ABOUT, TABLE
@@ -15,7 +13,7 @@ from ctcr.demo import bench_figures
 from ctcr.demo.bench_figures import Driven
 from ctcr.demo.bench_story import EFFECT, ROBOTS, VALUE, cube
 from ctcr.demo.story import Story
-from ctcr.frames import tracker_to_base
+from ctcr.frames import points_to_base
 from ctcr.model import parameters as free_parameters
 from ctcr.robot import history, robot_file
 from ctcr.robot.description import Robot
@@ -82,8 +80,7 @@ def _drives(folder: Path) -> dict[str, Driven]:
     seen_by, corners, found = robot_file.load(folder / "calibrated.yaml"), cube(folder), {}
 
     def in_base(points: Array) -> Array:
-        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1))
-        return 1e3 * tracker_to_base(seen_by.tracker, points, upright)[0]
+        return 1e3 * points_to_base(seen_by.tracker, points)
 
     for robot, name in ROBOTS.items():
         table = measurements.load(folder / f"blind_{robot}" / TABLE, seen_by.n_tubes)

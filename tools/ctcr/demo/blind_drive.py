@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr.arrays import Array, ArrayLike
 from ctcr.errors import InputError, Problem
-from ctcr.frames import base_to_tracker
+from ctcr.frames import points_to_tracker
 from ctcr.model import simulation
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
@@ -19,8 +19,7 @@ RADIAN = 0.05  # [m]: weight of a turn by 1 rad in it
 
 def in_tracker(robot: Robot, points: ArrayLike) -> Array:
     """Points (P, 3) [m] of the base frame in the tracker frame."""
-    points = np.asarray(points, float)
-    return base_to_tracker(robot.tracker, points, np.tile([1.0, 0.0, 0.0, 0.0], (len(points), 1)))[0]
+    return points_to_tracker(robot.tracker, points)
 
 
 def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:

@@ -147,7 +147,7 @@ def add(
     blocks of time, where there are few runs) is held out of the fits that give the errors; the values are those of a
     fit to all rows. Raises InputError where no fit is possible.
     """
-    given, unchanged, (readings, said) = readings, robot, prepared(robot, readings)
+    given, unchanged, (robot, readings, said) = readings, robot, prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
     fitted = [identity for identity in robot.effects if identity not in ids]

@@ -8,13 +8,14 @@ import numpy as np
 
 from ctcr import _core, settings
 from ctcr.arrays import Array, Mask
+from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.linearised import Linear
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
 from ctcr.fit.widening import Likelihood, Scales
 from ctcr.model import parameters, recording, user_recording
-from ctcr.model.sessions import without_frame
+from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -40,7 +41,7 @@ class Engine:
 
     def __post_init__(self) -> None:
         self.positions = joint.sensor_positions(self.robot, self.measurements)
-        self.base = without_frame(parameters.expand(self.free, self.robot), self.measurements)
+        self.base = told(sensor_pose.with_pose(self.free, self.robot), self.measurements)
         self.steps = recording.steps_for(self.robot, self.measurements, self.noise, settings.INTEGRATION_ERROR_COARSE)
 
     @property
@@ -86,6 +87,7 @@ class Engine:
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
+        options["row"] = self.measurements.row
         fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
         if table.friction_is_solved:
             self._friction_path = table

@@ -177,7 +177,7 @@ def diagnose(
     """
     began = perf_counter()
     options = {"progress": progress, "threads": threads}
-    measurements, notices = prepared(robot, measurements)
+    robot, measurements, notices = prepared(robot, measurements)
     for turn in range(settings.TURNS):
         held_out = folds.held_out_rows(robot, measurements, turn)
         result = _diagnose_robustly(robot, measurements, held_out, **options)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr import settings
-from ctcr.audit import sensor_roll
+from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.round import fraction_explained, unexplained
@@ -44,7 +44,7 @@ def of_runs(robot: Robot, readings: Measurements, asked: bool | None = None) -> 
 
 
 def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[Measurements, list[str]]:
-    robot, every, _ = sensor_roll.usable(robot, readings)
+    robot, every, _ = sensor_pose.usable(robot, readings)
     located = np.isfinite(every.positions).all(axis=1)
     if asked is False or len(np.unique(every.run[located])) < 2:
         return readings, []

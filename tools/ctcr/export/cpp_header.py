@@ -31,7 +31,7 @@ SYSTEM = """\
   const ctcr::PoseSensor sensor{{
       {{ctcr::rotation_matrix(ctcr::Vec3(tracker_rotation.data())), ctcr::Vec3(tracker_position.data())}},
       sensor_tube,
-      sensor_roll}};
+      {{ctcr::rotation_matrix(ctcr::Vec3(sensor_rotation.data())), ctcr::Vec3(sensor_position.data())}}}};
   Effects::On<tube_count> effects;{effects}
   return {{transmission, ctcr::Model<tube_count, Effects>(tubes_and_gravity, effects), sensor}};
 }}"""
@@ -144,10 +144,14 @@ def _devices(robot: Robot, known: dict[str, float]) -> Iterator[str]:
     yield from vector("home_rotation", "actuation.home_rotation", "alpha where the motors are at 0 [rad]")
     yield from vector("tracker_position", "tracker.position", "of the base frame in the tracker frame [m]")
     yield from vector("tracker_rotation", "tracker.rotation", "its rotation vector there [rad]")
-    roll = "" if robot.tracker.roll_known else "; not known"
     tube = robot.tracker.sensor_on_tube - 1
     yield f"inline constexpr int sensor_tube = {tube};  // whose tip carries the sensor, from 0"
-    yield scalar("sensor_roll", "tracker.sensor_roll", f"of the sensor about the axis of that tip [rad]{roll}")
+    for name, key, text in (
+        ("sensor_position", "sensor_position_mm", "of the sensor in the frame of that tip [m]"),
+        ("sensor_rotation", "sensor_rotation_vector_rad", "its rotation vector there [rad]"),
+    ):
+        unknown = "; not known" if getattr(robot.tracker, key) is None else ""
+        yield from vector(name, f"tracker.{name}", text + unknown)
 
 
 def _effects(robot: Robot) -> Iterator[str]:

@@ -8,14 +8,14 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Mask
-from ctcr.audit import sensor_roll
+from ctcr.audit import sensor_pose
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
 from ctcr.fit.sessions import part_of_runs, uncertain
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import Noise, noise_of_readings, with_field
-from ctcr.model.sessions import without_frame
+from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -50,13 +50,13 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     what parameters take of it, by the same rows in every command.
     """
     jitter = sqrt(3) * (robot.tracker.jitter_mm or nan)
-    readings, _ = sensor_roll.positions_alone(robot, readings)
+    robot, readings, _ = sensor_pose.trusted(robot, readings)
     if not np.isfinite(readings.positions).any():
         return Floors(jitter)
     readings, chosen = part_of_runs(robot, readings)
     try:
         noise = noise_of_readings(robot, readings)
-        names = without_frame(uncertain(robot), readings)
+        names = told(uncertain(robot), readings)
         _, sd, _, _ = parameters.priors(robot, names)
     except InputError:  # nothing could be fitted
         return Floors(jitter)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ctcr import _core, settings
-from ctcr.arrays import Array, Mask
-from ctcr.audit import sensor_roll
+from ctcr.arrays import Array, Integers, Mask
+from ctcr.audit import sensor_pose
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, one_sided
 from ctcr.fit.result import Fit, Priors, rms
@@ -27,7 +27,7 @@ from ctcr.model import recording, user_recording
 from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
-from ctcr.model.sessions import without_frame
+from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
@@ -48,6 +48,7 @@ class FitOptions:
     scales: Scales | None = None  # of another fit, on the stated uncertainties; by default those of most evidence.
     # Log evidences of models can be compared at the same weights, inflation and scales.
     starts: int = 1  # that are compared, all but the first drawn from the priors
+    row: Integers | None = None  # (M,) of the table, to name them; by default from 1
     max_iterations: int = settings.ITERATIONS
     tolerance: float = settings.TOLERANCE  # of log evidence
 
@@ -69,27 +70,28 @@ def fit(
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
-    noise    of the tracker; `noise_of_readings` by default. An unknown roll of the sensor is always free
+    noise    of the tracker; `noise_of_readings` by default. What is uncertain of the sensor's pose is always free
     Other options as in `FitOptions`. Raises NoFit where none is possible.
     """
     began = perf_counter()
-    robot, measurements, said = sensor_roll.usable(robot, measurements)
-    names = without_frame(sensor_roll.with_roll(free, robot), measurements)
+    robot, measurements, said = sensor_pose.usable(robot, measurements)
+    names = told(sensor_pose.with_pose(free, robot), measurements)
     noise = noise or noise_of_readings(robot, measurements)
     chosen = np.ones(len(measurements), bool) if rows is None else np.asarray(rows, dtype=bool)
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
     given = {"weights": weights, "inflation": inflation, "scales": scales}
+    named = {"row": measurements.row}
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
         kept = like.frozen if like else given
-        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept)
+        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept, **named)
 
-    start, priors = _with_frame(model(), priors, noise, positions, rows, **given)
+    start, priors = _with_frame(model(), priors, noise, positions, rows, **given, **named)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
@@ -190,11 +192,12 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
             if core.converged and (settled or (to_the_end and moved < settings.FRICTION_PATH_CHANGE)):
                 break
     except ValueError as error:
-        unsolved = _numbered(model.unsolved())
-        hint = f": the model has no solution for {unsolved}; correct their joints or loads, or leave them out"
+        unsolved = model.unsolved()
+        which = f": the model has no solution for {_named(unsolved, how)}"
+        hint = f"{which}; correct their joints or loads, or leave them out"
         raise NoFit([Problem(line + hint * bool(unsolved)) for line in str(error).splitlines()]) from None
     own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
-    warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded)], perf_counter() - began
+    warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded, how)], perf_counter() - began
     return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
 
 
@@ -334,11 +337,14 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
         yield "no orientation was measured: positions alone tell the parameters apart less well"
 
 
-def _exclusion_warnings(rows: Sequence[int]) -> list[str]:
+def _exclusion_warnings(rows: Sequence[int], how: FitOptions) -> list[str]:
     """Names rows without a solution, counted from 0."""
-    return [f"the model has no solution for {_numbered(rows)}, which are left out"] if rows else []
+    if not rows:
+        return []
+    return [f"the model has no solution for {_named(rows, how)}, which are left out: check their joints and loads"]
 
 
-def _numbered(rows: Sequence[int]) -> str:
-    """Rows counted from 0 as readings counted from 1; "" without any."""
-    return f"{len(rows)} readings, number {listed([row + 1 for row in rows], 8)}" if rows else ""
+def _named(rows: Sequence[int], how: FitOptions) -> str:
+    """Rows counted from 0 by their numbers in the table."""
+    named = [row + 1 if how.row is None else int(how.row[row]) for row in rows]
+    return f"{len(rows)} readings, rows {listed(named, 8)}"

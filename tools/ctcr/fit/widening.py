@@ -26,6 +26,8 @@ WORDS = {
     "translation_offset_mm": "the home translations",
     "length_mm": "the lengths of the tubes",
     "curved_length_mm": "the curved lengths of the tubes",
+    "sensor_position_mm": "the sensor's position",
+    "sensor_rotation_deg": "the sensor's rotation",
     "curvature_percent": "the curvatures",
     "youngs_modulus_percent": "the stiffnesses of the tubes",
 }
@@ -44,7 +46,8 @@ class Widened:
     @property
     def sentence(self) -> str:
         key, index = key_and_index(self.uncertainty)
-        which = "" if index is None else f" ({'xyz'[index] if key.startswith('tracker') else f'tube {index + 1}'})"
+        axes = key.startswith(("tracker", "sensor"))
+        which = "" if index is None else f" ({'xyz'[index] if axes else f'tube {index + 1}'})"
         unit = key.rsplit("_", 1)[-1].replace("percent", "%")
         of = f"The stated uncertainty of {WORDS[key]}{which}, {self.stated:g} {unit}"
         return f"{of}, is contradicted by the data: widened {self.factor:.2g} times."

@@ -9,6 +9,14 @@ from ctcr.model import parameters
 from ctcr.model.parameters import Field, field_of, value_at
 from ctcr.robot.description import Robot, Tube
 from ctcr.robot.ledger import Change
+from ctcr.robot.yaml_document import FieldPath
+
+_POSES = {  # of tracker: of the tracker frame and of the sensor, and their units
+    "position_mm": "mm",
+    "rotation_vector_rad": "rad",
+    "sensor_position_mm": "mm",
+    "sensor_rotation_vector_rad": "rad",
+}
 
 
 @dataclass(frozen=True)
@@ -88,18 +96,33 @@ def fitted(fit) -> list[Fitted]:
 
 
 def changes(fit, before: Robot, after: Robot) -> list[Change]:
-    """What a fit changes in the file; a turn of the tracker frame changes its rotation vector."""
+    """What a fit changes in the file; a turn of the tracker frame, or of the sensor, changes its rotation vector."""
     made = []
     for name, sd in zip(fit.names, fit.sd, strict=True):
         field = field_of(name)
-        if field.path:
+        if field.path and _is_list(before, field.path):
             made.append(Change(field.path, field.unit, value_at(after, field.path), field.factor * float(sd)))
     said = {change.path for change in made}
-    for key, unit in (("position_mm", "mm"), ("rotation_vector_rad", "rad")):
-        for i, (old, new) in enumerate(zip(getattr(before.tracker, key), getattr(after.tracker, key), strict=True)):
-            if old != new and ("tracker", key, i) not in said:
-                made.append(Change(("tracker", key, i), unit, new))
+    for key, unit in _POSES.items():
+        new = getattr(after.tracker, key)
+        if not _is_list(before, ("tracker", key, 0)):
+            made += [Change(("tracker", key), unit, new)] if new != getattr(before.tracker, key) else []
+            continue
+        for i, (old, value) in enumerate(zip(getattr(before.tracker, key), new, strict=True)):
+            if old != value and ("tracker", key, i) not in said:
+                made.append(Change(("tracker", key, i), unit, value))
+    for key, unit in (("sensor_position_mm", "mm"), ("sensor_rotation_deg", "deg")):  # of what was not known
+        stated = getattr(after.uncertainty, key)
+        if stated != getattr(before.uncertainty, key):
+            made.append(Change(("uncertainty", key), unit, stated))
     return made
+
+
+def _is_list(robot: Robot, path: FieldPath) -> bool:
+    """Whether the file of a robot has the list of a field; it has none of a pose that is left out or null."""
+    if path[0] != "tracker":
+        return True
+    return path[1] in robot.tracker.model_fields_set and getattr(robot.tracker, path[1]) is not None
 
 
 def _implausible(field: Field, value: float) -> str:

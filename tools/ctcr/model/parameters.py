@@ -1,7 +1,8 @@
 """The named parameters of a robot: names with wildcards, values and prior uncertainties of a robot file, and back.
 
-Names and units are those of the compiled library, in SI; tracker.rotation is the turn of the tracker frame from the one
-of the file, about the tracker's axes, as a rotation vector.
+Names and units are those of the compiled library, in SI. tracker.rotation and tracker.sensor_rotation are the turns of
+the tracker frame and of the sensor from those of the file, about the axes of the tracker and of the tip, as rotation
+vectors.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,16 +15,17 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, did_you_mean
-from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.yaml_document import FieldPath
 
 GROUPS = {  # short names
     "tracker.frame": ("tracker.position.*", "tracker.rotation.*"),
+    "tracker.sensor": ("tracker.sensor_position.*", "tracker.sensor_rotation.*"),
+    "tracker.sensor_roll": ("tracker.sensor_rotation.z",),
     "homes": ("actuation.home_translation.*", "actuation.home_rotation.*"),
 }
 STANDARD = "standard"  # the parameters of the paper's calibration
@@ -44,12 +46,16 @@ _FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), u
     "actuation.home_translation.#": (("actuation", "home_translation_mm", "#"), "mm", 1e3),
     "actuation.home_rotation.#": (("actuation", "home_rotation_deg", "#"), "deg", 180 / pi),
     "tracker.position.*": (("tracker", "position_mm", "#"), "mm", 1e3),
-    "tracker.sensor_roll": (("tracker", "sensor_roll_deg"), "deg", 180 / pi),
+    "tracker.sensor_position.*": (("tracker", "sensor_position_mm", "#"), "mm", 1e3),
     "tracker.rotation.*": (None, "deg", 180 / pi),  # a turn of the rotation vector, not one of its numbers
+    "tracker.sensor_rotation.*": (None, "deg", 180 / pi),
 }
+_TURNS = {"tracker.rotation": "rotation_vector_rad", "tracker.sensor_rotation": "sensor_rotation_vector_rad"}
 _UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
     ("tracker", "position"): "tracker_frame_mm",
     ("tracker", "rotation"): "tracker_frame_deg",
+    ("tracker", "sensor_position"): "sensor_position_mm",
+    ("tracker", "sensor_rotation"): "sensor_rotation_deg",
     ("actuation", "home_translation"): "translation_offset_mm",
     ("actuation", "home_rotation"): "rotation_offset_deg",
     ("tubes", "length"): "length_mm",
@@ -61,7 +67,8 @@ _UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
 CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little more than the sums of the two
 _UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
 LEAST_EIGENVALUE = 1e-6  # of correlations: beyond it they leave a sum of parameters exactly known
-ANYWHERE = pi / 3**0.5  # standard deviation of an angle of which nothing is known [rad]
+ANYWHERE = {"position": settings.SENSOR_BESIDE, "rotation": pi / 3**0.5}  # [m], [rad] standard deviations of a
+# sensor's place, and of an angle, of which nothing is known
 
 
 @dataclass(frozen=True)
@@ -121,8 +128,9 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
 
     A name may hold `*` (tubes.*.youngs_modulus), may be a group (tracker.frame, homes), and may be several separated by
     commas. `standard` is the calibration of the paper: tracker frame, homes, and stiffness, curvature, curved length
-    and length of each tube (of a straight tube: stiffness and length). Effects that the robot has are named as in
-    effects.friction.coefficient.1 (effects.friction.*). Raises InputError for names that do not exist.
+    and length of each tube (of a straight tube: stiffness and length), and what is uncertain of the sensor's pose.
+    Effects that the robot has are named as in effects.friction.coefficient.1 (effects.friction.*). Raises InputError
+    for names that do not exist.
     """
     known = [*names_of(robot.n_tubes), *of_effects(robot)]
     wanted = [name.strip() for item in ([free] if isinstance(free, str) else free) for name in item.split(",")]
@@ -149,7 +157,7 @@ def of_effects(robot: Robot) -> list[str]:
 
 
 def values(robot: Robot, names: Iterable[str] | None = None) -> Array:
-    """Values of parameters, all by default; at tracker.rotation the rotation vector of the tracker frame."""
+    """Values of parameters, all by default; at turns the rotation vector of the robot file."""
     return np.array([_value(robot, name) for name in (names_of(robot.n_tubes) if names is None else names)])
 
 
@@ -217,16 +225,15 @@ def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robo
     own = {name: values.pop(name) for name in [*values] if name.startswith("effects.")}
     if own:
         changed.effects = catalogue.as_section(own.keys(), own.values(), robot)
-    turn = np.zeros(3)
     for name, value in values.items():
         field = field_of(name)
         if field.path:
             _set(changed, field.path, value * field.factor)
-        else:
-            turn["xyz".index(name[-1])] = value
-    if turn.any():
-        frame = matrix_from_rotation_vector(turn) @ robot.tracker.rotation
-        changed.tracker.rotation_vector_rad = Rotation.from_matrix(frame).as_rotvec().tolist()
+    for kind, key in _TURNS.items():
+        turn = Rotation.from_rotvec([values.get(f"{kind}.{axis}", 0.0) for axis in "xyz"])
+        if turn.magnitude():
+            old = Rotation.from_rotvec(getattr(robot.tracker, key) or np.zeros(3))
+            setattr(changed.tracker, key, (turn * old).as_rotvec().tolist())
     return changed
 
 
@@ -288,6 +295,7 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
 
 def _standard(robot: Robot) -> list[str]:
     found = ["tracker.position.*", "tracker.rotation.*", "actuation.home_translation.*", "actuation.home_rotation.*"]
+    found += of_sensor(robot)
     for i, tube in enumerate(robot.tubes, start=1):
         curved = tube.curvature != 0 and tube.curved_length != 0
         stiffness = "youngs_modulus" if tube.bending_stiffness_Nm2 is None else "bending_stiffness"
@@ -296,11 +304,17 @@ def _standard(robot: Robot) -> list[str]:
     return found
 
 
+def of_sensor(robot: Robot) -> list[str]:
+    """The parameters of the sensor's pose that the robot file does not know exactly."""
+    return [name for name in names_of(robot.n_tubes) if name.startswith("tracker.sensor_") and _stated_sd(robot, name)]
+
+
 def _value(robot: Robot, name: str) -> float:
     """The value of a parameter of the robot in SI; what the file leaves out is 0, and a ratio 1."""
     field = field_of(name)
     if field.path is None:
-        return float(robot.tracker.rotation_vector_rad["xyz".index(name[-1])])
+        vector = getattr(robot.tracker, _TURNS[name[:-2]])
+        return float(vector["xyz".index(name[-1])]) if vector else 0.0
     value = value_at(robot, field.path)
     return float(name.endswith("_ratio")) if value is None else float(value) / field.factor
 
@@ -313,7 +327,7 @@ def _set(robot: Robot, path: FieldPath, value: float) -> None:
         setattr(value_at(robot, path[:-1]), path[-1], value)
     else:
         section, key, i = getattr(robot, path[0]), path[1], path[2]
-        old = list(getattr(section, key))
+        old = list(getattr(section, key) or (0.0, 0.0, 0.0))  # a pose that was not known
         if key.startswith("home_") and getattr(section, f"recorded_{key}") is None:
             setattr(section, f"recorded_{key}", old)
         setattr(section, key, _replaced(old, i, value))
@@ -335,19 +349,22 @@ def group_of(robot: Robot, name: str) -> str | None:
 
 
 def name_at(path: FieldPath) -> str | None:
-    """The parameter of a field; that of a rotation vector is the turn about the same axis of the tracker."""
-    if path[:2] == ("tracker", "rotation_vector_rad"):
-        return f"tracker.rotation.{'xyz'[path[2]]}"
+    """The parameter of a field; that of a rotation vector is the turn about the same axis."""
+    for kind, key in _TURNS.items():
+        if path[:2] == ("tracker", key) and len(path) > 2:
+            return f"{kind}.{'xyz'[path[2]]}"
     return next((name for name, field in _fields().items() if field.path == path), None)
 
 
 def _stated_sd(robot: Robot, name: str) -> float | None:
     """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
-    if name == "tracker.sensor_roll":
-        return ANYWHERE if robot.tracker.sensor_roll == "unknown" else None
     key, index = uncertainty_of(name) or (None, 0)
     if key is None:
         return None
+    if getattr(robot.uncertainty, key) is None:  # of the sensor's pose
+        kind = name.split(".")[1].removeprefix("sensor_")
+        field = {"position": "sensor_position_mm", "rotation": "sensor_rotation_vector_rad"}[kind]
+        return ANYWHERE[kind] if getattr(robot.tracker, field) is None else None
     relative = abs(_value(robot, name)) if key.endswith("_percent") else 1.0
     return robot.uncertainty.of(key, index) * _UNCERTAINTY_UNITS[key.rsplit("_", 1)[-1]] * relative
 

@@ -18,10 +18,10 @@ def names_of(n_tubes: int) -> tuple[str, ...]:
 
 
 def values(robot: Robot) -> Array:
-    """Values of all these parameters. The rotation of the tracker frame counts from the file's frame, so it is 0."""
+    """Values of all these parameters. Turns count from the file's, so they are 0."""
     own = parameters.values(robot)
     for i, name in enumerate(parameters.names_of(robot.n_tubes)):
-        if name.startswith("tracker.rotation."):
+        if parameters.field_of(name).path is None:
             own[i] = 0.0
     return np.concatenate([own, catalogue.values(robot)])
 

@@ -20,10 +20,12 @@ from ctcr.table.measurements import Measurements
 FRAME = 6  # numbers of a frame
 
 
-def without_frame(names: Sequence[str], readings: Measurements) -> list[str]:
-    """Names of parameters without those of a frame that all runs share, where each run has its own."""
-    frame = ("tracker.position.", "tracker.rotation.")
-    return [name for name in names if readings.sessions is None or not name.startswith(frame)]
+def told(names: Sequence[str], readings: Measurements) -> list[str]:
+    """Names of parameters without those of which readings tell nothing: of a frame that all runs share, where each run
+    has its own, and of the sensor's rotation, where no orientation was measured."""
+    nothing = () if readings.sessions is None else ("tracker.position.", "tracker.rotation.")
+    nothing += () if readings.oriented.any() else ("tracker.sensor_rotation.",)
+    return [name for name in names if not name.startswith(nothing)]
 
 
 def as_given(model: Any) -> Any:

@@ -111,7 +111,7 @@ def _relations(data: dict, tubes: list[dict]) -> Iterator[Fault]:
         if tubes and isinstance(home, list) and len(home) != len(tubes):
             yield ("actuation", key), f"has {len(home)} values: needs {len(tubes)}, one a tube"
     for key, stated in _mapping(data.get("uncertainty")).items():
-        count, what = (3, "axis") if str(key).startswith("tracker_frame") else (len(tubes), "tube")
+        count, what = (3, "axis") if str(key).startswith(("tracker_frame", "sensor_")) else (len(tubes), "tube")
         if tubes and key != "correlations" and isinstance(stated, list) and len(stated) != count:
             yield ("uncertainty", key), f"has {len(stated)} values: needs {count}, one for each {what}, or one for all"
     sensor = tracker.get("sensor_on_tube")

@@ -11,7 +11,8 @@ TRACKER = {
     "accuracy_95_deg": None,
     "position_mm": [0.0, 0.0, 0.0],
     "rotation_vector_rad": [0.0, 0.0, 0.0],
-    "sensor_roll": "unknown",
+    "sensor_position_mm": [0.0, 0.0, 0.0],
+    "sensor_rotation_vector_rad": None,
 }
 UNCERTAINTY = {
     "tracker_frame_mm": 5.0,
@@ -25,7 +26,8 @@ UNCERTAINTY = {
 }
 SAID = {
     "actuation": "not given: the ratios of the motors are not known, at home all tips are flush with the front plate",
-    "tracker": f"not given: the sensor reads the tip of tube 1, tracker and base frame agree, and the jitter is "
+    "tracker": f"not given: the sensor is at the tip of tube 1, turned anyhow, tracker and base frame agree, and the "
+    "jitter is "
     f"{TRACKER['jitter_mm']:g} mm and {TRACKER['jitter_deg']:g} deg",
     "uncertainty": f"not given: {UNCERTAINTY['tracker_frame_mm']:g} mm of the tracker frame, "
     f"{UNCERTAINTY['rotation_offset_deg']:g} deg of the homes, {UNCERTAINTY['curvature_percent']:g} % of curvatures "

@@ -5,7 +5,7 @@ Tubes go from the innermost outwards. Base frame: origin where the tubes leave t
 
 from collections.abc import Callable, Iterator, Mapping
 from math import pi
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, get_args
 
 import numpy as np
 from annotated_types import Len
@@ -61,7 +61,7 @@ class Section(BaseModel):
     def expected(cls, field: str) -> str:
         """The value that a field needs, for messages."""
         info, quantity = cls.model_fields[field], cls.quantity(field)
-        may_be_null = info.is_required() and type(None) in get_args(info.annotation)
+        may_be_null = type(None) in get_args(info.annotation) and (info.is_required() or info.default is not None)
         return (quantity.expected if quantity else info.description) + (" (null: not known)" if may_be_null else "")
 
     @classmethod
@@ -186,8 +186,8 @@ class Actuation(Section):
 class Tracker(Section):
     """The sensor, and T_ref, the pose of the robot base frame in the tracker frame.
 
-    `sensor_roll_deg` is the rotation of the sensor's axes against those of the tip about their common z axis; without
-    it they agree. Where `sensor_roll` is unknown, fits estimate it.
+    `sensor_position_mm` and `sensor_rotation_vector_rad` are T_tip_sensor, the pose of the sensor in the frame of the
+    tip; left out, the sensor is the tip. Fits estimate what is null.
     """
 
     sensor_on_tube: Annotated[int, Field(ge=1, description="the number of a tube, innermost 1")]
@@ -198,8 +198,12 @@ class Tracker(Section):
     accuracy_95_deg: Annotated[float | None, Quantity("deg", usual=(1e-3, 20), least=0)]
     position_mm: Annotated[Three, Quantity("mm", usual=(0, 5000), count="three numbers")]
     rotation_vector_rad: Annotated[Three, Quantity("rad", usual=(0, 2 * pi), count="three numbers")]
-    sensor_roll: Literal["known", "unknown"] = Field("known", description="known or unknown")
-    sensor_roll_deg: Annotated[float | None, Quantity("deg", usual=(0, 360))] = None
+    sensor_position_mm: Annotated[Three | None, Quantity("mm", usual=(0, 200), count="three numbers")] = [0.0, 0.0, 0.0]
+    sensor_rotation_vector_rad: Annotated[Three | None, Quantity("rad", usual=(0, 2 * pi), count="three numbers")] = [
+        0.0,
+        0.0,
+        0.0,
+    ]
 
     @property
     def position(self) -> Array:
@@ -212,14 +216,19 @@ class Tracker(Section):
         return matrix_from_rotation_vector(self.rotation_vector_rad)
 
     @property
-    def roll(self) -> float:
-        """Rotation of the sensor's axes against those of the tip about their common z axis [rad]."""
-        return np.deg2rad(self.sensor_roll_deg or 0.0)
+    def sensor_position(self) -> Array:
+        """The sensor in the tip's frame (3,) [m]; at the tip where it is not known."""
+        return 1e-3 * np.array(self.sensor_position_mm or (0.0, 0.0, 0.0))
 
     @property
-    def roll_known(self) -> bool:
-        """Whether measured orientations can be compared: by the file, or by an earlier fit."""
-        return self.sensor_roll == "known" or self.sensor_roll_deg is not None
+    def sensor_rotation_vector(self) -> Array:
+        """Of R_tip_sensor (3,) [rad]; zero where it is not known."""
+        return np.array(self.sensor_rotation_vector_rad or (0.0, 0.0, 0.0))
+
+    @property
+    def sensor_rotation_known(self) -> bool:
+        """Whether measured orientations can be compared."""
+        return self.sensor_rotation_vector_rad is not None
 
 
 class Correlation(Section):
@@ -231,8 +240,9 @@ class Correlation(Section):
 
 
 class Uncertainty(Section):
-    """Prior standard deviations of calibration parameters: a number for all tubes (of the frame, all axes) or a list
-    with one for each."""
+    """Prior standard deviations of calibration parameters: a number for all tubes (of the frame and the sensor, all
+    axes) or a list with one for each. Left out, the sensor's pose is exactly as the file has it; where that is null,
+    nothing is known of it."""
 
     tracker_frame_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 100), count=EACH_AXIS, least=0)]
     tracker_frame_deg: Annotated[Each, Quantity("deg", usual=(1e-3, 90), count=EACH_AXIS, least=0)]
@@ -242,6 +252,8 @@ class Uncertainty(Section):
     curved_length_mm: Annotated[Each, Quantity("mm", usual=(1e-3, 50), count=EACH_TUBE, least=0)]
     curvature_percent: Annotated[Each, Quantity("%", usual=(0.01, 100), count=EACH_TUBE, least=0)]
     youngs_modulus_percent: Annotated[Each, Quantity("%", usual=(0.01, 200), count=EACH_TUBE, least=0)]
+    sensor_position_mm: Annotated[Each | None, Quantity("mm", usual=(1e-3, 200), count=EACH_AXIS, least=0)] = None
+    sensor_rotation_deg: Annotated[Each | None, Quantity("deg", usual=(1e-3, 180), count=EACH_AXIS, least=0)] = None
 
     correlations: list[Correlation] = Field(
         default_factory=list, description="a list of pairs of parameters: first, second, r; others are independent"

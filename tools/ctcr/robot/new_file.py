@@ -15,7 +15,8 @@ _TRACKER = {
     "jitter_deg": "default",
     "accuracy_95_mm": "95 % figures of the maker; null: no smooth error of the tracker is assumed",
     "position_mm": "default: both frames agree; `ctcr calibrate frame` finds it",
-    "sensor_roll": "about the tip's axis; known: its x axis is that of the tip",
+    "sensor_position_mm": "in the tip's frame, z along the tip; null: not known, fits find it",
+    "sensor_rotation_vector_rad": "of its axes against those of the tip; null: not known, fits find it",
 }
 
 
@@ -121,7 +122,8 @@ def text(robot: NewRobot) -> str:
         "# The sensor, and the base frame as the tracker sees it: x_tracker = R x_base + position.\n"
         f"tracker:\n{_section(TRACKER | {'sensor_on_tube': robot.sensor_on_tube}, _TRACKER)}"
         "\n"
-        "# How far the true values may be from those above: one standard deviation. All defaults.\n"
+        "# How far the true values may be from those above: one standard deviation. All defaults. The sensor's pose\n"
+        "# counts as exact unless sensor_position_mm and sensor_rotation_deg stand here.\n"
         f"uncertainty:\n{_section(UNCERTAINTY, {})}"
     )
 

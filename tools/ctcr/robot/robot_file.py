@@ -5,6 +5,7 @@ comments and the layout of the file that the robot came from.
 """
 
 import io
+from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
 
 LINE_WIDTH = 1000  # a row of the ledger stays one line
+ANY_ROLL_DEG = 104.0  # standard deviation of an angle of which nothing is known
 
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
@@ -85,11 +87,27 @@ def dumped(yaml: YAML, document: Any) -> str:
 
 
 def _filled(data: dict[str, Any]) -> dict[str, Any]:
-    """A parsed file with the defaults of the sections that it leaves out."""
+    """A parsed file with the defaults of the sections that it leaves out, and with its sensor's pose for a roll."""
     listed = data.get("tubes")
     lengths = [tube.get("length_mm") for tube in listed if isinstance(tube, dict)] if isinstance(listed, list) else []
     known = [length if isinstance(length, int | float) else 0.0 for length in lengths]  # others are faults of their own
-    return data | {name: defaults.section(name, known) for name in defaults.absent(data)}
+    return _without_roll(data | {name: defaults.section(name, known) for name in defaults.absent(data)})
+
+
+def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
+    """A parsed file with the pose of the sensor instead of its roll about the tip's axis, which older files have."""
+    tracker, uncertainty = data["tracker"], data["uncertainty"]
+    if not isinstance(tracker, dict) or "sensor_rotation_vector_rad" in tracker:
+        return data
+    roll, degrees = tracker.get("sensor_roll", "known"), tracker.get("sensor_roll_deg")
+    if roll not in ("known", "unknown") or not isinstance(degrees, int | float | None):  # faults of their own
+        return data
+    kept = {key: value for key, value in tracker.items() if not key.startswith("sensor_roll")}
+    if degrees is not None or roll == "unknown":
+        kept["sensor_rotation_vector_rad"] = None if degrees is None else [0.0, 0.0, radians(degrees)]
+    if roll == "unknown" and isinstance(uncertainty, dict):
+        uncertainty = {"sensor_rotation_deg": [0.0, 0.0, ANY_ROLL_DEG]} | uncertainty
+    return data | {"tracker": kept, "uncertainty": uncertainty}
 
 
 def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:

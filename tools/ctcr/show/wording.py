@@ -1,7 +1,7 @@
 """Numbers, names and lists as messages and pages show them."""
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite, nan
 from typing import Any
 
@@ -82,3 +82,8 @@ def join(names: Sequence[str]) -> str:
 def listed(items: Sequence[Any], most: int = NAMED) -> str:
     """At most `most` items, and dots where there are more."""
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
+
+
+def numbers(values: Iterable[float], digits: int = 6) -> str:
+    """A list as a robot file holds it."""
+    return "[" + ", ".join(f"{round(float(value), digits) + 0.0:.10g}" for value in values) + "]"

@@ -20,6 +20,7 @@ from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
 from ctcr.show.result import Glance, Shown, frame
+from ctcr.show.wording import listed
 from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
 from ctcr.table.frame_table import FrameTable
 from ctcr.table.sessions import Sessions
@@ -330,7 +331,10 @@ def _warnings(t: Array, run: Integers, file: str) -> Iterator[Problem]:
     same_run = run[1:] == run[:-1]
     late = np.flatnonzero(same_run & (t[1:] <= t[:-1]))
     if len(late):
-        text = f"{t[late[0] + 1]:g} s does not come after {t[late[0]]:g} s ({len(late)} such rows)"
+        text = (
+            f"{t[late[0] + 1]:g} s does not come after {t[late[0]]:g} s ({len(late)} such rows: {listed(late + 3)}): "
+            "rows are taken in their order; correct their times, or leave t_s out"
+        )
         yield Problem(text, file, int(late[0]) + 3, "t_s", line_name="row")
     starts = run[np.flatnonzero(np.concatenate([[True], ~same_run]))]
     if len(np.unique(starts)) < len(starts):

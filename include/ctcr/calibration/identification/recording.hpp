@@ -1,6 +1,7 @@
 #pragma once
 // A table of readings beside what a system with other parameters would have read.
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <memory>
 #include <span>
@@ -15,8 +16,8 @@ namespace ctcr {
 
 /// Residuals of a recording, and their exact derivatives, as functions of chosen parameters of the system.
 ///
-/// A vector of parameters x holds values of SystemParameters<N, Fx>; tracker.rotation is the turn of T_ref from the
-/// nominal one about the tracker's axes, as one rotation vector [rad]. Rows stand in the order in which they were
+/// A vector of parameters x holds values of SystemParameters<N, Fx>; those of a turn from the nominal frame are one
+/// rotation vector [rad]. Rows stand in the order in which they were
 /// recorded. Each row starts from its own last solution. Answers do not depend on the number of threads. Not for several
 /// callers at once. Real time: no.
 /// @tparam Fx  the effects of the system
@@ -24,6 +25,7 @@ template <int N, class Fx = Standard>
 class Recording {
   using P = SystemParameters<N, Fx>;
   using HistoryOfRow = typename Fx::template On<N>::History;
+  static constexpr std::array turns{Parameter::tracker_rotation, Parameter::sensor_rotation};
 
 public:
   /// @param measured    T_tracker_sensor of each row, NaN where not measured
@@ -35,7 +37,7 @@ public:
       rows_(std::move(rows)),
       measured_(std::move(measured)),
       parameters_(std::move(parameters)),
-      columns_(with_whole_turn(parameters_)),
+      columns_(with_whole_turns(parameters_)),
       pool_(&pool),
       start_(rows_.size()),
       predicted_(rows_.size()),
@@ -62,7 +64,8 @@ public:
     const RecordedPath<N> path = recorded_path<N, Fx>(system, rows_, *torsion_);
     const std::vector<HistoryOfRow> history = histories<N, Fx>(system, rows_, path);
     const auto sensitivities = jacobian ? std::optional(history_sensitivities(system, path)) : std::nullopt;
-    const Mat3 turning = left_jacobian(turn_of(x));
+    std::array<Mat3, turns.size()> turning;
+    for (std::size_t t = 0; t < turns.size(); ++t) turning[t] = left_jacobian(turn_of(x, turns[t]));
     residual.resize(6 * size());
     if (jacobian) jacobian->resize(6 * size(), x.size());
     std::vector<std::uint8_t> failed(rows_.size(), 0);
@@ -166,21 +169,23 @@ private:
   }
 
   bool differentiate_row(const System<N, Fx>& system, std::size_t i, const RowHistorySensitivities& history,
-                         const Mat3& turning, Worker& w, Eigen::MatrixXd& jacobian) noexcept {
+                         const std::array<Mat3, turns.size()>& turning, Worker& w, Eigen::MatrixXd& jacobian) noexcept {
     w.derivatives.resize(6, Eigen::Index(columns_.size()));
     if (differentiate(system, rows_[i], w.workspace, w.prediction, columns_, w.derivatives, history) != Status::ok)
       return false;
     const Mat6 by_reading = residual_by_prediction(ctcr::residual(measured_[i], w.prediction.reading));
-    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
-    Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();
-    for (std::size_t k = 0; k < columns_.size(); ++k)
-      if (const int j = columns_[k] - rotation; j >= 0 && j < 3) turned.col(j) = w.derivatives.col(Eigen::Index(k));
-    turned = (turned * turning).eval();
-    for (std::size_t k = 0; k < parameters_.size(); ++k) {
-      const int j = parameters_[k] - rotation;
-      const Vec6 slope = j >= 0 && j < 3 ? Vec6(turned.col(j)) : Vec6(w.derivatives.col(Eigen::Index(k)));
-      jacobian.col(Eigen::Index(k)).template segment<6>(Eigen::Index(6 * i)) = by_reading * slope;
+    for (std::size_t t = 0; t < turns.size(); ++t) {
+      const int first = ParameterVector<N>::index(turns[t]);
+      Eigen::Matrix<double, 6, 3> turned = Eigen::Matrix<double, 6, 3>::Zero();
+      for (std::size_t k = 0; k < columns_.size(); ++k)
+        if (const int j = columns_[k] - first; j >= 0 && j < 3) turned.col(j) = w.derivatives.col(Eigen::Index(k));
+      turned = (turned * turning[t]).eval();
+      for (std::size_t k = 0; k < parameters_.size(); ++k)
+        if (const int j = parameters_[k] - first; j >= 0 && j < 3) w.derivatives.col(Eigen::Index(k)) = turned.col(j);
     }
+    for (std::size_t k = 0; k < parameters_.size(); ++k)
+      jacobian.col(Eigen::Index(k)).template segment<6>(Eigen::Index(6 * i)) =
+          by_reading * w.derivatives.col(Eigen::Index(k));
     return true;
   }
 
@@ -189,21 +194,23 @@ private:
     return v;
   }
 
-  /// The parameters, and all turns of T_ref where one is among them: each changes what the others do.
-  static std::vector<int> with_whole_turn(std::vector<int> columns) {
-    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
+  /// The parameters, and all three of a turn where one is among them: each changes what the others do.
+  static std::vector<int> with_whole_turns(std::vector<int> columns) {
     const auto asked = [&](int place) { return std::find(columns.begin(), columns.end(), place) != columns.end(); };
-    if (asked(rotation) || asked(rotation + 1) || asked(rotation + 2))
-      for (int place = rotation; place < rotation + 3; ++place)
-        if (!asked(place)) columns.push_back(place);
+    for (const Parameter kind : turns) {
+      const int first = ParameterVector<N>::index(kind);
+      if (asked(first) || asked(first + 1) || asked(first + 2))
+        for (int place = first; place < first + 3; ++place)
+          if (!asked(place)) columns.push_back(place);
+    }
     return columns;
   }
 
-  Vec3 turn_of(const Eigen::VectorXd& x) const {
-    constexpr int rotation = ParameterVector<N>::index(Parameter::tracker_rotation);
+  Vec3 turn_of(const Eigen::VectorXd& x, Parameter kind) const {
+    const int first = ParameterVector<N>::index(kind);
     Vec3 turn = Vec3::Zero();
     for (std::size_t k = 0; k < parameters_.size(); ++k)
-      if (const int j = parameters_[k] - rotation; j >= 0 && j < 3) turn[j] = x[Eigen::Index(k)];
+      if (const int j = parameters_[k] - first; j >= 0 && j < 3) turn[j] = x[Eigen::Index(k)];
     return turn;
   }
 

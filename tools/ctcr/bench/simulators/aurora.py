@@ -15,7 +15,7 @@ from ctcr.bench.simulators.robot import SimulatedRobot
 from ctcr.bench.simulators.serial_line import SerialLine
 from ctcr.bench.simulators.simulator import Settings, Simulator
 from ctcr.errors import InputError, Problem
-from ctcr.frames import base_to_tracker
+from ctcr.frames import points_to_tracker
 
 SENSOR = 0x0A  # the handle of the coil at the robot's tip
 PROBE = 0x0C  # the handle of the coil in the probe
@@ -132,7 +132,7 @@ class AuroraSimulator(Simulator):
             self.robot.force = _three(message, "force", "N")
         if "probe" in message:
             point = _three(message, "probe", "m, base frame")
-            self._probe = base_to_tracker(self.robot.robot.tracker, point, STILL[1])
+            self._probe = points_to_tracker(self.robot.robot.tracker, point), STILL[1]
         if "fasten" in message:
             tube = message["fasten"]
             if tube is not None and tube not in range(self.robot.robot.n_tubes):
