@@ -140,6 +140,25 @@ TEST(Clearance, KinksTheRobotWhereAnOuterTubeEnds) {
     }
 }
 
+// A straight tube in a curved one bends it open, and where that ends leans towards its own shape, with no load at all.
+TEST(Clearance, LeansAlongTheMomentThatTheOuterTubeHandsOver) {
+  Robot<2> robot;
+  for (std::size_t i = 0; i < 2; ++i) robot.tubes[i] = test::paper_robot().tubes[i];
+  robot.tubes[0].curvature = 0;
+  robot.tubes[1].curved_length = robot.tubes[1].length;
+  Joints<2> q;
+  q.alpha << 0.7, 0;
+  q.beta << 0.1 - robot.tubes[0].length, 0.04 - robot.tubes[1].length;
+  const double inner = robot.tubes[0].EI(), outer = robot.tubes[1].EI(),
+               u = outer * robot.tubes[1].curvature / (inner + outer);
+  Catalogue::On<2> effects;
+  for (const double size : {1e-3, 0.02, 1.0}) {
+    effect<Clearance, 2>(effects).values = {0.5, 0.015, size, 0, 1};
+    const Vec3 turn = rotation_vector(solved(robot, effects, q, {}).rotation * rotation_matrix(Vec3(0, 0, -0.7)));
+    EXPECT_LE((turn - Vec3(0.04 * u - 0.015 * std::tanh(inner * u / size), 0, 0)).norm(), 1e-9) << size;
+  }
+}
+
 TEST(TipWeight, IsATipLoad) {
   Random random(1);
   for (int n = 0; n < test::cases(10); ++n) {

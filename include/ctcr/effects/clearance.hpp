@@ -72,10 +72,12 @@ inline constexpr EffectInfo info{
     .title = "Clearance between the tubes",
     .physics = "Tubes fit loosely: where an outer tube ends, the inner ones lean to one side.",
     .signature =
-        "A kink of constant size whose direction follows the bending moment: it does not grow with the moment.",
-    .measure = "Load with different weights: a kink stays, a compliance grows.",
+        "A kink of constant size whose direction follows a bending moment: it does not grow with the moment. "
+        "It turns with the tubes, with a load or without.",
+    .measure = "Turn one tube against the others; load with different weights: a kink stays, a compliance grows.",
     .look_alikes = "entry_clearance softening sensor_offset",
     .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709",
+    .starts = {{{"law", 1.0}}},
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "tilt",
@@ -88,6 +90,16 @@ inline constexpr std::array parameters{
                     .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
     detail::saturation_moment,
     detail::contact_compliance,
+    EffectParameter{.name = "law",
+                    .unit = "",
+                    .neutral = 0,
+                    .sigma = 1,
+                    .soft = {0, 1},
+                    .hard = {0, 1},
+                    .role = Role::choice,
+                    .meaning =
+                        "moment along which the tubes lean: 0 the one that the inner tubes carry out of the outer "
+                        "tube; 1 the one that the outer tube carries just before its end and hands over there"},
 };
 }  // namespace clearance
 
@@ -139,15 +151,19 @@ inline constexpr std::array parameters{
 };
 }  // namespace entry_clearance
 
-/// Where a tube ends, the tubes inside it tilt within its clearance, along the moment that they carry.
+/// Where a tube ends, the tubes inside it tilt within its clearance: along the moment that they carry on, or along the one
+/// that the ending tube hands over to them. Without a load and beyond all curved parts the first one is zero; the second one
+/// is how hard the tubes bend each other.
 template <int N, class P = double>
 struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
   void breakpoint(Breakpoint<P, N>& b) const noexcept {
     if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
-    detail::kink(b, detail::tilt_under(b.moment, this->template get<0>(b.tube), this->template get<1>(),
-                                       this->template get<2>()));
+    const bool hands_over = value(this->template get<3>()) > 0.5;
+    detail::kink(
+        b, detail::tilt_under(hands_over ? b.near_moment[std::size_t(b.tube)] : b.moment, this->template get<0>(b.tube),
+                              this->template get<1>(), this->template get<2>()));
   }
 };
 
