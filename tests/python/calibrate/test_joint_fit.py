@@ -126,8 +126,8 @@ def test_report(calibration):
         assert f"<h2>{title}</h2>" in shown
     assert shown.count("<svg") == 6 and "expected error" in shown
     assert not re.search(r"""(?:src|href)=["']https?:""", shown)
-    drawing = json.loads(re.search(r"const drawing = (.*);\nPlotly", page)[1].replace("<\\/", "</"))
-    assert len(drawing["data"]) == 4 and drawing["data"][3]["visible"] and not drawing["data"][0]["visible"]
+    drawing = json.loads(re.search(r'<script type="application/json">(.*)</script>', page)[1])
+    assert [layer.get("choice") for layer in drawing["layers"]] == [None, 0, 1] and len(drawing["choices"]) == 2
 
 
 def test_json(capsys):

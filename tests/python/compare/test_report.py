@@ -53,12 +53,6 @@ def without_links(svg_or_css):
     return re.sub(r"url\(\s*[\"']?#", "", svg_or_css)
 
 
-@pytest.fixture(autouse=True)
-def short_plotly(monkeypatch):
-    """The page holds plotly.js, 5 MB, as it is; its content is not tested here."""
-    monkeypatch.setattr("ctcr.show.html_page.get_plotlyjs", lambda: "/* plotly.js */")
-
-
 def test_page():
     """The page fetches nothing and holds all findings."""
     result = compare(*planted())
@@ -78,15 +72,15 @@ def test_scene():
     """The 3-D view is valid JSON with the true points and arrows."""
     result = compare(*planted())
     drawing = json.loads(report.scene(result))
-    by_name = {trace.get("name"): trace for trace in drawing["data"]}
+    by_name = {layer["name"]: layer for layer in drawing["layers"]}
     rows = report.shown_rows(result)
     for name, points in (("measured", result.headline.measured), ("predicted", result.headline.predicted)):
         shown = np.column_stack([by_name[name][axis] for axis in "xyz"])
         np.testing.assert_allclose(shown, points[rows] * 1e3, atol=5.1e-4)
     factor = report.arrow_factor(result)
     assert factor >= 1
-    shafts = by_name[f"error × {factor:g}"]
-    start, end = (np.column_stack([shafts[axis][k::3] for axis in "xyz"]) for k in (0, 1))
+    arrows = by_name[f"error × {factor:g}"]
+    start, end = (np.column_stack([ends[axis] for axis in "xyz"]) for ends in (arrows, arrows["to"]))
     np.testing.assert_allclose(end - start, factor * result.headline.error[rows] * 1e3, atol=2e-3)
 
 

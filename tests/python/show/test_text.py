@@ -75,15 +75,12 @@ class Page(HTMLParser):
         self.texts.append(data)
 
 
-@pytest.fixture(autouse=True)
-def small_pages(monkeypatch):
-    monkeypatch.setattr(html_page, "get_plotlyjs", lambda: "")
-
-
 def page_with(name: str) -> str:
     sections = [paragraph(name, "lead", bold=f"{name}."), cards([("good", name, name)]), bullets([name]), as_html(name)]
-    drawing = scene.view([scene.trace(np.zeros((1, 3)), f"{name}.")])
-    return html_page.page(name, [*sections, table(name, [name], [[name]], 1)], name, "ctcr", drawing)
+    view = html_page.view(scene.view([scene.layer("points", f"{name}.", np.zeros((1, 3)))]), name)
+    return html_page.page(
+        name, [*sections, view, html_page.command(name), table(name, [name], [[name]], 1)], name, "ctcr"
+    )
 
 
 @laws
@@ -95,9 +92,8 @@ def test_page(name):
     assert page.tags == Page(page_with("x")).tags
     assert text.encode() and text.replace("\n", "").isprintable()
     assert "".join(page.texts).count(visible(name)) >= 12
-    (script,) = [script for script in page.scripts if script.startswith("const drawing")]
-    drawn = json.JSONDecoder().raw_decode(script.removeprefix("const drawing = "))[0]
-    assert drawn["data"][0]["name"] == f"{name}." and "<" not in script
+    drawing = page.scripts[0]
+    assert json.loads(drawing)["layers"][0]["name"] == f"{name}." and "<" not in drawing
 
 
 NASTY = "[red]a[/nope] $\\frac{$ :warning: <script>alert(1)</script> \x1b[2J\a\x9b \ud800"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ctcr.arrays import Array, Mask
-from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT, TINT
 
 WIDTH, ROW_HEIGHT = 10.4, 3.6
 LONGEST_ARROW = 0.15  # of the size of the picture
@@ -90,7 +90,7 @@ def homes(figure, found: tuple[list[int], Array, Array, Array, Array]) -> None:
     """The tubes at home: grasped points and tips (N,) [mm], standard deviations and old values (N, 2), NaN: none."""
     tubes, grasped, tip, sd, old = found
     axes = figure.subplots()
-    axes.axvspan(0, max(5.0, 1.25 * tip.max()), color="#eef2f5", lw=0)
+    axes.axvspan(0, max(5.0, 1.25 * tip.max()), color=TINT, lw=0)
     axes.axvline(0, color=INK, lw=1.5)
     for row in range(len(tubes)):
         ends = (grasped[row], tip[row])

@@ -98,7 +98,7 @@ def page(c: Calibration, source: str) -> str:
     lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
     known = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
     sections = [_opening(c), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
-    return html_page.page(title, sections, source, "ctcr calibrate fit", figures.view(c))
+    return html_page.page(title, sections, source, "ctcr calibrate fit")
 
 
 def _opening(c: Calibration) -> str:
@@ -155,11 +155,13 @@ def _halves(c: Calibration) -> str:
 def _residuals(c: Calibration) -> str:
     left = figure(figures.histogram, c, 5.2, 3.5, "How large the errors are (logarithmic axis).")
     right = figure(figures.course, c, 5.2, 3.5, "The error in the order measured.")
+    caption = (
+        "Arrows lead from the predicted towards the measured tip, tracker frame. The buttons choose between the robot "
+        "file's values and the calibrated ones, drawn to one scale."
+    )
     return (
-        f'<h2>The error before and after</h2><div class="pair">{left}{right}</div><div id="view"></div>'
-        '<p class="soft">Arrows lead from the predicted towards the measured tip, tracker frame. The buttons choose '
-        "between the robot file's values and the calibrated ones; mind the scale of the arrows. Drag to turn, scroll "
-        "to zoom.</p>"
+        f'<h2>The error before and after</h2><div class="pair">{left}{right}</div>'
+        f"{html_page.view(figures.scene(c), caption)}"
     )
 
 

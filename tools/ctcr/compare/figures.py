@@ -11,7 +11,7 @@ from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
-from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
+from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT, TINT
 
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 
@@ -58,7 +58,7 @@ def course(figure: Figure, c: Comparison) -> None:
     for number, (start, stop) in enumerate(zip(starts, stops, strict=True)):
         rows = np.arange(start, stop)[:: max(1, len(run) // MOST_POINTS)]
         if number % 2:
-            axes.axvspan(x[start], x[stop - 1], color="#f2f4f7", lw=0)
+            axes.axvspan(x[start], x[stop - 1], color=TINT, lw=0)
         axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
         if len(starts) > 1 and number % sparse == 0:
             axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), **above)
@@ -191,7 +191,7 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
         axes.scatter(x[shown], local[shown, axis], s=3, color=AXES[axis], alpha=0.15, lw=0, rasterized=True)
         means = np.array([(x[rows].mean(), local[rows, axis].mean()) for rows in cells])
         axes.plot(*means.T, color=AXES[axis], lw=1.8, marker="o", ms=3, label=name)
-    axes.axhline(0, color="#8794a0", lw=0.7)
+    axes.axhline(0, color=NOISE, lw=0.7)
     limit = np.percentile(np.abs(local), 99) * 1.15
     axes.set(xlabel=label, ylabel="error, mm", ylim=(-limit, limit))
     axes.set_title(f"{100 * item.share:.0f} % of the squared error{' *' if found else ''}")

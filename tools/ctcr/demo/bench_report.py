@@ -20,7 +20,7 @@ from ctcr.model import parameters as free_parameters
 from ctcr.robot import history, robot_file
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import as_html, cards, figure, table
+from ctcr.show.html_page import as_html, cards, figure, table, view
 from ctcr.show.output import write_text
 from ctcr.table import measurements
 from ctcr.track import scenario
@@ -71,8 +71,7 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         _truth(story, known, found, hidden),
         _loops(story),
     ]
-    drawing = bench_figures.scene(drives) if drives else None
-    return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench", drawing)
+    return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench")
 
 
 def _drives(folder: Path) -> dict[str, Driven]:
@@ -126,8 +125,8 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
 
 def _steps(story: Story) -> str:
     rows = "".join(
-        f'<li>{as_html("", bold=step.why)} <span class="soft">{step.seconds:.0f} s</span><br>'
-        f"<code>{as_html(step.command)}</code><br>{as_html(step.found)}</li>"
+        f'<li>{as_html("", bold=step.why)} <span class="soft">{step.seconds:.0f} s</span>'
+        f"{html_page.command(step.command)}{as_html(step.found)}</li>"
         for step in story.steps
     )
     return f'<h2>The steps</h2><ol class="steps">{rows}</ol>'
@@ -154,8 +153,8 @@ def _cube(drives: dict[str, Driven]) -> str:
         f"know; there, knowing {EFFECT} {'helps too' if helps else 'does not help'}."
     )
     drawn = figure(bench_figures.tracking, drives, 10.4, 3.8, text, wide=True)
-    below = "The cube, and the corners that the blind robot reached; base frame. Drag to turn, click a name to hide it."
-    return f'<h2>The error in tracking</h2>{drawn}<div id="view"></div><p class="soft">{below}</p>'
+    tips = view(bench_figures.scene(drives), "The cube, and the corners that the blind robot reached; base frame.")
+    return f"<h2>The error in tracking</h2>{drawn}{tips}"
 
 
 def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:

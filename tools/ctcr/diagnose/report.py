@@ -16,6 +16,7 @@ from ctcr.show.html_page import as_html, cards, figure, paragraph, table
 from ctcr.show.wording import sentence, short
 
 MOST_ARROWS = 800
+ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
 
 
 def page(d: Diagnosis, source: str) -> str:
@@ -23,7 +24,7 @@ def page(d: Diagnosis, source: str) -> str:
     title = f"Diagnosis: {d.robot.name}"
     parts = [_found, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
-    return html_page.page(title, sections, source, "ctcr diagnose", scene(d))
+    return html_page.page(title, sections, source, "ctcr diagnose")
 
 
 def _listed(lines: Iterable[str]) -> str:
@@ -57,7 +58,7 @@ def _found(d: Diagnosis) -> str:
 
 
 def _errors(d: Diagnosis) -> str:
-    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs (logarithmic axis).")
+    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs.")
     right = figure(figures.course, d, 5.2, 3.8, "The error of every reading, in the order measured.")
     text = (
         "The error after calibration over the quantities that predict it best, and its part that the effects explain."
@@ -82,9 +83,9 @@ def _varying(d: Diagnosis) -> str:
 
 def _view(d: Diagnosis) -> str:
     heading = "Before and after" if d.accepted else "Where the errors are"
-    return (
-        f'<h2>{heading}</h2><div id="view"></div><p class="soft">Errors as lines from the predicted towards the '
-        "measured tip, all drawn with the same factor; tracker frame. Click a name to hide it.</p>"
+    return f"<h2>{heading}</h2>" + html_page.view(
+        scene(d),
+        "Arrows lead from the predicted towards the measured tip, all drawn with the same factor; tracker frame.",
     )
 
 
@@ -138,16 +139,17 @@ def _limits(d: Diagnosis) -> str:
 
 
 def scene(d: Diagnosis) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
-    measured = d.measurements.position
+    """JSON text for `html_page.view`; positions in mm, tracker frame."""
     rows = np.flatnonzero(np.isfinite(d.calibrated.residual[:, :3]).all(axis=1))
     rows = rows[evenly(len(rows), MOST_ARROWS)]
-    tips = 1e3 * measured[rows]
-    size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
-    factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
-    data = [show.trace(tips, "measured", hoverinfo="name", mode="markers", marker={"size": 2, "color": "#6b7785"})]
+    tips = 1e3 * d.measurements.position[rows]
+    size = np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1)
+    factor = show.arrow_factor(tips, float(np.quantile(size, 0.95)), ARROW_SHARE)
+    readings = {"row": d.measurements.row[rows].tolist(), "run": d.measurements.run[rows].tolist()}
+    layers = [show.layer("points", "measured", tips, "noise", hover=readings)]
     for fit, colour, name in figures.fits_shown(d):
-        lines = show.shafts(tips, tips - factor * 1e3 * fit.residual[rows, :3])
-        style = {"mode": "lines", "hoverinfo": "name", "line": {"width": 4, "color": colour}, "connectgaps": False}
-        data.append(show.trace(lines, f"error, {name}, × {factor:g}", **style))
-    return show.view(data)
+        error = 1e3 * fit.residual[rows, :3]
+        readings[f"error, {name}, mm"] = show.numbers(np.linalg.norm(error, axis=1))
+        tail = tips - error
+        layers.append(show.layer("arrows", f"error, {name}, × {factor:g}", tail, colour, 1.4, to=tail + factor * error))
+    return show.view(layers)

@@ -10,7 +10,7 @@ from ctcr.sensitivity.open_loop import OpenLoop
 from ctcr.sensitivity.terminal import CLOSED_COLUMNS, OPEN_COLUMNS, closed_rows, closing, open_rows
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.style import AXES, ERROR, FAINT
+from ctcr.show.style import AXES, ERROR, FAINT, INK
 
 
 def page(found: dict[str, Any], source: str, accuracy: float) -> str:
@@ -42,8 +42,8 @@ def bars(figure: Figure, study: OpenLoop) -> None:
     order = [study.together, *sorted(study.influences, key=lambda one: one.p95)]
     row = np.arange(len(order))
     axes.barh(row, [max(one.p95, 1e-4) for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
-    axes.plot([max(one.mean, 1e-4) for one in order], row, "D", color="#1c2733", ms=3.5, label="mean")
-    axes.plot([max(one.maximum, 1e-4) for one in order], row, "|", color="#1c2733", ms=8, label="largest")
+    axes.plot([max(one.mean, 1e-4) for one in order], row, "D", color=INK, ms=3.5, label="mean")
+    axes.plot([max(one.maximum, 1e-4) for one in order], row, "|", color=INK, ms=8, label="largest")
     axes.set_yticks(row, [one.name for one in order])
     axes.set(xscale="log", xlabel="tip error, mm")
     axes.legend(loc="lower right", bbox_to_anchor=(1, 2 / len(order)), fontsize=9)  # above the last bar

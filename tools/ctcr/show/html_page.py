@@ -5,26 +5,29 @@ from datetime import date
 from importlib.resources import files
 from typing import Any
 
-from plotly.offline import get_plotlyjs
-
-from ctcr.show.style import draw
+from ctcr.show.style import colours, draw
 from ctcr.show.wording import as_html
 
+HOW_TO_TURN = (
+    "Drag to turn. Click, then scroll, or pinch to zoom. Double-click to return. Click a name to hide it or to show it."
+)
 
-def page(
-    title: str, sections: Iterable[str], footer: str, command: str, drawing: str | None = None, reload_s: int = 0
-) -> str:
+
+def page(title: str, sections: Iterable[str], footer: str, command: str, reload_s: int = 0) -> str:
     """The whole HTML text.
 
     title     plain text, the heading of the page
     sections  HTML by the functions below; empty ones are left out
     footer    plain text: the sources of the page; `command` made it
-    drawing   JSON of a 3-D view, which one of the sections has the element `view` for
     reload_s  interval at which the browser reloads the page; 0: never
     """
     title = as_html(title)
     reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
-    style = (files("ctcr.show") / "html_page.css").read_text(encoding="utf-8")
+    style, script = ((files("ctcr.show") / f"html_page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js"))
+    style = (
+        f":root {{ {colours(dark=False)} }}\n"
+        f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {colours(dark=True)} }} }}\n{style}"
+    )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -32,18 +35,23 @@ def page(
         f"<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>"
         + "\n".join(filter(None, sections))
         + f"<footer>{as_html(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"
-        + (_drawn(drawing) if drawing is not None else "")
-        + "</body></html>\n"
+        + f"<script>{script}</script></body></html>\n"
     )
 
 
-def _drawn(drawing: str) -> str:
+def view(drawing: str, caption: str) -> str:
+    """A 3-D view: `drawing` is the JSON of `scene.view`."""
     text = drawing.replace("<", "\\u003c")  # in JSON they stand in strings only; no text may end or open a script
     return (
-        f"<script>{get_plotlyjs()}</script>"
-        f"<script>const drawing = {text};\n"
-        'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
+        f'<figure class="view"><script type="application/json">{text}</script>'
+        f"<noscript>This view needs JavaScript.</noscript>"
+        f"<figcaption>{as_html(f'{caption} {HOW_TO_TURN}')}</figcaption></figure>"
     )
+
+
+def command(text: str) -> str:
+    """A command line, with a button that copies it."""
+    return f'<div class="command"><code>{as_html(text)}</code></div>'
 
 
 def paragraph(text: str, kind: str = "", bold: str = "") -> str:

@@ -2,7 +2,7 @@
 
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table
+from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table, view
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
@@ -12,16 +12,15 @@ def page(runs: list[Run], source: str, scenario: Scenario, robot: Robot, measure
     """The whole HTML text; `source` says what was run; `measured`: tips are tracker readings."""
     numbers = summary(runs)
     drawn = [worst([run for run in group if run.started] or group) for group in by_mass(runs).values()]
+    tip = "as measured" if measured else "without noise"
     sections = [
         _opening(numbers, scenario),
-        '<h2>The path</h2><div id="view"></div>'
-        f'<p class="soft">The tip {"as measured" if measured else "without noise"}, the worst run of each weight. '
-        "Drag to turn, scroll to zoom.</p>",
+        "<h2>The path</h2>" + view(figures.scene(drawn, scenario), f"The tip {tip}, the worst run of each weight."),
         _errors(runs, numbers, scenario, measured),
         *(_one(run, scenario, robot) for run in _shown(drawn)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
-    return html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario))
+    return html_page.page(title, sections, source, "ctcr track")
 
 
 def _shown(runs: list[Run]) -> list[Run]:
