@@ -115,7 +115,7 @@ def test_fixed_point(calibration, readings):
 
 def test_report(calibration):
     """The report is one page that needs nothing else."""
-    page = report.page(calibration, "a table fitted with a robot")
+    page = report.page(calibration)
     shown = page.split("<script>")[0]
     for title in (
         "What calibration brings",
@@ -351,7 +351,7 @@ def test_run_frames(robot, readings):
     true = (Rotation.from_rotvec(turn[0]).inv() * Rotation.from_rotvec(turn)).as_rotvec()
     np.testing.assert_allclose(own, true, atol=np.radians(1.0))
     np.testing.assert_allclose(found.shift - found.shift[0], shift - shift[0], atol=2e-3)
-    assert len(framed.as_dict()["frames"]) == 12 and "each run has of its own" in report.page(framed, "these")
+    assert len(framed.as_dict()["frames"]) == 12 and "each run has of its own" in report.page(framed)
     with pytest.raises(InputError, match="the frames of the runs are fitted by themselves"):
         outcome(robot, framed.readings, ["tracker.frame"])
 

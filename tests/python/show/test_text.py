@@ -66,7 +66,8 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attributes) -> None:
-        self.tags.append((tag, attributes))
+        self.tags.append((tag, [pair for pair in attributes if pair[0] != "title"]))
+        self.texts += [value for name, value in attributes if name == "title"]
 
     def handle_data(self, data) -> None:
         (self.scripts if self.tags and self.tags[-1][0] == "script" else self.texts).append(data)
@@ -78,9 +79,7 @@ class Page(HTMLParser):
 def page_with(name: str) -> str:
     sections = [paragraph(name, "lead", bold=f"{name}."), cards([("good", name, name)]), bullets([name]), as_html(name)]
     view = html_page.view(scene.view([scene.layer("points", f"{name}.", np.zeros((1, 3)))]), name)
-    return html_page.page(
-        name, [*sections, view, html_page.command(name), table(name, [name], [[name]], 1)], name, "ctcr"
-    )
+    return html_page.page(name, [*sections, view, html_page.command(name), table(name, {name: name}, [[name]], 1)])
 
 
 @laws
@@ -104,7 +103,7 @@ def test_history():
     robot = robot_file.load(ROBOT)
     figures = {"rms_mm": {"nominal": 2.0, NASTY: 1.0, "noise_floor": 0.1}, "added": [NASTY]}
     entry = {"date": NASTY, "command": NASTY, "sources": [{"file": NASTY}], "figures": figures}
-    text = history.page(robot.model_copy(update={"name": NASTY, "history": [entry]}), NASTY)
+    text = history.page(robot.model_copy(update={"name": NASTY, "history": [entry]}))
     assert text.replace("\n", "").isprintable() and "<script>alert" not in text
     assert "".join(Page(text).texts).count(visible(NASTY)) >= 6
 

@@ -1,13 +1,12 @@
 """The pictures of the calibration report and its 3-D view. Colours mean what they mean in the comparison's."""
 
 import numpy as np
-from scipy import stats
 
 from ctcr import settings
 from ctcr.arrays import evenly
 from ctcr.calibrate.joint_fit import Calibration
 from ctcr.show import scene as show
-from ctcr.show.style import ERROR, FAINT, GOOD, INK, LINE, NOISE, OUT, TINT
+from ctcr.show.style import ERROR, FAINT, GOOD, INK, LINE, NOISE, OUT, TINT, noise_below, shares_below
 from ctcr.show.wording import mm
 
 MOST_NAMES = 60
@@ -46,19 +45,16 @@ def waterfall(figure, c: Calibration) -> None:
     axes.grid(axis="x", visible=False)
 
 
-def histogram(figure, c: Calibration) -> None:
+def sizes(figure, c: Calibration) -> None:
     """Error sizes before and after, against what noise would give."""
     axes = figure.subplots()
     sizes = (1e3 * np.linalg.norm(r[:, :3], axis=1) for r in (c.fit.nominal_residual, c.fit.residual))
     before, after = (size[np.isfinite(size)] for size in sizes)
-    axis_sd = c.floors.expected_error_mm / np.sqrt(3)
-    low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
-    edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
-    for sizes, colour, label in ((before, ERROR, "robot file"), (after, GOOD, "calibrated")):
-        axes.hist(sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label)
-    axes.stairs(100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)), edges, color=NOISE, lw=1.5, label="noise alone")
-    axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
-    axes.legend(fontsize=9)
+    shares_below(axes, before, color=ERROR, lw=1.8, label="robot file")
+    shares_below(axes, after, color=GOOD, lw=1.8, label="calibrated")
+    noise_below(axes, c.floors.expected_error_mm / np.sqrt(3), "expected error")
+    axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings below")
+    axes.legend(fontsize=9, loc="lower right")
 
 
 def course(figure, c: Calibration) -> None:
@@ -144,19 +140,11 @@ def half_difference(figure, c: Calibration) -> bool | None:
     for mask, colour, label in ((~beyond, NOISE, "what noise can do"), (beyond, ERROR, "beyond twice the noise")):
         if mask.any():
             axes.plot(noise[mask], size[mask], ".", color=colour, ms=5, alpha=0.6, label=f"{label} ({mask.mean():.0%})")
-    low, high = min(noise.min(), size.min()), max(noise.max(), size.max())
-    low = max(low, 1e-3 * high)
-    line = np.array([low, high])
+    line = np.array([0, noise.max()])
     axes.plot(line, line, color=INK, lw=1)
     axes.plot(line, 2 * line, color=INK, lw=0.8, ls="--")
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="expected from noise, mm RMS",
-        ylabel="difference, mm",
-        ylim=(low, 1.3 * high),
-    )
-    axes.legend(fontsize=8, loc="lower right")
+    axes.set(xlabel="expected from noise, mm RMS", ylabel="difference, mm", xlim=(0, None), ylim=(0, 1.1 * size.max()))
+    axes.legend(fontsize=8, loc="upper right")
     return None
 
 

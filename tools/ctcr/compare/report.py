@@ -16,11 +16,11 @@ MOST_ARROWS = 1500
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
 
 
-def page(c: Comparison, source: str) -> str:
-    """The whole HTML text; `source` says what was compared."""
+def page(c: Comparison) -> str:
+    """The whole HTML text."""
     title = f"Model and measurement: {c.robot}"
     sections = [_opening(c), _findings(c), _view(c), _figures(c), _tables(c)]
-    return html_page.page(title, sections, source, "ctcr compare")
+    return html_page.page(title, sections, c.files)
 
 
 def _opening(c: Comparison) -> str:
@@ -69,7 +69,7 @@ def _view(c: Comparison) -> str:
 def _figures(c: Comparison) -> str:
     wide = partial(figure, subject=c, width=10.4, wide=True)
     half = partial(figure, subject=c, width=5.2, height=3.4)
-    sizes = half(figures.histogram, caption="Sizes of the errors against noise alone (logarithmic axis).")
+    sizes = half(figures.sizes, caption="Sizes of the errors against noise alone.")
     course = half(figures.course, caption="The error in the order measured.")
     hysteresis = wide(
         figures.hysteresis,

@@ -71,7 +71,9 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         _truth(story, known, found, hidden),
         _loops(story),
     ]
-    return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench")
+    return html_page.page(
+        TITLE, sections, [str(folder / name) for name in ("robot.yaml", "both.csv", "with_effect.yaml")]
+    )
 
 
 def _drives(folder: Path) -> dict[str, Driven]:
@@ -168,7 +170,13 @@ def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
         if (field := change["field"]).startswith(SHOWN):
             numbers = (_at(known, field), change["new"], change["sd"], _at(hidden, field))
             rows.append([field, *(f"{number:.2f}" for number in numbers)])
-    columns = ["", "robot file", "found", "standard deviation", "true"]
+    columns = {
+        "": "",
+        "robot file": "the value before",
+        "found": "by the fit",
+        "standard deviation": "of the value found",
+        "true": "of the simulated robot",
+    }
     return "<h2>Found and true values</h2>" + table("", columns, rows, 1)
 
 
@@ -181,7 +189,17 @@ def _at(robot: Robot, path: str) -> float:
 
 
 def _loops(story: Story) -> str:
-    columns = ["recording", "frames", "missed", "99 % late, ms", "bus cycles", "bad", "99 % late, ms", "worst, ms"]
+    columns = {
+        "recording": "",
+        "frames": "of the tracker",
+        "missed": "frames that were not read",
+        "frames late, ms": "99 of 100 frames are later by less",
+        "bus cycles": "exchanges with the motors",
+        "bad": "cycles without an answer",
+        "cycles late, ms": "99 of 100 cycles begin later by less",
+        "worst, ms": "the latest cycle",
+        "real-time": "whether the bus had real-time priority",
+    }
     rows = []
     for path in sorted(story.folder.glob(f"*/{ABOUT}"), key=lambda path: path.stat().st_mtime):
         about = json.loads(path.read_text(encoding="utf-8"))["sittings"][-1]
@@ -189,4 +207,4 @@ def _loops(story: Story) -> str:
         counts = [tracker["frames"], tracker["missed"], f"{about['frames_late']['p99_ms']:.2f}"]
         counts += [bus["cycles"], bus["bad_cycles"], f"{bus['p99_late_ms']:.2f}", f"{bus['worst_late_ms']:.2f}"]
         rows.append([path.parent.name, *map(str, counts), "yes" if bus["real_time_priority"] else "no"])
-    return "<h2>How steady the loops were</h2>" + table("", [*columns, "real-time"], rows, 1)
+    return "<h2>How steady the loops were</h2>" + table("", columns, rows, 1)

@@ -130,5 +130,5 @@ def course(figure, d: Diagnosis) -> None:
     for start, end in zip(edges, edges[1:], strict=False):
         if end > start and d.held_out[start]:
             axes.axvspan(start + 0.5, end + 0.5, color=TINT, zorder=0)
-    axes.set(yscale="log", xlabel="reading (grey: held-out runs)", ylabel="error, mm")
+    axes.set(xlabel="reading (grey: held-out runs)", ylabel="error, mm", ylim=(0, None))
     axes.legend(markerscale=3)

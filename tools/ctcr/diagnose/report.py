@@ -1,5 +1,6 @@
 """The diagnosis as one HTML page that needs nothing else: verdict first."""
 
+import shlex
 from collections.abc import Iterable
 
 import numpy as np
@@ -19,12 +20,12 @@ MOST_ARROWS = 800
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
 
 
-def page(d: Diagnosis, source: str) -> str:
-    """The whole HTML text; `source` says what was diagnosed."""
+def page(d: Diagnosis) -> str:
+    """The whole HTML text."""
     title = f"Diagnosis: {d.robot.name}"
     parts = [_found, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
-    return html_page.page(title, sections, source, "ctcr diagnose")
+    return html_page.page(title, sections, d.files)
 
 
 def _listed(lines: Iterable[str]) -> str:
@@ -54,7 +55,11 @@ def _found(d: Diagnosis) -> str:
         return ""
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
-    return f"<h2>{heading}</h2>" + _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
+    listed = _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
+    ids = " ".join(e.id for e in effects)
+    line = _typed(d, f"ctcr add {{robot}} {ids} --fit {{table}} -o new.yaml")
+    add = paragraph("To add to the robot file what was found:") + html_page.command(line)
+    return f"<h2>{heading}</h2>{listed}{'' if d.verdict.names_no_cause else add}"
 
 
 def _errors(d: Diagnosis) -> str:
@@ -113,8 +118,16 @@ def _next(d: Diagnosis) -> str:
     advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:
         return ""
-    runs = "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
+    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(
+        _typed(d, "ctcr next {robot} {table}")
+    )
     return f"<h2>What to measure next</h2>{_listed(advice)}{runs if ids else ''}"
+
+
+def _typed(d: Diagnosis, command: str) -> str:
+    """A command line on the files of the diagnosis: `{robot}` and `{table}` stand for them."""
+    files = {"{robot}": d.robot.file or "ROBOT", "{table}": d.measurements.file or "MEASUREMENTS"}
+    return shlex.join(files.get(word, word) for word in command.split())
 
 
 def _parameters(d: Diagnosis) -> str:
@@ -125,7 +138,14 @@ def _parameters(d: Diagnosis) -> str:
         unit, meaning = (p.unit, p.meaning) if p else (units[name], "")
         rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
-    columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]
+    columns = {
+        "parameter": "",
+        "meaning": "",
+        "value": "as fitted",
+        "sd": "its standard deviation",
+        "unit": "of both",
+        "shift, prior sd": "fitted less robot file, in standard deviations that the robot file gives the value",
+    }
     fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
     if sessions := d.measurements.sessions:
         fitted += table(sessions.TITLE, sessions.columns, sessions.rows(), 0)

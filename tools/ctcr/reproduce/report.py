@@ -41,7 +41,7 @@ def page(claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made
         "<h2>Figures 2 to 6</h2>",
         *(figure(*picture, wide=True) for picture in pictures),
     ]
-    return html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce")
+    return html_page.page(title, sections)
 
 
 def _robot() -> str:

@@ -124,7 +124,7 @@ function view(figure) {
       if (long < 30) continue;
       ticks[k].forEach((tick, n) => {
         const [x, y] = place(tick);
-        if (n % every === 0) pen.fillText(String(tick), x + 8 * out[0], y + 11 * out[1]);
+        if (n % every === 0 && (k === 2 || tick !== near[k])) pen.fillText(String(tick), x + 8 * out[0], y + 11 * out[1]);
       });
       pen.fillText(`${"xyz"[k]}, mm`, edge.on[0] + 40 * out[0], edge.on[1] + 30 * out[1]);
     }
@@ -264,6 +264,7 @@ function view(figure) {
     tip.style.translate = `${Math.min(x + 14, canvas.clientWidth - 180)}px ${canvas.offsetTop + y + 14}px`;
   }
 
+  draw();
   new ResizeObserver(redraw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 }

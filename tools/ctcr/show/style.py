@@ -6,8 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
+from scipy import stats
+
+from ctcr.arrays import Array
 
 PALETTE = {  # on light paper, on dark paper
     "paper": ("#ffffff", "#14191f"),
@@ -81,6 +85,22 @@ def picture(plot: Callable[[Figure, Any], Any], subject: Any, width: float, heig
             return None
         _number_ticks(figure)
     return figure
+
+
+def shares_below(axes, sizes: Array, **style: Any) -> None:
+    """The share of `sizes` [mm] below each size, in percent; lengths stand on one linear scale."""
+    share = np.linspace(0, 100, 201)
+    before = axes.get_xlim()[1] if axes.lines else 0.0
+    axes.plot(np.percentile(sizes, share), share, **style)
+    axes.set(xlim=(0, max(before, 1.1 * float(np.percentile(sizes, 99)), 1e-3)), ylim=(0, 102))
+
+
+def noise_below(axes, sd: float, label: str) -> None:
+    """The same of noise alone, of this standard deviation along each axis [mm], beside what is drawn already."""
+    if sd > 0:
+        reach = axes.get_xlim()[1]
+        size = np.append(np.linspace(0, min(5 * sd, reach), 60), reach)
+        axes.plot(size, 100 * stats.maxwell.cdf(size, scale=sd), color=NOISE, lw=1.4, label=label)
 
 
 def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:

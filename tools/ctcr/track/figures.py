@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
-from ctcr.show.style import AXES, ERROR, FAINT, INK, PALE_ERROR, PALE_OUT
+from ctcr.show.style import AXES, ERROR, FAINT, GOOD, INK, PALE_ERROR, PALE_OUT
 from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
 
@@ -24,8 +24,8 @@ def box_plot(axes, groups: Mapping[str, Array], colours: Sequence[str], means: b
         whis=(0, 100),
         showmeans=means,
         patch_artist=True,
-        medianprops={"color": INK},
-        meanprops={"marker": "D", "markersize": 4},
+        **{f"{part}props": {"color": INK} for part in ("median", "whisker", "cap", "box")},
+        meanprops={"marker": "D", "markersize": 4, "color": GOOD, "markeredgecolor": GOOD, "markerfacecolor": GOOD},
     )
     for box, colour in zip(drawn["boxes"], colours, strict=True):
         box.set(facecolor=colour)
