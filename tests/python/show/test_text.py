@@ -79,7 +79,9 @@ class Page(HTMLParser):
 def page_with(name: str) -> str:
     sections = [paragraph(name, "lead", bold=f"{name}."), cards([("good", name, name)]), bullets([name]), as_html(name)]
     view = html_page.view(scene.view([scene.layer("points", f"{name}.", np.zeros((1, 3)))]), name)
-    return html_page.page(name, [*sections, view, html_page.command(name), table(name, {name: name}, [[name]], 1)])
+    return html_page.page(
+        name, [*sections, view, html_page.command(name), table(name, {f"{name}.": f"{name}."}, [[name]], 1)]
+    )
 
 
 @laws
