@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ctcr import cli, inputs
 from ctcr.show import html_page, scene
+from ctcr.show.style import ERROR, draw
 
 DEMO = Path(__file__).parents[3] / "examples" / "data" / "demo"
 ROBOT, TABLE = DEMO / "robot.yaml", DEMO / "measurements.csv"
@@ -82,7 +83,6 @@ def test_columns():
 
 def test_colours():
     """Pictures take the colours of the page, so that they are legible on dark paper too."""
-    from ctcr.show.style import ERROR, draw
 
     def plot(figure, values):
         figure.subplots().plot(values, color=ERROR, label=ERROR)
@@ -102,3 +102,13 @@ def test_fingerprint(tmp_path):
     path.write_bytes(b"new")
     assert inputs.fingerprint(path) == hashlib.sha256(b"old").hexdigest()
     assert inputs.sha256(path) == hashlib.sha256(b"new").hexdigest() == inputs.fingerprint(path)
+
+
+def test_many_points():
+    """A picture of very many points stays small."""
+
+    def plot(figure, values):
+        figure.subplots().plot(values, ".")
+
+    few, many = (len(draw(plot, np.random.default_rng(1).normal(size=count), 8, 4)) for count in (500, 50_000))
+    assert many < 5 * few

@@ -40,6 +40,7 @@ INK, LINE, TINT, ERROR, GOOD, NOISE, OUT, BACK, FAINT, PALE_ERROR, PALE_OUT, PAL
 )
 AXES = (OUT, BACK, PALETTE["third"][0])
 
+MOST_MARKS = 1000  # of a line; where there are more, they become an image, which is smaller
 STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"],
@@ -84,6 +85,9 @@ def picture(plot: Callable[[Figure, Any], Any], subject: Any, width: float, heig
         if plot(figure, subject) is False:
             return None
         _number_ticks(figure)
+        for line in (line for axes in figure.axes for line in axes.lines):
+            marks = line.get_marker() not in ("None", None, "", " ")
+            line.set_rasterized(marks and len(line.get_xdata()) > MOST_MARKS)
     return figure
 
 
