@@ -51,8 +51,8 @@ class Outcome:
     figures: dict[str, Any] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     picture: Picture | None = None
-    view: tuple[str, str] | None = None  # JSON of a 3-D view of the report, and its caption
     correlations: list[tuple[FieldPath, FieldPath, float]] = field(default_factory=list)
+    view: tuple[str, str] | None = None  # JSON of a 3-D view of the report, and its caption
 
     @property
     def changes(self) -> list[Change]:
