@@ -64,7 +64,8 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """The exit code of a command line. Set CTCR_DEBUG to see the traceback of an unexpected error."""
     try:
-        code = cli.main(arguments, prog_name="ctcr", standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else arguments
+        code = cli.main(given, prog_name="ctcr", standalone_mode=False, obj=given)  # a page tells how it was made
         sys.stdout.flush()
         return code if isinstance(code, int) else 0
     except click.ClickException as error:

@@ -1,12 +1,9 @@
 """Faults of an input, with messages that help its author to correct it."""
 
-import os
-import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import BinaryIO
 
 
 @dataclass(frozen=True)
@@ -57,18 +54,6 @@ def shown(value: object) -> str:
     """A value as an error shows it: short, on one line."""
     text = repr(value)
     return text if len(text) <= 40 else text[:36] + " ..."
-
-
-@contextmanager
-def open_input(path: object) -> Iterator[BinaryIO]:
-    """An input file to read as bytes. Raises InputError where it cannot be read; a pipe would be waited for in vain."""
-    with (
-        file_faults(path, "read"),
-        open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file,
-    ):
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-            raise InputError(Problem("is a pipe or a device: give a file", file=str(path)))
-        yield file
 
 
 @contextmanager

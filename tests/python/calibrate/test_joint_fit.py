@@ -115,7 +115,7 @@ def test_fixed_point(calibration, readings):
 
 def test_report(calibration):
     """The report is one page that needs nothing else."""
-    page = report.page(calibration, "a table fitted with a robot")
+    page = report.page(calibration)
     shown = page.split("<script>")[0]
     for title in (
         "What calibration brings",
@@ -126,8 +126,8 @@ def test_report(calibration):
         assert f"<h2>{title}</h2>" in shown
     assert shown.count("<svg") == 6 and "expected error" in shown
     assert not re.search(r"""(?:src|href)=["']https?:""", shown)
-    drawing = json.loads(re.search(r"const drawing = (.*);\nPlotly", page)[1].replace("<\\/", "</"))
-    assert len(drawing["data"]) == 4 and drawing["data"][3]["visible"] and not drawing["data"][0]["visible"]
+    drawing = json.loads(re.search(r'<script type="application/json">(.*)</script>', page)[1])
+    assert [layer.get("choice") for layer in drawing["layers"]] == [None, 0, 1] and len(drawing["choices"]) == 2
 
 
 def test_json(capsys):
@@ -355,7 +355,7 @@ def test_run_frames(robot, readings):
     true = (Rotation.from_rotvec(turn[0]).inv() * Rotation.from_rotvec(turn)).as_rotvec()
     np.testing.assert_allclose(own, true, atol=np.radians(1.0))
     np.testing.assert_allclose(found.shift - found.shift[0], shift - shift[0], atol=2e-3)
-    assert len(framed.as_dict()["frames"]) == 12 and "each run has of its own" in report.page(framed, "these")
+    assert len(framed.as_dict()["frames"]) == 12 and "each run has of its own" in report.page(framed)
     with pytest.raises(InputError, match="the frames of the runs are fitted by themselves"):
         outcome(robot, framed.readings, ["tracker.frame"])
 

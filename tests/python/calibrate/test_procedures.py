@@ -273,8 +273,8 @@ def test_report(run, tmp_path, command, table, options, title):
     code, out, err = run(command, DATA / table, "--robot", ROBOT, *options, "--report", page)
     assert code == 0 and f"Report: {page}" in out, err
     text = page.read_text()
-    assert f"<h1>{title}</h1>" in text and text.count("<svg") == 1 and "<th>sd</th>" in text
-    assert f"{table}. Made by ctcr calibrate {command} on" in text
+    assert f"<h1>{title}</h1>" in text and text.count("<svg") == 1 and ">sd</th>" in text
+    assert f"<code>ctcr calibrate {command} " in text and f'{DATA / table}</td><td class="text">' in text
     assert not re.search(r"""(?:src|href)=["']https?:""", text)
 
 

@@ -128,7 +128,6 @@ class Elements(HTMLParser):
 @pytest.mark.parametrize("command", [("compare",), ("calibrate", "fit", "--free", "tubes.1.curvature")])
 def test_report(run, robot, table, tmp_path, monkeypatch, command):
     """A report has the elements that it has with plain names."""
-    monkeypatch.setattr(html_page, "get_plotlyjs", lambda: "")
     monkeypatch.setattr(html_page, "draw", lambda *_: "<svg/>")
     plain, page = tmp_path / "plain.csv", tmp_path / "page.html"
     plain.write_bytes(table.read_bytes())

@@ -53,16 +53,10 @@ def without_links(svg_or_css):
     return re.sub(r"url\(\s*[\"']?#", "", svg_or_css)
 
 
-@pytest.fixture(autouse=True)
-def short_plotly(monkeypatch):
-    """The page holds plotly.js, 5 MB, as it is; its content is not tested here."""
-    monkeypatch.setattr("ctcr.show.html_page.get_plotlyjs", lambda: "/* plotly.js */")
-
-
 def test_page():
     """The page fetches nothing and holds all findings."""
     result = compare(*planted())
-    page = Page(report.page(result, "a table & a <robot>"))
+    page = Page(report.page(result))
     text = "".join(page.words)
     for fetched in page.fetched:
         assert fetched.startswith("data:"), fetched[:60]
@@ -70,7 +64,6 @@ def test_page():
     assert headline(result) in text
     for item in findings(result):
         assert item.text in text
-    assert "a table & a <robot>" in text
     assert len(page.scripts) == 2
 
 
@@ -78,15 +71,15 @@ def test_scene():
     """The 3-D view is valid JSON with the true points and arrows."""
     result = compare(*planted())
     drawing = json.loads(report.scene(result))
-    by_name = {trace.get("name"): trace for trace in drawing["data"]}
+    by_name = {layer["name"]: layer for layer in drawing["layers"]}
     rows = report.shown_rows(result)
     for name, points in (("measured", result.headline.measured), ("predicted", result.headline.predicted)):
         shown = np.column_stack([by_name[name][axis] for axis in "xyz"])
         np.testing.assert_allclose(shown, points[rows] * 1e3, atol=5.1e-4)
     factor = report.arrow_factor(result)
     assert factor >= 1
-    shafts = by_name[f"error × {factor:g}"]
-    start, end = (np.column_stack([shafts[axis][k::3] for axis in "xyz"]) for k in (0, 1))
+    arrows = by_name[f"error × {factor:g}"]
+    start, end = (np.column_stack([ends[axis] for axis in "xyz"]) for ends in (arrows, arrows["to"]))
     np.testing.assert_allclose(end - start, factor * result.headline.error[rows] * 1e3, atol=2e-3)
 
 
@@ -95,7 +88,7 @@ def test_escaping(monkeypatch):
     monkeypatch.setattr("ctcr.show.html_page.draw", lambda *_: None)
     robot, readings, prediction = planted(runs=6)
     robot.name = "</script><script>alert(1)</script>"
-    page = Page(report.page(compare(robot, readings, prediction), "x"))
+    page = Page(report.page(compare(robot, readings, prediction)))
     assert len(page.scripts) == 2
     assert not any("alert(1)" in script for script in page.scripts)
 

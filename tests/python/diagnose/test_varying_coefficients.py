@@ -128,7 +128,7 @@ def test_diagnosis(robot, plan, capsys):
     assert found.verdict.word != "identified"
     assert "length1" in found.as_dict()["leftover"]["depends_on"]
     terminal.show(output.console(), found)
-    page = report.page(found, "a test")
+    page = report.page(found)
     for text in (capsys.readouterr().out, page):
         assert "home rotation of tube 1" in text
     assert "Parameters that vary" in page and "identified" not in page.split("</p>")[0]
@@ -137,7 +137,7 @@ def test_diagnosis(robot, plan, capsys):
 def test_diagnosis_of_noise(tip_load):
     """Where the residual is noise nothing is said to vary."""
     assert tip_load.varying is None
-    assert "Parameters that vary" not in report.page(tip_load, "a test")
+    assert "Parameters that vary" not in report.page(tip_load)
 
 
 def test_explained_by_run(twist, recorded):

@@ -14,6 +14,7 @@ from ctcr.bench.devices import bench_file
 from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.export import cpp_header
+from ctcr.inputs import sha256
 from ctcr.model import recording
 from ctcr.model.model import Model
 from ctcr.robot import ledger, robot_file
@@ -156,7 +157,7 @@ def test_provenance(tmp_path):
     ledger.write(robot, path, changes, Entry("ctcr calibrate fit", [], figures), effects={"delay": {"delay": 0.03}})
     path.write_text(path.read_text().replace("curvature_per_m: 5.25", "curvature_per_m: 5.5"))
     text = cpp_header(robot_file.load(path))
-    assert ledger.sha256(path) in text and '"fitted.yaml"' in text
+    assert sha256(path) in text and '"fitted.yaml"' in text
     today = robot_file.load(path).history[0]["date"]
     assert f".length = 0.46325,  // 463.25 mm, sd 0.50 (ctcr calibrate fit, {today})" in text
     assert re.search(r"0\.0436\d+,  // 2\.50 deg, sd 0\.25 ", text)

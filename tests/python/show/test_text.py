@@ -66,7 +66,8 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attributes) -> None:
-        self.tags.append((tag, attributes))
+        self.tags.append((tag, [pair for pair in attributes if pair[0] != "title"]))
+        self.texts += [value for name, value in attributes if name == "title"]
 
     def handle_data(self, data) -> None:
         (self.scripts if self.tags and self.tags[-1][0] == "script" else self.texts).append(data)
@@ -75,15 +76,12 @@ class Page(HTMLParser):
         self.texts.append(data)
 
 
-@pytest.fixture(autouse=True)
-def small_pages(monkeypatch):
-    monkeypatch.setattr(html_page, "get_plotlyjs", lambda: "")
-
-
 def page_with(name: str) -> str:
     sections = [paragraph(name, "lead", bold=f"{name}."), cards([("good", name, name)]), bullets([name]), as_html(name)]
-    drawing = scene.view([scene.trace(np.zeros((1, 3)), f"{name}.")])
-    return html_page.page(name, [*sections, table(name, [name], [[name]], 1)], name, "ctcr", drawing)
+    view = html_page.view(scene.view([scene.layer("points", f"{name}.", np.zeros((1, 3)))]), name)
+    return html_page.page(
+        name, [*sections, view, html_page.command(name), table(name, {f"{name}.": f"{name}."}, [[name]], 1)]
+    )
 
 
 @laws
@@ -95,9 +93,8 @@ def test_page(name):
     assert page.tags == Page(page_with("x")).tags
     assert text.encode() and text.replace("\n", "").isprintable()
     assert "".join(page.texts).count(visible(name)) >= 12
-    (script,) = [script for script in page.scripts if script.startswith("const drawing")]
-    drawn = json.JSONDecoder().raw_decode(script.removeprefix("const drawing = "))[0]
-    assert drawn["data"][0]["name"] == f"{name}." and "<" not in script
+    drawing = page.scripts[0]
+    assert json.loads(drawing)["layers"][0]["name"] == f"{name}." and "<" not in drawing
 
 
 NASTY = "[red]a[/nope] $\\frac{$ :warning: <script>alert(1)</script> \x1b[2J\a\x9b \ud800"
@@ -108,7 +105,7 @@ def test_history():
     robot = robot_file.load(ROBOT)
     figures = {"rms_mm": {"nominal": 2.0, NASTY: 1.0, "noise_floor": 0.1}, "added": [NASTY]}
     entry = {"date": NASTY, "command": NASTY, "sources": [{"file": NASTY}], "figures": figures}
-    text = history.page(robot.model_copy(update={"name": NASTY, "history": [entry]}), NASTY)
+    text = history.page(robot.model_copy(update={"name": NASTY, "history": [entry]}))
     assert text.replace("\n", "").isprintable() and "<script>alert" not in text
     assert "".join(Page(text).texts).count(visible(NASTY)) >= 6
 

@@ -225,5 +225,5 @@ def test_command(tmp_path):
     assert "10 g" in done.output and "done" in done.output
     assert json.loads(numbers.read_text())["weights"]["10 g"]["failed"] == 0
     html = page.read_text()
-    assert "Tracking errors" in html and html.count("<svg") >= 5 and 'id="view"' in html
+    assert "Tracking errors" in html and html.count("<svg") >= 5 and 'class="view"' in html
     assert "http://" not in html.replace("http://www.w3.org", "") or "<script src" not in html

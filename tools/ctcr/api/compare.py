@@ -20,7 +20,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     is, the corrected one is. Raises InputError where no row can be compared.
     """
     check_of(robot, table)
-    source = f"{table.source} compared with the model of {robot.file or robot.name}"
+    files = [*robot.files, *table.files]
     found = reviewed(robot, table)
     readings, corrected = table, []
     if table.refusal:
@@ -36,7 +36,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
     notices = [f"{said}." for said in (*corrected, *placed, *excluded, *added)] + repeated
-    return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, source)
+    return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
 
 
 def _fitted(robot: Robot, readings: Measurements, found: Review) -> tuple[list[str], dict[str, float]]:

@@ -1,16 +1,14 @@
 """The pictures of the calibration report and its 3-D view. Colours mean what they mean in the comparison's."""
 
 import numpy as np
-from scipy import stats
 
 from ctcr import settings
 from ctcr.arrays import evenly
 from ctcr.calibrate.joint_fit import Calibration
-from ctcr.show import scene
-from ctcr.show.style import ERROR, FAINT, INK, NOISE, OUT
+from ctcr.show import scene as show
+from ctcr.show.style import ERROR, FAINT, GOOD, INK, LINE, NOISE, OUT, TINT, noise_below, shares_below
 from ctcr.show.wording import mm
 
-GOOD = "#2e7d4f"
 MOST_NAMES = 60
 MOST_POINTS = 4000
 MOST_ARROWS = 1200
@@ -47,19 +45,16 @@ def waterfall(figure, c: Calibration) -> None:
     axes.grid(axis="x", visible=False)
 
 
-def histogram(figure, c: Calibration) -> None:
+def sizes(figure, c: Calibration) -> None:
     """Error sizes before and after, against what noise would give."""
     axes = figure.subplots()
     sizes = (1e3 * np.linalg.norm(r[:, :3], axis=1) for r in (c.fit.nominal_residual, c.fit.residual))
     before, after = (size[np.isfinite(size)] for size in sizes)
-    axis_sd = c.floors.expected_error_mm / np.sqrt(3)
-    low = max(min(np.percentile(after, 0.5), 0.4 * axis_sd), 1e-4)
-    edges = np.geomspace(low, 1.05 * max(before.max(), after.max()), 46)
-    for sizes, colour, label in ((before, ERROR, "robot file"), (after, GOOD, "calibrated")):
-        axes.hist(sizes, edges, weights=np.full(len(sizes), 100 / len(sizes)), color=colour, alpha=0.72, label=label)
-    axes.stairs(100 * np.diff(stats.maxwell.cdf(edges, scale=axis_sd)), edges, color=NOISE, lw=1.5, label="noise alone")
-    axes.set(xscale="log", xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
-    axes.legend(fontsize=9)
+    shares_below(axes, before, color=ERROR, lw=1.8, label="robot file")
+    shares_below(axes, after, color=GOOD, lw=1.8, label="calibrated")
+    noise_below(axes, c.floors.expected_error_mm / np.sqrt(3), "expected error")
+    axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings below")
+    axes.legend(fontsize=9, loc="lower right")
 
 
 def course(figure, c: Calibration) -> None:
@@ -71,7 +66,7 @@ def course(figure, c: Calibration) -> None:
     edges = np.flatnonzero(np.concatenate([[True], run[1:] != run[:-1], [True]]))
     for number, (start, stop) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
         if number % 2:
-            axes.axvspan(start, stop - 1, color="#f2f4f7", lw=0)
+            axes.axvspan(start, stop - 1, color=TINT, lw=0)
     for values, colour, label in zip(size, (ERROR, GOOD), ("robot file", "calibrated"), strict=True):
         axes.plot(rows, values[rows], color=colour, lw=0.9, label=label)
     axes.axhline(c.floors.expected_error_mm, color=NOISE, ls="--", lw=1, label="expected error")
@@ -89,8 +84,8 @@ def shifts(figure, c: Calibration) -> None:
         axes.hlines(y, item.shift - item.sd_left, item.shift + item.sd_left, color=colour, lw=2.2)
         axes.plot(item.shift, y, "o", color=colour, ms=4.5)
     reach = max(3.0, 1.1 * max(abs(item.shift) + item.sd_left for item in items))
-    axes.axvspan(-2, 2, color="#eef2f5", lw=0, zorder=0)
-    axes.axvspan(-1, 1, color="#dfe6eb", lw=0, zorder=0)
+    axes.axvspan(-2, 2, color=TINT, lw=0, zorder=0)
+    axes.axvspan(-1, 1, color=LINE, lw=0, zorder=0)
     axes.axvline(0, color=NOISE, lw=0.8)
     axes.set_yticks(range(len(items)), [item.name for item in items], fontsize=8)
     axes.set(
@@ -116,7 +111,7 @@ def correlations(figure, c: Calibration) -> None:
     for edge in (i - 0.5 for i in range(1, count) if kinds[i] != kinds[i - 1]):
         left.axhline(edge, color="white", lw=1.5)
         left.axvline(edge, color="white", lw=1.5)
-        right.axhline(edge, color="#e7ebef", lw=1.5)
+        right.axhline(edge, color=LINE, lw=1.5)
     figure.colorbar(image, ax=left, location="left", shrink=0.5, pad=0.02, label="correlation")
     ratio = np.array([item.ratio for item in c.fitted[:count]])
     colours = [FAINT if value > settings.SAYS_NOTHING else OUT for value in ratio]
@@ -145,61 +140,29 @@ def half_difference(figure, c: Calibration) -> bool | None:
     for mask, colour, label in ((~beyond, NOISE, "what noise can do"), (beyond, ERROR, "beyond twice the noise")):
         if mask.any():
             axes.plot(noise[mask], size[mask], ".", color=colour, ms=5, alpha=0.6, label=f"{label} ({mask.mean():.0%})")
-    low, high = min(noise.min(), size.min()), max(noise.max(), size.max())
-    low = max(low, 1e-3 * high)
-    line = np.array([low, high])
+    line = np.array([0, noise.max()])
     axes.plot(line, line, color=INK, lw=1)
     axes.plot(line, 2 * line, color=INK, lw=0.8, ls="--")
-    axes.set(
-        xscale="log",
-        yscale="log",
-        xlabel="expected from noise, mm RMS",
-        ylabel="difference, mm",
-        ylim=(low, 1.3 * high),
-    )
-    axes.legend(fontsize=8, loc="lower right")
+    axes.set(xlabel="expected from noise, mm RMS", ylabel="difference, mm", xlim=(0, None), ylim=(0, 1.1 * size.max()))
+    axes.legend(fontsize=8, loc="upper right")
     return None
 
 
-def view(c: Calibration) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot, in mm, tracker frame. Buttons choose before or after."""
+def scene(c: Calibration) -> str:
+    """JSON text for `html_page.view`, in mm, tracker frame, before or after; one scale for both."""
     measured = 1e3 * c.readings.position
     states = {"robot file": 1e3 * c.fit.nominal_residual[:, :3], "calibrated": 1e3 * c.fit.residual[:, :3]}
     known = np.flatnonzero(np.isfinite(np.hstack([measured, *states.values()])).all(axis=1))
     rows = known[evenly(len(known), MOST_ARROWS)]
-    data, labels = [], []
-    for name, error in states.items():
-        error = error[rows]
-        size = np.linalg.norm(error, axis=1)
-        factor = scene.arrow_factor(measured[rows], float(np.percentile(size, 95)), ARROW_SHARE)
-        tail = measured[rows] - error
-        hover = [
-            f"row {row}, run {run}: {value:.2f} mm"
-            for row, run, value in zip(c.readings.row[rows], c.readings.run[rows], size, strict=True)
-        ]
-        shown = {"visible": name == "calibrated", "showlegend": False}
-        shaft = {
-            "width": 4,
-            "color": np.repeat(size, 3).round(3).tolist(),
-            "colorscale": scene.SCALE,
-            "cmin": 0,
-            "cmax": max(float(np.percentile(size, 98)), 1e-6),
-            "showscale": True,
-            "colorbar": scene.COLOUR_BAR,
-        }
-        line = {"mode": "lines", "hoverinfo": "skip", "connectgaps": False, "line": shaft}
-        marker = {"size": 2, "color": OUT, "opacity": 0.8}
-        data += [
-            scene.trace(scene.shafts(tail, tail + factor * error), "error", **line, **shown),
-            scene.trace(
-                measured[rows], "measured", mode="markers", text=hover, hoverinfo="text", marker=marker, **shown
-            ),
-        ]
-        labels.append(f"{name} (arrows × {factor:g})")
-    buttons = [
-        {"label": label, "method": "restyle", "args": [{"visible": [i // 2 == number for i in range(len(data))]}]}
-        for number, label in enumerate(labels)
-    ]
-    menu = {"type": "buttons", "direction": "right", "buttons": buttons, "active": 1, "bgcolor": "#f6f8fa"}
-    menu |= {"x": 0.01, "y": 0.99, "xanchor": "left", "yanchor": "top"}
-    return scene.view(data, eye=(1.3, 1.3, 0.7), updatemenus=[menu])
+    tips = measured[rows]
+    sizes = {name: np.linalg.norm(error[rows], axis=1) for name, error in states.items()}
+    factor = show.arrow_factor(tips, float(np.percentile(sizes["robot file"], 95)), ARROW_SHARE)
+    readings = {"row": c.readings.row[rows].tolist(), "run": c.readings.run[rows].tolist()}
+    readings |= {f"error, {name}, mm": show.numbers(size) for name, size in sizes.items()}
+    layers = [show.layer("points", "measured", tips, "out", hover=readings)]
+    for choice, (name, error) in enumerate(states.items()):
+        tail = tips - error[rows]
+        arrows = {"to": tail + factor * error[rows], "value": show.numbers(sizes[name]), "choice": choice}
+        layers.append(show.layer("arrows", name, tail, size=1.6, **arrows))
+    choices = [f"{name} (arrows × {factor:g})" for name in states]
+    return show.view(layers, (1.3, 1.3, 0.7), show.most(sizes["robot file"]), choices)

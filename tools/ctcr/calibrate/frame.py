@@ -6,6 +6,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
 from ctcr.calibrate.outcome import Outcome, Row, in_file
+from ctcr.calibrate.procedure_figures import frame_scene
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.hypotheses import with_frame
@@ -49,7 +50,9 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
         "rms_mm": {"before": before_mm, "after": after_mm, "calibrated": fit.rms_mm()},
         "rotation_sd_deg": np.degrees(sd[3:]).tolist(),
     }
-    return Outcome("Tracker frame", rows, [*map(sentence, [*unknown(covariance), *fit.warnings])], figures)
+    notices = [*map(sentence, [*unknown(covariance), *fit.warnings])]
+    view = frame_scene(readings, tips.predicted(robot, readings), {"robot file": robot.tracker, "found": after.tracker})
+    return Outcome("Tracker frame", rows, notices, figures, view=view)
 
 
 def registered(robot: Robot, readings: Measurements) -> Robot:

@@ -82,8 +82,9 @@ class Calibration(Result):
         return ledger.changed(self.before, changes, entry, effects=effects)
 
     @property
-    def source(self) -> str:
-        return f"{self.readings.source} fitted with {self.before.file or self.before.name}"
+    def files(self) -> list[str]:
+        """The input files."""
+        return [*self.before.files, *self.readings.files]
 
     def save(self, path: str | Path, *, in_place: bool = False) -> Robot:
         """Writes the calibrated robot file with its entry in the ledger, and returns that robot.

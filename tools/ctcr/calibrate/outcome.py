@@ -1,6 +1,6 @@
 """The result of a calibration procedure, and how it is given back: table, JSON, report, robot file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import degrees, inf, isfinite, nan
 from typing import Any
@@ -52,6 +52,7 @@ class Outcome:
     details: dict[str, Any] = field(default_factory=dict)
     picture: Picture | None = None
     correlations: list[tuple[FieldPath, FieldPath, float]] = field(default_factory=list)
+    view: tuple[str, str] | None = None  # JSON of a 3-D view of the report, and its caption
 
     @property
     def changes(self) -> list[Change]:
@@ -126,10 +127,12 @@ def show(console, outcome: Outcome) -> None:
         console.print(f"  • {notice}")
 
 
-def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
+def cells(outcome: Outcome) -> tuple[dict[str, str], list[list[str]]]:
     """Columns and rows of the table; the first two columns are text."""
     with_old = any(isfinite(row.old) for row in outcome.rows)
-    columns, rows = ["", "unit", *(["robot file"] if with_old else []), "found", "sd"], []
+    columns = {"": "", "unit": ""} | ({"robot file": "the value before"} if with_old else {})
+    columns |= {"found": "the value measured", "sd": "its standard deviation"}
+    rows = []
     for row in outcome.rows:
         values = [row.old, row.value] if with_old else [row.value]
         shown = [number(value, row.sd) for value in values]
@@ -137,12 +140,14 @@ def cells(outcome: Outcome) -> tuple[list[str], list[list[str]]]:
     return columns, rows
 
 
-def page(outcome: Outcome, source: str, command: str, robot=None) -> str:
-    """The whole HTML text; `source` names the table."""
+def page(outcome: Outcome, files: Sequence[str], robot=None) -> str:
+    """The whole HTML text; `files`: the input files."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
     sections = ["<h2>To know</h2>" + bullets(outcome.notices)] if outcome.notices else []
     if outcome.picture:
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))
+    if outcome.view:
+        sections.append(html_page.view(*outcome.view))
     sections.append(table("Found, with one standard deviation", *cells(outcome), 2))
-    return html_page.page(title, sections, source, command)
+    return html_page.page(title, sections, files)

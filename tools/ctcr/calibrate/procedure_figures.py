@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from ctcr.arrays import Array, Mask
-from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.arrays import Array, Mask, evenly
+from ctcr.show import scene
+from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT, TINT
+from ctcr.table.measurements import Measurements
 
 WIDTH, ROW_HEIGHT = 10.4, 3.6
 LONGEST_ARROW = 0.15  # of the size of the picture
+MOST_ARROWS = 800
 
 
 @dataclass(frozen=True)
@@ -86,11 +89,40 @@ def points(figure, found: tuple[Array, Any]) -> None:
     right.grid(axis="y", visible=False)
 
 
+def frame_scene(readings: Measurements, predicted: Array, frames: dict[str, Any]) -> tuple[str, str]:
+    """Base frames by name, the last of them found, with the tips that they predict: the JSON of a view, its caption.
+
+    `predicted` (M, 3) [m], base frame; `frames` as the `tracker` of robots.
+    """
+    known = np.flatnonzero(np.isfinite(predicted + readings.positions).all(axis=1))
+    rows = known[evenly(len(known), MOST_ARROWS)]
+    measured = 1e3 * readings.positions[rows]
+    tips = {name: 1e3 * (predicted[rows] @ f.rotation.T + f.position) for name, f in frames.items()}
+    sizes = {name: np.linalg.norm(measured - tip, axis=1) for name, tip in tips.items()}
+    found = list(frames)[-1]
+    hover = {"row": readings.row[rows].tolist(), "run": readings.run[rows].tolist()}
+    hover |= {f"error, {name}, mm": scene.numbers(size) for name, size in sizes.items()}
+    factor = scene.arrow_factor(measured, float(np.percentile(sizes[found], 95)), LONGEST_ARROW)
+    layers = [scene.layer("points", "measured", measured, "out", hover=hover)]
+    for (name, f), colour in zip(frames.items(), ("error", "good"), strict=True):
+        origin = np.tile(1e3 * f.position, (3, 1))
+        axes = origin + 2 * LONGEST_ARROW * np.ptp(measured, axis=0).max() * f.rotation.T
+        layers.append(scene.layer("arrows", f"base frame, {name}", origin, colour, 2.5, to=axes))
+    to = tips[found] + factor * (measured - tips[found])
+    layers.append(scene.layer("arrows", f"error, {found}, × {factor:g}", tips[found], "back", 1.4, to=to))
+    layers.append(scene.layer("points", "predicted, robot file", tips["robot file"], "error", hidden=True))
+    caption = (
+        "The base frame, x, y and z, by the robot file and as found, with the tips; tracker frame. Arrows at the tips "
+        f"lead from the predicted towards the measured one, drawn {factor:g} times as long as they are."
+    )
+    return scene.view(layers, (1.3, 1.3, 0.7)), caption
+
+
 def homes(figure, found: tuple[list[int], Array, Array, Array, Array]) -> None:
     """The tubes at home: grasped points and tips (N,) [mm], standard deviations and old values (N, 2), NaN: none."""
     tubes, grasped, tip, sd, old = found
     axes = figure.subplots()
-    axes.axvspan(0, max(5.0, 1.25 * tip.max()), color="#eef2f5", lw=0)
+    axes.axvspan(0, max(5.0, 1.25 * tip.max()), color=TINT, lw=0)
     axes.axvline(0, color=INK, lw=1.5)
     for row in range(len(tubes)):
         ends = (grasped[row], tip[row])

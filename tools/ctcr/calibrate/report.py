@@ -12,8 +12,23 @@ from ctcr.show.html_page import bullets, cards, figure, paragraph, table
 from ctcr.show.wording import deviation, mm, number
 
 WIDE = 10.4  # [in] of a figure as wide as the page
-ERROR_COLUMNS = ["", "RMS, mm", "mean, mm", "max, mm", "RMS, deg", "readings"]
-PARAMETER_COLUMNS = ["", "unit", "robot file", "fitted", "moved", "sd left", ""]
+ERROR_COLUMNS = {
+    "": "",
+    "RMS, mm": "root mean square of the distance between the measured and the predicted tip",
+    "mean, mm": "mean of this distance",
+    "max, mm": "largest of these distances",
+    "RMS, deg": "root mean square of the angle between the orientations, or between tip directions",
+    "readings": "how many count",
+}
+PARAMETER_COLUMNS = {
+    "parameter": "",
+    "unit": "",
+    "robot file": "the value before, and its standard deviation by the uncertainty of the robot file",
+    "fitted": "the value found, and its standard deviation after the fit",
+    "moved": "fitted less robot file, in standard deviations of the robot file's value",
+    "sd left": "standard deviation after the fit, of that before: near 100 % the data say nothing",
+    "note": "",
+}
 SHOWN = 12
 NEEDED_WIDTH = 114  # of the table of parameters; a narrower terminal wraps its lines
 
@@ -92,13 +107,13 @@ def _sizes(stage: Stage) -> list[str]:
     return [f"{value:.3f}" if isfinite(value) else "-" for value in values]
 
 
-def page(c: Calibration, source: str) -> str:
-    """The whole HTML text; `source` says what was fitted."""
+def page(c: Calibration) -> str:
+    """The whole HTML text."""
     title = f"Calibration: {c.before.name}"
     lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
     known = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
     sections = [_opening(c), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
-    return html_page.page(title, sections, source, "ctcr calibrate fit", figures.view(c))
+    return html_page.page(title, sections, c.files)
 
 
 def _opening(c: Calibration) -> str:
@@ -153,13 +168,15 @@ def _halves(c: Calibration) -> str:
 
 
 def _residuals(c: Calibration) -> str:
-    left = figure(figures.histogram, c, 5.2, 3.5, "How large the errors are (logarithmic axis).")
+    left = figure(figures.sizes, c, 5.2, 3.5, "How large the errors are.")
     right = figure(figures.course, c, 5.2, 3.5, "The error in the order measured.")
+    caption = (
+        "Arrows lead from the predicted towards the measured tip, tracker frame. The buttons choose between the robot "
+        "file's values and the calibrated ones, drawn to one scale."
+    )
     return (
-        f'<h2>The error before and after</h2><div class="pair">{left}{right}</div><div id="view"></div>'
-        '<p class="soft">Arrows lead from the predicted towards the measured tip, tracker frame. The buttons choose '
-        "between the robot file's values and the calibrated ones; mind the scale of the arrows. Drag to turn, scroll "
-        "to zoom.</p>"
+        f'<h2>The error before and after</h2><div class="pair">{left}{right}</div>'
+        f"{html_page.view(figures.scene(c), caption)}"
     )
 
 

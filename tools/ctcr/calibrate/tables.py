@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ctcr.arrays import Array, Integers
-from ctcr.errors import InputError, Problem, did_you_mean, open_input, shown
+from ctcr.errors import InputError, Problem, did_you_mean, shown
+from ctcr.inputs import open_input
 from ctcr.table.csv_table import Faults, header_names
 
 MAX_BYTES = 16 << 20

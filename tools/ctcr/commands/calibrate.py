@@ -71,7 +71,7 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
 
     if target:
         outcome.write_robot(found, robot, target, called, table, in_place)
-    out.write_report("calibrate.outcome", found, table, command=called, robot=robot)
+    out.write_report("calibrate.outcome", found, files=[*(robot.files if robot else []), table], robot=robot)
     out.write_json(found.as_dict())
     outcome.show(out.console, found)
     if target:

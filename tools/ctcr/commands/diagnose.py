@@ -35,8 +35,8 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
                 loaded, readings, anyway=anyway, frame_per_run=frame_per_run, threads=threads, progress=say
             )
     except WrongConventions as wrong:
-        found, source = wrong.review, f"{measurements} with {robot}"
-        out.write_report("conventions.report", found, source, command="ctcr diagnose")
+        found = wrong.review
+        out.write_report("conventions.report", found)
         out.write_json(report.as_diagnosis(found))
         report.show(out.console, found)
         return

@@ -21,6 +21,6 @@ def command(robot: str, out) -> None:
 
     loaded = robot_file.load(robot)
     entries, stages = history.entries(loaded), history.waterfall(loaded)
-    out.write_report("robot.history", loaded, robot)
+    out.write_report("robot.history", loaded)
     out.write_json({"entries": loaded.history, "waterfall": [vars(stage) for stage in stages]})
     history.show(out.console, loaded, entries, stages)

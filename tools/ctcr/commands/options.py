@@ -4,6 +4,7 @@ Each option exists once, as a decorator. Heavy imports are late: `ctcr --help` l
 """
 
 import os
+from collections.abc import Iterable
 from functools import cached_property, wraps
 from importlib import import_module
 
@@ -156,7 +157,7 @@ class Output:
         for line in lines:
             self.console.print(str(line))
 
-    def table(self, title: str, columns: list[str], rows: list[list[str]], text_columns: int = 1) -> None:
+    def table(self, title: str, columns: Iterable[str], rows: list[list[str]], text_columns: int = 1) -> None:
         """Prints a table; the first columns are text, the others numbers."""
         from ctcr.show import output
 
@@ -174,12 +175,12 @@ class Output:
         if self.report:
             result.report(self.report)
 
-    def write_report(self, module: str, result, source: str, **details) -> None:
-        """Where --report asks for it: the page of the module, below ctcr; `source` says what it is made from."""
+    def write_report(self, module: str, result, **details) -> None:
+        """Where --report asks for it: the page of the module, below ctcr."""
         if self.report:
             from ctcr.show import output
 
-            page = import_module(f"ctcr.{module}").page(result, source, **details)
+            page = import_module(f"ctcr.{module}").page(result, **details)
             output.write_text(page, self.report)
 
 

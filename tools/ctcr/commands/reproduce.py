@@ -51,5 +51,5 @@ def command(quick: bool, target: str, out) -> None:
     out.write_json([{**vars(claim), "ratio": claim.ratio} for claim in claims])
     shown = (0, 1, 3, 4, 5)  # the reasons are on the page
     rows = [[claim.row()[k] for k in shown] for claim in claims]
-    out.table("Boyer et al. 2024", [COLUMNS[k] for k in shown], rows, 2)
+    out.table("Boyer et al. 2024", [list(COLUMNS)[k] for k in shown], rows, 2)
     out.say(f"{made}. Report: {target}")

@@ -56,7 +56,7 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
         chosen = {"points": points, "dask": dask, "keep": keep}
         with Progress("closed loop", 1 + len(varied) * points) as progress:
             found["closed_loop"] = closed.study(loaded, varied, wanted, advance=progress.advance, **chosen)
-    source = robot + (f" in {closed_loop}" if closed_loop else "")
-    out.write_report("sensitivity.report", found, source, accuracy=accuracy)
+    files = [robot, *([closed_loop] if closed_loop else [])]
+    out.write_report("sensitivity.report", found, files=files, accuracy=accuracy)
     out.write_json(terminal.as_data(loaded.name, found, accuracy))
     terminal.show(out.console, found, accuracy)

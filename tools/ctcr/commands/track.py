@@ -45,16 +45,15 @@ def command(robot, scenario, plant, live, bench_path, target, patience, most_err
 
         stops = {"patience_s": patience, "most_error_mm": most_error_mm}
         runs, wanted = bench.track(target, robot, scenario, bench_path, place=folder, said=out.say, **stops)
-        on = f" on the bench, into {target}"
     else:
         real = robot_file.load(plant) if plant else loaded
         wanted = scenario_file.load(scenario, loaded.n_tubes)
         with Progress("tracking", len(wanted.load.mass_g) * wanted.repetitions) as progress:
             runs = run_all(wanted, loaded, real, progress.advance)
-        on = f" on {plant}" if plant else ""
     numbers = summary(runs)
-    out.write_report("track.report", runs, f"{scenario} with {robot}{on}", scenario=wanted, robot=loaded, measured=live)
+    files = [robot, scenario, *filter(None, [plant, bench_path])]
+    out.write_report("track.report", runs, files=files, scenario=wanted, robot=loaded, measured=live)
     out.write_json({"robot": loaded.name, "scenario": wanted.name, "weights": numbers})
-    title = f"{wanted.name}: tracking errors of {loaded.name} in mm, runs a weight: {wanted.repetitions}"
-    out.table(title, ["weight", *COLUMNS], rows(numbers))
+    title = f"{wanted.name}: tracking errors of {loaded.name}, runs a weight: {wanted.repetitions}"
+    out.table(title, COLUMNS, rows(numbers))
     out.say(*(f"{weight:>6}  {figures['verdict']}" for weight, figures in numbers.items()))

@@ -53,7 +53,7 @@ class Comparison(Result):
     """Everything `compare` finds. Lengths in mm, angles in degrees, as the names say."""
 
     PAGE = "compare.report"
-    PICTURE = "compare.figures", "histogram", 5.2, 3.4
+    PICTURE = "compare.figures", "sizes", 5.2, 3.4
 
     robot: str
     position_mm: Spread
@@ -80,7 +80,7 @@ class Comparison(Result):
     conventions: Sequence[Convention]  # that are wrong, the clearest first
     floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
-    source: str = ""  # what was compared with what
+    files: Sequence[str] = ()  # that were compared
 
     WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
 
@@ -148,11 +148,11 @@ def compare(
     conventions: Sequence[Convention] = (),
     sessions: Sequence[str] = (),
     floors: Mapping[str, float] | None = None,
-    source: str = "",
+    files: Sequence[str] = (),
 ) -> Comparison:
     """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
     `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
-    `ctcr.fit.floors` as_dict(), `source` what is compared, in words.
+    `ctcr.fit.floors` as_dict(), `files` what is compared.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -219,7 +219,7 @@ def compare(
         conventions=conventions,
         floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
         sessions=sessions,
-        source=source,
+        files=files,
     )
 
 

@@ -4,14 +4,13 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy import stats
 
 from ctcr.arrays import Array, evenly
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import FRAME_NAMES, Dependence
 from ctcr.compare.sample import Sample
 from ctcr.compare.visits import OPPOSITE, SAME
-from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT
+from ctcr.show.style import AXES, BACK, ERROR, FAINT, NOISE, OUT, TINT, noise_below, shares_below
 
 Abscissa = tuple[Array, str, str]  # values, label, and the frame in which the error depends on them
 
@@ -21,27 +20,14 @@ PANELS = 6
 BINS = 18
 
 
-def histogram(figure: Figure, c: Comparison) -> None:
+def sizes(figure: Figure, c: Comparison) -> None:
     """Error sizes against those of noise alone."""
     axes = figure.subplots()
     size = np.linalg.norm(c.headline.error, axis=1) * 1e3
-    noise = c.noise.axis_mm if c.noise.axis_mm > 0 else np.nan
-    low = np.nanmin([np.percentile(size, 0.5), noise * 0.4, size.max() / 3])
-    edges = np.geomspace(max(low, 1e-4), size.max() * 1.05, 45)
-    _percent(axes, size, edges, color=ERROR, alpha=0.85, label="error")
-    if np.isfinite(noise):
-        share = 100 * np.diff(stats.maxwell.cdf(edges, scale=noise))
-        axes.stairs(share, edges, fill=True, color=NOISE, alpha=0.55, label="noise alone")
-        axes.axvline(c.noise.rms_mm, color=NOISE, lw=1.2, ls="--", label=f"noise {c.noise.rms_mm:.2g} mm RMS")
-    axes.axvline(c.position_mm.rms, color=ERROR, lw=1.2, ls="--", label=f"error {c.position_mm.rms:.3g} mm RMS")
-    axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings")
-    axes.set_xscale("log")
-    axes.legend(loc="best", fontsize=9)
-
-
-def _percent(axes, values: Array, edges: Array, **style) -> None:
-    """Histogram in percent of the values."""
-    axes.hist(values, edges, weights=np.full(len(values), 100 / len(values)), **style)
+    shares_below(axes, size, color=ERROR, lw=1.8, label=f"error, {c.position_mm.rms:.3g} mm RMS")
+    noise_below(axes, c.noise.axis_mm, f"noise alone, {c.noise.rms_mm:.2g} mm RMS")
+    axes.set(xlabel="distance between measured and predicted tip, mm", ylabel="% of readings below")
+    axes.legend(loc="lower right", fontsize=9)
 
 
 def course(figure: Figure, c: Comparison) -> None:
@@ -58,7 +44,7 @@ def course(figure: Figure, c: Comparison) -> None:
     for number, (start, stop) in enumerate(zip(starts, stops, strict=True)):
         rows = np.arange(start, stop)[:: max(1, len(run) // MOST_POINTS)]
         if number % 2:
-            axes.axvspan(x[start], x[stop - 1], color="#f2f4f7", lw=0)
+            axes.axvspan(x[start], x[stop - 1], color=TINT, lw=0)
         axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
         if len(starts) > 1 and number % sparse == 0:
             axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), **above)
@@ -78,20 +64,12 @@ def hysteresis(figure: Figure, c: Comparison) -> bool | None:
         return False
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.5))
     apart = {"opposite direction": 1e3 * np.sqrt(opposite.square), "same direction": 1e3 * np.sqrt(same.square)}
-    everything = np.concatenate(list(apart.values()))
-    quiet = c.noise.axis_mm * 0.6 if c.noise.axis_mm > 0 else np.inf
-    low, high = max(min(np.percentile(everything, 1), quiet), 1e-3), max(everything.max() * 1.05, 2e-3)
-    edges = np.geomspace(low, high, 32)
     for (name, values), colour in zip(apart.items(), (BACK, OUT), strict=True):
         if len(values):
-            _percent(left, values, edges, color=colour, alpha=0.7, label=f"{name} ({len(values)})")
-    if c.noise.axis_mm > 0:
-        share = 100 * np.diff(stats.maxwell.cdf(edges, scale=c.noise.axis_mm * np.sqrt(2)))
-        left.stairs(share, edges, color=NOISE, lw=1.4, label="noise alone")
-    left.set(xlabel="distance between two visits, mm", ylabel="% of pairs", title="Same joints, visited twice")
-    left.set_xscale("log")
-    left.legend(fontsize=8, loc="best")
-    left.margins(y=0.3)
+            shares_below(left, values, color=colour, lw=1.8, label=f"{name} ({len(values)})")
+    noise_below(left, c.noise.axis_mm * np.sqrt(2), "noise alone")
+    left.set(xlabel="distance between two visits, mm", ylabel="% of pairs below", title="Same joints, visited twice")
+    left.legend(fontsize=8, loc="lower right")
     _both_ways(right, c, opposite)
 
 
@@ -191,7 +169,7 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
         axes.scatter(x[shown], local[shown, axis], s=3, color=AXES[axis], alpha=0.15, lw=0, rasterized=True)
         means = np.array([(x[rows].mean(), local[rows, axis].mean()) for rows in cells])
         axes.plot(*means.T, color=AXES[axis], lw=1.8, marker="o", ms=3, label=name)
-    axes.axhline(0, color="#8794a0", lw=0.7)
+    axes.axhline(0, color=NOISE, lw=0.7)
     limit = np.percentile(np.abs(local), 99) * 1.15
     axes.set(xlabel=label, ylabel="error, mm", ylim=(-limit, limit))
     axes.set_title(f"{100 * item.share:.0f} % of the squared error{' *' if found else ''}")

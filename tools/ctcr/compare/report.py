@@ -10,19 +10,17 @@ from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show import scene as show
-from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table
-from ctcr.show.style import INK, OUT
+from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table, view
 
 MOST_ARROWS = 1500
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
-HEAD_SHARE = 0.015  # of the workspace that an arrow head is long
 
 
-def page(c: Comparison, source: str) -> str:
-    """The whole HTML text; `source` says what was compared."""
+def page(c: Comparison) -> str:
+    """The whole HTML text."""
     title = f"Model and measurement: {c.robot}"
     sections = [_opening(c), _findings(c), _view(c), _figures(c), _tables(c)]
-    return html_page.page(title, sections, source, "ctcr compare", scene(c))
+    return html_page.page(title, sections, c.files)
 
 
 def _opening(c: Comparison) -> str:
@@ -64,17 +62,14 @@ def _view(c: Comparison) -> str:
     factor = arrow_factor(c)
     length = "at their true length" if factor == 1 else f"{factor:g} times as long as they are"
     note = f" {MOST_ARROWS} of {count} readings are shown, evenly spread." if count > MOST_ARROWS else ""
-    return (
-        '<h2>Measured and predicted tips</h2><div id="view"></div>'
-        f'<p class="soft">Arrows lead from the predicted towards the measured tip, drawn {length}; tracker '
-        f"frame.{note} Drag to turn, scroll to zoom.</p>"
-    )
+    caption = f"Arrows lead from the predicted towards the measured tip, drawn {length}; tracker frame.{note}"
+    return "<h2>Measured and predicted tips</h2>" + view(scene(c), caption)
 
 
 def _figures(c: Comparison) -> str:
     wide = partial(figure, subject=c, width=10.4, wide=True)
     half = partial(figure, subject=c, width=5.2, height=3.4)
-    sizes = half(figures.histogram, caption="Sizes of the errors against noise alone (logarithmic axis).")
+    sizes = half(figures.sizes, caption="Sizes of the errors against noise alone.")
     course = half(figures.course, caption="The error in the order measured.")
     hysteresis = wide(
         figures.hysteresis,
@@ -124,38 +119,19 @@ def shown_rows(c: Comparison) -> Integers:
 
 
 def scene(c: Comparison) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
+    """JSON text for `html_page.view`; positions in mm, tracker frame."""
     rows, factor, sample = shown_rows(c), arrow_factor(c), c.headline
     predicted, measured = sample.predicted[rows] * 1e3, sample.measured[rows] * 1e3
     error = measured - predicted
     size = np.linalg.norm(error, axis=1)
-    unit = error / np.maximum(size, 1e-12)[:, None]
-    head = predicted + factor * error
-    colour = {"colorscale": show.SCALE, "cmin": 0, "cmax": float(max(np.percentile(size, 98), 1e-6))}
-    lines = {"mode": "lines", "hoverinfo": "skip", "connectgaps": False}
-    lines["line"] = {"width": 4, "color": np.repeat(size, 3).round(3).tolist(), **colour}
-    extent = float(np.max(np.ptp(measured, axis=0)))
-    cones = {"anchor": "tip", "sizemode": "absolute", "sizeref": HEAD_SHARE * extent, "hoverinfo": "skip"}
-    cones |= {"showscale": False, "colorscale": [[0, "#b3361e"], [1, "#b3361e"]]}
-    plate = {"mode": "markers", "hoverinfo": "name", "marker": {"size": 6, "symbol": "diamond", "color": INK}}
-    bar = {"size": 0.01, "color": [0], **colour, "showscale": True, "colorbar": show.COLOUR_BAR}
-    hover = [
-        f"row {row}, run {run}: {value:.2f} mm"
-        for row, run, value in zip(sample.row[rows], sample.run[rows], size, strict=True)
-    ]
-
-    def points(where, name, colour, size):
-        marker = {"size": size, "color": colour, "opacity": 0.85}
-        return show.trace(where, name, mode="markers", text=hover, hoverinfo="text+name", marker=marker)
-
+    readings = {"row": sample.row[rows].tolist(), "run": sample.run[rows].tolist(), "error, mm": show.numbers(size)}
+    arrows = {"to": predicted + factor * error, "value": show.numbers(size)}
     return show.view(
         [
-            points(predicted, "predicted", "#8794a0", 1.8),
-            points(measured, "measured", OUT, 2.2),
-            show.trace(show.shafts(predicted, head), f"error × {factor:g}", **lines),
-            show.trace(head, "arrow heads", "cone", **show.columns(unit, "uvw"), **cones),
-            show.trace(c.plate_mm[None, :], "front plate (robot file)", **plate),
-            # an invisible point carries the colour bar
-            show.trace(predicted[:1], mode="markers", showlegend=False, hoverinfo="skip", marker=bar),
-        ]
+            show.layer("points", "predicted", predicted, "noise", 1.8),
+            show.layer("points", "measured", measured, "out", 2.2, hover=readings),
+            show.layer("arrows", f"error × {factor:g}", predicted, size=1.6, **arrows),
+            show.layer("points", "front plate (robot file)", c.plate_mm[None, :], "ink", 5, hidden=True),
+        ],
+        most=show.most(size),
     )

@@ -1,6 +1,6 @@
 """The comparison on a terminal, and the tables that the report shares with it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import findings, headline, held_out, limits, quiet
@@ -11,7 +11,13 @@ SHOWN_RUNS = 15
 SHOWN_FORMS = 10
 SHOWN_ROWS = 20
 
-Table = tuple[str, list[str], list[list[str]], int]  # title, columns, rows, number of columns of text
+Table = tuple[str, Mapping[str, str], list[list[str]], int]  # title, columns, rows, number of columns of text
+SIZES = {
+    "mean": "mean distance between measured and predicted",
+    "RMS": "root mean square of it",
+    "95 %": "95 of 100 are below",
+    "max": "the largest",
+}
 
 
 def show(console, c: Comparison) -> None:
@@ -61,12 +67,13 @@ def errors(c: Comparison) -> Table:
         for name, unit, s in spreads
         if s
     ]
-    return "Error, measured minus predicted", ["", "unit", "mean", "RMS", "95 %", "max", "readings"], rows, 2
+    return "Error, measured minus predicted", {"": "", "unit": "", **SIZES, "readings": ""}, rows, 2
 
 
 def by_run(c: Comparison) -> Table:
     """Errors of each run, with the mean error vector."""
-    columns, rows = ["run", "readings", "mean", "RMS", "95 %", "max", "mean x", "mean y", "mean z"], []
+    mean = {f"mean {axis}": f"mean of measured minus predicted along {axis}" for axis in "xyz"}
+    columns, rows = {"run": "", "readings": "", **SIZES, **mean}, []
     for r in c.runs:
         p = r.position_mm
         sizes = [f"{v:.2f}" for v in (p.mean, p.rms, p.p95, p.maximum)]
@@ -92,7 +99,14 @@ def repeatability(c: Comparison) -> Table:
     if d:
         rows.append(["hysteresis", f"{d.rms_mm:.3f} ± {number(d.uncertainty_mm)}", "", str(d.pairs)])
         rows.append(["floor of a model without history", f"{d.floor_mm:.3f}", "", ""])
-    return "Repeatability, mm", ["", "RMS distance", "per axis", "pairs or rests"], rows, 1
+    columns = {
+        "": "",
+        "RMS distance": "root mean square of the distance of a reading from the mean of its like; hysteresis: between "
+        "two visits from opposite directions",
+        "per axis": "standard deviation along one axis",
+        "pairs or rests": "how many pairs of visits, or rests of the robot, tell",
+    }
+    return "Repeatability, mm", columns, rows, 1
 
 
 def dependences(c: Comparison) -> Table:
@@ -104,4 +118,11 @@ def dependences(c: Comparison) -> Table:
         for d in c.ranking.distinct()
     ]
     title = f"What the error depends on, judged on {c.ranking.blocks} {held_out(c)}"
-    return title, ["depends on", "frame", "share", "size, mm", "p"], rows, 2
+    columns = {
+        "depends on": "",
+        "frame": "in which the error is predicted",
+        "share": "of the squared error about its offset, predicted on held-out data",
+        "size, mm": "RMS of the part that is predicted",
+        "p": "probability of such a share by chance",
+    }
+    return title, columns, rows, 2

@@ -51,8 +51,8 @@ def show(console: Any, review: Review) -> None:
     console.print(ADVICE)
 
 
-def page(review: Review, source: str, command: str) -> str:
-    """The whole HTML text; `source` says what was diagnosed."""
+def page(review: Review) -> str:
+    """The whole HTML text."""
     found = bullets([one.sentence for one in review.findings])
     sections = [paragraph(LEAD, "lead", bold="Wrong convention. "), found, paragraph(ADVICE, "soft")]
-    return html_page.page(f"Conventions: {review.robot.name}", sections, source, command)
+    return html_page.page(f"Conventions: {review.robot.name}", sections, [*review.robot.files, *review.readings.files])

@@ -7,14 +7,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from ctcr.arrays import Array
-from ctcr.diagnose.figures import GOOD
 from ctcr.model import simulation
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
-from ctcr.show.style import BACK, ERROR, FAINT, INK, NOISE, OUT
+from ctcr.show.style import BACK, ERROR, FAINT, GOOD, INK, NOISE, OUT, PALE_BACK, PALE_OUT
 from ctcr.table.measurements import Measurements
 
-OURS, SIMULATED = "#e2eef4", "#f6ead9"
+OURS, SIMULATED = PALE_OUT, PALE_BACK
 BOXES = {  # name: x, y, width, colour, text
     "commands": (0.0, 0.5, 2.6, OURS, "ctcr record, ctcr track\nwhat a person types"),
     "reader": (3.6, 1.2, 2.3, OURS, "tracker reader\n40 frames a second"),
@@ -107,13 +106,8 @@ def tracking(figure: Figure, drives: dict[str, Driven]) -> None:
 
 
 def scene(drives: dict[str, Driven]) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot: the cube and the tips of the blind drives, mm, base frame."""
-
-    def line(points: Array, name: str, colour: str, dash: str, width: float) -> dict:
-        style = {"line": {"color": colour, "dash": dash, "width": width}, "marker": {"color": colour, "size": 3}}
-        return show.trace(points, name, mode="lines+markers", hoverinfo="name", **style)
-
-    data = [line(next(iter(drives.values())).corners, "cube", "#8794a0", "dash", 3)]
-    for (name, driven), colour in zip(drives.items(), (ERROR, GOOD), strict=True):
-        data.append(line(driven.tips, name, colour, "solid", 5))
-    return show.view(data, eye=(1.3, -1.4, 0.9), legend={"orientation": "h", "y": 0, "x": 0})
+    """JSON text for `html_page.view`: the cube and the tips of the blind drives, mm, base frame."""
+    layers = [show.layer("line", "cube", next(iter(drives.values())).corners, "noise", 1.6, dashed=True, marked=2)]
+    for (name, driven), colour in zip(drives.items(), ("error", "good"), strict=True):
+        layers.append(show.layer("line", name, driven.tips, colour, 2.2, marked=3))
+    return show.view(layers, (1.3, -1.4, 0.9))

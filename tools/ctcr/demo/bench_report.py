@@ -18,7 +18,7 @@ from ctcr.model import parameters as free_parameters
 from ctcr.robot import history, robot_file
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import as_html, cards, figure, table
+from ctcr.show.html_page import as_html, cards, figure, table, view
 from ctcr.show.output import write_text
 from ctcr.table import measurements
 from ctcr.track import scenario
@@ -69,8 +69,9 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         _truth(story, known, found, hidden),
         _loops(story),
     ]
-    drawing = bench_figures.scene(drives) if drives else None
-    return html_page.page(TITLE, sections, f"recordings in {folder}", "ctcr demo bench", drawing)
+    return html_page.page(
+        TITLE, sections, [str(folder / name) for name in ("robot.yaml", "both.csv", "with_effect.yaml")]
+    )
 
 
 def _drives(folder: Path) -> dict[str, Driven]:
@@ -123,8 +124,8 @@ def _opening(story: Story, found: Robot, drives: dict[str, Driven]) -> str:
 
 def _steps(story: Story) -> str:
     rows = "".join(
-        f'<li>{as_html("", bold=step.why)} <span class="soft">{step.seconds:.0f} s</span><br>'
-        f"<code>{as_html(step.command)}</code><br>{as_html(step.found)}</li>"
+        f'<li>{as_html("", bold=step.why)} <span class="soft">{step.seconds:.0f} s</span>'
+        f"{html_page.command(step.command)}{as_html(step.found)}</li>"
         for step in story.steps
     )
     return f'<h2>The steps</h2><ol class="steps">{rows}</ol>'
@@ -151,8 +152,8 @@ def _cube(drives: dict[str, Driven]) -> str:
         f"know; there, knowing {EFFECT} {'helps too' if helps else 'does not help'}."
     )
     drawn = figure(bench_figures.tracking, drives, 10.4, 3.8, text, wide=True)
-    below = "The cube, and the corners that the blind robot reached; base frame. Drag to turn, click a name to hide it."
-    return f'<h2>The error in tracking</h2>{drawn}<div id="view"></div><p class="soft">{below}</p>'
+    tips = view(bench_figures.scene(drives), "The cube, and the corners that the blind robot reached; base frame.")
+    return f"<h2>The error in tracking</h2>{drawn}{tips}"
 
 
 def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
@@ -166,7 +167,13 @@ def _truth(story: Story, known: Robot, found: Robot, hidden: Robot) -> str:
         if (field := change["field"]).startswith(SHOWN):
             numbers = (_at(known, field), change["new"], change["sd"], _at(hidden, field))
             rows.append([field, *(f"{number:.2f}" for number in numbers)])
-    columns = ["", "robot file", "found", "standard deviation", "true"]
+    columns = {
+        "": "",
+        "robot file": "the value before",
+        "found": "by the fit",
+        "standard deviation": "of the value found",
+        "true": "of the simulated robot",
+    }
     return "<h2>Found and true values</h2>" + table("", columns, rows, 1)
 
 
@@ -179,7 +186,17 @@ def _at(robot: Robot, path: str) -> float:
 
 
 def _loops(story: Story) -> str:
-    columns = ["recording", "frames", "missed", "99 % late, ms", "bus cycles", "bad", "99 % late, ms", "worst, ms"]
+    columns = {
+        "recording": "",
+        "frames": "of the tracker",
+        "missed": "frames that were not read",
+        "frames late, ms": "99 of 100 frames are later by less",
+        "bus cycles": "exchanges with the motors",
+        "bad": "cycles without an answer",
+        "cycles late, ms": "99 of 100 cycles begin later by less",
+        "worst, ms": "the latest cycle",
+        "real-time": "whether the bus had real-time priority",
+    }
     rows = []
     for path in sorted(story.folder.glob(f"*/{ABOUT}"), key=lambda path: path.stat().st_mtime):
         about = json.loads(path.read_text(encoding="utf-8"))["sittings"][-1]
@@ -187,4 +204,4 @@ def _loops(story: Story) -> str:
         counts = [tracker["frames"], tracker["missed"], f"{about['frames_late']['p99_ms']:.2f}"]
         counts += [bus["cycles"], bus["bad_cycles"], f"{bus['p99_late_ms']:.2f}", f"{bus['worst_late_ms']:.2f}"]
         rows.append([path.parent.name, *map(str, counts), "yes" if bus["real_time_priority"] else "no"])
-    return "<h2>How steady the loops were</h2>" + table("", [*columns, "real-time"], rows, 1)
+    return "<h2>How steady the loops were</h2>" + table("", columns, rows, 1)

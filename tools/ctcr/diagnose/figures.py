@@ -6,10 +6,9 @@ from ctcr.compare.figures import drawable
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.round import imitated
 from ctcr.fit.result import Fit
-from ctcr.show.style import ERROR, FAINT, INK, NOISE
+from ctcr.show.style import ERROR, FAINT, GOOD, INK, NOISE, PALETTE, TINT
 from ctcr.show.wording import short
 
-GOOD = "#4b8b3b"
 CANDIDATES = 10
 PANELS = 3
 PALE = 0.45  # opacity of bars of linearised gains
@@ -23,19 +22,18 @@ def waterfall(figure, d: Diagnosis) -> None:
     for k, a in enumerate(d.accepted, start=1):
         reached = rms["with_effects"] if k == len(d.accepted) else d.rms_mm_after(a)
         bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
-    above = {"ha": "center", "va": "bottom", "weight": "bold"}
-    above["bbox"] = {"facecolor": "white", "edgecolor": "none", "pad": 1}
+    above = {"textcoords": "offset points", "ha": "center", "weight": "bold"}
     for i, (_, value, colour) in enumerate(bars):
         axes.bar(i, value, color=colour, width=0.62)
-        axes.text(i, 1.04 * value, f"{short(value)} mm", **above)
-    last, (_, (name, floor)) = len(bars) - 0.6, d.floors.rows()
-    axes.axhline(floor, color=NOISE, linestyle="--")
-    axes.text(last, floor, f"{name}\n{short(floor)} mm", color=NOISE, va="bottom")
-    axes.set_xlim(right=last + 0.75)
-    axes.set_xticks(range(len(bars)), [name.replace("_", "\n") for name, _, _ in bars])
-    sizes = [value for _, value, _ in bars]
-    limits = 0.5 * min(floor, *sizes), 2 * max(sizes)
-    axes.set(ylabel="RMS error on held-out runs, mm", yscale="log", ylim=limits)
+        axes.annotate(f"{short(value)} mm", (i, value), (0, 3), **above)
+    last, (_, (name, floor)) = len(bars), d.floors.rows()
+    axes.bar(last, floor, color=NOISE, width=0.62)
+    axes.annotate(f"{short(floor)} mm", (last, floor), (0, 3), **above)
+    axes.axhline(floor, color=NOISE, linestyle="--", linewidth=1)
+    names = [*(name for name, _, _ in bars), name]
+    axes.set_xticks(range(last + 1), [name.replace("_", "\n") for name in names])
+    axes.set(ylabel="RMS error on held-out runs, mm", ylim=(0, 1.12 * max(floor, *(value for _, value, _ in bars))))
+    axes.grid(axis="x", visible=False)
 
 
 def candidates(figure, d: Diagnosis) -> bool | None:
@@ -116,8 +114,8 @@ def overlap(figure, d: Diagnosis) -> bool | None:
 
 
 def fits_shown(d: Diagnosis) -> list[tuple[Fit, str, str]]:
-    """Fits whose errors are drawn one beside the other, each with its colour and name."""
-    shown = [(d.calibrated, ERROR, "calibrated"), (d.with_effects, GOOD, "with the effects found")]
+    """Fits whose errors are drawn one beside the other, each with its colour of the palette and its name."""
+    shown = [(d.calibrated, "error", "calibrated"), (d.with_effects, "good", "with the effects found")]
     return shown if d.accepted else shown[:1]
 
 
@@ -126,11 +124,11 @@ def course(figure, d: Diagnosis) -> None:
     axes = figure.subplots()
     for fit, colour, label in fits_shown(d):
         size = 1e3 * np.linalg.norm(fit.residual[:, :3], axis=1)
-        axes.plot(np.arange(len(size)) + 1, size, ".", color=colour, markersize=3, alpha=0.7, label=label)
+        axes.plot(np.arange(len(size)) + 1, size, ".", color=PALETTE[colour][0], markersize=3, alpha=0.7, label=label)
     first = np.flatnonzero(np.diff(d.held_out.astype(int)) != 0) + 1
     edges = np.concatenate([[0], first, [len(d.held_out)]])
     for start, end in zip(edges, edges[1:], strict=False):
         if end > start and d.held_out[start]:
-            axes.axvspan(start + 0.5, end + 0.5, color="#eef2f5", zorder=0)
-    axes.set(yscale="log", xlabel="reading (grey: held-out runs)", ylabel="error, mm")
+            axes.axvspan(start + 0.5, end + 0.5, color=TINT, zorder=0)
+    axes.set(xlabel="reading (grey: held-out runs)", ylabel="error, mm", ylim=(0, None))
     axes.legend(markerscale=3)

@@ -64,8 +64,9 @@ class Diagnosis(Result):
     conventions: Sequence[Finding] = ()  # that the review of the table found
 
     @property
-    def source(self) -> str:
-        return f"{self.measurements.source} diagnosed with the model of {self.robot.file or self.robot.name}"
+    def files(self) -> list[str]:
+        """The input files."""
+        return [*self.robot.files, *self.measurements.files]
 
     def to_frame(self) -> "DataFrame":
         """A row an effect that was tried in a round: log evidence gained, linearised and in the joint fit (NaN: not

@@ -1,5 +1,6 @@
 """The diagnosis as one HTML page that needs nothing else: verdict first."""
 
+import shlex
 from collections.abc import Iterable
 
 import numpy as np
@@ -16,14 +17,15 @@ from ctcr.show.html_page import as_html, cards, figure, paragraph, table
 from ctcr.show.wording import most, sentence, short
 
 MOST_ARROWS = 800
+ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
 
 
-def page(d: Diagnosis, source: str) -> str:
-    """The whole HTML text; `source` says what was diagnosed."""
+def page(d: Diagnosis) -> str:
+    """The whole HTML text."""
     title = f"Diagnosis: {d.robot.name}"
     parts = [_found, _explanations, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
-    return html_page.page(title, sections, source, "ctcr diagnose", scene(d))
+    return html_page.page(title, sections, d.files)
 
 
 def _listed(lines: Iterable[str]) -> str:
@@ -53,7 +55,11 @@ def _found(d: Diagnosis) -> str:
         return ""
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
-    return f"<h2>{heading}</h2>" + _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
+    listed = _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
+    ids = " ".join(e.id for e in effects)
+    line = _typed(d, f"ctcr add {{robot}} {ids} --fit {{table}} -o new.yaml")
+    add = paragraph("To add to the robot file what was found:") + html_page.command(line)
+    return f"<h2>{heading}</h2>{listed}{'' if d.verdict.names_no_cause else add}"
 
 
 def _explanations(d: Diagnosis) -> str:
@@ -63,7 +69,7 @@ def _explanations(d: Diagnosis) -> str:
 
 
 def _errors(d: Diagnosis) -> str:
-    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs (logarithmic axis).")
+    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs.")
     right = figure(figures.course, d, 5.2, 3.8, "The error of every reading, in the order measured.")
     text = (
         "The error after calibration over the quantities that predict it best, and its part that the effects explain."
@@ -88,9 +94,9 @@ def _varying(d: Diagnosis) -> str:
 
 def _view(d: Diagnosis) -> str:
     heading = "Before and after" if d.accepted else "Where the errors are"
-    return (
-        f'<h2>{heading}</h2><div id="view"></div><p class="soft">Errors as lines from the predicted towards the '
-        "measured tip, all drawn with the same factor; tracker frame. Click a name to hide it.</p>"
+    return f"<h2>{heading}</h2>" + html_page.view(
+        scene(d),
+        "Arrows lead from the predicted towards the measured tip, all drawn with the same factor; tracker frame.",
     )
 
 
@@ -111,15 +117,23 @@ def _candidates(d: Diagnosis) -> str:
 
 
 def _next(d: Diagnosis) -> str:
-    """Further measurements that would make the answer surer."""
-    named = [] if d.verdict.names_no_cause else d.accepted
-    ids = list(dict.fromkeys(identity for a in named for identity in a.ids))
+    """Further measurements that would decide what is open: effects that some of the likely explanations hold."""
+    likely = [one.effects for one in d.verdict.likeliest]
+    ids = [] if d.verdict.names_no_cause else sorted(frozenset.union(*likely) - frozenset.intersection(*likely))
     advice = [as_html(f": {catalogue.get(i, d.robot.n_tubes).measure}", bold=i) for i in ids]
     advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:
         return ""
-    runs = "<p><code>ctcr next ROBOT MEASUREMENTS</code> proposes the runs that decide between rivals.</p>"
+    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(
+        _typed(d, "ctcr next {robot} {table}")
+    )
     return f"<h2>What to measure next</h2>{_listed(advice)}{runs if ids else ''}"
+
+
+def _typed(d: Diagnosis, command: str) -> str:
+    """A command line on the files of the diagnosis: `{robot}` and `{table}` stand for them."""
+    files = {"{robot}": d.robot.file or "ROBOT", "{table}": d.measurements.file or "MEASUREMENTS"}
+    return shlex.join(files.get(word, word) for word in command.split())
 
 
 def _parameters(d: Diagnosis) -> str:
@@ -130,7 +144,14 @@ def _parameters(d: Diagnosis) -> str:
         unit, meaning = (p.unit, p.meaning) if p else (units[name], "")
         rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
-    columns = ["parameter", "meaning", "value", "sd", "unit", "shift, prior sd"]
+    columns = {
+        "parameter": "",
+        "meaning": "",
+        "value": "as fitted",
+        "sd": "its standard deviation",
+        "unit": "of both",
+        "shift, prior sd": "fitted less robot file, in standard deviations that the robot file gives the value",
+    }
     fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)
     if sessions := d.measurements.sessions:
         fitted += table(sessions.TITLE, sessions.columns, sessions.rows(), 0)
@@ -144,16 +165,17 @@ def _limits(d: Diagnosis) -> str:
 
 
 def scene(d: Diagnosis) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot; positions in mm, tracker frame."""
-    measured = d.measurements.position
+    """JSON text for `html_page.view`; positions in mm, tracker frame."""
     rows = np.flatnonzero(np.isfinite(d.calibrated.residual[:, :3]).all(axis=1))
     rows = rows[evenly(len(rows), MOST_ARROWS)]
-    tips = 1e3 * measured[rows]
-    size = np.quantile(np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1), 0.95)
-    factor = max(1.0, float(f"{0.12 * np.ptp(tips, axis=0).max() / max(size, 1e-9):.0e}"))
-    data = [show.trace(tips, "measured", hoverinfo="name", mode="markers", marker={"size": 2, "color": "#6b7785"})]
+    tips = 1e3 * d.measurements.position[rows]
+    size = np.linalg.norm(1e3 * d.calibrated.residual[rows, :3], axis=1)
+    factor = show.arrow_factor(tips, float(np.quantile(size, 0.95)), ARROW_SHARE)
+    readings = {"row": d.measurements.row[rows].tolist(), "run": d.measurements.run[rows].tolist()}
+    layers = [show.layer("points", "measured", tips, "noise", hover=readings)]
     for fit, colour, name in figures.fits_shown(d):
-        lines = show.shafts(tips, tips - factor * 1e3 * fit.residual[rows, :3])
-        style = {"mode": "lines", "hoverinfo": "name", "line": {"width": 4, "color": colour}, "connectgaps": False}
-        data.append(show.trace(lines, f"error, {name}, × {factor:g}", **style))
-    return show.view(data)
+        error = 1e3 * fit.residual[rows, :3]
+        readings[f"error, {name}, mm"] = show.numbers(np.linalg.norm(error, axis=1))
+        tail = tips - error
+        layers.append(show.layer("arrows", f"error, {name}, × {factor:g}", tail, colour, 1.4, to=tail + factor * error))
+    return show.view(layers)

@@ -13,8 +13,9 @@ import numpy as np
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
+from ctcr.inputs import sha256
 from ctcr.model import parameters
-from ctcr.robot import ledger, robot_file
+from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
 from ctcr.show.wording import deviation, number, visible
@@ -107,7 +108,7 @@ def _opening(robot: Robot) -> Iterator[str]:
     source = f" from {_quoted(Path(robot.file).name)}" if robot.file else ""
     yield f"// Exported by ctcr {version('ctcr')} on {date.today().isoformat()}{source}: change that, not this header."
     if robot.file:
-        yield f"// sha256 of the file: {ledger.sha256(robot.file)}"
+        yield f"// sha256 of the file: {sha256(robot.file)}"
     yield "// SI units; tubes from the innermost outwards. `sd`: standard deviation of a value that was fitted."
 
 

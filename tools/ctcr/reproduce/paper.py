@@ -8,7 +8,14 @@ from scipy.spatial.transform import Rotation
 from ctcr.robot.description import Actuation, Robot, Tracker
 from ctcr.robot.table_ii import table_ii
 
-COLUMNS = ["where", "what", "why ours differs", "paper", "ours", "ratio"]
+COLUMNS = {
+    "where": "in the paper",
+    "what": "",
+    "why ours differs": "",
+    "paper": "its value",
+    "ours": "what this library finds",
+    "ratio": "ours over the paper's",
+}
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from ctcr.reproduce.influence import SLOW_FEEDBACK, Influence
 from ctcr.reproduce.paper import COLUMNS, Claim, paper_robot
 from ctcr.sensitivity import report as sensitivity
 from ctcr.show import html_page
-from ctcr.show.html_page import cards, figure, table
-from ctcr.show.style import AXES, ERROR
+from ctcr.show.html_page import cards, figure, table, view
+from ctcr.show.style import AXES, ERROR, NOISE, PALE_BACK, PALE_OUT, TINT
 from ctcr.track import figures as track
 from ctcr.track.result import errors_mm
 from ctcr.track.scenario import shipped
@@ -30,18 +30,18 @@ def page(claims: list[Claim], errors: dict, s: Scenarios, found: Influence, made
         (_beyond, s, 8, 3.4, "Beyond the paper: weights above 20 g. Dashed: 1 mm."),
         (sensitivity.bars, found.opened, 10.4, 8, "Wrong parameters in open loop (Section V.A)."),
     ]
+    path = track.scene(list(runs.values()), wanted, list(runs))
     sections = [
         '<p class="lead">Boyer et al., On High Performance Control of Concentric Tube Continuum Robots through '
         "Parsimonious Calibration, RA-L 2024.</p>",
         cards([("good", str(len(claims)), "values of the paper beside ours"), ("noise", made, shown)]),
         table("Values", COLUMNS, [claim.row() for claim in claims], 3),
         "<h2>Table II: the robot</h2>" + _robot(),
-        '<h2>Figure 3a: the path</h2><div id="view"></div>',
+        "<h2>Figure 3a: the path</h2>" + view(path, "The tip along the path, base frame."),
         "<h2>Figures 2 to 6</h2>",
         *(figure(*picture, wide=True) for picture in pictures),
     ]
-    view = track.scene(list(runs.values()), wanted, list(runs))
-    return html_page.page(title, sections, "ctcr reproduce", "ctcr reproduce", view)
+    return html_page.page(title, sections)
 
 
 def _robot() -> str:
@@ -68,13 +68,13 @@ def _integration(picture: Figure, errors: dict[str, np.ndarray]) -> None:
     """Fig. 2: errors of one step a segment."""
     axes = picture.subplots()
     percent = {name: 100 * np.maximum(error, 1e-13) for name, error in errors.items()}
-    track.box_plot(axes, percent, ["#cfe3ee"] * len(percent), means=False)
+    track.box_plot(axes, percent, [PALE_OUT] * len(percent), means=False)
     axes.set(yscale="log", ylabel="tip error, % of the length")
 
 
 def _forces(picture: Figure, s: Scenarios) -> None:
     """Fig. 3b and Fig. 6: errors by weight, up to 20 g."""
-    axes, colour = picture.subplots(), {"S2": "#e3e7ea", "S3": "#f6dcc0", "S4": "#cfe3ee"}
+    axes, colour = picture.subplots(), {"S2": TINT, "S3": PALE_BACK, "S4": PALE_OUT}
     groups = [("S2", 0.0), *((name, mass) for name in ("S3", "S4") for mass in (5.0, 10.0, 15.0, 20.0))]
     errors = {f"{name}\n{mass:g} g": errors_mm(s.runs[name, mass]) for name, mass in groups}
     track.box_plot(axes, errors, [colour[name] for name, _ in groups])
@@ -94,6 +94,6 @@ def _beyond(picture: Figure, s: Scenarios) -> None:
         axes.plot(masses, largest, "o-", color=colour, label=label)
     least = {mass: 1e3 * away for mass, away in s.reach.items() if away > 0}
     axes.plot(list(least), list(least.values()), "k_", ms=16, mew=2, label="least of any posture within the limits")
-    axes.axhline(1, color="#8794a0", lw=1, ls="--")
+    axes.axhline(1, color=NOISE, lw=1, ls="--")
     axes.set(yscale="log", xlabel="weight at the tip, g", ylabel="largest error, mm")
     axes.legend(fontsize=9)

@@ -290,6 +290,11 @@ class Robot(Shown, Section):
         return len(self.tubes)
 
     @property
+    def files(self) -> list[str]:
+        """For a ledger or a page: the file that it was loaded from, or none."""
+        return [self.file] if self.file else []
+
+    @property
     def file(self) -> str:
         """That it was loaded from; empty where it was not."""
         return self._source.file if self._source else ""

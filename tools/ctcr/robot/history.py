@@ -8,7 +8,13 @@ from ctcr.show.output import table
 from ctcr.show.style import ERROR, NOISE, OUT
 from ctcr.show.wording import visible
 
-COLUMNS = ["date", "command", "from", "changes", "error"]
+COLUMNS = {
+    "date": "",
+    "command": "that changed the file",
+    "from": "the measurements",
+    "changes": "",
+    "error": "RMS before and after, and the expected error of a right model (floor)",
+}
 FLOOR = "expected error"
 _BAR = 44  # characters of the longest bar
 
@@ -71,7 +77,7 @@ def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> 
         console.print(f"The figures come from different tables: {', '.join(sources)}")
 
 
-def page(robot: Robot, file: str) -> str:
+def page(robot: Robot) -> str:
     """Both as one HTML page that needs nothing else."""
     stages, lines = waterfall(robot), entries(robot)
     title = f"History: {robot.name}"
@@ -80,7 +86,7 @@ def page(robot: Robot, file: str) -> str:
     if stages:
         sections.append(html_page.figure(draw_waterfall, stages, 10.4, 4.4, "RMS error after each step."))
     sections.append("<h2>Ledger</h2>" + html_page.table("Oldest first", COLUMNS, lines, len(COLUMNS)))
-    return html_page.page(title, sections, file, "ctcr history")
+    return html_page.page(title, sections, robot.files)
 
 
 def _lead(stages: list[Stage]) -> str:

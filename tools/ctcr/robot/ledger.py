@@ -5,7 +5,6 @@ field, and the error before and after. Old values are never lost.
 """
 
 import fcntl
-import hashlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -18,7 +17,8 @@ from typing import Any
 
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from ctcr.errors import InputError, Problem, open_input
+from ctcr.errors import InputError, Problem
+from ctcr.inputs import fingerprint, open_input
 from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
@@ -114,12 +114,6 @@ def _unchanged(source: YamlDocument) -> Iterator[None]:
         yield
 
 
-def sha256(path: str | Path) -> str:
-    """The fingerprint of a file, in hexadecimal."""
-    with open_input(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def _apply(document: CommentedMap, change: Change) -> CommentedMap:
     """Sets one value; returns its row of the ledger."""
     *parents, last = change.path
@@ -158,7 +152,7 @@ def _set_effects(document: CommentedMap, effects: Mapping[str, Mapping[str, Any]
 def _ledger_entry(entry: Entry, rows: list[CommentedMap]) -> CommentedMap:
     made = CommentedMap(date=date.today().isoformat(), command=entry.command)
     if entry.sources:
-        made["sources"] = [_one_line({"file": Path(path).name, "sha256": sha256(path)}) for path in entry.sources]
+        made["sources"] = [_one_line({"file": Path(path).name, "sha256": fingerprint(path)}) for path in entry.sources]
     if rows:
         made["changes"] = rows
     if entry.figures:

@@ -8,7 +8,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
-from ctcr.errors import InputError, Problem, open_input
+from ctcr.errors import InputError, Problem
+from ctcr.inputs import open_input
 
 FieldPath = tuple[str | int, ...]
 MAX_BYTES = 1 << 20  # a description is a few kB: a larger file is something else, often a table

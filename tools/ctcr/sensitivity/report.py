@@ -1,5 +1,6 @@
 """The study as one HTML page that needs nothing else."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,11 @@ from ctcr.sensitivity.open_loop import OpenLoop
 from ctcr.sensitivity.terminal import CLOSED_COLUMNS, OPEN_COLUMNS, closed_rows, closing, open_rows
 from ctcr.show import html_page
 from ctcr.show.html_page import bullets, figure, table
-from ctcr.show.style import AXES, ERROR, FAINT
+from ctcr.show.style import AXES, ERROR, FAINT, INK
 
 
-def page(found: dict[str, Any], source: str, accuracy: float) -> str:
-    """The whole HTML text; `accuracy` [mm]."""
+def page(found: dict[str, Any], files: Sequence[str], accuracy: float) -> str:
+    """The whole HTML text; `files`: the input files; `accuracy` [mm]."""
     sections = [bullets(closing(found, accuracy))]
     if study := found.get("open_loop"):
         text = (
@@ -33,19 +34,19 @@ def page(found: dict[str, Any], source: str, accuracy: float) -> str:
         drawn = figure(curves, study, 10.4, 5.4, text, wide=True)
         rows = table("Increase of the error, worst of the range", CLOSED_COLUMNS, closed_rows(study), 2)
         sections.append(f"<h2>Closed loop</h2>{drawn}{rows}")
-    return html_page.page("Which parameters matter", sections, source, "ctcr sensitivity")
+    return html_page.page("Which parameters matter", sections, files)
 
 
 def bars(figure: Figure, study: OpenLoop) -> None:
-    """Mean, 95 % and largest tip error of each parameter, logarithmic."""
+    """Mean, 95 % and largest tip error of each parameter."""
     axes = figure.subplots()
     order = [study.together, *sorted(study.influences, key=lambda one: one.p95)]
     row = np.arange(len(order))
-    axes.barh(row, [max(one.p95, 1e-4) for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
-    axes.plot([max(one.mean, 1e-4) for one in order], row, "D", color="#1c2733", ms=3.5, label="mean")
-    axes.plot([max(one.maximum, 1e-4) for one in order], row, "|", color="#1c2733", ms=8, label="largest")
+    axes.barh(row, [one.p95 for one in order], color=ERROR, alpha=0.8, height=0.65, label="95 % are below")
+    axes.plot([one.mean for one in order], row, "D", color=INK, ms=3.5, label="mean")
+    axes.plot([one.maximum for one in order], row, "|", color=INK, ms=8, label="largest")
     axes.set_yticks(row, [one.name for one in order])
-    axes.set(xscale="log", xlabel="tip error, mm")
+    axes.set(xlabel="tip error, mm", xlim=(0, None))
     axes.legend(loc="lower right", bbox_to_anchor=(1, 2 / len(order)), fontsize=9)  # above the last bar
 
 

@@ -7,8 +7,18 @@ from ctcr.sensitivity.closed_loop import ClosedLoop
 from ctcr.sensitivity.open_loop import OpenLoop
 from ctcr.show import output
 
-OPEN_COLUMNS = ["parameter", "mean, mm", "95 %, mm", "max, mm"]
-CLOSED_COLUMNS = ["parameter", "range", "mean +um", "max +um"]
+OPEN_COLUMNS = {
+    "parameter": "",
+    "mean, mm": "mean distance between the tips that the nominal robot and the wrong one predict",
+    "95 %, mm": "95 of 100 distances are below",
+    "max, mm": "largest distance",
+}
+CLOSED_COLUMNS = {
+    "parameter": "",
+    "range": "over which it was varied",
+    "mean +um": "by how much the mean tracking error grows, in µm",
+    "max +um": "by how much the largest tracking error grows, in µm",
+}
 
 
 def open_rows(study: OpenLoop) -> list[list[str]]:

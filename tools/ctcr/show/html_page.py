@@ -1,49 +1,84 @@
 """Parts of a report: one HTML page that needs nothing else, no network and no other file."""
 
-from collections.abc import Iterable, Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
-from importlib.resources import files
+from importlib import resources
+from importlib.metadata import version
 from typing import Any
 
-from plotly.offline import get_plotlyjs
+import click
 
-from ctcr.show.style import draw
+from ctcr.errors import InputError
+from ctcr.inputs import fingerprint
+from ctcr.show.style import colours, draw
 from ctcr.show.wording import as_html
 
+SHORT = 12  # digits of a fingerprint that a page shows
+HOW_TO_TURN = (
+    "Drag to turn. Click, then scroll, or pinch to zoom. Double-click to return. Click a name to hide it or to show it."
+)
 
-def page(
-    title: str, sections: Iterable[str], footer: str, command: str, drawing: str | None = None, reload_s: int = 0
-) -> str:
+
+def page(title: str, sections: Iterable[str], files: Sequence[str] = (), reload_s: int = 0) -> str:
     """The whole HTML text.
 
     title     plain text, the heading of the page
     sections  HTML by the functions below; empty ones are left out
-    footer    plain text: the sources of the page; `command` made it
-    drawing   JSON of a 3-D view, which one of the sections has the element `view` for
+    files     input files that it is made from, whose fingerprints it ends with
     reload_s  interval at which the browser reloads the page; 0: never
     """
     title = as_html(title)
     reload = f'<meta http-equiv="refresh" content="{reload_s}">' if reload_s else ""
-    style = (files("ctcr.show") / "html_page.css").read_text(encoding="utf-8")
+    style, script = (
+        (resources.files("ctcr.show") / f"html_page.{kind}").read_text(encoding="utf-8") for kind in ("css", "js")
+    )
+    style = (
+        f":root {{ {colours(dark=False)} }}\n"
+        f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {colours(dark=True)} }} }}\n{style}"
+    )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"{reload}"
         f"<title>{title}</title><style>{style}</style></head><body><h1>{title}</h1>"
         + "\n".join(filter(None, sections))
-        + f"<footer>{as_html(footer)}. Made by {command} on {date.today().isoformat()}.</footer>"
-        + (_drawn(drawing) if drawing is not None else "")
-        + "</body></html>\n"
+        + _footer(files)
+        + f"<script>{script}</script></body></html>\n"
     )
 
 
-def _drawn(drawing: str) -> str:
+def _footer(files: Sequence[str]) -> str:
+    """The version, the day, the command line where there is one, and each input file with its fingerprint."""
+    context = click.get_current_context(silent=True)
+    given = context and context.find_root().obj
+    made = f"Made by ctcr {version('ctcr')} on {date.today().isoformat()}"
+    way = paragraph(f"{made}:") + command(shlex.join(["ctcr", *given])) if given else paragraph(f"{made} in Python.")
+    rows = [[file, _digits(file)] for file in files]
+    read = table("Input files", {"file": "", "SHA-256": f"its first {SHORT} digits: sha256sum FILE gives all"}, rows, 2)
+    return f"<footer>{way}{read if rows else ''}</footer>"
+
+
+def _digits(file: str) -> str:
+    try:
+        return fingerprint(file)[:SHORT]
+    except InputError:  # a robot of a program may bear the name of a file that was never written
+        return "not read"
+
+
+def view(drawing: str, caption: str) -> str:
+    """A 3-D view: `drawing` is the JSON of `scene.view`."""
     text = drawing.replace("<", "\\u003c")  # in JSON they stand in strings only; no text may end or open a script
     return (
-        f"<script>{get_plotlyjs()}</script>"
-        f"<script>const drawing = {text};\n"
-        'Plotly.newPlot("view", drawing.data, drawing.layout, {responsive: true, displaylogo: false});</script>'
+        f'<figure class="view"><script type="application/json">{text}</script>'
+        f"<noscript>This view needs JavaScript.</noscript>"
+        f"<figcaption>{as_html(f'{caption} {HOW_TO_TURN}')}</figcaption></figure>"
     )
+
+
+def command(text: str) -> str:
+    """A command line, with a button that copies it."""
+    return f'<div class="command"><code>{as_html(text)}</code></div>'
 
 
 def paragraph(text: str, kind: str = "", bold: str = "") -> str:
@@ -74,16 +109,22 @@ def figure(plot: Any, subject: Any, width: float, height: float, caption: str, w
     return f"<figure{kind}>{drawn}<figcaption>{as_html(caption)}</figcaption></figure>" if drawn else ""
 
 
-def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], text_columns: int) -> str:
-    """The first columns are text, the others numbers."""
+def table(
+    caption: str, columns: Sequence[str] | Mapping[str, str], rows: Iterable[Sequence[str]], text_columns: int
+) -> str:
+    """The first columns are text, the others numbers. `columns` may hold what each means: shown below and on hover."""
+    meanings = {name: text for name, text in columns.items() if text} if isinstance(columns, Mapping) else {}
 
     def cell(tag: str, index: int, value: str) -> str:
         kind = ' class="text"' if index < text_columns else ""
-        return f"<{tag}{kind}>{as_html(value)}</{tag}>"
+        meaning = f' title="{as_html(meanings[value])}"' if tag == "th" and value in meanings else ""
+        return f"<{tag}{kind}{meaning}>{as_html(value)}</{tag}>"
 
     head = "".join(cell("th", i, name) for i, name in enumerate(columns))
     body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
+    below = "; ".join(as_html(f": {text}", bold=name) for name, text in meanings.items())
     return (
         f'<div class="scroll"><table><caption>{as_html(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
+        + (f'<p class="soft">{below}.</p>' if below else "")
     )

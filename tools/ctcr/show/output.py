@@ -6,7 +6,7 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, is_dataclass
 from pathlib import Path
@@ -105,7 +105,11 @@ def console(json_target: str | None = None) -> Terminal:
 
 
 def table(
-    title: str, columns: list[str], rows: list[list[str | list[str]]], text_columns: int = 1, text: Collection[int] = ()
+    title: str,
+    columns: Iterable[str],
+    rows: list[list[str | list[str]]],
+    text_columns: int = 1,
+    text: Collection[int] = (),
 ):
     """A rich table: the first columns, or those of `text`, are text, the others numbers. A cell may have several lines.
 

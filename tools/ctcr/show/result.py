@@ -56,17 +56,12 @@ class Shown:
 class Result(Shown):
     """What a comparison or a fit found. A subclass names the module of its page and its picture."""
 
-    PAGE: ClassVar[str] = ""  # page(result, source) is a function of this module below ctcr
+    PAGE: ClassVar[str] = ""  # page(result) is a function of this module below ctcr
     PICTURE: ClassVar[tuple[str, str, float, float]]  # a module, its function, width and height [in]
-
-    @property
-    def source(self) -> str:
-        """What it is made from, for the foot of its page."""
-        raise NotImplementedError
 
     def report(self, path: str | Path) -> None:
         """Writes the page that the command's --report writes: one HTML file that needs no network."""
-        write_text(import_module(f"ctcr.{self.PAGE}").page(self, self.source), path)
+        write_text(import_module(f"ctcr.{self.PAGE}").page(self), path)
 
     def plot(self) -> Picture:
         """Its main picture, a matplotlib figure; `savefig` writes it."""

@@ -1,32 +1,43 @@
-"""3-D views of a report, as the JSON that plotly.js draws."""
+"""3-D views of a report, as the JSON that html_page.js draws: layers of points, lines, arrows and balls in mm."""
 
 import json
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ctcr.arrays import Array
-from ctcr.show.style import INK
 
-SCALE = [[0, "#f3c623"], [0.5, "#e0662b"], [1, "#8c1d18"]]  # of an error, from small to large
-COLOUR_BAR = {"title": {"text": "error, mm"}, "len": 0.6, "thickness": 12}
+DIGITS = 3  # after the point: a micrometre
 
 
-def trace(points: Array, name: str = "", kind: str = "scatter3d", **style) -> dict:
-    """A trace of points (K, 3); NaN breaks a line. `style` as plotly.js takes it."""
-    return {"type": kind, **columns(points), **({"name": name} if name else {}), **style}
+def layer(kind: str, name: str, points: Array, colour: str = "", size: float = 2, **more: Any) -> dict:
+    """A layer that a click on its name hides.
+
+    kind      points, line (through the points; NaN breaks it), arrows (from the points to `to`) or ball (of `radius`)
+    points    (K, 3) [mm]
+    colour    a name of the palette; without it `value` (K,) colours each point, by the scale of the view
+    size      radius of a point or width of a line [px]
+    more      to: heads (K, 3); radius [mm]; dashed; marked: radius of a mark on each point [px]; hidden at first;
+              hover: {name: value of each point} to show under the pointer; choice: drawn with this choice alone
+    """
+    if "to" in more:
+        more["to"] = _columns(more["to"])
+    return {"kind": kind, "name": name, "colour": colour, "size": size, **_columns(points), **more}
 
 
-def columns(vectors: Array, names: str = "xyz") -> dict[str, list[float | None]]:
-    """Vectors (K, 3) as lists of three digits after the point, null where not finite."""
-    rounded = [[round(float(v), 3) if np.isfinite(v) else None for v in column] for column in vectors.T]
-    return dict(zip(names, rounded, strict=True))
+def numbers(values: Array) -> list[float | None]:
+    """Values (K,) as JSON, null where not finite."""
+    return [round(float(v), DIGITS) if np.isfinite(v) else None for v in values]
 
 
-def shafts(tail: Array, head: Array) -> Array:
-    """Lines (3 K, 3) from each tail to its head (K, 3), with a break after each."""
-    lines = np.full((3 * len(tail), 3), np.nan)
-    lines[0::3], lines[1::3] = tail, head
-    return lines
+def _columns(vectors: Array) -> dict[str, list[float | None]]:
+    return {name: numbers(column) for name, column in zip("xyz", vectors.T, strict=True)}
+
+
+def most(errors: Array) -> float:
+    """The end of a scale of colours for errors (K,) [mm]: the largest, but for two in a hundred."""
+    return max(float(f"{np.percentile(errors, 98):.2g}"), 10.0**-DIGITS)
 
 
 def arrow_factor(points: Array, length: float, share: float) -> float:
@@ -38,19 +49,14 @@ def arrow_factor(points: Array, length: float, share: float) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted))
 
 
-def view(data: list[dict], eye: tuple[float, float, float] = (1.4, 1.4, 0.8), **layout) -> str:
-    """JSON text {"data", "layout"} for Plotly.newPlot with equal axes in mm, seen from `eye`."""
-    axis = {"backgroundcolor": "#ffffff", "gridcolor": "#e1e6ea", "zerolinecolor": "#c9d1d9"}
-    layout = {
-        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
-        "paper_bgcolor": "#ffffff",
-        "font": {"family": "system-ui, sans-serif", "color": INK},
-        "legend": {"orientation": "h", "y": 0, "x": 0, "itemsizing": "constant"},
-        "scene": {
-            "aspectmode": "data",
-            "camera": {"eye": dict(zip("xyz", eye, strict=True))},
-            **{f"{name}axis": {**axis, "title": {"text": f"{name}, mm"}} for name in "xyz"},
-        },
-        **layout,
-    }
-    return json.dumps({"data": data, "layout": layout}, separators=(",", ":"), allow_nan=False)
+def view(
+    layers: list[dict], eye: tuple[float, float, float] = (1.4, 1.4, 0.8), most: float = 0, choices: Sequence[str] = ()
+) -> str:
+    """JSON text for `html_page.view`, seen from the direction `eye`.
+
+    most       error at the end of the scale of colours [mm]; 0: no layer has values
+    choices    names; one of them is chosen at a time, the last at first
+    """
+    scale = {"scale": {"title": "error, mm", "most": most}} if most else {}
+    drawing = {"eye": eye, **scale, "choices": choices, "layers": layers}
+    return json.dumps(drawing, separators=(",", ":"), allow_nan=False)

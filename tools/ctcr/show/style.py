@@ -1,22 +1,51 @@
 """How figures look: one colour means one thing in all of them."""
 
 import io
+import re
 from collections.abc import Callable
 from typing import Any
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
+from scipy import stats
 
-ERROR, NOISE, OUT, BACK, FAINT = "#b3361e", "#6b7785", "#0b6e99", "#d17a00", "#c9d1d9"
-AXES = ("#0b6e99", "#d17a00", "#4b8b3b")
-INK = "#1c2733"
+from ctcr.arrays import Array
 
+PALETTE = {  # on light paper, on dark paper
+    "paper": ("#ffffff", "#14191f"),
+    "ink": ("#1c2733", "#e2e8ed"),
+    "soft": ("#5c6b78", "#a3b0bb"),
+    "line": ("#dde3e8", "#35414c"),
+    "tint": ("#f2f5f7", "#1e262e"),
+    "error": ("#b3361e", "#ef7b62"),
+    "good": ("#2e7d4f", "#5bb884"),
+    "noise": ("#6b7785", "#93a0ad"),
+    "out": ("#0b6e99", "#4fb0dc"),
+    "back": ("#d17a00", "#f0a340"),
+    "third": ("#4b8b3b", "#7cc06a"),
+    "violet": ("#7a4fa3", "#b592da"),
+    "pink": ("#c2699f", "#e091c0"),
+    "faint": ("#c9d1d9", "#4a5763"),
+    "low": ("#f3c623", "#8f7f35"),  # of an error by colour
+    "middle": ("#e0662b", "#f0954a"),
+    "high": ("#8c1d18", "#ff6a5e"),
+    "pale_error": ("#f2cdc6", "#6e3429"),
+    "pale_out": ("#cfe3ee", "#234b60"),
+    "pale_back": ("#f6dcc0", "#6b4a20"),
+}
+INK, LINE, TINT, ERROR, GOOD, NOISE, OUT, BACK, FAINT, PALE_ERROR, PALE_OUT, PALE_BACK = (
+    PALETTE[name][0] for name in "ink line tint error good noise out back faint pale_error pale_out pale_back".split()
+)
+AXES = (OUT, BACK, PALETTE["third"][0])
+
+MOST_MARKS = 1000  # of a line; where there are more, they become an image, which is smaller
 STYLE = {
     "font.family": "sans-serif",
     "font.sans-serif": ["Helvetica", "Arial", "DejaVu Sans"],
     "font.size": 10,
-    "axes.edgecolor": "#8794a0",
+    "axes.edgecolor": NOISE,
     "axes.labelcolor": INK,
     "text.color": INK,
     "text.parse_math": False,  # a name with two dollar signs is no formula
@@ -28,11 +57,13 @@ STYLE = {
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "legend.frameon": False,
-    "savefig.dpi": 150,
+    "savefig.dpi": 110,
+    "path.simplify_threshold": 0.3,  # px
     "axes.grid": True,
-    "grid.color": "#e7ebef",
+    "grid.color": LINE,
     "axes.axisbelow": True,
     "svg.hashsalt": "ctcr",
+    "svg.fonttype": "none",
 }
 
 
@@ -54,13 +85,62 @@ def picture(plot: Callable[[Figure, Any], Any], subject: Any, width: float, heig
         if plot(figure, subject) is False:
             return None
         _number_ticks(figure)
+        for line in (line for axes in figure.axes for line in axes.lines):
+            marks = line.get_marker() not in ("None", None, "", " ")
+            line.set_rasterized(marks and len(line.get_xdata()) > MOST_MARKS)
     return figure
 
 
+def shares_below(axes, sizes: Array, **style: Any) -> None:
+    """The share of `sizes` [mm] below each size, in percent; lengths stand on one linear scale."""
+    share = np.linspace(0, 100, 201)
+    before = axes.get_xlim()[1] if axes.lines else 0.0
+    axes.plot(np.percentile(sizes, share), share, **style)
+    axes.set(xlim=(0, max(before, 1.1 * float(np.percentile(sizes, 99)), 1e-3)), ylim=(0, 102))
+
+
+def noise_below(axes, sd: float, label: str) -> None:
+    """The same of noise alone, of this standard deviation along each axis [mm], beside what is drawn already."""
+    if sd > 0:
+        reach = axes.get_xlim()[1]
+        size = np.append(np.linspace(0, min(5 * sd, reach), 60), reach)
+        axes.plot(size, 100 * stats.maxwell.cdf(size, scale=sd), color=NOISE, lw=1.4, label=label)
+
+
 def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:
-    """SVG text of a picture, or None when there is nothing to draw."""
+    """SVG text of a picture for a page, whose colours it takes, or None when there is nothing to draw."""
     made = picture(plot, subject, width, height)
-    return made and made._repr_svg_()
+    return made and _for_page(made._repr_svg_())
+
+
+def colours(dark: bool) -> str:
+    """The palette as properties of a style sheet, such as --ink."""
+    return " ".join(f"--{name}: {pair[dark]};" for name, pair in PALETTE.items())
+
+
+def _for_page(svg: str) -> str:
+    """The picture with the colours of the page, a tenth of a point exact, without what a browser does not need."""
+
+    def in_group(group: re.Match) -> str:  # marks of one style, which then stands once
+        styles = set(re.findall(r' style="[^"]*"', group[2]))
+        shared = styles.pop() if len(styles) == 1 else ""
+        return f"{group[1]}{shared}>{group[2].replace(shared, '')}</g>" if shared else group[0]
+
+    def in_tag(tag: re.Match) -> str:
+        text = re.sub(r"\s+", " ", tag[0])
+        if "data:image" in text:
+            return text
+        digits = 2 if " id=" in text else 1  # a mark is small
+        text = re.sub(r"(?<!: )-?\d+\.\d+", lambda number: f"{round(float(number[0]), digits):g}", text)
+        text = re.sub("#[0-9a-f]{6}", lambda hexes: named.get(hexes[0], hexes[0]), text)
+        return text if "<path" not in text else re.sub(r" ?([MLCQzZ]) ?", r"\1", text)
+
+    named = {light: f"var(--{name})" for name, (light, _) in PALETTE.items()}
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'<g id="[^"]*"', "<g", svg)
+    svg = re.sub(r"<[^>]*>", in_tag, svg)
+    svg = re.sub(r">\s+<", "><", svg).replace("xlink:href", "href")
+    return re.sub(r'(<g(?: clip-path="[^"]*")?)>((?:<use [^>]*>)+)</g>', in_group, svg)
 
 
 def _number_ticks(figure: Figure) -> None:

@@ -13,7 +13,8 @@ from typing import BinaryIO
 import numpy as np
 
 from ctcr.arrays import Array, Integers, Mask
-from ctcr.errors import InputError, Problem, open_input, shown
+from ctcr.errors import InputError, Problem, shown
+from ctcr.inputs import open_input
 
 BLOCK_BYTES = 4 << 20
 BYTES_PER_NUMBER = 32  # of memory: the table, and what comparisons and fits make of it

@@ -77,11 +77,16 @@ class Sessions:
         return np.median(self.shift, axis=0), Rotation.from_rotvec(self.turn).mean().as_rotvec(), homes
 
     @property
-    def columns(self) -> list[str]:
-        """Of `rows`."""
-        frame = ["run", "x, mm", "y, mm", "z, mm", "turn x, deg", "turn y, deg", "turn z, deg"]
+    def columns(self) -> dict[str, str]:
+        """Of `rows`, with what they mean."""
         tubes = [] if self.homes is None else range(1, self.homes.shape[1] // 2 + 1)
-        return frame + [f"beta{i}, mm" for i in tubes] + [f"alpha{i}, deg" for i in tubes]
+        return (
+            {"run": ""}
+            | {f"{axis}, mm": f"shift of the run's tracker frame along {axis}" for axis in "xyz"}
+            | {f"turn {axis}, deg": f"its rotation vector, {axis}" for axis in "xyz"}
+            | {f"beta{i}, mm": f"shift of the home of tube {i}" for i in tubes}
+            | {f"alpha{i}, deg": f"turn of the home of tube {i}" for i in tubes}
+        )
 
     def rows(self) -> list[list[str]]:
         """The runs against the typical one, for people."""

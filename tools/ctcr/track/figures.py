@@ -1,4 +1,4 @@
-"""The pictures of a scenario: SVG text through `html_page.figure`, and the 3-D view as JSON for plotly.js."""
+"""The pictures of a scenario: SVG text through `html_page.figure`, and the 3-D view as JSON."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 from ctcr.arrays import Array
 from ctcr.robot.description import Robot
 from ctcr.show import scene as show
-from ctcr.show.style import AXES, ERROR, FAINT, INK, OUT
+from ctcr.show.style import AXES, ERROR, FAINT, GOOD, INK, PALE_ERROR, PALE_OUT
 from ctcr.track.result import Run, by_mass, errors_mm
 from ctcr.track.scenario import TASKS, Scenario
 
-MOST_POINTS = 3000  # of a line of the 3-D view
-COLOURS = (OUT, "#d17a00", "#4b8b3b", "#7a4fa3", "#b3361e", "#6b7785", "#1c2733", "#c2699f")
+MOST_POINTS = 1000  # of a line of the 3-D view
+COLOURS = ("out", "back", "third", "violet", "error", "noise", "ink", "pink")
 
 
 def box_plot(axes, groups: Mapping[str, Array], colours: Sequence[str], means: bool = True) -> None:
@@ -24,8 +24,8 @@ def box_plot(axes, groups: Mapping[str, Array], colours: Sequence[str], means: b
         whis=(0, 100),
         showmeans=means,
         patch_artist=True,
-        medianprops={"color": INK},
-        meanprops={"marker": "D", "markersize": 4},
+        **{f"{part}props": {"color": INK} for part in ("median", "whisker", "cap", "box")},
+        meanprops={"marker": "D", "markersize": 4, "color": GOOD, "markeredgecolor": GOOD, "markerfacecolor": GOOD},
     )
     for box, colour in zip(drawn["boxes"], colours, strict=True):
         box.set(facecolor=colour)
@@ -39,7 +39,7 @@ def boxes(figure: Figure, runs: list[Run]) -> bool | None:
     axes = figure.subplots()
     errors = {f"{mass:g} g": errors_mm(group) for mass, group in groups.items()}
     failed = [any(run.failed for run in group) for group in groups.values()]
-    box_plot(axes, errors, ["#f2cdc6" if bad else "#cfe3ee" for bad in failed])
+    box_plot(axes, errors, [PALE_ERROR if bad else PALE_OUT for bad in failed])
     largest = [error.max() for error in errors.values()]
     top = max((value for value, bad in zip(largest, failed, strict=True) if not bad), default=max(largest))
     axes.set(ylabel="tracking error, mm", xlabel="weight at the tip", ylim=(0, 1.3 * top))
@@ -88,29 +88,20 @@ def tasks(figure: Figure, subject: tuple[Run, Scenario]) -> None:
 
 
 def scene(runs: list[Run], scenario: Scenario, names: list[str] | None = None) -> str:
-    """JSON text {"data", "layout"}; mm, base frame. `names` of the runs; None: one run a weight, named by it."""
+    """JSON text for `html_page.view`; mm, base frame. `names` of the runs; None: one run a weight, named by it."""
     names = names or [f"{run.mass_g:g} g" for run in runs]
-    data = [_line(1e3 * runs[0].wanted, "wanted", "#8794a0", 3, "dash")]
+    layers = [show.layer("line", "wanted", _thinned(runs[0].wanted), "noise", 1.6, dashed=True)]
     for run, name, colour in zip(runs, names, COLOURS * 3, strict=False):
         if run.started:
             failed = " (failed)" if run.failed else ""
-            data.append(_line(1e3 * run.tip, name + failed, colour, 4, "solid"))
-    if scenario.obstacle:
-        data.append(_ball(np.array(scenario.obstacle.centre_mm), scenario.obstacle.radius_mm))
-    plate = {"mode": "markers", "visible": "legendonly", "marker": {"size": 6, "symbol": "diamond", "color": INK}}
-    data.append(show.trace(np.zeros((1, 3)), "front plate", **plate))
-    return show.view(data, eye=(1.4, -1.62, 0.86), legend={"orientation": "h", "y": 0, "x": 0})
+            layers.append(show.layer("line", name + failed, _thinned(run.tip), colour, 1.8))
+    if obstacle := scenario.obstacle:
+        centre = np.array([obstacle.centre_mm], float)
+        layers.append(show.layer("ball", "obstacle", centre, "error", radius=obstacle.radius_mm))
+    layers.append(show.layer("points", "front plate", np.zeros((1, 3)), "ink", 5, hidden=True))
+    return show.view(layers, (1.4, -1.62, 0.86))
 
 
-def _line(points: Array, name: str, colour: str, width: int, dash: str) -> dict:
-    shown = points[:: max(1, len(points) // MOST_POINTS)]
-    return show.trace(shown, name, mode="lines", hoverinfo="name", line={"color": colour, "width": width, "dash": dash})
-
-
-def _ball(centre: Array, radius: float) -> dict:
-    around, down = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(0, np.pi, 13))
-    unit = np.stack([np.cos(around) * np.sin(down), np.sin(around) * np.sin(down), np.cos(down)])
-    ball = np.round(centre[:, None, None] + radius * unit, 3)
-    shape = {axis: values.tolist() for axis, values in zip("xyz", ball, strict=True)}
-    style = {"showscale": False, "showlegend": True, "hoverinfo": "name", "opacity": 0.6}
-    return {"type": "surface", "name": "obstacle", **shape, **style, "colorscale": [[0, ERROR], [1, ERROR]]}
+def _thinned(points: Array) -> Array:
+    """At most about MOST_POINTS of the points [m], in mm."""
+    return 1e3 * points[:: max(1, len(points) // MOST_POINTS)]

@@ -1,27 +1,28 @@
 """A scenario as one HTML page that needs nothing else: no network, no other file."""
 
+from collections.abc import Sequence
+
 from ctcr.robot.description import Robot
 from ctcr.show import html_page
-from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table
+from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table, view
 from ctcr.track import figures
 from ctcr.track.result import COLUMNS, FAILED, FAR, Run, by_mass, rows, summary, worst
 from ctcr.track.scenario import Scenario
 
 
-def page(runs: list[Run], source: str, scenario: Scenario, robot: Robot, measured: bool = False) -> str:
-    """The whole HTML text; `source` says what was run; `measured`: tips are tracker readings."""
+def page(runs: list[Run], files: Sequence[str], scenario: Scenario, robot: Robot, measured: bool = False) -> str:
+    """The whole HTML text; `files`: the input files; `measured`: tips are tracker readings."""
     numbers = summary(runs)
     drawn = [worst([run for run in group if run.started] or group) for group in by_mass(runs).values()]
+    tip = "as measured" if measured else "without noise"
     sections = [
         _opening(numbers, scenario),
-        '<h2>The path</h2><div id="view"></div>'
-        f'<p class="soft">The tip {"as measured" if measured else "without noise"}, the worst run of each weight. '
-        "Drag to turn, scroll to zoom.</p>",
+        "<h2>The path</h2>" + view(figures.scene(drawn, scenario), f"The tip {tip}, the worst run of each weight."),
         _errors(runs, numbers, scenario, measured),
         *(_one(run, scenario, robot) for run in _shown(drawn)),
     ]
     title = f"Scenario {scenario.name}: {robot.name}"
-    return html_page.page(title, sections, source, "ctcr track", figures.scene(drawn, scenario))
+    return html_page.page(title, sections, files)
 
 
 def _shown(runs: list[Run]) -> list[Run]:
@@ -55,13 +56,12 @@ def _errors(runs: list[Run], numbers: dict, scenario: Scenario, measured: bool) 
         f"means. Left out: references nearer than {1e3 * FAR:g} mm to the obstacle, where the tip has to deviate."
     )
     drawn = figure(figures.boxes, runs, 8.5, 3.8, text, wide=True)
-    columns = ["weight", *(f"{name}, mm" if "," not in name and name != "failed" else name for name in COLUMNS)]
     noise = "as measured, with noise" if measured else f"noise {scenario.noise_mm:g} mm a reading and axis"
     note = (
         f'<p class="soft">A run fails that is off by more than {1e3 * FAILED:g} mm, touches the obstacle or stops. '
         f"Runs a weight: {scenario.repetitions}; {noise}.</p>"
     )
-    return f"<h2>Tracking errors</h2>{drawn}{table('Errors by weight', columns, rows(numbers), 1)}{note}"
+    return f"<h2>Tracking errors</h2>{drawn}{table('Errors by weight', COLUMNS, rows(numbers), 1)}{note}"
 
 
 def _one(run: Run, scenario: Scenario, robot: Robot) -> str:

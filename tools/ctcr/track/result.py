@@ -12,7 +12,15 @@ from ctcr.track.scenario import TASKS, Scenario
 FAR = 10e-3  # [m] from the obstacle's surface; errors nearer to it do not count, as the tip must deviate there
 FAILED = 1e-3  # [m] error above which a run has failed
 UNSETTLED = 1e-3  # [m] distance from the start of the path above which a run has not started
-COLUMNS = ["mean", "p99.8", "max", "< 1 mm, %", "obstacle", "failed"]
+COLUMNS = {
+    "weight": "at the tip",
+    "mean, mm": "mean distance of the tip from its reference",
+    "p99.8, mm": "998 of 1000 distances are below",
+    "max, mm": "largest distance",
+    "< 1 mm, %": "share of the distances below 1 mm",
+    "obstacle, mm": "least distance of the tip from the obstacle",
+    "failed": "runs that failed",
+}
 
 
 @dataclass(frozen=True)
@@ -145,7 +153,7 @@ def summary(runs: list[Run]) -> dict[str, Any]:
 
 
 def rows(numbers: dict[str, dict[str, Any]]) -> list[list[str]]:
-    """Of a table with the columns weight and COLUMNS, lengths in mm."""
+    """Of a table with COLUMNS."""
     forms = {"mean_mm": ".3f", "p99_8_mm": ".3f", "max_mm": ".3f", "below_1_mm_percent": ".2f", "obstacle_mm": ".2f"}
 
     def cell(value: float | None, form: str) -> str:

@@ -52,8 +52,7 @@ def page(progress: Progress, title: str, reload_s: int) -> str:
         html_page.cards(numbers),
         picture(errors[-SHOWN:], len(errors)) if known else "",
     ]
-    footer = "Error against the model at the joints of the encoders"
-    return html_page.page(title, sections, footer, "ctcr record", reload_s=reload_s)
+    return html_page.page(title, sections, reload_s=reload_s)
 
 
 def picture(errors_mm: list[float], count: int) -> str:
@@ -68,15 +67,16 @@ def picture(errors_mm: list[float], count: int) -> str:
     dots = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5"/>' for x, y in points)
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     levels = "".join(
-        f'<line x1="{LEFT}" x2="{WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="#e1e6ea"/>'
+        f'<line x1="{LEFT}" x2="{WIDTH}" y1="{y:.1f}" y2="{y:.1f}" stroke="var(--line)"/>'
         f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:.2f}</text>'
         for value, y in ((value, height(value)) for value in (0.0, top / 2, top))
     )
     first, base = count - len(errors_mm) + 1, HEIGHT - 8
     return (
-        f'<figure class="wide"><svg viewBox="0 0 {WIDTH + 10} {HEIGHT}" font-size="12" fill="#6b7785">{levels}'
+        f'<figure class="wide"><svg viewBox="0 0 {WIDTH + 10} {HEIGHT}" font-size="12" fill="var(--noise)">{levels}'
         f'<text x="{LEFT}" y="{base}">reading {first}</text>'
         f'<text x="{WIDTH}" y="{base}" text-anchor="end">{count}</text>'
-        f'<polyline points="{line}" fill="none" stroke="#b8c4ce"/><g fill="#b3361e">{dots}</g></svg>'
-        "<figcaption>Distance between measured and predicted tip, mm, newest right.</figcaption></figure>"
+        f'<polyline points="{line}" fill="none" stroke="var(--faint)"/><g fill="var(--error)">{dots}</g></svg>'
+        "<figcaption>Distance between the measured tip and that of the model at the joints of the encoders, mm, newest "
+        "right.</figcaption></figure>"
     )
