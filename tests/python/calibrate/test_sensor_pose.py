@@ -22,7 +22,7 @@ NAMES = [f"tracker.sensor_{kind}.{axis}" for kind in ("position", "rotation") fo
 @pytest.mark.parametrize("oriented", [True, False])
 @pytest.mark.parametrize("n_tubes", [1, 2, 3, 4])
 def test_found(n_tubes, oriented):
-    """A fit finds the sensor within its uncertainty, and is as good as one that knows it; its axes need orientations."""
+    """A fit finds the sensor within its uncertainty and is as good as one that knows it; its axes need orientations."""
     for seed in range(3):
         random = np.random.default_rng([seed, n_tubes])
         truth = marked(design(random, n_tubes), random)
@@ -75,11 +75,12 @@ def test_undetermined():
 
 
 def test_derivatives():
-    """Residuals have the derivatives of their differences by the sensor's pose, with effects of the tracker and without."""
+    """Residuals have the derivatives of their differences by the sensor's pose, with effects of the tracker too."""
     random = np.random.default_rng(9)
     robot = marked(design(random, 2), random)
     readings = session(robot, random, runs=2, stops=5)
-    for effects in ({}, {"sensor_offset": {"x": 1e-3, "turn_y": 0.02}, "field_distortion": {"scale": 0.01, "x_yz": 1e-3}}):
+    of_tracker = {"sensor_offset": {"x": 1e-3, "turn_y": 0.02}, "field_distortion": {"scale": 0.01, "x_yz": 1e-3}}
+    for effects in ({}, of_tracker):
         table = user_recording.recording_of(robot.with_effects(effects), readings, NAMES)
         at = np.array([0.01, -0.02, 0.03, 0.4, -0.7, 0.2])
         jacobian = table.residual(at, True)[1]
