@@ -78,7 +78,16 @@ inline constexpr std::array<double, 3> tracker_rotation{  // its rotation vector
     0.3,
 };
 inline constexpr int sensor_tube = 0;  // whose tip carries the sensor, from 0
-inline constexpr double sensor_roll = 0.0;  // of the sensor about the axis of that tip [rad]
+inline constexpr std::array<double, 3> sensor_position{  // of the sensor in the frame of that tip [m]
+    0.0,
+    0.0,
+    0.0,
+};
+inline constexpr std::array<double, 3> sensor_rotation{  // its rotation vector there [rad]
+    0.0,
+    0.0,
+    0.0,
+};
 
 using Effects = ctcr::Standard;  // none beyond the standard model
 
@@ -91,7 +100,7 @@ using Effects = ctcr::Standard;  // none beyond the standard model
   const ctcr::PoseSensor sensor{
       {ctcr::rotation_matrix(ctcr::Vec3(tracker_rotation.data())), ctcr::Vec3(tracker_position.data())},
       sensor_tube,
-      sensor_roll};
+      {ctcr::rotation_matrix(ctcr::Vec3(sensor_rotation.data())), ctcr::Vec3(sensor_position.data())}};
   Effects::On<tube_count> effects;
   return {transmission, ctcr::Model<tube_count, Effects>(tubes_and_gravity, effects), sensor};
 }

@@ -145,6 +145,18 @@ def test_frozen():
     assert np.isnan(found.readings.position[rows]).all()
 
 
+def test_frozen_at_stops():
+    """Where the robot stops while the tracker repeats an old pose, all readings of the stop are missing."""
+    robot, readings = bench(17)
+    twice = readings.rows(np.repeat(np.arange(len(readings)), 2))
+    twice = replace(twice, t=np.arange(len(twice), dtype=float), row=np.arange(len(twice)) + 2)
+    rows = np.arange(80, 90)[twice.run[80:90] == twice.run[79]]
+    position, quaternion = twice.position.copy(), twice.quaternion.copy()
+    position[rows], quaternion[rows] = position[79], quaternion[79]
+    [one] = review(robot, replace(twice, position=position, quaternion=quaternion)).findings
+    assert (one.kind, list(one.rows)) == ("frozen", twice.row[rows].tolist())
+
+
 def test_at_rest():
     """A tracker without noise that repeats its pose at rest did not stand still."""
     robot, readings = bench(19, noise="none")

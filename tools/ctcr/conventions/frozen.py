@@ -13,14 +13,18 @@ from ctcr.table.measurements import Measurements
 
 
 def repeated(readings: Measurements) -> Mask:
-    """Rows (M,) with exactly the pose of the row before, in the same run, at other joints."""
-    same = np.zeros(len(readings), bool)
+    """Rows (M,) with exactly the pose of a row before, and of all between, in the same run, at other joints."""
     q = readings.load_space
+    return (q != q[_since(readings)]).any(axis=1)
+
+
+def _since(readings: Measurements) -> Integers:
+    """The row (M,) of the same run since which exactly this pose was read; the row itself where it is a new one."""
     pose = np.column_stack([readings.positions, np.nan_to_num(readings.quaternions)])
-    same[1:] = (
-        (pose[1:] == pose[:-1]).all(axis=1) & (readings.run[1:] == readings.run[:-1]) & (q[1:] != q[:-1]).any(axis=1)
-    )
-    return same
+    held, first = np.zeros(len(readings), bool), np.arange(len(readings))
+    held[1:] = (pose[1:] == pose[:-1]).all(axis=1) & (readings.run[1:] == readings.run[:-1])
+    first[held] = 0
+    return np.maximum.accumulate(first)
 
 
 def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | None:
@@ -28,10 +32,7 @@ def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | 
     same = repeated(readings)
     if not same.any():
         return None
-    first = np.arange(len(same))
-    first[same] = 0
-    first = np.maximum.accumulate(first)  # the row whose pose is repeated
-    rows = np.flatnonzero(same)
+    first, rows = _since(readings), np.flatnonzero(same)
     moved = np.linalg.norm(
         tips.predicted(robot, readings.rows(rows)) - tips.predicted(robot, readings.rows(first[rows])), axis=1
     )

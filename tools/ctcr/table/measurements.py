@@ -332,7 +332,7 @@ def _warnings(t: Array, run: Integers, file: str) -> Iterator[Problem]:
     late = np.flatnonzero(same_run & (t[1:] <= t[:-1]))
     if len(late):
         text = (
-            f"{t[late[0] + 1]:g} s does not come after {t[late[0]]:g} s ({len(late)} such rows: {listed(late + 3)}): "
+            f"{t[late[0] + 1]:g} s does not come after {t[late[0]]:g} s ({len(late)} in all, rows {listed(late + 3)}): "
             "rows are taken in their order; correct their times, or leave t_s out"
         )
         yield Problem(text, file, int(late[0]) + 3, "t_s", line_name="row")
