@@ -1,4 +1,4 @@
-"""A sensor that is not the tip is never taken for a wrong convention; where the file is wrong on it, that is said."""
+"""A sensor that is not the tip is taken for no wrong convention, and where the file is wrong on it, that is said."""
 
 import numpy as np
 import pytest
