@@ -23,7 +23,7 @@ ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the
 def page(d: Diagnosis) -> str:
     """The whole HTML text."""
     title = f"Diagnosis: {d.robot.name}"
-    parts = [_found, _explanations, _errors, _varying, _view, _candidates, _next, _parameters, _limits]
+    parts = [_found, _errors, _explanations, _varying, _view, _candidates, _next, _parameters, _limits]
     sections = [_opening(d), *(part(d) for part in parts)]
     return html_page.page(title, sections, d.files)
 
@@ -64,8 +64,10 @@ def _found(d: Diagnosis) -> str:
 
 def _explanations(d: Diagnosis) -> str:
     rows = [[one.text, most(one.probability)] for one in d.verdict.likeliest]
-    about = "Posterior probability of each, from the fits and the held-out runs; all others together are less likely"
-    return table(about, ["what acts", "probability"], rows, 1)
+    about = paragraph(
+        "All sets of effects that were fitted, noise alone, and a cause outside the catalogue share them."
+    )
+    return f"<h2>How probable each explanation is</h2>{about}" + table("", ["what acts", "probability"], rows, 1)
 
 
 def _errors(d: Diagnosis) -> str:
