@@ -32,7 +32,10 @@ def wrong_form(fit: Calibrated, readings: Measurements) -> tuple[list[Finding], 
     before, after = errors[0, 0], errors[best]
     turn = _turn_between(predicted, given[use])
     turned = _error_deg(predicted, given[use], False)
-    if known and turned < min(after, settings.CONVENTION_CLEAR * before) and turn.magnitude() > settings.SENSOR_JUMP[1]:
+    # A physical effect may ask for a turn, too, but hardly for a large one, and it leaves more than noise.
+    is_noise = turned < settings.CONVENTION_AT_FLOOR * (fit.robot.tracker.jitter_deg or 0.0)
+    jump = settings.SENSOR_JUMP[1] if is_noise else np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)
+    if known and turned < min(after, settings.CONVENTION_CLEAR * before) and turn.magnitude() > jump:
         return [_turned(fit, turn, (before, turned))], lambda m: m
     if not any(best) or after > settings.CONVENTION_CLEAR * before:
         return [], lambda m: m
