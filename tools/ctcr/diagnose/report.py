@@ -67,7 +67,7 @@ def _explanations(d: Diagnosis) -> str:
     about = paragraph(
         "All sets of effects that were fitted, noise alone, and a cause outside the catalogue share them."
     )
-    return f"<h2>How probable each explanation is</h2>{about}" + table("", ["what acts", "probability"], rows, 1)
+    return f"<h2>How probable each explanation is</h2>{about}" + table("Posterior probabilities", ["what acts", "probability"], rows, 1)
 
 
 def _errors(d: Diagnosis) -> str:

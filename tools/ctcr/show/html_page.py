@@ -112,9 +112,7 @@ def figure(plot: Any, subject: Any, width: float, height: float, caption: str, w
 def table(
     caption: str, columns: Sequence[str] | Mapping[str, str], rows: Iterable[Sequence[str]], text_columns: int
 ) -> str:
-    """The first columns are text, the others numbers. `columns` may hold what each means: shown below and on hover.
-    The caption may be empty.
-    """
+    """The first columns are text, the others numbers. `columns` may hold what each means: shown below and on hover."""
     meanings = {name: text for name, text in columns.items() if text} if isinstance(columns, Mapping) else {}
 
     def cell(tag: str, index: int, value: str) -> str:
@@ -126,7 +124,7 @@ def table(
     body = "".join("<tr>" + "".join(cell("td", i, v) for i, v in enumerate(row)) + "</tr>" for row in rows)
     below = "; ".join(as_html(f": {text}", bold=name) for name, text in meanings.items())
     return (
-        f'<div class="scroll"><table>{caption and f"<caption>{as_html(caption)}</caption>"}'
+        f'<div class="scroll"><table><caption>{as_html(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
         + (f'<p class="soft">{below}.</p>' if below else "")
     )
