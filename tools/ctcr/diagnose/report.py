@@ -64,10 +64,9 @@ def _found(d: Diagnosis) -> str:
 
 def _explanations(d: Diagnosis) -> str:
     rows = [[one.text, most(one.probability)] for one in d.verdict.likeliest]
-    about = paragraph(
-        "All sets of effects that were fitted, noise alone, and a cause outside the catalogue share them."
-    )
-    return f"<h2>How probable each explanation is</h2>{about}" + table("Posterior probabilities", ["what acts", "probability"], rows, 1)
+    about = paragraph("Sets of effects that were fitted, noise alone and a cause outside the catalogue share it.")
+    known = table("Posterior probability", ["what acts", "probability"], rows, 1)
+    return f"<h2>How probable each explanation is</h2>{about}{known}"
 
 
 def _errors(d: Diagnosis) -> str:
