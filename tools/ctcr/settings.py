@@ -3,6 +3,8 @@
 Use it as `settings.NAME`. Limits of what is printed or drawn stand where they are used.
 """
 
+from math import pi
+
 # ---- Shared: one meaning, one value
 
 SIGNIFICANCE = 0.01  # p-value below which the noise as stated does not explain a residual
@@ -28,6 +30,8 @@ PROFILE_STEPS = 16  # integration steps per segment, at least, of tubes with pro
 
 ONE_ROTATION = 0.8  # mean cosine of the angles by which readings miss the best rotation of the sensor, from which it
 # describes them all
+ANY_ANGLE = pi / 3**0.5  # [rad] standard deviation of an angle of which nothing is known
+PLACINGS = 5  # of an unknown sensor and of the tracker frame in turn: only a start of a fit
 SENSOR_BESIDE = 0.05  # [m] standard deviation of the place of a sensor of which nothing is known: a body of markers is
 # some centimetres large
 SPIKE_LEAP = 2.0  # leap of a spike over the distance that the model moves the tip there

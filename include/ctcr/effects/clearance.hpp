@@ -90,16 +90,9 @@ inline constexpr std::array parameters{
                     .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
     detail::saturation_moment,
     detail::contact_compliance,
-    EffectParameter{.name = "law",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 1,
-                    .soft = {0, 1},
-                    .hard = {0, 1},
-                    .role = Role::choice,
-                    .meaning =
-                        "moment along which the tubes lean: 0 the one that the inner tubes carry out of the outer "
-                        "tube; 1 the one that the outer tube carries just before its end and hands over there"},
+    two_laws.named("law",
+                   "moment along which the tubes lean: 0 the one that the inner tubes carry out of the outer "
+                   "tube; 1 the one that the outer tube carries just before its end and hands over there"),
 };
 }  // namespace clearance
 

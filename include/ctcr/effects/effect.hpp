@@ -61,6 +61,10 @@ struct EffectParameter {
   }
 };
 
+/// Selects one of two constitutive laws; its meaning says which.
+inline constexpr EffectParameter two_laws{
+    .name = "law", .neutral = 0, .sigma = 1, .soft = {0, 1}, .hard = {0, 1}, .role = Role::choice};
+
 /// What measurements must have for an effect to be seen.
 struct Needs {
   bool order = false;        ///< rows in the order in which they were measured

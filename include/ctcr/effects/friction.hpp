@@ -66,16 +66,9 @@ inline constexpr std::array parameters{
                     .meaning =
                         "weight of sliding by insertion against sliding by rotation: 0 insertion does not matter, "
                         "1 it counts as much as rotation at the outer radius of the inner tube"},
-    EffectParameter{.name = "law",
-                    .unit = "",
-                    .neutral = 0,
-                    .sigma = 1,
-                    .soft = {0, 1},
-                    .hard = {0, 1},
-                    .role = Role::choice,
-                    .meaning =
-                        "constitutive law: 0 a bristle, stiffness decreasing towards the limit (Dahl); 1 elastic with "
-                        "constant stiffness up to the limit, which rotation and insertion share"},
+    two_laws.named("law",
+                   "constitutive law: 0 a bristle, stiffness decreasing towards the limit (Dahl); 1 elastic with "
+                   "constant stiffness up to the limit, which rotation and insertion share"),
 };
 }  // namespace friction
 

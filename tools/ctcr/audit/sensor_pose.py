@@ -11,7 +11,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector, nearest_rotation, points_to_base
 from ctcr.model import parameters
-from ctcr.model.model import Model
+from ctcr.model.model import Model, Prediction
 from ctcr.robot.description import Robot
 from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
@@ -19,17 +19,17 @@ from ctcr.table.measurements import Measurements
 ROTATION = "tracker.sensor_rotation."
 
 
-def placed(robot: Robot, measurements: Measurements) -> tuple[Robot, list[str]]:
+def placed(robot: Robot, measurements: Measurements, tips: Prediction | None = None) -> tuple[Robot, list[str]]:
     """The robot with a pose of the sensor where its file does not know it, and a notice.
 
     It is the one that fits the readings best where the tracker frame is that of the file. The rotation stays unknown
     where the readings have none in common, as of a sensor that does not measure its roll.
+    tips    those of all rows, base frame, where they are predicted already
     """
     tracker = robot.tracker
     if tracker.sensor_position_mm is not None and tracker.sensor_rotation_known:
         return robot, []
-    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    tips = Model(robot.standard).predict(beta, alpha, measurements.force)
+    tips = _tips(robot, measurements) if tips is None else tips
     turn, pose, width, said = matrix_from_quaternion(tips.quaternion), {}, {}, []
     read = tips.solved & measurements.oriented
     if not tracker.sensor_rotation_known and read.any():
@@ -40,7 +40,7 @@ def placed(robot: Robot, measurements: Measurements) -> tuple[Robot, list[str]]:
             width["sensor_rotation_deg"] = float(np.degrees(parameters.ANYWHERE["rotation"]))
             said.append(f"the rotation vector {numbers(vector, 3)} rad")
     if tracker.sensor_position_mm is None and np.isfinite(measurements.positions).all(axis=1).any():
-        pose["sensor_position_mm"] = (1e3 * position(robot, measurements)).tolist()
+        pose["sensor_position_mm"] = (1e3 * position(robot, measurements, tips)).tolist()
         width["sensor_position_mm"] = 1e3 * parameters.ANYWHERE["position"]
         said.insert(0, f"the position {numbers(pose['sensor_position_mm'], 2)} mm")
     if not pose:
@@ -87,6 +87,11 @@ def with_pose(free: str | Iterable[str], robot: Robot) -> list[str]:
     return parameters.expand([*names, *more], robot) if more else names
 
 
+def _tips(robot: Robot, measurements: Measurements) -> Prediction:
+    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
+    return Model(robot.standard).predict(beta, alpha, measurements.force)
+
+
 def _rotation(robot: Robot, turns: Array) -> Array | None:
     """Rotation vector of the sensor of those (K, 3, 3) that the readings ask for, about uncertain axes alone; None
     where they do not agree."""
@@ -96,13 +101,13 @@ def _rotation(robot: Robot, turns: Array) -> Array | None:
     return vector if cosine.mean() > settings.ONE_ROTATION else None
 
 
-def position(robot: Robot, measurements: Measurements) -> Array:
+def position(robot: Robot, measurements: Measurements, tips: Prediction | None = None) -> Array:
     """The sensor's place (3,) [m] in the frame of the tip that fits the readings best, whatever the file says of it.
 
-    The tracker frame may be shifted too, as far as its file says; what no tip turns stays near the tip.
+    The tracker frame may be shifted too, as far as its file says; what no tip turns stays near the tip. `tips` as of
+    `placed`.
     """
-    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    tips = Model(robot.standard).predict(beta, alpha, measurements.force)
+    tips = _tips(robot, measurements) if tips is None else tips
     read = tips.solved & np.isfinite(measurements.positions).all(axis=1)
     turns = matrix_from_quaternion(tips.quaternion[read])
     beside = points_to_base(robot.tracker, measurements.positions[read]) - tips.position[read]

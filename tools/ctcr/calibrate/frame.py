@@ -20,7 +20,6 @@ from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
 
 AXES = "xyz"
-ROUNDS = 5  # of placing sensor and frame in turn: only a start
 SD = parameters.ANYWHERE | {"position": settings.CONVENTION_ANYWHERE}  # [m], [rad] about the registration
 
 
@@ -82,8 +81,8 @@ def registered(robot: Robot, readings: Measurements) -> Robot:
     if not tracker.sensor_rotation_known and oriented.any():
         turn = world_rotation(*(matrix_from_quaternion(q[oriented]) for q in (tip.quaternion, readings.quaternions)))
         framed = with_frame(robot, turn, np.nanmean(measured - place @ turn.T, axis=0))
-    for _ in range(ROUNDS):
-        found = carrying(sensor_pose.placed(framed, readings)[0])
+    for _ in range(settings.PLACINGS):
+        found = carrying(sensor_pose.placed(framed, readings, tip)[0])
         framed = with_frame(robot, found.tracker.rotation, found.tracker.position)
     return found
 

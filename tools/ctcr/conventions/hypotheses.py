@@ -22,7 +22,6 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
     "beta": (("mm", 1e-3), ("cm", 1e-2)),
     "position": (("mm", 1e-3), ("cm", 1e-2)),
 }
-FRAME_NAMES = ("tracker.position.", "tracker.rotation.")
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
@@ -45,7 +44,7 @@ class Hypothesis:
     def frees(self) -> str | tuple[str, ...] | None:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:
-            return FRAME_NAMES
+            return parameters.FRAME
         if self.sensor is not None:
             return "tracker.sensor_position."
         if self.offset:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import softmax
 
 from ctcr import settings
 from ctcr.diagnose.residual import Residual
@@ -96,9 +97,7 @@ def weighed(
     weigh(none, outside + sum(_density(1 - s) for s in shares), True)
     if accepted:
         weigh(found, outside + math.log(settings.SECOND_CAUSE) + values + sum(map(_density, shares)), True)
-    most = max(weights.values())
-    total = sum(math.exp(w - most) for w in weights.values())
-    every = [Explanation(*what, math.exp(w - most) / total) for what, w in weights.items()]
+    every = [Explanation(*what, p) for what, p in zip(weights, softmax([*weights.values()]).tolist(), strict=True)]
     return sorted(every, key=lambda one: -one.probability)
 
 
@@ -111,7 +110,7 @@ def probability(
 
 def _refitted(round_: Round) -> dict[str, CandidateFit]:
     """The best fit of each effect, by its id."""
-    return {one.id: one for one in sorted(round_.tried, key=lambda one: one.score) if one.refit is not None}
+    return {one.id: one for one in round_.best if one.refit is not None}
 
 
 def _noise(residual: Residual) -> float:

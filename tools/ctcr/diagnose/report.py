@@ -14,7 +14,7 @@ from ctcr.model import parameters
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, cards, figure, paragraph, table
-from ctcr.show.wording import most, sentence, short
+from ctcr.show.wording import sentence, short
 
 MOST_ARROWS = 800
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
@@ -63,9 +63,8 @@ def _found(d: Diagnosis) -> str:
 
 
 def _explanations(d: Diagnosis) -> str:
-    rows = [[one.text, most(one.probability)] for one in d.verdict.likeliest]
     about = paragraph("Sets of effects that were fitted, noise alone and a cause outside the catalogue share it.")
-    known = table("Posterior probability", ["what acts", "probability"], rows, 1)
+    known = table("Posterior probability", ["what acts", "probability"], d.verdict.rows, 1)
     return f"<h2>How probable each explanation is</h2>{about}{known}"
 
 

@@ -13,7 +13,7 @@ from ctcr.diagnose.round import Round
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
 from ctcr.show import output
-from ctcr.show.wording import deviation, most, number, sentence
+from ctcr.show.wording import deviation, number, sentence
 
 CANDIDATES = 8  # of a round
 ALIKE = 6  # coefficients of one meaning that are all shown; of more, the clearest
@@ -59,8 +59,8 @@ def show(console: Any, result: Diagnosis) -> None:
 
 
 def _explanations(result: Diagnosis) -> Any:
-    rows = [[one.text, most(one.probability)] for one in result.verdict.likeliest]
-    return output.table("Explanations that were weighed", ["what acts", "probability"], rows, text=(0,))
+    columns = ["what acts", "probability"]
+    return output.table("Explanations that were weighed", columns, result.verdict.rows, text=(0,))
 
 
 def _errors(result: Diagnosis) -> Any:

@@ -33,6 +33,11 @@ class Verdict:
     sentences: list[str] = field(default_factory=list)
 
     @property
+    def rows(self) -> list[list[str]]:
+        """What acts, and with which probability, of the likeliest explanations."""
+        return [[one.text, most(one.probability)] for one in self.likeliest]
+
+    @property
     def likeliest(self) -> list[Explanation]:
         """Those that people look at: the most probable ones, together nearly certain."""
         before = np.cumsum([0.0, *(one.probability for one in self.explanations)])[:-1]

@@ -67,8 +67,8 @@ _UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
 CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little more than the sums of the two
 _UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
 LEAST_EIGENVALUE = 1e-6  # of correlations: beyond it they leave a sum of parameters exactly known
-ANYWHERE = {"position": settings.SENSOR_BESIDE, "rotation": pi / 3**0.5}  # [m], [rad] standard deviations of a
-# sensor's place, and of an angle, of which nothing is known
+ANYWHERE = {"position": settings.SENSOR_BESIDE, "rotation": settings.ANY_ANGLE}  # [m], [rad] where nothing is known
+FRAME = ("tracker.position.", "tracker.rotation.")  # how the names of the tracker frame's parameters begin
 
 
 @dataclass(frozen=True)

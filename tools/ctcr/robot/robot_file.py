@@ -5,7 +5,7 @@ comments and the layout of the file that the robot came from.
 """
 
 import io
-from math import radians
+from math import degrees, radians
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
 from ruamel.yaml.util import load_yaml_guess_indent
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot import checks, defaults, yaml_document
 from ctcr.robot.description import Robot
@@ -22,7 +22,6 @@ from ctcr.robot.yaml_document import YamlDocument
 from ctcr.show.output import atomic_writer
 
 LINE_WIDTH = 1000  # a row of the ledger stays one line
-ANY_ROLL_DEG = 104.0  # standard deviation of an angle of which nothing is known
 
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
@@ -99,14 +98,14 @@ def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
     tracker, uncertainty = data["tracker"], data["uncertainty"]
     if not isinstance(tracker, dict) or "sensor_rotation_vector_rad" in tracker:
         return data
-    roll, degrees = tracker.get("sensor_roll", "known"), tracker.get("sensor_roll_deg")
-    if roll not in ("known", "unknown") or not isinstance(degrees, int | float | None):  # faults of their own
+    roll, roll_deg = tracker.get("sensor_roll", "known"), tracker.get("sensor_roll_deg")
+    if roll not in ("known", "unknown") or not isinstance(roll_deg, int | float | None):  # faults of their own
         return data
     kept = {key: value for key, value in tracker.items() if not key.startswith("sensor_roll")}
-    if degrees is not None or roll == "unknown":
-        kept["sensor_rotation_vector_rad"] = None if degrees is None else [0.0, 0.0, radians(degrees)]
+    if roll_deg is not None or roll == "unknown":
+        kept["sensor_rotation_vector_rad"] = None if roll_deg is None else [0.0, 0.0, radians(roll_deg)]
     if roll == "unknown" and isinstance(uncertainty, dict):
-        uncertainty = {"sensor_rotation_deg": [0.0, 0.0, ANY_ROLL_DEG]} | uncertainty
+        uncertainty = {"sensor_rotation_deg": [0.0, 0.0, float(round(degrees(settings.ANY_ANGLE)))]} | uncertainty
     return data | {"tracker": kept, "uncertainty": uncertainty}
 
 
