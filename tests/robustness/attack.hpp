@@ -2,6 +2,7 @@
 // Solves of one random case: cold, from near and from far, and a walk of control steps; each answer is judged.
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "robustness/judge.hpp"
@@ -58,8 +59,8 @@ public:
   Attacker(const Attack& attack, Random& random, Tally& tally) : attack_(attack), random_(random), tally_(tally) {}
 
   /// @param model  of the robot of the case   @param name  of the class, with seed and number of the case
-  /// @param known  whether the independent rod knows the model: it has no effects, or they are too small to matter
-  void at(const Case<N>& c, const auto& model, bool known, const std::string& name) {
+  /// @param known  the effects of the model, where the independent rod knows all of them
+  void at(const Case<N>& c, const auto& model, const std::optional<Known<N>>& known, const std::string& name) {
     name_ = name;
     known_ = known;
     thorough_ = number_ % attack_.thorough == 0;
@@ -116,14 +117,16 @@ private:
 
   void judge(const char* start, const auto& model, const Case<N>& c, const Workspace<N>& ws, const Solution<N>& s) {
     ++tally_.answers;
-    if (!is_defined(s, c, known_ ? 0 : 1.0)) fault("outputs are not defined", start, c, s);
+    // Effects may displace the tip.
+    const double longer = std::is_same_v<decltype(model), const Model<N>&> ? 0 : 1;
+    if (!is_defined(s, c, longer)) fault("outputs are not defined", start, c, s);
     if (s.status != Status::ok || !moved_) return;
     if (!(length_of(c) > 1e-3)) return;  // a robot inside the plate has no shape to judge
     bool same_branch = true;
     std::string wrong = differs_from_finer_steps(c, model, ws, s, settings_.accuracy, same_branch);
     if (wrong.empty() && known_ && (thorough_ || !same_branch)) {
       ++tally_.judged;
-      wrong = wrong_equilibrium(c, ws, s, settings_.accuracy);
+      wrong = wrong_equilibrium(c, ws, s, settings_.accuracy, *known_);
     }
     if (!wrong.empty()) fault(wrong, start, c, s);
   }
@@ -148,7 +151,8 @@ private:
   const Settings settings_{};
   std::string name_;
   int number_ = 0;
-  bool moved_ = false, thorough_ = false, known_ = true;
+  bool moved_ = false, thorough_ = false;
+  std::optional<Known<N>> known_;
 };
 
 }  // namespace ctcr::test

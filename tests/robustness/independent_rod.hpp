@@ -10,6 +10,7 @@
 #include "ctcr/robot/joints.hpp"
 #include "ctcr/robot/robot.hpp"
 #include "ctcr/robot/tip_load.hpp"
+#include "robustness/independent_material.hpp"
 
 namespace ctcr::test {
 
@@ -19,6 +20,7 @@ public:
   static constexpr int unknowns = N + 2;
   using Vector = Eigen::Matrix<double, unknowns, 1>;
   using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
+  using Materials = std::array<IndependentMaterial, N>;
 
   /// R_base_tip and angle of each tube at its tip, against tube 1 at the robot tip [rad].
   struct Tip {
@@ -51,7 +53,8 @@ public:
     State state;
   };
 
-  IndependentRod(const Robot<N>& robot, const Joints<N>& q, const TipLoad& load) : robot_(robot), q_(q), load_(load) {}
+  IndependentRod(const Robot<N>& robot, const Joints<N>& q, const TipLoad& load, const Materials& materials = {})
+    : robot_(robot), q_(q), load_(load), materials_(materials) {}
 
   /// Cross-sections from the tip to the plate.
   [[nodiscard]] std::vector<Place> integrate(const Tip& tip) const {
@@ -68,7 +71,7 @@ public:
       const int steps = steps_for(length, middle);
       for (int i = 0; i < steps; ++i) {
         places.push_back({ends[k] - length * i / steps, y});
-        y = runge_kutta(y, middle, -length / steps);
+        y = runge_kutta(y, places.back().s, middle, -length / steps);
       }
     }
     places.push_back({0, y});
@@ -179,52 +182,65 @@ private:
     for (std::size_t i = 0; i < N; ++i) {
       force += robot_.gravity.norm() * robot_.tubes[i].mass_per_length() * std::max(0.0, end(i));
       if (s > end(i)) continue;
-      stiffness += robot_.tubes[i].EI();
-      if (s > end(i) - robot_.tubes[i].curved_length)
-        bending += robot_.tubes[i].EI() * std::abs(robot_.tubes[i].curvature);
+      const double least = robot_.tubes[i].EI() * materials_[i].least_stiffness();
+      stiffness += least;
+      bending += least * materials_[i].most_curvature(robot_.tubes[i], is_curved(i, s));
+      twist += std::abs(materials_[i].twist);
     }
     const double u = (bending + load_.moment.norm()) / stiffness;
     return int(std::min(4 + 30 * length * (std::sqrt(force / stiffness) + u + twist), 2000.0));
   }
 
-  [[nodiscard]] State rate(const State& y, double s) const {
+  /// @param inside  any place inside the segment of s, which says the tubes
+  [[nodiscard]] State rate(const State& y, double s, double inside) const {
     State d;
-    const Vec3 tangent = y.frame.col(2), moment = y.frame.transpose() * y.moment;
-    double stiffness = 0;
-    Eigen::Vector2d bending = moment.head<2>();
-    for (std::size_t i = 0; i < N; ++i)
-      if (s < end(i)) {
-        stiffness += robot_.tubes[i].EI();
-        bending += robot_.tubes[i].EI() * precurvature(i, y, s);
-        d.force -= robot_.tubes[i].mass_per_length() * robot_.gravity;
+    const Vec3 tangent = y.frame.col(2);
+    const Eigen::Vector2d moment = (y.frame.transpose() * y.moment).template head<2>();
+    std::array<Eigen::Vector2d, N> free;
+    std::size_t present = 0;
+    for (; present < N && inside < end(present); ++present) {
+      d.force -= robot_.tubes[present].mass_per_length() * robot_.gravity;
+      free[present] = turned(y.psi[Eigen::Index(present)]) *
+                      materials_[present].free_curvature(robot_.tubes[present], s - q_.beta[Eigen::Index(present)],
+                                                         is_curved(present, inside));
+    }
+    // The curvature that all share, by stiffnesses at the last one until it no longer changes.
+    std::array<Eigen::Matrix2d, N> stiffness;
+    Eigen::Vector2d u = Eigen::Vector2d::Zero(), last;
+    int iterations = 0;
+    do {
+      last = u;
+      Eigen::Matrix2d together = Eigen::Matrix2d::Zero();
+      Eigen::Vector2d sum = moment;
+      for (std::size_t i = 0; i < present; ++i) {
+        const Eigen::Matrix2d R = turned(y.psi[Eigen::Index(i)]);
+        stiffness[i] =
+            robot_.tubes[i].EI() * R * materials_[i].stiffness(R.transpose() * (u - free[i])) * R.transpose();
+        together += stiffness[i];
+        sum += stiffness[i] * free[i];
       }
-    const Eigen::Vector2d u = bending / stiffness;
+      u = together.inverse() * sum;
+    } while ((u - last).norm() > 1e-12 * (1 + u.norm()) && ++iterations < 200);
     Mat3 turning = Mat3::Zero();
     turning(0, 2) = u[1], turning(1, 2) = -u[0], turning(2, 0) = -u[1], turning(2, 1) = u[0];
     d.position = tangent;
     d.frame = y.frame * turning;
     d.moment = -tangent.cross(y.force);
-    for (std::size_t i = 0; i < N; ++i)
-      if (s < end(i)) {
-        const Tube& tube = robot_.tubes[i];
-        const Eigen::Vector2d free = precurvature(i, y, s);
-        d.psi[Eigen::Index(i)] = y.twist[Eigen::Index(i)];
-        d.twist[Eigen::Index(i)] = tube.EI() / tube.GJ() * (u[0] * free[1] - u[1] * free[0]);
-      }
+    for (std::size_t i = 0; i < present; ++i) {
+      const Eigen::Vector2d own = stiffness[i] * (u - free[i]);
+      d.psi[Eigen::Index(i)] = y.twist[Eigen::Index(i)];
+      d.twist[Eigen::Index(i)] = (u[1] * own[0] - u[0] * own[1]) / robot_.tubes[i].GJ();
+    }
     return d;
   }
 
-  /// Free curvature of a tube in the frame [1/m]: about its x axis.
-  [[nodiscard]] Eigen::Vector2d precurvature(std::size_t i, const State& y, double s) const {
-    if (s < end(i) - robot_.tubes[i].curved_length) return Eigen::Vector2d::Zero();
-    const double psi = y.psi[Eigen::Index(i)];
-    return robot_.tubes[i].curvature * Eigen::Vector2d(std::cos(psi), std::sin(psi));
-  }
+  [[nodiscard]] bool is_curved(std::size_t i, double s) const { return s > end(i) - robot_.tubes[i].curved_length; }
+  static Eigen::Matrix2d turned(double angle) { return Eigen::Rotation2Dd(angle).toRotationMatrix(); }
 
-  /// One step inside a segment, of which `middle` says the tubes.
-  [[nodiscard]] State runge_kutta(const State& y, double middle, double h) const {
-    const State k1 = rate(y, middle), k2 = rate(y.plus(k1, h / 2), middle), k3 = rate(y.plus(k2, h / 2), middle),
-                k4 = rate(y.plus(k3, h), middle);
+  /// One step from s inside a segment, of which `middle` says the tubes.
+  [[nodiscard]] State runge_kutta(const State& y, double s, double middle, double h) const {
+    const State k1 = rate(y, s, middle), k2 = rate(y.plus(k1, h / 2), s + h / 2, middle),
+                k3 = rate(y.plus(k2, h / 2), s + h / 2, middle), k4 = rate(y.plus(k3, h), s + h, middle);
     State next = y.plus(k1, h / 6).plus(k2, h / 3).plus(k3, h / 3).plus(k4, h / 6);
     next.frame = orthonormal(next.frame);
     return next;
@@ -233,6 +249,7 @@ private:
   const Robot<N>& robot_;
   const Joints<N>& q_;
   const TipLoad& load_;
+  const Materials materials_;
 };
 
 }  // namespace ctcr::test

@@ -7,13 +7,23 @@
 
 namespace ctcr::test {
 
+/// Effects that the judge knows, too.
+template <int N>
+struct Known {
+  typename IndependentRod<N>::Materials materials{};
+  Vec3 tip_force = Vec3::Zero();  ///< beside the load, base frame [N]
+};
+
 /// Whether an `ok` answer is an equilibrium of the model, to three times the stated accuracy, and stable.
-/// @param ws  as the answer left it: the tip frame and the angles at the tubes' tips
+/// @param ws     as the answer left it: the tip frame and the angles at the tubes' tips
+/// @param known  what the effects of the model make of the robot
 /// @return empty, or what is wrong. An equilibrium so near to a snap that the discrete model and the exact one may differ
 ///         (det below 0.01) is not judged for stability.
 template <int N>
-std::string wrong_equilibrium(const Case<N>& c, const Workspace<N>& ws, const Solution<N>& s, double accuracy) {
-  const IndependentRod<N> rod(c.robot, c.q, c.load);
+std::string wrong_equilibrium(const Case<N>& c, const Workspace<N>& ws, const Solution<N>& s, double accuracy,
+                              const Known<N>& known = {}) {
+  const TipLoad load{c.load.force + known.tip_force, c.load.moment};
+  const IndependentRod<N> rod(c.robot, c.q, load, known.materials);
   // Under a force alone any turn about it leaves the workspace's frame as good; that of the tip is the one.
   typename IndependentRod<N>::Tip tip{s.rotation, ws.guess.psi};
   typename IndependentRod<N>::Miss found;

@@ -23,7 +23,7 @@ Status replay(const char* name) {
   test::Random random(1);
   test::Tally tally;
   const test::Attack attack{.moved = 1, .thorough = 1};
-  test::Attacker<N>(attack, random, tally).at(c, Model<N>(c.robot), true, name);
+  test::Attacker<N>(attack, random, tally).at(c, Model<N>(c.robot), test::Known<N>{}, name);
   for (const std::string& fault : tally.faults) ADD_FAILURE() << fault;
   Workspace<N> ws;
   Solution<N> s;

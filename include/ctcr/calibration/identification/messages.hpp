@@ -104,7 +104,7 @@ inline void add_warnings(const std::vector<FreeParameter>& parameters, const Pos
   for (int kind = 0; kind < 2; ++kind) {
     const auto used = (use.col(kind).array() > 0).count();
     const auto low = used - (out.weights.col(kind).array() > 0.5 * use.col(kind).array()).count();
-    if (low > 0.02 * double(used))
+    if (double(low) > 0.02 * double(used))
       warn(std::to_string(low) + " of " + std::to_string(used) + (kind ? " rotations" : " positions") +
            " are outliers and count for little");
   }

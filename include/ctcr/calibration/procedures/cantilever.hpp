@@ -203,7 +203,7 @@ inline void check(std::span<const Deflection> rows, const CantileverOptions& opt
   if (degrees < 3 || !(largest > 1.01 * least)) return result;
   const Eigen::VectorXd x = least_squares(wide, error);
   const double remaining = (error - wide * x).squaredNorm(), saved = sum - remaining;
-  const double floor = 1e-20 * error.size() * std::pow(rows.front().free_length, 2);
+  const double floor = 1e-20 * double(error.size()) * std::pow(rows.front().free_length, 2);
   const double score = stated > 0
                            ? chi_square_score(saved / stated, 1)
                            : variance_ratio_score(saved / std::max(remaining / (degrees - 1), floor), 1, degrees - 1);

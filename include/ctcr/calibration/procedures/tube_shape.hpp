@@ -237,7 +237,7 @@ inline std::vector<LineAndArc> starts(std::span<const Vec2> points) {
       bend = found;
     }
   }
-  require(best < std::numeric_limits<double>::infinity(), no_bend);
+  require(best < std::numeric_limits<double>::infinity(), "%s", no_bend);
   double sd = 0;
   const auto scale = [&] { return std::max({sd, options.point_sd, 1e-4 * size}); };  // no photo is finer
   for (int k = 0; k < 3; ++k) {
@@ -266,7 +266,7 @@ inline std::vector<LineAndArc> starts(std::span<const Vec2> points) {
     s[i] = arc_position(used[std::size_t(i)], bend);
   }
   const Eigen::MatrixXd G = gain(fit.J);
-  require(G.size() > 0 && s.maxCoeff() > 0 && s.minCoeff() < 0, no_bend);
+  require(G.size() > 0 && s.maxCoeff() > 0 && s.minCoeff() < 0, "%s", no_bend);
   const double variance = std::max(options.point_sd * options.point_sd, error.squaredNorm() / degrees);
   const double length = s.maxCoeff();
   // Foot of the tip: s = atan2(k along, 1 - k across) / k; its error along the shape, and the shape's own motion.
