@@ -36,7 +36,8 @@ Square unknowns_of(const Table& table) {
 /// Rows solved for the unknowns, which are gone from the further rows: [A B; E F] -> [I A^-1 B; 0 F - E A^-1 B].
 void expect_solved(const Table& before, const Table& after, double tolerance) {
   const Square A = unknowns_of(before);
-  const Eigen::Matrix<double, unknowns, columns> solved = A.fullPivLu().solve(before.topRows<unknowns>());
+  const Eigen::Matrix<double, unknowns, columns> solved =
+      Eigen::MatrixXd(A).fullPivLu().solve(before.topRows<unknowns>());
   Table expected = before;
   expected.topRows<unknowns>() = solved;
   for (int j = 0; j < unknowns; ++j)

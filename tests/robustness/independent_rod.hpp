@@ -19,7 +19,7 @@ class IndependentRod {
 public:
   static constexpr int unknowns = N + 2;
   using Vector = Eigen::Matrix<double, unknowns, 1>;
-  using Matrix = Eigen::Matrix<double, unknowns, unknowns>;
+  using Matrix = Eigen::MatrixXd;  ///< (unknowns, unknowns); of any size: decompositions compile once for all
   using Materials = std::array<IndependentMaterial, N>;
 
   /// R_base_tip and angle of each tube at its tip, against tube 1 at the robot tip [rad].
@@ -100,7 +100,7 @@ public:
     for (int k = 0;; ++k) {
       found = miss(tip);
       if (found.angles.norm() < 1e-9 || k == iterations || !found.angles.allFinite()) return found.angles.norm();
-      Matrix J;
+      Matrix J(unknowns, unknowns);
       for (int j = 0; j < unknowns; ++j)
         J.col(j) =
             (miss(moved(tip, j, difference)).angles - miss(moved(tip, j, -difference)).angles) / (2 * difference);
@@ -120,7 +120,7 @@ public:
     }
     double smallest = 1;
     const auto base_at = [&](std::size_t place, double s) {
-      Matrix B;
+      Matrix B(unknowns, unknowns);
       for (std::size_t j = 0; j < unknowns; ++j) {
         const State &a = up[j][place].state, &b = down[j][place].state;
         const VecN<N> angle = (angles(a, s) - angles(b, s)) / (2 * difference);
@@ -128,7 +128,7 @@ public:
         const Mat3 turn = a.frame * b.frame.transpose();
         const Vec3 w =
             Vec3(turn(2, 1) - turn(1, 2), turn(0, 2) - turn(2, 0), turn(1, 0) - turn(0, 1)) / (4 * difference);
-        B.col(Eigen::Index(j)).template head<3>() = w + angle[0] * 0.5 * (a.frame + b.frame).col(2);
+        B.col(Eigen::Index(j)).head<3>() = w + angle[0] * 0.5 * (a.frame + b.frame).col(2);
         for (int i = 1; i < N; ++i) B(2 + i, Eigen::Index(j)) = angle[i] - angle[0];
       }
       smallest = std::min(smallest, B.determinant());

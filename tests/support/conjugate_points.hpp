@@ -12,6 +12,9 @@
 
 namespace ctcr::test {
 
+/// A matrix of any size: the decomposition compiles once for all.
+inline double determinant(const Eigen::MatrixXd& matrix) { return matrix.determinant(); }
+
 /// Where a robot comes closest to a conjugate point.
 struct SmallestDeterminant {
   double value = 1;  ///< > 0: stable (two modes that buckle at once only touch zero)
@@ -46,7 +49,7 @@ public:
     const auto arc_length = [](int, double s) noexcept { return s; };
     const auto record = [&](double s, const SegmentTubes<N>&, const RobotState<S, N>& y, const Frame<S>& f) noexcept {
       if constexpr (!std::is_same_v<Watch, NoRecord>)
-        watch(s, jacobian(y, f, guess.rotation * f.rotation(), VecN<N>::Zero()).determinant());
+        watch(s, determinant(jacobian(y, f, guess.rotation * f.rotation(), VecN<N>::Zero())));
     };
     Pass::run(c_, sort_events(c_, q_.beta), arc_length, 0.0, steps_per_segment_, y_, frame, tips, record);
     frame_ = frame;
@@ -106,7 +109,7 @@ template <Loading L = Loading::weight, int N>
   constexpr int samples = 32;
   for (int k = 0; k <= samples; ++k) {
     const double s = q.beta[0] * k / samples;
-    watch(s, problem.jacobian_behind_plate(s).determinant());
+    watch(s, determinant(problem.jacobian_behind_plate(s)));
   }
   return smallest;
 }

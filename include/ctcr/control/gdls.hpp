@@ -1,9 +1,8 @@
 #pragma once
 // Generalised damped least squares: competing goals as one sum of weighted squares, quadratic in q'.
-#include <Eigen/Cholesky>
-
 #include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
+#include "ctcr/math/small_solve.hpp"
 
 namespace ctcr {
 
@@ -57,10 +56,8 @@ public:
   /// The minimum: dF/dq' = 0.
   /// @return ok; singular: goals leave a direction free (add damping), or are not finite. Then q' = 0.
   Status minimum(JointVelocity<N>& velocity) const noexcept {
-    const Eigen::LDLT<Matrix> ldlt(A_);
-    const auto pivots = ldlt.vectorD().array();
-    velocity = ldlt.solve(b_);
-    if (pivots.minCoeff() > 1e-14 * pivots.maxCoeff() && velocity.allFinite()) return Status::ok;
+    velocity = b_;
+    if (solve_in_place(A_, velocity) > 1e-14 && velocity.allFinite()) return Status::ok;
     velocity.setZero();
     return Status::singular;
   }

@@ -91,9 +91,9 @@ public:
     torsion_solver_.set_derivative(d.by_friction);
     // Friction responds to the torsion it causes.
     using ByFriction = typename TorsionDerivatives<N>::ByFriction;
-    const auto lu = (ByFriction::Identity() - d.by_friction * friction_by_torsion().asDiagonal()).eval().partialPivLu();
-    d.by_friction = lu.solve(d.by_friction).eval();
-    d.by_variables = lu.solve(d.by_variables).eval();
+    const ByFriction response = ByFriction::Identity() - d.by_friction * friction_by_torsion().asDiagonal();
+    (void)solve_in_place(response, d.by_friction);
+    (void)solve_in_place(response, d.by_variables);
     return d;
   }
 

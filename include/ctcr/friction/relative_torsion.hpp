@@ -1,9 +1,8 @@
 #pragma once
 // Relative torsion of the tubes at their contacts in equilibrium, the moment jumps there, and the derivatives of the torsion
 // by the friction at the contacts.
-#include <Eigen/LU>
-
 #include "ctcr/math/functions.hpp"
+#include "ctcr/math/small_solve.hpp"
 #include "ctcr/mechanics/effect_evaluation.hpp"
 #include "ctcr/mechanics/rod_in_equilibrium.hpp"
 #include "ctcr/mechanics/solution.hpp"
@@ -154,7 +153,7 @@ template <int Most, int N, class Fx>
     for (int i = 0; i < unknowns; ++i)
       for (int lane = 0; lane < window.size; ++lane) put(window.first + lane, by_unknown, by_known, i, row[i][lane]);
   }
-  torsion_by_known.noalias() -= torsion_by_unknown * by_unknown.partialPivLu().solve(by_known).eval();
+  torsion_by_known.noalias() -= torsion_by_unknown * solved(by_unknown, by_known);
   return {torsion_by_known.template leftCols<contacts>(), torsion_by_known.rightCols(variables)};
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 // Friction and torsion at one sample: friction depends on how the tubes turn at their contacts, and that on friction.
-#include <Eigen/LU>
 
 #include "ctcr/friction/relative_torsion.hpp"
 
@@ -113,7 +112,7 @@ private:
     as_vector(moved).array() += small;  // friction at a contact follows the torsion there alone
     const Vec by_torsion = (friction(effects_at(moved)) - friction(at.effects)) / small;
     const ByFriction jacobian = ByFriction::Identity() - by_friction_ * by_torsion.asDiagonal();
-    return jacobian.partialPivLu().solve(at.residual);
+    return solved(jacobian, Vec(at.residual));
   }
 
   bool equilibrium_is_current_ = false;

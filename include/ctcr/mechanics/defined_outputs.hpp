@@ -2,6 +2,7 @@
 // Outputs are defined whatever comes of a solve: finite, rotations that are rotations, positions within reach.
 // Real time: yes, all of it.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -71,11 +72,15 @@ CTCR_INLINE bool are_defined(const Solution<N>& out, double reach) noexcept {
   return sum < rotation_error * rotation_error && farthest <= limit * limit;
 }
 
+/// Of numbers whose squares overflow, too; NaN of a vector that is none.
+inline double length_of(const Vec3& v) noexcept { return std::hypot(v[0], v[1], v[2]); }
+
 /// The axes of R made perpendicular, of length 1 and right-handed, one after the other.
 inline Mat3 orthonormalised(const Mat3& R) noexcept {
-  Vec3 x = R.col(0).stableNormalized();
+  const auto normalised = [](const Vec3& v) -> Vec3 { return v / length_of(v); };
+  Vec3 x = normalised(R.col(0));
   if (!(x.squaredNorm() > 0.5)) x = Vec3::UnitX();
-  Vec3 y = R.col(1).stableNormalized();
+  Vec3 y = normalised(R.col(1));
   for (int i = 0; i < 2; ++i) {
     y -= x * x.dot(y);
     if (!(y.squaredNorm() > 1e-16)) y = x.unitOrthogonal();
@@ -90,7 +95,7 @@ inline Mat3 orthonormalised(const Mat3& R) noexcept {
 template <int N>
 inline bool define(Mat3& rotation, Vec3& position, double reach, double drift) noexcept {
   const double error = (rotation * rotation.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff();
-  const double distance = position.stableNorm();
+  const double distance = length_of(position);
   if (!(error <= rotation_error)) rotation = orthonormalised(rotation);
   if (distance > reach + reach_slack<N>) position *= reach / distance;
   return !(error <= drift) || distance > (1 + overreach) * reach + reach_slack<N>;

@@ -6,6 +6,7 @@
 // convergence is faster than linear. Ref: Broyden 1965. For the paper's robot, its parameters off by the paper's ranges
 // and 0.3 N at its tip, 3.6 evaluations are good to 5e-8 m.
 #include "ctcr/math/four.hpp"
+#include "ctcr/math/small_solve.hpp"
 #include "ctcr/mechanics/solve.hpp"
 
 namespace ctcr {
@@ -179,7 +180,8 @@ private:
       for (int i = 0; i < lane_count && first + i < unknowns; ++i)
         for (int k = 0; k < rows; ++k) J(k, first + i) = (there[std::size_t(k)][i] - at[std::size_t(k)][i]) / small;
     }
-    const Eigen::Matrix<double, unknowns, unknowns> inverse = J.template topRows<unknowns>().inverse();
+    using Square = Eigen::Matrix<double, unknowns, unknowns>;
+    const Square inverse = solved<unknowns>(J.template topRows<unknowns>(), Square(Square::Identity()));
     J = (J * inverse).eval();
     J.template topRows<unknowns>() = inverse;
     for (int k = 0; k < rows; ++k)

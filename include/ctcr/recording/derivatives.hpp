@@ -146,7 +146,7 @@ private:
         for (int i = 0; i < 6; ++i) by_force(i, j) = rows_[unknowns + i][force_ + j];
         for (int i = 0; i < 3; ++i) C(i, j) = rows_[Pass::rows + i][force_ + j];
       }
-      const Eigen::PartialPivLU<Mat3> lu(Mat3::Identity() - by_position * C);
+      const Mat3 stiffer = Mat3::Identity() - by_position * C;
       for (int j = unknowns; j < end; ++j) {
         Vec3 A, direct = Vec3::Zero();
         for (int i = 0; i < 3; ++i) {
@@ -155,7 +155,7 @@ private:
           const int l = j % Window::size;
           direct[i] = push_[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
         }
-        const Vec6 change = by_force * lu.solve(direct + by_position * A);
+        const Vec6 change = by_force * solved(stiffer, Vec3(direct + by_position * A));
         for (int i = 0; i < 6; ++i) rows_[unknowns + i].add(j, change[i]);
       }
     }

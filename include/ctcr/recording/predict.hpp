@@ -4,6 +4,7 @@
 //   motor angles --transmission--> joints --history, drives--> joints that the tubes have --model--> tip --T_ref,
 //   sensor--> reading
 #include "ctcr/math/frame_algebra.hpp"
+#include "ctcr/math/small_solve.hpp"
 #include "ctcr/recording/history.hpp"
 #include "ctcr/system/predict.hpp"
 
@@ -59,7 +60,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
       added -= change;
     } else {
       const Mat3 C = out.solution.compliance.template topLeftCorner<3, 3>();
-      change = (Mat3::Identity() - push.by_position * C).partialPivLu().solve(push.force - added);
+      change = solved<3>(Mat3::Identity() - push.by_position * C, Vec3(push.force - added));
       if (change.norm() < settings.tolerance) return status;
       added += change;
     }

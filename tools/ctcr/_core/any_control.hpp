@@ -1,7 +1,9 @@
 #pragma once
 // Closed loops of robots whose number of tubes is known at run time.
 #include <cstdint>
+#include <ctcr/control/control_state.hpp>
 #include <functional>
+#include <vector>
 
 #include "any_recording.hpp"
 
@@ -42,6 +44,17 @@ struct AnyDevice {
   std::function<bool(const Eigen::VectorXd& velocity, double period)> move;  ///< velocity (2N,) of motors [rad/s]
   std::function<bool(const LoopResult& so_far, Eigen::Index row)> record;    ///< that row is complete
 };
+
+/// A path of a kind known at run time.
+struct AnyPath {
+  std::function<Reference(double)> at_time;
+  double seconds;
+  [[nodiscard]] double duration() const noexcept { return seconds; }
+  [[nodiscard]] Reference at(double t) const noexcept { return at_time(t); }
+};
+
+/// From rest to rest through points [m], base frame, on a spline or straight from one to the next.
+AnyPath path_through(const std::vector<Vec3>& points, bool spline, double speed, double acceleration);
 
 /// One run of a scenario.
 struct LoopRequest {

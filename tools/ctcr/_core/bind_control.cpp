@@ -5,6 +5,8 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <ctcr/control/polyline.hpp>
+#include <ctcr/control/spline_path.hpp>
 #include <exception>
 #include <stdexcept>
 #include <tuple>
@@ -16,6 +18,12 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace ctcr::python {
+
+AnyPath path_through(const std::vector<Vec3>& points, bool spline, double speed, double acceleration) {
+  const auto any = [](const auto& path) { return AnyPath{[path](double t) { return path.at(t); }, path.duration()}; };
+  return spline ? any(SplinePath(points, speed, acceleration)) : any(Polyline(points, speed, acceleration));
+}
+
 namespace {
 
 LoopResult any_closed_loop(const LoopRequest& r) {

@@ -1,12 +1,9 @@
 #pragma once
 // Closed loops of a robot of N tubes.
 #include <ctcr/control/closed_loop.hpp>
-#include <ctcr/control/polyline.hpp>
-#include <ctcr/control/spline_path.hpp>
 #include <ctcr/parallel/thread_pool.hpp>
 #include <ctcr/simulation/sensitivity.hpp>
 #include <ctcr/simulation/simulated_robot.hpp>
-#include <variant>
 
 #include "any_control.hpp"
 #include "systems_of.hpp"
@@ -15,25 +12,6 @@ namespace ctcr::python {
 
 template <int N>
 using AllTasks = TaskList<Tracking, Damping, LimitAvoidance, ObstacleAvoidance, StabilityMargin, Posture<N>>;
-
-/// Rests at a point.
-struct StillPath {
-  Reference reference;
-  double seconds;
-  [[nodiscard]] double duration() const noexcept { return seconds; }
-  [[nodiscard]] Reference at(double) const noexcept { return reference; }
-};
-
-/// A path of a kind known at run time.
-struct AnyPath {
-  std::variant<StillPath, Polyline, SplinePath> kind;
-  [[nodiscard]] double duration() const noexcept {
-    return std::visit([](const auto& path) { return path.duration(); }, kind);
-  }
-  [[nodiscard]] Reference at(double t) const noexcept {
-    return std::visit([t](const auto& path) { return path.at(t); }, kind);
-  }
-};
 
 template <int N>
 AllTasks<N> tasks_of(const TaskValues& v) {
@@ -85,9 +63,8 @@ LoopResult closed_loop(const LoopRequest& r) {
   std::vector<Vec3> points;
   for (Eigen::Index i = 0; i < r.points.rows(); ++i)
     points.push_back((T_base_world * Pose{Mat3::Identity(), r.points.row(i).transpose()}).position);
-  const AnyPath path = r.spline ? AnyPath{SplinePath(points, r.speed, r.acceleration)}
-                                : AnyPath{Polyline(points, r.speed, r.acceleration)};
-  const AnyPath start{StillPath{path.at(0), r.settle}};
+  const AnyPath path = path_through(points, r.spline, r.speed, r.acceleration);
+  const AnyPath start{[first = path.at(0)](double) { return first; }, r.settle};
   TaskValues seen = r.tasks;
   seen.obstacle = (T_base_world * Pose{Mat3::Identity(), seen.obstacle}).position;
 

@@ -62,15 +62,21 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
 #define CTCR_SOLVE(kind, function, D, N)                                                                               \
   kind Status function<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
                                                      Solution<N>&, const Settings&) noexcept;
-#define CTCR_EVALUATE(kind, D, N)                                                                             \
-  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                          \
-      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&,          \
-      Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;                                              \
-  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                          \
-      const EffectCoefficients<N, python::AllEffects>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, \
-      const Steps<N>&, Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;
+#define CTCR_EFFECT_COEFFICIENTS(N) EffectCoefficients<N, python::AllEffects>
+#define CTCR_EVALUATE(kind, D, N)                                                                                \
+  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                             \
+      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&,             \
+      Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;                                                 \
+  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                             \
+      const CTCR_EFFECT_COEFFICIENTS(N)&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&, \
+      Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;
+#define CTCR_STABILITY(kind, C, N)                                                                       \
+  kind bool detail::is_stable<MagnusRk4>(const C&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, \
+                                         const Steps<N>&) noexcept;
 #define CTCR_SOLVERS(kind, N)                                                                                          \
   namespace ctcr {                                                                                                     \
+  CTCR_STABILITY(kind, Coefficients<N>, N)                                                                             \
+  CTCR_STABILITY(kind, CTCR_EFFECT_COEFFICIENTS(N), N)                                                                 \
   CTCR_EVALUATE(kind, none, N)                                                                                         \
   CTCR_EVALUATE(kind, jacobian, N)                                                                                     \
   CTCR_EVALUATE(kind, compliance, N)                                                                                   \
