@@ -11,6 +11,8 @@ from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
+JITTER_ALONE = 1.366  # typical error over the floor, where errors are jitter: exp E log sqrt(1 + chi^2_3 / 3)
+
 
 @dataclass(frozen=True)
 class Calibrated:
@@ -32,8 +34,31 @@ class Calibrated:
 
     @property
     def typical(self) -> float:
-        """Geometric mean of the error [m]: what decides."""
-        return float(np.exp(self.log_error.mean()))
+        """Geometric mean of the error [m]: what decides. Infinite where the model solves too few readings."""
+        return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
+
+    @property
+    def _of_jitter(self) -> float:
+        """The typical error [m] where there is nothing but jitter."""
+        return JITTER_ALONE * max(self.floor, settings.CONVENTION_FINEST)
+
+    @property
+    def beyond_jitter(self) -> float:
+        """The part [m] of the typical error that jitter does not make."""
+        return float(np.sqrt(max(self.typical**2 - self._of_jitter**2, 0.0)))
+
+    def likelier_than(self, typical: float) -> bool:
+        """Whether readings tell this error from another typical one [m], beyond the odds against a further cause."""
+        return self._gain(self.typical, typical)
+
+    @property
+    def may_gain(self) -> bool:
+        """Whether a fit that leaves nothing but jitter would be likelier."""
+        return self._gain(self._of_jitter, self.typical)
+
+    def _gain(self, less: float, more: float) -> bool:
+        """Whether the readings tell two typical errors [m] apart."""
+        return less < more and 3 * len(self.error) * np.log(more / less) > settings.DECISIVE + settings.UNASKED
 
     @property
     def rms_mm(self) -> float:
@@ -42,12 +67,12 @@ class Calibrated:
 
 
 def calibrated(
-    robot: Robot, readings: Measurements, *, free: str | tuple[str, ...] | None = None, to_beat: float = np.inf
+    robot: Robot, readings: Measurements, *, free: tuple[str, ...] = (), to_beat: float = np.inf
 ) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
     Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
-    name begins with `free` say nothing.
+    name begins with one of `free` say nothing.
     Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
     gives up where it does not soon fall below an error `to_beat` [m].
     """
@@ -99,13 +124,13 @@ def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:
     return 1.5 * float(np.sum(np.log1p((missed / size) ** 2))) + 0.5 * float(np.sum(shift**2))
 
 
-def _priors(robot: Robot, free: str | tuple[str, ...] | None) -> tuple[list[str], Array, Array, Array, Array]:
+def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Array, Array, Array]:
     """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly, and
-    of those whose name begins with `free`.
+    of those whose name begins with one of `free`.
 
     Beyond CONVENTION_JUMP lies no data sheet, but another convention.
     """
-    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if free and name.startswith(free)}
+    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if name.startswith(free)}
     for name in parameters.expand([parameters.STANDARD, *chosen], robot):
         sd = {name: np.inf} if name in chosen else None
         try:
