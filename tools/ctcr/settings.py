@@ -254,6 +254,7 @@ CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
 CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which it is noise
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
+CONVENTION_CONSTANT = 0.1  # of an error that an offset leaves, where it is the same offset in all readings
 CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that
 CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts so far off finds nothing
 CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between

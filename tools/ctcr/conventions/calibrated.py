@@ -91,7 +91,7 @@ def calibrated(
             residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
             error = np.linalg.norm(residual, axis=1)
             solved = np.isfinite(error)
-            if not solved.any():
+            if solved.mean() <= settings.CONVENTION_SOLVED:
                 break
             size = max(float(np.median(error[solved])), floor, settings.CONVENTION_FINEST)
             if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
@@ -140,7 +140,8 @@ def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Arra
     names = [name for name, *_ in found]
     mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
-    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, mean - far), np.minimum(high, mean + far)
+    least = np.where(low < 0, mean - far, mean**2 / (mean + far))  # what is positive is off by a factor, either way
+    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, least), np.minimum(high, mean + far)
 
 
 def jump(name: str, sd: float) -> float:

@@ -1,7 +1,7 @@
 """The search: every hypothesis is predicted, alone and with one of the tracker, the likely ones are calibrated, the
 clearest is applied, and again."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -71,14 +71,12 @@ def _clearest(case: Case) -> Tried | None:
     singles, pairs = _likely(case)
     tried = _clear(case, singles)
     if not any(_is_noise(one.case.fit) for one in tried):
-        tried += [
-            one for one in _clear(case, pairs) if all(_is_clear(half, one.case.fit) for half in _halves(case, one))
-        ]
+        tried += _clear(case, pairs)
+        if tried and len((best := _alike(tried)[0]).wrong) > 1:
+            tried += _clear(case, _exchanged(case, best))
     if not tried:
         return None
-    least = min(one.case.fit.typical for one in tried)
-    alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    best = min(alike, key=lambda one: (one.doubts, one.case.fit.typical))
+    best, *_ = alike = _alike(tried)
     if any(one.sensor is not None for one in best.wrong) and not _is_far(case.robot, best.case.fit.robot):
         return None
     if best.offset:
@@ -90,10 +88,29 @@ def _clearest(case: Case) -> Tried | None:
     return replace(best, rivals=tuple(one for one in other if not one.offset and not one.registers))
 
 
-def _clear(case: Case, some: Sequence[Wrong]) -> list[Tried]:
-    """Those that leave far less error than the table as it is."""
+def _alike(tried: list[Tried]) -> list[Tried]:
+    """Those that leave the least error, or hardly more; first the one by which least is wrong."""
+    least = min(one.case.fit.typical for one in tried)
+    alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
+    return sorted(alike, key=lambda one: (one.doubts, one.case.fit.typical))
+
+
+def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
+    """Each of two hypotheses with others that are likely where it holds: one of the tracker takes in much."""
+    for one in pair.wrong:
+        singles, _ = _likely(_applied(case, (one,)))
+        yield from ((one, *single) for single in singles)
+
+
+def _clear(case: Case, some: Iterable[Wrong]) -> list[Tried]:
+    """Those that leave far less error than the table as it is, and than without one of their hypotheses."""
     tried = (Tried(wrong, _applied(case, wrong)) for wrong in some)
-    return [one for one in tried if _is_clear(case.fit, one.case.fit) and _is_jump(one)]
+    return [one for one in tried if _is_clear(case.fit, one.case.fit) and all(_needed(case, one))]
+
+
+def _needed(case: Case, tried: Tried) -> Iterator[bool]:
+    for one, half in zip(tried.wrong, _halves(case, tried), strict=True):
+        yield _is_clear(half, tried.case.fit) and (not one.offset or _is_jump(tried, half))
 
 
 def _halves(case: Case, tried: Tried) -> list[Calibrated]:
@@ -212,19 +229,18 @@ def _is_far(before: Robot, after: Robot) -> bool:
     return float(np.linalg.norm(move)) > settings.SENSOR_JUMP[0]
 
 
-def _is_jump(tried: Tried) -> bool:
-    """Whether an offset, where it is one, moves a home farther than calibration would: by right angles, or so that only
-    noise is left. A physical effect may ask for another offset, but it leaves more.
+def _is_jump(tried: Tried, half: Calibrated) -> bool:
+    """Whether an offset moves a home farther than calibration would, by right angles or so that hardly anything is left
+    of the error of the half without it. A physical effect may ask for another offset, but it leaves more.
     """
-    if not tried.offset:
-        return True
     kind, tube, _ = tried.offset.offset
     uncertainty, size = tried.case.robot.uncertainty, offset_of(tried)
     sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
     if kind == "beta":
         sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
     right = kind == "alpha" and size % (np.pi / 2) == 0
-    return abs(size) > jump(tried.offset.frees[0], sd) and (right or _is_noise(tried.case.fit))
+    constant = tried.case.fit.beyond_jitter < settings.CONVENTION_CONSTANT * half.beyond_jitter
+    return abs(size) > jump(tried.offset.frees[0], sd) and (right or constant)
 
 
 def offset_of(tried: Tried) -> float:
