@@ -1,6 +1,6 @@
 """The error of a hypothesis after all that a calibration may move: a short robust fit to few readings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,10 @@ class Calibrated:
     def typical(self) -> float:
         """Geometric mean of the error [m]: what decides. Infinite where the model solves too few readings."""
         return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
+
+    def at(self, rows: Mask) -> "Calibrated":
+        """The same of some readings (K,)."""
+        return replace(self, error=self.error[rows])
 
     @property
     def _of_jitter(self) -> float:

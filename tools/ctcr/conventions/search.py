@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, Mask
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, jump
@@ -105,12 +106,24 @@ def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
 def _clear(case: Case, some: Iterable[Wrong]) -> list[Tried]:
     """Those that leave far less error than the table as it is, and than without one of their hypotheses."""
     tried = (Tried(wrong, _applied(case, wrong)) for wrong in some)
-    return [one for one in tried if _is_clear(case.fit, one.case.fit) and all(_needed(case, one))]
+    return [one for one in tried if one.case.fit.typical < case.fit.typical and all(_needed(case, one))]
 
 
 def _needed(case: Case, tried: Tried) -> Iterator[bool]:
+    """Of each hypothesis, whether the readings that it changes have far less error with it than without."""
     for one, half in zip(tried.wrong, _halves(case, tried), strict=True):
-        yield _is_clear(half, tried.case.fit) and (not one.offset or _is_jump(tried, half))
+        rows = _rows_of(one, case.readings)
+        jumps = not (one.offset or one.registers) or _is_jump(case, one, tried, half)
+        yield jumps and _is_clear(half.at(rows), tried.case.fit.at(rows))
+
+
+def _rows_of(hypothesis: Hypothesis, readings: Measurements) -> Mask:
+    """The readings (K,) that it changes; all where it changes the robot file."""
+    new = hypothesis.change(readings)
+    rows = ((new.load_space != readings.load_space) | (new.position != readings.position).any(axis=1)[:, None]).any(
+        axis=1
+    )
+    return rows if rows.any() else ~rows
 
 
 def _halves(case: Case, tried: Tried) -> list[Calibrated]:
@@ -229,18 +242,26 @@ def _is_far(before: Robot, after: Robot) -> bool:
     return float(np.linalg.norm(move)) > settings.SENSOR_JUMP[0]
 
 
-def _is_jump(tried: Tried, half: Calibrated) -> bool:
-    """Whether an offset moves a home farther than calibration would, by right angles or so that hardly anything is left
-    of the error of the half without it. A physical effect may ask for another offset, but it leaves more.
+def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> bool:
+    """Whether an offset moves a home, or another frame the frame, farther than calibration would.
+
+    A physical effect may ask for another offset, too, but that leaves more of the error of the half without it: so an
+    offset is a right angle, or leaves hardly anything.
     """
-    kind, tube, _ = tried.offset.offset
-    uncertainty, size = tried.case.robot.uncertainty, offset_of(tried)
+    uncertainty = tried.case.robot.uncertainty
+    if one.registers:
+        old, new = case.robot.tracker, tried.case.fit.robot.tracker
+        turn = Rotation.from_matrix(new.rotation @ old.rotation.T).magnitude()
+        shift = np.max(np.abs(new.position - old.position))
+        sd = [max(np.atleast_1d(getattr(uncertainty, f"tracker_frame_{unit}"))) for unit in ("mm", "deg")]
+        return shift > jump("position", 1e-3 * sd[0]) or turn > jump("rotation", np.deg2rad(sd[1]))
+    (kind, tube, _), size = one.offset, offset_of(tried)
     sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
     if kind == "beta":
         sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
     right = kind == "alpha" and size % (np.pi / 2) == 0
     constant = tried.case.fit.beyond_jitter < settings.CONVENTION_CONSTANT * half.beyond_jitter
-    return abs(size) > jump(tried.offset.frees[0], sd) and (right or constant)
+    return abs(size) > jump(one.frees[0], sd) and (right or constant)
 
 
 def offset_of(tried: Tried) -> float:
