@@ -56,7 +56,7 @@ PASS_APART = 0.25  # usual joint steps by which two passes through the same join
 PASS_APART_BOUNDS = (0.1e-3, 0.5e-3)  # [m] ... but no less than the first and no more than the second
 LONGEST_LINK = 3.0  # usual joint steps over which errors are interpolated at most,
 LONGEST_LINK_TURN = 0.2  # ... and part of the lever arm: about 0.2 rad of rotation
-MOST_NEIGHBOURS = 1_000_000  # pairs of visits that are looked up: their RMS is known to 0.1 %; memory
+MOST_NEIGHBOURS = 300_000  # pairs of visits that are looked up: their RMS is known to 0.2 %; time and memory
 FEWEST_PAIRS = 5  # of visits from the same direction, below which the noise floor is taken from elsewhere
 FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the noise floor
 NOTABLE = 1.5  # difference of visits over the stated jitter, below which it is not reported
@@ -236,6 +236,7 @@ PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that 
 # ---- Conventions of a table, before any physics
 
 SENSOR_JUMP = 0.01, 0.2  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
+SENSOR_ROWS = 2000  # readings, evenly spread, of which its pose is estimated: to save time
 CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )
