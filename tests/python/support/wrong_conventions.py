@@ -129,9 +129,9 @@ def _shows(case: Case, wrong: Fault) -> bool:
         return True
     bad = wrong.spoil(case)
     moved = np.linalg.norm(tips.predicted(bad.robot, bad.readings) - tips.predicted(case.robot, case.readings), axis=1)
-    rows = moved != 0
-    error = calibrated(case.robot, case.readings).error
-    return not np.nanmean(moved[rows] ** 2) < np.nanmean(error[rows] ** 2)  # NaN: it cannot be predicted at all
+    moved = np.nan_to_num(moved, nan=np.inf)  # it cannot be predicted at all
+    rows, error = moved > 0, calibrated(case.robot, case.readings).error
+    return bool(rows.any() and np.mean(moved[rows] ** 2) > np.nanmean(error[rows] ** 2))
 
 
 def mended(case: Case, found: Review) -> float:

@@ -51,18 +51,18 @@ class Calibrated:
         """The part [m] of the typical error that jitter does not make."""
         return float(np.sqrt(max(self.typical**2 - self._of_jitter**2, 0.0)))
 
-    def likelier_than(self, typical: float) -> bool:
-        """Whether readings tell this error from another typical one [m], beyond the odds against a further cause."""
-        return self._gain(self.typical, typical)
+    def beats(self, before: "Calibrated") -> bool:
+        """Whether the error fell far towards that of jitter, and not by chance."""
+        return self.beyond_jitter < settings.CONVENTION_CLEAR * before.beyond_jitter and before._exceeds(self.typical)
 
     @property
-    def may_gain(self) -> bool:
-        """Whether a fit that leaves nothing but jitter would be likelier."""
-        return self._gain(self._of_jitter, self.typical)
+    def may_be_beaten(self) -> bool:
+        """Whether it is more than jitter."""
+        return self._exceeds(self._of_jitter)
 
-    def _gain(self, less: float, more: float) -> bool:
-        """Whether the readings tell two typical errors [m] apart."""
-        return less < more and 3 * len(self.error) * np.log(more / less) > settings.DECISIVE + settings.UNASKED
+    def _exceeds(self, typical: float) -> bool:
+        """Whether so many readings tell this from a lesser typical error [m], beyond the odds against a cause."""
+        return 3 * len(self.error) * np.log(self.typical / typical) > settings.DECISIVE + settings.UNASKED
 
     @property
     def rms_mm(self) -> float:

@@ -67,7 +67,7 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
 
 def _clearest(case: Case) -> Tried | None:
     """What leaves far less error than the table as it is and than all else, one hypothesis or two; None without any."""
-    if not case.fit.may_gain:
+    if not case.fit.may_be_beaten:
         return None
     singles, pairs = _likely(case)
     tried = _clear(case, singles)
@@ -114,7 +114,7 @@ def _needed(case: Case, tried: Tried) -> Iterator[bool]:
     for one, half in zip(tried.wrong, _halves(case, tried), strict=True):
         rows = _rows_of(one, case.readings)
         jumps = not (one.offset or one.registers) or _is_jump(case, one, tried, half)
-        yield jumps and _is_clear(half.at(rows), tried.case.fit.at(rows))
+        yield jumps and tried.case.fit.at(rows).beats(half.at(rows))
 
 
 def _rows_of(hypothesis: Hypothesis, readings: Measurements) -> Mask:
@@ -141,7 +141,7 @@ def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
     if all(one.frame or one.registers for one in better.wrong):
         return True
     before, after = (_with_run_frames(one, of_runs) for one in (case, better.case))
-    return better.case.fit.typical < before.typical or _is_clear(before, after)
+    return better.case.fit.typical < before.typical or after.beats(before)
 
 
 def _with_run_frames(case: Case, of_runs: Measurements) -> Calibrated:
@@ -162,13 +162,6 @@ def _with_run_frames(case: Case, of_runs: Measurements) -> Calibrated:
 
 def _is_noise(fit: Calibrated) -> bool:
     return fit.typical < settings.CONVENTION_AT_FLOOR * max(fit.floor, settings.CONVENTION_FINEST)
-
-
-def _is_clear(before: Calibrated, after: Calibrated) -> bool:
-    """Whether the error falls far towards that of jitter, and not by chance."""
-    return after.beyond_jitter < settings.CONVENTION_CLEAR * before.beyond_jitter and after.likelier_than(
-        before.typical
-    )
 
 
 def _likely(case: Case) -> tuple[list[Wrong], list[Wrong]]:
