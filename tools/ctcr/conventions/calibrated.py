@@ -152,3 +152,8 @@ def jump(name: str, sd: float) -> float:
     """How far a parameter with this standard deviation is off at most by an error of the data sheet, SI."""
     far = settings.CONVENTION_JUMP * sd
     return min(far, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if "rotation" in name else far
+
+
+def dearer(numbers: int, readings: int) -> float:
+    """Factor on errors of so many positions that more numbers of a fit cost, by the Bayesian information criterion."""
+    return float(np.exp(0.5 * numbers * np.log(3 * readings) / (3 * readings)))

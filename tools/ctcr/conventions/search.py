@@ -12,7 +12,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
-from ctcr.conventions.calibrated import Calibrated, calibrated, jump
+from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.model.sessions import FRAME
@@ -145,19 +145,16 @@ def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
 
 
 def _with_run_frames(case: Case, of_runs: Measurements) -> Calibrated:
-    """A case in which each run has the frame that fits it best; the errors are larger by the factor that these numbers
-    cost by the Bayesian information criterion.
-    """
+    """A case in which each run has the frame that fits it best, with the cost of these numbers."""
     for change in case.changes:
         of_runs = change(of_runs)
     positions, error = tips.predicted(case.fit.robot, of_runs), np.full(len(of_runs), np.nan)
-    runs, count = np.unique(of_runs.run), 3 * len(of_runs)
+    runs = np.unique(of_runs.run)
     for run in runs:
         rows = of_runs.run == run
         if 3 * np.sum(rows) > FRAME:
             error[rows] = aligned(positions[rows], of_runs.position[rows])[2]
-    cost = np.exp(0.5 * len(runs) * FRAME * np.log(count) / count)
-    return Calibrated(case.robot, cost * error, case.fit.floor)
+    return Calibrated(case.robot, dearer(len(runs) * FRAME, len(of_runs)) * error, case.fit.floor)
 
 
 def _is_noise(fit: Calibrated) -> bool:
