@@ -136,11 +136,13 @@ def _halves(case: Case, tried: Tried) -> list[Calibrated]:
 def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
     """Whether a better case leaves less error than a frame for each run does, or far less where each run has its own.
 
-    Else the runs are not one session, and what is better is not clear. Frames of runs contain a frame of all.
+    Else the runs are not one session, and what is better is not clear. Frames of runs contain a frame of all:
+    where that is what is better, it leaves hardly anything, or not much more than they do.
     """
-    if all(one.frame or one.registers for one in better.wrong):
-        return True
     before, after = (_with_run_frames(one, of_runs) for one in (case, better.case))
+    if all(one.frame or one.registers for one in better.wrong):
+        constant = settings.CONVENTION_CONSTANT * case.fit.beyond_jitter
+        return better.case.fit.beyond_jitter < constant or not before.beats(better.case.fit)
     return better.case.fit.typical < before.typical or after.beats(before)
 
 
