@@ -45,7 +45,7 @@ class Answer:
 
 
 def oracle_case(random: np.random.Generator):
-    """A right session of the oracle; None where it finds no equilibrium."""
+    """A right session of the oracle; None where there is none: no equilibrium, or tubes that cannot stand so."""
     from benches import ROBOTS
     from ctcr.robot import robot_file
     from ctcr.table import measurements
@@ -65,7 +65,7 @@ def oracle_case(random: np.random.Generator):
     with TemporaryDirectory() as folder:
         try:
             write_set(order, Path(folder) / "set", Path(folder) / "truth.yaml")
-        except NoEquilibriumError:
+        except (NoEquilibriumError, ValueError):
             return None
         robot = robot_file.load(Path(folder) / "set" / "robot.yaml")
         return Case(robot, measurements.load(Path(folder) / "set" / "measurements.csv", robot.n_tubes), str(order))

@@ -56,7 +56,7 @@ PASS_APART = 0.25  # usual joint steps by which two passes through the same join
 PASS_APART_BOUNDS = (0.1e-3, 0.5e-3)  # [m] ... but no less than the first and no more than the second
 LONGEST_LINK = 3.0  # usual joint steps over which errors are interpolated at most,
 LONGEST_LINK_TURN = 0.2  # ... and part of the lever arm: about 0.2 rad of rotation
-MOST_NEIGHBOURS = 1_000_000  # pairs of visits that are looked up: their RMS is known to 0.1 %; memory
+MOST_NEIGHBOURS = 300_000  # pairs of visits that are looked up: their RMS is known to 0.2 %; time and memory
 FEWEST_PAIRS = 5  # of visits from the same direction, below which the noise floor is taken from elsewhere
 FEWEST_FREEDOM = 10  # degrees of freedom of the scatter at rest, from which it serves as the noise floor
 NOTABLE = 1.5  # difference of visits over the stated jitter, below which it is not reported
@@ -236,6 +236,7 @@ PLAN_STOPS = 4  # of a run on the way out; it returns through the same, so that 
 # ---- Conventions of a table, before any physics
 
 SENSOR_JUMP = 0.01, 0.2  # [m], [rad] from where the file has the sensor, beyond which no mounting error lies
+SENSOR_ROWS = 2000  # readings, evenly spread, of which its pose is estimated: to save time
 CONVENTION_ROWS = (
     240  # readings on which hypotheses are compared, spread over all runs: a prediction takes microseconds
 )
@@ -254,6 +255,7 @@ CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
 CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which it is noise
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
+CONVENTION_CONSTANT = 0.1  # of an error that an offset or a frame leaves, where it is the same in all readings
 CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that
 CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts so far off finds nothing
 CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between

@@ -123,6 +123,19 @@ def test_two_faults():
     assert {one.kind for one in found.findings} == {"frame_inverse", "joint_sign", "quaternion_inverse"}
 
 
+def test_hidden_faults():
+    """Two wrong conventions are named where neither alone makes the table better."""
+    robot, readings = bench(11)
+    turn = Rotation.from_rotvec([0.5, -1.0, 0.7]).as_matrix()
+    other = with_frame(robot, turn @ robot.tracker.rotation, robot.tracker.position + 0.1)
+    found = review(other, scaled(readings, "alpha", 180 / np.pi))
+    assert {one.kind for one in found.findings} == {"joint_unit", "frame_wrong"}
+    left = replace(scaled(readings, "position", [-100, 100, 100]), quaternion=mirror(readings.quaternion, 0))
+    found = review(robot, replace(left, quaternion=np.roll(left.quaternion, -1, 1)))
+    assert {one.kind for one in found.findings} == {"mirrored", "position_unit", "quaternion_order"}
+    np.testing.assert_allclose(found.readings.quaternion, readings.quaternion, atol=1e-9)
+
+
 @pytest.mark.parametrize(("kind", "move"), [("alpha", 0.35), ("beta", 4e-3)])
 def test_run(kind, move):
     """A run that was homed elsewhere is named with its joint, and by how much it is off."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from conventions_bench import design, session
+from ctcr.conventions import tips
 from ctcr.conventions.calibrated import calibrated
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
@@ -102,14 +103,14 @@ def wrong_sheet(case: Case, random: np.random.Generator) -> Case:
 
 
 def faults(random: np.random.Generator, case: Case, kinds: Sequence[str]) -> list[Fault]:
-    """A fault of each kind that the case has room for; no two of the same joints, and none that undoes another."""
+    """A fault of each kind that the case has room for and that shows; no two of the same joints, and none that undoes
+    another."""
     found, taken = [], set()
     for kind in kinds:
         if any({kind, one.kind} <= alike for one in found for alike in UNDO):
             continue
-        drawn = next(
-            (one for _ in range(20) if (one := DRAWN[kind](random, case)) and not taken & {*one.columns}), None
-        )
+        tries = (one for _ in range(20) if (one := DRAWN[kind](random, case)) and not taken & {*one.columns})
+        drawn = next((one for one in tries if _shows(case, one)), None)
         if drawn:
             found.append(drawn)
             taken |= {*drawn.columns} if kind.startswith("joint") or kind == "run_offset" else set()
@@ -120,6 +121,17 @@ def spoiled(case: Case, wrong: Sequence[Fault]) -> Case:
     for one in sorted(wrong, key=lambda one: one.kind == "quaternion_order"):  # the order of columns comes last
         case = one.spoil(case)
     return case
+
+
+def _shows(case: Case, wrong: Fault) -> bool:
+    """Whether a fault of joints or loads moves the predicted positions by more than a right table leaves of errors."""
+    if not wrong.kind.startswith(("joint", "force", "run")):
+        return True
+    bad = wrong.spoil(case)
+    moved = np.linalg.norm(tips.predicted(bad.robot, bad.readings) - tips.predicted(case.robot, case.readings), axis=1)
+    moved = np.nan_to_num(moved, nan=np.inf)  # it cannot be predicted at all
+    rows, error = moved > 0, calibrated(case.robot, case.readings).error
+    return bool(rows.any() and np.mean(moved[rows] ** 2) > np.nanmean(error[rows] ** 2))
 
 
 def mended(case: Case, found: Review) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, evenly
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector, nearest_rotation, points_to_base
 from ctcr.model import parameters
 from ctcr.model.model import Model, Prediction
@@ -29,7 +29,8 @@ def placed(robot: Robot, measurements: Measurements, tips: Prediction | None = N
     tracker = robot.tracker
     if tracker.sensor_position_mm is not None and tracker.sensor_rotation_known:
         return robot, []
-    tips = _tips(robot, measurements) if tips is None else tips
+    if tips is None:
+        measurements, tips = _predicted(robot, measurements)
     turn, pose, width, said = matrix_from_quaternion(tips.quaternion), {}, {}, []
     read = tips.solved & measurements.oriented
     if not tracker.sensor_rotation_known and read.any():
@@ -87,9 +88,11 @@ def with_pose(free: str | Iterable[str], robot: Robot) -> list[str]:
     return parameters.expand([*names, *more], robot) if more else names
 
 
-def _tips(robot: Robot, measurements: Measurements) -> Prediction:
-    beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    return Model(robot.standard).predict(beta, alpha, measurements.force)
+def _predicted(robot: Robot, measurements: Measurements) -> tuple[Measurements, Prediction]:
+    """Readings spread over the table, and their tips."""
+    few = measurements.rows(evenly(len(measurements), settings.SENSOR_ROWS))
+    beta, alpha = robot.joints_of_table(few.beta, few.alpha)
+    return few, Model(robot.standard).predict(beta, alpha, few.force)
 
 
 def _rotation(robot: Robot, turns: Array) -> Array | None:
@@ -107,7 +110,8 @@ def position(robot: Robot, measurements: Measurements, tips: Prediction | None =
     The tracker frame may be shifted too, as far as its file says; what no tip turns stays near the tip. `tips` as of
     `placed`.
     """
-    tips = _tips(robot, measurements) if tips is None else tips
+    if tips is None:
+        measurements, tips = _predicted(robot, measurements)
     read = tips.solved & np.isfinite(measurements.positions).all(axis=1)
     turns = matrix_from_quaternion(tips.quaternion[read])
     beside = points_to_base(robot.tracker, measurements.positions[read]) - tips.position[read]

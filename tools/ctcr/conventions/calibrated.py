@@ -1,6 +1,6 @@
 """The error of a hypothesis after all that a calibration may move: a short robust fit to few readings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from ctcr.errors import InputError
 from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
+
+JITTER_ALONE = 1.366  # typical error over the floor, where errors are jitter: exp E log sqrt(1 + chi^2_3 / 3)
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,35 @@ class Calibrated:
 
     @property
     def typical(self) -> float:
-        """Geometric mean of the error [m]: what decides."""
-        return float(np.exp(self.log_error.mean()))
+        """Geometric mean of the error [m]: what decides. Infinite where the model solves too few readings."""
+        return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
+
+    def at(self, rows: Mask) -> "Calibrated":
+        """The same of some readings (K,)."""
+        return replace(self, error=self.error[rows])
+
+    @property
+    def _of_jitter(self) -> float:
+        """The typical error [m] where there is nothing but jitter."""
+        return JITTER_ALONE * max(self.floor, settings.CONVENTION_FINEST)
+
+    @property
+    def beyond_jitter(self) -> float:
+        """The part [m] of the typical error that jitter does not make."""
+        return float(np.sqrt(max(self.typical**2 - self._of_jitter**2, 0.0)))
+
+    def beats(self, before: "Calibrated") -> bool:
+        """Whether the error fell far towards that of jitter, and not by chance."""
+        return self.beyond_jitter < settings.CONVENTION_CLEAR * before.beyond_jitter and before._exceeds(self.typical)
+
+    @property
+    def may_be_beaten(self) -> bool:
+        """Whether it is more than jitter."""
+        return self._exceeds(self._of_jitter)
+
+    def _exceeds(self, typical: float) -> bool:
+        """Whether so many readings tell this from a lesser typical error [m], beyond the odds against a cause."""
+        return 3 * len(self.error) * np.log(self.typical / typical) > settings.DECISIVE + settings.UNASKED
 
     @property
     def rms_mm(self) -> float:
@@ -42,12 +71,12 @@ class Calibrated:
 
 
 def calibrated(
-    robot: Robot, readings: Measurements, *, free: str | tuple[str, ...] | None = None, to_beat: float = np.inf
+    robot: Robot, readings: Measurements, *, free: tuple[str, ...] = (), to_beat: float = np.inf
 ) -> Calibrated:
     """The robot whose standard parameters fit the positions best, each near its value in the file.
 
     Data sheets err by more than they say: the stated standard deviations are widened, and those of parameters whose
-    name begins with `free` say nothing.
+    name begins with one of `free` say nothing.
     Errors have an unknown size, so that what no calibration explains does not drive the parameters anywhere. The fit
     gives up where it does not soon fall below an error `to_beat` [m].
     """
@@ -66,7 +95,7 @@ def calibrated(
             residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
             error = np.linalg.norm(residual, axis=1)
             solved = np.isfinite(error)
-            if not solved.any():
+            if solved.mean() <= settings.CONVENTION_SOLVED:
                 break
             size = max(float(np.median(error[solved])), floor, settings.CONVENTION_FINEST)
             if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
@@ -99,13 +128,13 @@ def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:
     return 1.5 * float(np.sum(np.log1p((missed / size) ** 2))) + 0.5 * float(np.sum(shift**2))
 
 
-def _priors(robot: Robot, free: str | tuple[str, ...] | None) -> tuple[list[str], Array, Array, Array, Array]:
+def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Array, Array, Array]:
     """Names, means, widened standard deviations and bounds of the standard parameters that are not known exactly, and
-    of those whose name begins with `free`.
+    of those whose name begins with one of `free`.
 
     Beyond CONVENTION_JUMP lies no data sheet, but another convention.
     """
-    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if free and name.startswith(free)}
+    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if name.startswith(free)}
     for name in parameters.expand([parameters.STANDARD, *chosen], robot):
         sd = {name: np.inf} if name in chosen else None
         try:
@@ -115,10 +144,16 @@ def _priors(robot: Robot, free: str | tuple[str, ...] | None) -> tuple[list[str]
     names = [name for name, *_ in found]
     mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
-    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, mean - far), np.minimum(high, mean + far)
+    least = np.where(low < 0, mean - far, mean**2 / (mean + far))  # what is positive is off by a factor, either way
+    return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, least), np.minimum(high, mean + far)
 
 
 def jump(name: str, sd: float) -> float:
     """How far a parameter with this standard deviation is off at most by an error of the data sheet, SI."""
     far = settings.CONVENTION_JUMP * sd
     return min(far, np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)) if "rotation" in name else far
+
+
+def dearer(numbers: int, readings: int) -> float:
+    """Factor on errors of so many positions that more numbers of a fit cost, by the Bayesian information criterion."""
+    return float(np.exp(0.5 * numbers * np.log(3 * readings) / (3 * readings)))

@@ -25,7 +25,7 @@ OTHER_UNITS = {  # of a group of columns: unit, factor to SI
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """What may be wrong, and the table or the robot file as it should be."""
 
@@ -41,16 +41,26 @@ class Hypothesis:
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
 
     @property
-    def frees(self) -> str | tuple[str, ...] | None:
+    def of_positions(self) -> bool:
+        """Whether it is of the positions that the tracker reads."""
+        return self.kind in ("position_unit", "mirrored")
+
+    @property
+    def of_tracker(self) -> bool:
+        """Whether it is of these or of the tracker frame, and not of what the model predicts."""
+        return bool(self.of_positions or self.frame or self.registers)
+
+    @property
+    def frees(self) -> tuple[str, ...]:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:
             return parameters.FRAME
         if self.sensor is not None:
-            return "tracker.sensor_position."
+            return ("tracker.sensor_position.",)
         if self.offset:
             kind, tube, _ = self.offset
-            return f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
-        return None
+            return (f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}",)
+        return ()
 
     def robot(self, robot: Robot) -> Robot:
         if self.sensor is not None:

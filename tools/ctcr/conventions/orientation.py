@@ -19,32 +19,36 @@ SCALAR_LAST = ("quaternion_order", "the quaternion columns hold x, y, z, w", "ct
 INVERSE = ("quaternion_inverse", "the quaternions are those of the inverse rotation", "ctcr import --invert-quaternion")
 
 
-def wrong_form(fit: Calibrated, readings: Measurements) -> tuple[list[Finding], Change]:
-    """What is wrong with the quaternions of readings whose positions fit, and the change that corrects them."""
+def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None) -> tuple[list[Finding], Change]:
+    """What is wrong with the quaternions of readings whose positions fit, and the change that corrects them.
+
+    axis: of the tracker, along which they are mirrored.
+    """
     given = readings.quaternions
     use = fit.solved & readings.oriented
     if not use.any():
         return [], lambda m: m
     predicted = _predicted(fit.robot, readings.rows(use))
     known = fit.robot.tracker.sensor_rotation_known
-    errors = {form: _error_deg(predicted, _in_form(given[use], *form), known) for form in np.ndindex(2, 2)}
+    measured = {form: _in_form(given[use], *form, axis) for form in np.ndindex(2, 2)}
+    errors = {form: _error_deg(predicted, measured[form], known) for form in measured}
     last, inverse = best = min(errors, key=lambda form: errors[form])
     before, after = errors[0, 0], errors[best]
-    turn = _turn_between(predicted, given[use])
-    turned = _error_deg(predicted, given[use], False)
+    turn = _turn_between(predicted, measured[0, 0])
+    turned = _error_deg(predicted, measured[0, 0], False)
     # A physical effect may ask for a turn, too, but hardly for a large one, and it leaves more than noise.
     is_noise = turned < settings.CONVENTION_AT_FLOOR * (fit.robot.tracker.jitter_deg or 0.0)
     jump = settings.SENSOR_JUMP[1] if is_noise else np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)
     if known and turned < min(after, settings.CONVENTION_CLEAR * before) and turn.magnitude() > jump:
-        return [_turned(fit, turn, (before, turned))], lambda m: m
+        return [_turned(fit, turn, (before, turned))], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))
     if not any(best) or after > settings.CONVENTION_CLEAR * before:
-        return [], lambda m: m
+        return [], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))
     wrong = [SCALAR_LAST] * last + [INVERSE] * inverse
     found = [
         Finding(kind, text, QUATERNION, fix, rms_mm=(fit.rms_mm, fit.rms_mm), rms_deg=(before, after))
         for kind, text, fix in wrong
     ]
-    return found, changed("quaternion", lambda q: _in_form(q, last, inverse))
+    return found, changed("quaternion", lambda q: _in_form(q, last, inverse, axis))
 
 
 def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
@@ -55,8 +59,8 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
     known = fit.robot.tracker.sensor_rotation_known
     options = [
-        min(_error_deg(predicted, _in_form(q, *form), known) for form in np.ndindex(2, 2))
-        for q in (given, mirror(given, axis))
+        min(_error_deg(predicted, _in_form(given, *form, along), known) for form in np.ndindex(2, 2))
+        for along in (None, axis)
     ]
     return options[1] < options[0]
 
@@ -75,9 +79,11 @@ def mirror(quaternion: Array, axis: int) -> Array:
     return quaternion * sign
 
 
-def _in_form(quaternion: Array, last: int, inverse: int) -> Array:
+def _in_form(quaternion: Array, last: int, inverse: int, axis: int | None) -> Array:
+    """Right quaternions (..., 4) of those that are scalar last, of the inverse rotation, mirrored along an axis."""
     moved = np.roll(quaternion, 1, axis=-1) if last else quaternion
-    return conjugate(moved) if inverse else moved
+    turned = conjugate(moved) if inverse else moved
+    return turned if axis is None else mirror(turned, axis)
 
 
 def _predicted(robot: Robot, readings: Measurements) -> Array:

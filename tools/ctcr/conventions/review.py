@@ -9,7 +9,6 @@ from ctcr.arrays import Array, Integers, Mask, evenly
 from ctcr.conventions import clock, frozen, orientation, runs, search, tips
 from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
-from ctcr.conventions.hypotheses import Change, changed
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -44,13 +43,17 @@ def review(robot: Robot, readings: Measurements) -> Review:
     of_runs = _of_every_run(readings, located)
     sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
     case, found = search.corrected(robot, sample, readings.rows(of_runs))
-    changes = [*case.changes]
 
     # Orientations are judged where positions are right.
-    found = [_with_quaternion(one, case, changes) for one in found]
-    wrong, change = orientation.wrong_form(case.fit, _applied(case.readings, changes[len(case.changes) :]))
+    axis = next(("xyz".index(one.columns[0][0]) for one in found if one.kind == "mirrored"), None)
+    if axis is not None and not orientation.mirrored(case.fit, case.readings, axis):
+        axis = None
+    found = [_with_quaternion(one, case.readings, axis) for one in found]
+    wrong, change = orientation.wrong_form(case.fit, case.readings, axis)
     found += wrong
-    right = _applied(readings, [*changes, change])
+    right = readings
+    for one in (*case.changes, change):
+        right = one(right)
 
     # Runs need some readings of each, which a large table has.
     fit, of_runs = case.fit, right.rows(of_runs)
@@ -76,21 +79,13 @@ def review(robot: Robot, readings: Measurements) -> Review:
     return Review(sorted(found, key=lambda one: -one.clarity), case.robot, right)
 
 
-def _applied(readings: Measurements, changes: list[Change]) -> Measurements:
-    for change in changes:
-        readings = change(readings)
-    return readings
-
-
-def _with_quaternion(finding: Finding, case: search.Case, changes: list[Change]) -> Finding:
-    """A mirror with words on the quaternions, which may be mirrored too: then that joins the changes."""
+def _with_quaternion(finding: Finding, readings: Measurements, axis: int | None) -> Finding:
+    """A mirror with words on the quaternions, which may be mirrored too, along this axis."""
     if finding.kind != "mirrored":
         return finding
     [column] = finding.columns
-    axis, fix, rivals = "xyz".index(column[0]), f"ctcr import --mirror {column[0]}", finding.rivals
-    if orientation.mirrored(case.fit, case.readings, axis):
-        changes.append(changed("quaternion", lambda q: orientation.mirror(q, axis)))
-    elif case.readings.oriented.any():
+    fix, rivals = f"ctcr import --mirror {column[0]}", finding.rivals
+    if axis is None and readings.oriented.any():
         fix = f"negate {column}"
         rivals = ()  # joints that count the other way would mirror the orientations too
     return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)

@@ -6,9 +6,10 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
-from ctcr.conventions.calibrated import Calibrated, calibrated
+from ctcr.conventions.calibrated import Calibrated, calibrated, dearer
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, changed, joints
+from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.show.wording import short
 from ctcr.table.measurements import Measurements
@@ -34,15 +35,15 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     (after, kind, tube, offset), second = scanned[0], scanned[1][0] if len(scanned) > 1 else np.inf
     if after > clear * before or clear * after > usual:
         return None
-    moved = _typical(_moved(like.robot, mine), like)  # the whole frame instead of a joint
+    moved = dearer(FRAME - 1, len(mine)) * _typical(_moved(like.robot, mine), like)  # the whole frame, not a joint
     if second < settings.CONVENTION_ALIKE * after or moved < after:
         return None
     of_others = [_scan(like, readings.rows(readings.run == run), kind, tube)[3] for run in np.delete(runs, worst)]
     if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
         return None  # the others would take offsets too: something else acts
     move = offset * (np.arange(fit.robot.n_tubes) == tube)
-    turned = orientation.error_deg(like.robot, mine)
-    if orientation.error_deg(like.robot, changed(kind, lambda q: q + move)(mine)) > settings.CONVENTION_ALIKE * turned:
+    corrected = changed(kind, lambda q: q + move)(mine)
+    if orientation.error_deg(like.robot, mine) < clear * orientation.error_deg(like.robot, corrected):
         return None  # the orientations deny it
     run = int(runs[worst])
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)

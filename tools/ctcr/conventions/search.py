@@ -1,20 +1,26 @@
-"""The search: every hypothesis is predicted, the likely ones are calibrated, the clearest is applied, and again."""
+"""The search: every hypothesis is predicted, alone and with one of the tracker, the likely ones are calibrated, the
+clearest is applied, and again."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ctcr import settings
+from ctcr.arrays import Array, Mask
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
-from ctcr.conventions.calibrated import Calibrated, calibrated, jump
+from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
+
+Wrong = tuple[Hypothesis, ...]
 
 
 @dataclass(frozen=True)
@@ -29,99 +35,197 @@ class Case:
 
 @dataclass(frozen=True)
 class Tried:
-    """A hypothesis, and the case that it makes."""
+    """One hypothesis or two, and the case that they make."""
 
-    hypothesis: Hypothesis
+    wrong: Wrong
     case: Case
-    rivals: Sequence[Hypothesis] = ()  # of another kind, which explain the readings as well
+    rivals: Wrong = ()  # of another kind, which explain the readings as well
+
+    @property
+    def doubts(self) -> int:
+        return sum(one.doubts for one in self.wrong)
+
+    @property
+    def offset(self) -> Hypothesis | None:
+        """The one that says that a home is another."""
+        return next((one for one in self.wrong if one.offset), None)
 
 
 def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding]]:
-    """The case after all clear findings, one at a time, and these.
+    """The case after all clear findings, and these.
 
-    `readings` are a sample of the table, `of_runs` some of each run. Where a frame for each run explains more than a
-    hypothesis on joints, loads or positions does, the runs are not one session, and it is not clear.
+    `readings` are a sample of the table, `of_runs` some of each run.
     """
     case, found = Case(robot, readings, calibrated(robot, readings)), []
     while len(found) < settings.MOST_CONVENTIONS and (better := _clearest(case)):
-        whole = better.hypothesis.frame or better.hypothesis.registers
-        if not whole and _with_run_frames(case, of_runs) < better.case.fit.typical:
+        if not _of_one_session(case, better, of_runs):
             break
-        found.append(_finding(case, better))
+        found += _findings(case, better)
         case = better.case
     return case, found
 
 
 def _clearest(case: Case) -> Tried | None:
-    """The hypothesis that leaves far less error than the table as it is and than every other one; None without any."""
-    before = case.fit
-    if _is_noise(before):
+    """What leaves far less error than the table as it is and than all else, one hypothesis or two; None without any."""
+    if not case.fit.may_be_beaten:
         return None
-    tried = [Tried(one, _applied(case, one)) for one in _likely(case)]
-    tried = [one for one in tried if _is_clear(before, one.case.fit) and _is_jump(one)]
+    singles, pairs = _likely(case)
+    tried = _clear(case, singles)
+    if not any(_is_noise(one.case.fit) for one in tried):
+        tried += _clear(case, pairs)
+        if tried and len((best := _alike(tried)[0]).wrong) > 1:
+            tried += _clear(case, _exchanged(case, best))
     if not tried:
         return None
+    best, *_ = alike = _alike(tried)
+    if any(one.sensor is not None for one in best.wrong) and not _is_far(case.robot, best.case.fit.robot):
+        return None
+    if best.offset:
+        exact = offset_by(best.offset, offset_of(best), case.robot.n_tubes)
+        wrong = tuple(exact if one.offset else one for one in best.wrong)
+        best = Tried(wrong, _applied(case, wrong))
+    rivals = (one.wrong[0] for one in alike if len(best.wrong) == len(one.wrong) == 1)
+    other = (one for one in rivals if one.kind != best.wrong[0].kind)
+    return replace(best, rivals=tuple(one for one in other if not one.offset and not one.registers))
+
+
+def _alike(tried: list[Tried]) -> list[Tried]:
+    """Those that leave the least error, or hardly more; first the one by which least is wrong."""
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    best = min(alike, key=lambda one: (one.hypothesis.doubts, one.case.fit.typical))
-    if best.hypothesis.sensor is not None and not _is_far(case.robot, best.case.fit.robot):
-        return None
-    if best.hypothesis.offset:
-        exact = offset_by(best.hypothesis, offset_of(best), case.robot.n_tubes)
-        best = Tried(exact, _applied(case, exact))
-    rivals = [one.hypothesis for one in alike if one.hypothesis.kind != best.hypothesis.kind]
-    return replace(best, rivals=[one for one in rivals if not one.offset and not one.registers])
+    return sorted(alike, key=lambda one: (one.doubts, one.case.fit.typical))
 
 
-def _with_run_frames(case: Case, of_runs: Measurements) -> float:
-    """Typical error [m] of a case in which each run has the frame that fits it best."""
+def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
+    """Each of two hypotheses with others that are likely where it holds: one of the tracker takes in much."""
+    for one in pair.wrong:
+        singles, _ = _likely(_applied(case, (one,)))
+        yield from ((one, *single) for single in singles)
+
+
+def _clear(case: Case, some: Iterable[Wrong]) -> list[Tried]:
+    """Those that leave far less error than the table as it is, and than without one of their hypotheses."""
+    tried = (Tried(wrong, _applied(case, wrong)) for wrong in some)
+    return [one for one in tried if one.case.fit.typical < case.fit.typical and all(_needed(case, one))]
+
+
+def _needed(case: Case, tried: Tried) -> Iterator[bool]:
+    """Of each hypothesis, whether the readings that it changes have far less error with it than without."""
+    for one, half in zip(tried.wrong, _halves(case, tried), strict=True):
+        rows = _rows_of(one, case.readings)
+        jumps = not (one.offset or one.registers) or _is_jump(case, one, tried, half)
+        yield jumps and tried.case.fit.at(rows).beats(half.at(rows))
+
+
+def _rows_of(hypothesis: Hypothesis, readings: Measurements) -> Mask:
+    """The readings (K,) that it changes; all where it changes the robot file."""
+    new = hypothesis.change(readings)
+    rows = ((new.load_space != readings.load_space) | (new.position != readings.position).any(axis=1)[:, None]).any(
+        axis=1
+    )
+    return rows if rows.any() else ~rows
+
+
+def _halves(case: Case, tried: Tried) -> list[Calibrated]:
+    """For each of several hypotheses the fit where it does not hold, but the others do."""
+    if len(tried.wrong) == 1:
+        return [case.fit]
+    return [_applied(case, tuple(other for other in tried.wrong if other is not one)).fit for one in tried.wrong]
+
+
+def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
+    """Whether a better case leaves less error than a frame for each run does, or far less where each run has its own.
+
+    Else the runs are not one session, and what is better is not clear. Frames of runs contain a frame of all:
+    where that is what is better, it leaves hardly anything, or not much more than they do.
+    """
+    before, after = (_with_run_frames(one, of_runs) for one in (case, better.case))
+    if all(one.frame or one.registers for one in better.wrong):
+        constant = settings.CONVENTION_CONSTANT * case.fit.beyond_jitter
+        return better.case.fit.beyond_jitter < constant or not before.beats(better.case.fit)
+    return better.case.fit.typical < before.typical or after.beats(before)
+
+
+def _with_run_frames(case: Case, of_runs: Measurements) -> Calibrated:
+    """A case in which each run has the frame that fits it best, with the cost of these numbers."""
     for change in case.changes:
         of_runs = change(of_runs)
     positions, error = tips.predicted(case.fit.robot, of_runs), np.full(len(of_runs), np.nan)
-    for run in np.unique(of_runs.run):
+    runs = np.unique(of_runs.run)
+    for run in runs:
         rows = of_runs.run == run
-        freedom = 3 * np.sum(rows) - FRAME
-        left = aligned(positions[rows], of_runs.position[rows])[2]
-        error[rows] = left * np.sqrt(3 * np.sum(rows) / freedom) if freedom > 0 else np.inf
-    return Calibrated(case.robot, error, case.fit.floor).typical
+        if 3 * np.sum(rows) > FRAME:
+            error[rows] = aligned(positions[rows], of_runs.position[rows])[2]
+    return Calibrated(case.robot, dearer(len(runs) * FRAME, len(of_runs)) * error, case.fit.floor)
 
 
 def _is_noise(fit: Calibrated) -> bool:
     return fit.typical < settings.CONVENTION_AT_FLOOR * max(fit.floor, settings.CONVENTION_FINEST)
 
 
-def _is_clear(before: Calibrated, after: Calibrated) -> bool:
-    return (
-        after.solved.mean() > settings.CONVENTION_SOLVED and after.typical < settings.CONVENTION_CLEAR * before.typical
-    )
+def _likely(case: Case) -> tuple[list[Wrong], list[Wrong]]:
+    """Single hypotheses, and pairs of which each is needed, that leave the least error before any calibration. Of the
+    offsets of a joint the best one counts.
+    """
+    looks = dict(_looks(case))
+    given = settings.CONVENTION_ROUGH * looks.pop(())
+
+    def first(some: Iterable[Wrong], look: int) -> list[Wrong]:
+        best = {}
+        for wrong in sorted(some, key=lambda wrong: looks[wrong][look]):
+            if np.isfinite(looks[wrong]).all() and (looks[wrong] <= given).any():
+                best.setdefault(tuple((one.kind, one.columns, one.text) for one in wrong), wrong)
+        return [*best.values()][: settings.CONVENTION_LIKELY]
+
+    singles = [wrong for wrong in looks if len(wrong) == 1]
+    unsolved = np.full(2, np.inf)
+    halves = {two: min(looks.get((one,), unsolved)[0] for one in two) for two in looks if len(two) > 1}
+    pairs = [wrong for wrong, half in halves.items() if looks[wrong][0] < settings.CONVENTION_CLEAR * half]
+    return [*dict.fromkeys(first(singles, 0) + first(singles, 1))], first(pairs, 0)
 
 
-def _likely(case: Case) -> Iterator[Hypothesis]:
-    """The hypotheses that leave the least error before any calibration: in the file's frame, and in the best one."""
+def _looks(case: Case) -> Iterator[tuple[Wrong, Array]]:
+    """Median errors (2,) [m] before any calibration, in the file's frame and in the one that fits best: with no
+    hypothesis, with each, and with pairs, one at least of which is of the tracker; of these in the file's frame alone.
+
+    What the model does not solve is left out.
+    """
     every, few = hypotheses(case.robot, case.readings), case.readings.rows(slice(None, None, settings.CONVENTION_EVERY))
-    rough = np.array([_rough(one.robot(case.robot), one.change(few)) for one in every])
-    given = settings.CONVENTION_ROUGH * np.array(_rough(case.robot, few))
-    chosen = np.unique(np.argsort(rough, axis=0, kind="stable")[: settings.CONVENTION_LIKELY])
-    return (every[i] for i in chosen if np.isfinite(rough[i]).all() and (rough[i] <= given).any())
+    alone = [(one,) for one in every if one.of_tracker]
+    pairs = [a + b for a, b in combinations(alone, 2) if a[0].kind != b[0].kind]
+    of_tracker = {wrong: _changed(case, wrong, few) for wrong in [(), *alone, *pairs]}
+    for own in [(), *((one,) for one in every if not one.of_tracker)]:
+        predicted, free = tips.predicted(*_changed(case, own, few)), {}
+        if np.isfinite(predicted).all(axis=1).mean() <= settings.CONVENTION_SOLVED:
+            yield own, np.full(2, np.inf)
+            continue
+        room = 0 if own and own[0].sensor is not None else 2 - len(own)  # the place of the sensor takes in what it can
+        for wrong, (robot, readings) in of_tracker.items():
+            if len(wrong) > room:
+                continue
+            moved, registers = tuple(one for one in wrong if one.of_positions), any(one.registers for one in wrong)
+            if moved not in free and (registers or len(own) + len(wrong) < 2):
+                free[moved] = np.nanmedian(aligned(predicted, readings.position)[2])
+            here = free[moved] if registers else np.nanmedian(tips.errors(robot, readings, predicted))
+            yield own + wrong, np.array([here, free.get(moved, here)])
 
 
-def _rough(robot: Robot, readings: Measurements) -> tuple[float, float]:
-    """Median error [m] in the frame of the robot, and in the one that fits best."""
-    predicted = tips.predicted(robot, readings)
-    solved = np.isfinite(predicted).all(axis=1)
-    if solved.mean() < settings.CONVENTION_SOLVED:
-        return np.inf, np.inf
-    here = tips.errors(robot, readings, predicted)
-    return float(np.nanmedian(here)), float(np.nanmedian(aligned(predicted, readings.position)[2]))
+def _changed(case: Case, wrong: Wrong, readings: Measurements) -> tuple[Robot, Measurements]:
+    """Robot and readings where the hypotheses hold."""
+    robot = case.robot
+    for one in wrong:
+        robot, readings = one.robot(robot), one.change(readings)
+    return robot, readings
 
 
-def _applied(case: Case, hypothesis: Hypothesis) -> Case:
-    robot, readings = hypothesis.robot(case.robot), hypothesis.change(case.readings)
-    if hypothesis.registers:
+def _applied(case: Case, wrong: Wrong) -> Case:
+    robot, readings = _changed(case, wrong, case.readings)
+    if any(one.registers for one in wrong):
         rotation, origin, _ = aligned(tips.predicted(robot, readings), readings.position)
         robot = with_frame(robot, rotation, origin)
-    fit = calibrated(robot, readings, free=hypothesis.frees, to_beat=case.fit.typical)
-    return Case(robot, readings, fit, (*case.changes, hypothesis.change))
+    free = tuple(name for one in wrong for name in one.frees)
+    fit = calibrated(robot, readings, free=free, to_beat=case.fit.typical)
+    return Case(robot, readings, fit, (*case.changes, *(one.change for one in wrong)))
 
 
 def _is_far(before: Robot, after: Robot) -> bool:
@@ -130,19 +234,26 @@ def _is_far(before: Robot, after: Robot) -> bool:
     return float(np.linalg.norm(move)) > settings.SENSOR_JUMP[0]
 
 
-def _is_jump(tried: Tried) -> bool:
-    """Whether an offset, where it is one, moves a home farther than calibration would: by right angles, or so that only
-    noise is left. A physical effect may ask for another offset, but it leaves more.
+def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> bool:
+    """Whether an offset moves a home, or another frame the frame, farther than calibration would.
+
+    A physical effect may ask for another offset, too, but that leaves more of the error of the half without it: so an
+    offset is a right angle, or leaves hardly anything.
     """
-    if not tried.hypothesis.offset:
-        return True
-    kind, tube, _ = tried.hypothesis.offset
-    uncertainty, size = tried.case.robot.uncertainty, offset_of(tried)
+    uncertainty = tried.case.robot.uncertainty
+    if one.registers:
+        old, new = case.robot.tracker, tried.case.fit.robot.tracker
+        turn = Rotation.from_matrix(new.rotation @ old.rotation.T).magnitude()
+        shift = np.max(np.abs(new.position - old.position))
+        sd = [max(np.atleast_1d(getattr(uncertainty, f"tracker_frame_{unit}"))) for unit in ("mm", "deg")]
+        return shift > jump("position", 1e-3 * sd[0]) or turn > jump("rotation", np.deg2rad(sd[1]))
+    (kind, tube, _), size = one.offset, offset_of(tried)
     sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
     if kind == "beta":
         sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
     right = kind == "alpha" and size % (np.pi / 2) == 0
-    return abs(size) > jump(tried.hypothesis.frees, sd) and (right or _is_noise(tried.case.fit))
+    constant = tried.case.fit.beyond_jitter < settings.CONVENTION_CONSTANT * half.beyond_jitter
+    return abs(size) > jump(one.frees[0], sd) and (right or constant)
 
 
 def offset_of(tried: Tried) -> float:
@@ -150,7 +261,7 @@ def offset_of(tried: Tried) -> float:
 
     A right angle is taken for one, where the fit is as near to it as homes are known.
     """
-    kind, tube, size = tried.hypothesis.offset
+    kind, tube, size = tried.offset.offset
     home, factor = ("home_rotation_deg", np.pi / 180) if kind == "alpha" else ("home_translation_mm", 1e-3)
     old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
     size += factor * (new - old)
@@ -159,23 +270,21 @@ def offset_of(tried: Tried) -> float:
     return right if kind == "alpha" and right and abs(size - right) < near else size
 
 
-def _finding(case: Case, tried: Tried) -> Finding:
-    one, text, fix = tried.hypothesis, tried.hypothesis.text, tried.hypothesis.fix
-    if one.offset:
-        text, fix = _offset_in_words(tried)
-    if one.sensor is not None:
-        place = numbers(tried.case.fit.robot.tracker.sensor_position_mm, 1)
-        fix = f"set tracker.sensor_position_mm to {place}, or to null: ctcr calibrate fit finds it"
-    if one.frame or one.registers:
-        fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
-    errors = (case.fit.rms_mm, tried.case.fit.rms_mm)
+def _findings(case: Case, tried: Tried) -> Iterator[Finding]:
+    """A finding of each hypothesis, with the error where all others hold but this."""
     rivals = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in tried.rivals]
-    return Finding(one.kind, text, one.columns, fix, rms_mm=errors, rivals=rivals)
+    for one, without in zip(tried.wrong, _halves(case, tried), strict=True):
+        text, fix = _offset_in_words(one, tried.case.robot) if one.offset else (one.text, one.fix)
+        if one.sensor is not None:
+            place = numbers(tried.case.fit.robot.tracker.sensor_position_mm, 1)
+            fix = f"set tracker.sensor_position_mm to {place}, or to null: ctcr calibrate fit finds it"
+        if one.frame or one.registers:
+            fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
+        yield Finding(one.kind, text, one.columns, fix, rms_mm=(without.rms_mm, tried.case.fit.rms_mm), rivals=rivals)
 
 
-def _offset_in_words(tried: Tried) -> tuple[str, str]:
-    kind, tube, size = tried.hypothesis.offset
-    robot, name = tried.case.robot, tried.hypothesis.columns[0]
+def _offset_in_words(hypothesis: Hypothesis, robot: Robot) -> tuple[str, str]:
+    (kind, tube, size), name = hypothesis.offset, hypothesis.columns[0]
     key, unit, factor = (
         ("home_rotation_deg", "deg", 180 / np.pi) if kind == "alpha" else ("home_translation_mm", "mm", 1e3)
     )
