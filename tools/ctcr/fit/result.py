@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import chdtrc
+from scipy.stats import chi2
 
 from ctcr import _core
 from ctcr.arrays import Array, Integers, Mask
@@ -212,7 +212,7 @@ class Fit:
     @cached_property
     def p_value(self) -> float:
         """Probability of so large a chi-square where model, priors and noise are right."""
-        return float(chdtrc(self.bulk_observations, self.chi_square + self.shift_square))
+        return float(chi2.sf(self.chi_square + self.shift_square, self.bulk_observations))
 
     def rms_mm(self, rows: Mask | None = None) -> float:
         """RMS length of the position residual of some rows (M,), all by default."""
