@@ -5,7 +5,10 @@ The same file serves the command line: ctcr add .. --effects examples/05_own_eff
 
 from pathlib import Path
 
+import numpy as np
 from ctcr.user_effects import Effect, Parameter, load
+
+HOME = np.array([-0.298, -0.2205, -0.145])  # [m] translations at which the angles are set to zero
 
 
 class RotationPickup(Effect):
@@ -21,7 +24,7 @@ class RotationPickup(Effect):
 
     def joints(self, rows, values):
         """What the tubes get where the controller asks for rows.beta and rows.alpha."""
-        return rows.beta, rows.alpha + values.gain * rows.beta
+        return rows.beta, rows.alpha + values.gain * (rows.beta - HOME)
 
 
 def main() -> None:

@@ -42,8 +42,8 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
         return None  # the others would take offsets too: something else acts
     move = offset * (np.arange(fit.robot.n_tubes) == tube)
-    corrected = changed(kind, lambda q: q + move)(mine)
-    if orientation.error_deg(like.robot, mine) < clear * orientation.error_deg(like.robot, corrected):
+    turned = orientation.error_deg(like.robot, mine)
+    if orientation.error_deg(like.robot, changed(kind, lambda q: q + move)(mine)) > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
     run = int(runs[worst])
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)

@@ -1,6 +1,9 @@
 """Effects that users write in a Python file, which needs no compiler: `--effects my_effects.py`.
 
+    import numpy as np
     from ctcr.user_effects import Effect, Parameter
+
+    HOME = np.array([-0.298, -0.2205, -0.145])  # [m] translations at which the angles are set to zero
 
     class Pickup(Effect):
         id = "rotation_pickup"
@@ -9,7 +12,7 @@
         parameters = [Parameter("gain", unit="rad/m", sigma=1.0, bounds=(-5, 5), per_tube=True)]
 
         def joints(self, rows, values):
-            return rows.beta, rows.alpha + values.gain * rows.beta
+            return rows.beta, rows.alpha + values.gain * (rows.beta - HOME)
 
 Values are SI: a number, or an array (N,) where a parameter is per tube, innermost first. At the neutral values of its
 amplitudes an effect must change nothing. Hooks, any of them; M rows in the order measured, N tubes:
