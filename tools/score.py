@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from datetime import date
 from itertools import pairwise
 from pathlib import Path
 from statistics import quantiles
@@ -24,7 +25,8 @@ KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
 robot file and measurements alone. %s `jitter`: noise of single readings;
 `realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which
-the unequal lags of single readings belong where a delay is hidden. Written by `tools/dev score --keep`."""
+the unequal lags of single readings belong where a delay is hidden. Written by `tools/dev score --keep` on %s, commit
+%s."""
 TUNED = "Thresholds were set on the tuning half."
 UNSEEN = """Other seeds than those by which thresholds were set, scored once
 (`python tools/oracle/make_suite.py --shift K --out FOLDER`)."""
@@ -173,7 +175,8 @@ def main() -> None:
     if options.keep:
         of = "unseen seeds" if options.unseen else f"the {options.half} half"
         title = f"Scores of `ctcr diagnose`: {len(chosen)} sets of {of}"
-        about = ABOUT % (UNSEEN if options.unseen else TUNED)
+        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+        about = ABOUT % (UNSEEN if options.unseen else TUNED, date.today(), commit.stdout.strip())
         target = KEPT.with_stem(f"{KEPT.stem}_unseen") if options.unseen else KEPT
         target.write_text(f"# {title}\n\n{about}\n\n{text}\n", encoding="utf-8")
 
