@@ -1,5 +1,6 @@
 #pragma once
 // Random robots, joints and loads for tests of laws. Seed the generator yourself, so that a failing case can be told.
+#include <algorithm>
 #include <cstddef>
 #include <numbers>
 #include <random>
@@ -79,7 +80,7 @@ Joints<N> random_joints(const Robot<N>& robot, Random& random, double flush = 0)
   double base = 0, tip = 0;
   for (int i = N - 1; i >= 0; --i) {
     const double length = robot.tubes[static_cast<std::size_t>(i)].length;
-    const double lowest = tip - length, highest = base;
+    const double highest = base, lowest = std::min(tip - length, highest);  // where flush tubes leave rounding
     q.beta[i] = !chance(random, flush) ? uniform(random, lowest, highest) : chance(random, 0.5) ? lowest : highest;
     q.alpha[i] = uniform(random, -std::numbers::pi, std::numbers::pi);
     base = q.beta[i];
