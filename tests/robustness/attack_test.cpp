@@ -36,11 +36,8 @@ test::Tally attack(const char* name, int cases, const Draw& draw, const ModelOf&
 }
 
 template <int N>
-using Known = std::optional<test::Known<N>>;
-
-template <int N>
-std::pair<Model<N>, Known<N>> without_effects(const Robot<N>& robot, test::Random&) {
-  return {Model<N>(robot), test::Known<N>{}};
+auto without_effects(const Robot<N>& robot, test::Random&) {
+  return std::pair(Model<N>(robot), test::Known<N>{});
 }
 
 TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
@@ -70,7 +67,7 @@ TYPED_TEST_SUITE(RandomRobotsWithEffects, test::OneToThreeTubes);
 TYPED_TEST(RandomRobotsWithEffects, OfAnySize) {
   constexpr int N = TypeParam::N;
   const auto with_effects = [](const Robot<N>& robot, test::Random& random) {
-    return std::pair(Model<N, Catalogue>(robot, test::random_effects<N>(random, 3)), Known<N>{});
+    return std::pair(Model<N, Catalogue>(robot, test::random_effects<N>(random, 3)), std::optional<test::Known<N>>{});
   };
   const test::Tally tally = attack<N>("effects", 400, test::sane_case<N>, with_effects);
   EXPECT_GT(tally.evaluations.at("cold").size(), 0u);
@@ -108,7 +105,7 @@ TYPED_TEST(RandomRobotsWithEffects, OfTheMaterial) {
           .twist = helix.template get<0>(i)};
     known.tip_force = weight.template get<0>() * robot.gravity +
                       Vec3(weight.template get<1>(), weight.template get<2>(), weight.template get<3>());
-    return std::pair(Model<N, Catalogue>(robot, effects), Known<N>{known});
+    return std::pair(Model<N, Catalogue>(robot, effects), known);
   };
   EXPECT_GT(attack<N>("effects of the material", 200, test::sane_case<N>, of_the_material).judged, 0);
 }
@@ -117,7 +114,7 @@ TYPED_TEST(RandomRobotsWithEffects, OfTheMaterial) {
 TYPED_TEST(RandomRobotsWithEffects, TooSmallToMatter) {
   constexpr int N = TypeParam::N;
   const auto hardly_any = [](const Robot<N>& robot, test::Random&) {
-    return std::pair(Model<N, Catalogue>(robot, test::hardly_any_effects<N>()), Known<N>{test::Known<N>{}});
+    return std::pair(Model<N, Catalogue>(robot, test::hardly_any_effects<N>()), test::Known<N>{});
   };
   EXPECT_GT(attack<N>("hardly any effects", 400, test::sane_case<N>, hardly_any).judged, 0);
 }

@@ -1,8 +1,8 @@
 #pragma once
 // Effects of the material of a tube once more, for the independent rod: they share no code with include/ctcr/effects.
 #include <Eigen/Dense>
+#include <array>
 #include <cmath>
-#include <cstdlib>
 
 #include "ctcr/robot/tube.hpp"
 

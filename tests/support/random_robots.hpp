@@ -80,7 +80,8 @@ Joints<N> random_joints(const Robot<N>& robot, Random& random, double flush = 0)
   double base = 0, tip = 0;
   for (int i = N - 1; i >= 0; --i) {
     const double length = robot.tubes[static_cast<std::size_t>(i)].length;
-    const double highest = base, lowest = std::min(tip - length, highest);  // where flush tubes leave rounding
+    // Where tubes are flush, rounding may put one limit beyond the other.
+    const double highest = base, lowest = std::min(tip - length, highest);
     q.beta[i] = !chance(random, flush) ? uniform(random, lowest, highest) : chance(random, 0.5) ? lowest : highest;
     q.alpha[i] = uniform(random, -std::numbers::pi, std::numbers::pi);
     base = q.beta[i];

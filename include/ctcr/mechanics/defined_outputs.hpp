@@ -72,7 +72,7 @@ CTCR_INLINE bool are_defined(const Solution<N>& out, double reach) noexcept {
   return sum < rotation_error * rotation_error && farthest <= limit * limit;
 }
 
-/// Of numbers whose squares overflow, too; NaN of a vector that is none.
+/// Length of a vector, also where the squares of its components overflow.
 inline double length_of(const Vec3& v) noexcept { return std::hypot(v[0], v[1], v[2]); }
 
 /// The axes of R made perpendicular, of length 1 and right-handed, one after the other.

@@ -146,7 +146,8 @@ private:
         for (int i = 0; i < 6; ++i) by_force(i, j) = rows_[unknowns + i][force_ + j];
         for (int i = 0; i < 3; ++i) C(i, j) = rows_[Pass::rows + i][force_ + j];
       }
-      const Mat3 stiffer = Mat3::Identity() - by_position * C;
+      const Eigen::Matrix<double, 6, 3> by_push =
+          by_force * solved<3>(Mat3::Identity() - by_position * C, Mat3(Mat3::Identity()));
       for (int j = unknowns; j < end; ++j) {
         Vec3 A, direct = Vec3::Zero();
         for (int i = 0; i < 3; ++i) {
@@ -155,7 +156,7 @@ private:
           const int l = j % Window::size;
           direct[i] = push_[std::size_t(j / Window::size)][std::size_t(i)].d[l / lane_count][l % lane_count];
         }
-        const Vec6 change = by_force * solved(stiffer, Vec3(direct + by_position * A));
+        const Vec6 change = by_push * (direct + by_position * A);
         for (int i = 0; i < 6; ++i) rows_[unknowns + i].add(j, change[i]);
       }
     }

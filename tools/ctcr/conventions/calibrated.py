@@ -38,7 +38,7 @@ class Calibrated:
         return float(np.exp(self.log_error.mean())) if self.solved.mean() > settings.CONVENTION_SOLVED else np.inf
 
     def at(self, rows: Mask) -> "Calibrated":
-        """The same of some readings (K,)."""
+        """The same fit, judged by some readings (K,) only."""
         return replace(self, error=self.error[rows])
 
     @property
@@ -61,7 +61,7 @@ class Calibrated:
         return self._exceeds(self._of_jitter)
 
     def _exceeds(self, typical: float) -> bool:
-        """Whether so many readings tell this from a lesser typical error [m], beyond the odds against a cause."""
+        """Whether the likelihood of a smaller typical error [m] outweighs the prior odds against a cause."""
         return 3 * len(self.error) * np.log(self.typical / typical) > settings.DECISIVE + settings.UNASKED
 
     @property
@@ -155,5 +155,5 @@ def jump(name: str, sd: float) -> float:
 
 
 def dearer(numbers: int, readings: int) -> float:
-    """Factor on errors of so many positions that more numbers of a fit cost, by the Bayesian information criterion."""
+    """By which factor the errors of a fit must fall to pay for more numbers, by the Bayesian information criterion."""
     return float(np.exp(0.5 * numbers * np.log(3 * readings) / (3 * readings)))

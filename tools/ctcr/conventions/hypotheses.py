@@ -54,7 +54,7 @@ class Hypothesis:
     def frees(self) -> tuple[str, ...]:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:
-            return parameters.FRAME
+            return parameters.OF_FRAME
         if self.sensor is not None:
             return ("tracker.sensor_position.",)
         if self.offset:

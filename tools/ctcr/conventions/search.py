@@ -97,7 +97,10 @@ def _alike(tried: list[Tried]) -> list[Tried]:
 
 
 def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
-    """Each of two hypotheses with others that are likely where it holds: one of the tracker takes in much."""
+    """Each of two hypotheses paired with others that are likely once it holds.
+
+    A hypothesis on the tracker may absorb the error of another one.
+    """
     for one in pair.wrong:
         singles, _ = _likely(_applied(case, (one,)))
         yield from ((one, *single) for single in singles)
@@ -120,9 +123,7 @@ def _needed(case: Case, tried: Tried) -> Iterator[bool]:
 def _rows_of(hypothesis: Hypothesis, readings: Measurements) -> Mask:
     """The readings (K,) that it changes; all where it changes the robot file."""
     new = hypothesis.change(readings)
-    rows = ((new.load_space != readings.load_space) | (new.position != readings.position).any(axis=1)[:, None]).any(
-        axis=1
-    )
+    rows = (new.load_space != readings.load_space).any(axis=1) | (new.position != readings.position).any(axis=1)
     return rows if rows.any() else ~rows
 
 
@@ -237,8 +238,8 @@ def _is_far(before: Robot, after: Robot) -> bool:
 def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> bool:
     """Whether an offset moves a home, or another frame the frame, farther than calibration would.
 
-    A physical effect may ask for another offset, too, but that leaves more of the error of the half without it: so an
-    offset is a right angle, or leaves hardly anything.
+    A physical effect may look like an offset, but an offset explains it in part only. So an offset is a right angle, or
+    leaves hardly any of the error that there is without it.
     """
     uncertainty = tried.case.robot.uncertainty
     if one.registers:

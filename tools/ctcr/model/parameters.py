@@ -68,7 +68,7 @@ CONFOUNDED = ("length_mm", "translation_offset_mm")  # readings determine little
 _UNCERTAINTY_UNITS = {"mm": 1e-3, "deg": pi / 180, "percent": 0.01}  # SI per unit; percent: of the value
 LEAST_EIGENVALUE = 1e-6  # of correlations: beyond it they leave a sum of parameters exactly known
 ANYWHERE = {"position": settings.SENSOR_BESIDE, "rotation": settings.ANY_ANGLE}  # [m], [rad] where nothing is known
-FRAME = ("tracker.position.", "tracker.rotation.")  # how the names of the tracker frame's parameters begin
+OF_FRAME = ("tracker.position.", "tracker.rotation.")  # how the names of the tracker frame's parameters begin
 
 
 @dataclass(frozen=True)
