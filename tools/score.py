@@ -89,12 +89,15 @@ def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
             scores["outside the catalogue: the quantity it depends on named, where it is one"] = dependence
     elif unseen:
         scores["below what the data can show: nothing else named"] = not classes or all(found)
+    elif group == "fuller_model":
+        scores["forms of a fuller model: named"] = all(found)
+        scores["forms of a fuller model: nothing else named"] = len(classes) == sum(found)
     elif hidden:
         scores["right class first"] = bool(classes) and any(identity in classes[0] for identity in hidden)
         scores["exactly the right classes"] = exact
         if len(hidden) > 1:
             scores["pairs: both found"] = all(found)
-    if said and hidden:
+    if said and hidden and group != "fuller_model":
         limit = 1.1 if truth["noise"] == "jitter" else 1.25
         within = said["rms_mm"]["with_effects"] <= limit * floor_mm(truth)
         scores["locked error within its limit of the floor"] = within

@@ -152,11 +152,18 @@ TEST(Clearance, LeansAlongTheMomentThatTheOuterTubeHandsOver) {
   const double inner = robot.tubes[0].EI(), outer = robot.tubes[1].EI(),
                u = outer * robot.tubes[1].curvature / (inner + outer);
   Catalogue::On<2> effects;
-  for (const double size : {1e-3, 0.02, 1.0}) {
-    effect<Clearance, 2>(effects).values = {0.5, 0.015, size, 0, 1};
+  const auto leans_by = [&](double law, double size) {
+    effect<Clearance, 2>(effects).values = {0.5, 0.015, size, 0, law};
     const Vec3 turn = rotation_vector(solved(robot, effects, q, {}).rotation * rotation_matrix(Vec3(0, 0, -0.7)));
-    EXPECT_LE((turn - Vec3(0.04 * u - 0.015 * std::tanh(inner * u / size), 0, 0)).norm(), 1e-9) << size;
-  }
+    EXPECT_LE(turn.tail<2>().norm(), 1e-9);
+    return (0.04 * u - turn.x()) / 0.015;
+  };
+  const double moment = inner * u;
+  for (const double size : {1e-3, 0.02, 1.0}) EXPECT_NEAR(leans_by(1, size), std::tanh(moment / size), 1e-7) << size;
+  EXPECT_NEAR(leans_by(2, moment), 1, 1e-7);
+  EXPECT_NEAR(leans_by(2, 1e3 * moment) / 1e-3, std::pow(2, 0.25), 1e-4);
+  for (const double size : {1e-4, 1e-3})
+    EXPECT_NEAR(leans_by(2, size * moment), std::pow(2, 0.25) / std::sqrt(size), size * size / std::sqrt(size)) << size;
 }
 
 TEST(TipWeight, IsATipLoad) {

@@ -47,7 +47,7 @@ class Energy:
         self._node_force[-1] += force
         self._loaded = bool(np.any(self._node_force))
         self.offset = 2 * grid.n_elements + np.concatenate([[0], np.cumsum(grid.tip_node + 1)])
-        self.size = int(self.offset[-1])
+        self.size, self.bends = int(self.offset[-1]), 2 * grid.n_elements  # the unknowns, those that are curvatures
         self._twist_stiffness = [gj / grid.h[:n] for gj, n in zip(torsion, grid.tip_node, strict=True)]
 
     def theta(self, x: np.ndarray, tube: int) -> np.ndarray:

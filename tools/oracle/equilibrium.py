@@ -102,8 +102,8 @@ def _descent_step(hessian: np.ndarray, gradient: np.ndarray) -> tuple[np.ndarray
 
 def _size(energy: Energy, step: np.ndarray) -> float:
     """Largest change: angle in rad, or turn of the backbone over 0.1 m."""
-    n = 2 * energy.grid.n_elements
-    return max(0.1 * np.max(np.abs(step[:n]), initial=0.0), np.max(np.abs(step[n:])), np.finfo(float).tiny)
+    bends, angles = np.abs(step[: energy.bends]), np.abs(step[energy.bends :])
+    return max(0.1 * np.max(bends, initial=0.0), np.max(angles), np.finfo(float).tiny)
 
 
 def carry_over(last: Energy, x: np.ndarray, energy: Energy) -> np.ndarray:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from bore import radial_gaps
 from friction import FrictionLaw
 from hidden_cause import Truth, cause, n_tubes, signed
 from mechanics import Joint, standard_profile
@@ -27,6 +28,12 @@ def clearance(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
         i + 1: Joint(stiffness=100.0, centring=2e-3 / angle, gap=angle) for i, angle in enumerate(gap)
     }
     return {"gap_rad": gap}
+
+
+@cause("clearance")
+def loose_bores(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
+    setup.mechanics.bore_gap = size * rng.uniform(0.7, 1.3, n_tubes(setup) - 1) * radial_gaps(setup.mechanics.robot)
+    return {"radial_gap_m": setup.mechanics.bore_gap}
 
 
 def _over_curved_part(tube: Tube, shape: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:

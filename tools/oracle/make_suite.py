@@ -136,6 +136,10 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
         for hidden in WRONG_SHEETS:
             for _ in range(2):
                 yield "wrong_sheet", order(*((name, 1.0) for name in hidden), noise=noise, wrong_sheet=True)
+    for noise in ("jitter", "realistic"):
+        for share_of_gap in (0.1, 0.3, 1.0):
+            for _ in range(2):
+                yield "fuller_model", order(("loose_bores", share_of_gap), noise=noise)
 
 
 def entries(shift: int = 0) -> list[Entry]:

@@ -7,6 +7,7 @@ energy: after every small move each elastic-plastic joint's anchor has followed 
 from itertools import product
 
 import numpy as np
+from bore import loose_pose
 from equilibrium import Pose
 from grid import COINCIDENT
 from kernel import Problem
@@ -28,13 +29,19 @@ class Specimen:
         self._jump: dict[Place, float] = {}
         self._fibres = [np.zeros((round(tube.length / FIBRE) + 1, 2)) for tube in mechanics.robot.tubes]
         self._last: tuple[Configuration, Problem, np.ndarray] | None = None
+        self._loose: dict[bytes, Pose] = {}  # of tubes with centre lines of their own: slow, and stops are revisited
 
     def settle(self, beta: np.ndarray, alpha: np.ndarray, force: np.ndarray, time: float = 0.0) -> Pose:
         """Pose in the base frame after one small move to the joints beta (N,) [m], alpha (N,) [rad], with the known
         tip force (3,) [N]. Without history the way there does not matter."""
         mechanics = self.mechanics
-        here = configure(mechanics, beta, alpha, self._element_length, time)
         force = force + mechanics.tip_force
+        if mechanics.bore_gap is not None:
+            key = np.concatenate([beta, alpha, force]).tobytes()
+            if key not in self._loose:
+                self._loose[key] = loose_pose(mechanics.robot, beta, alpha, force, mechanics.bore_gap, self._sensor)
+            return self._loose[key]
+        here = configure(mechanics, beta, alpha, self._element_length, time)
         history = self._history(here, beta) if mechanics.has_history else {}
         problem = here.problem(force, **history)
         x = problem.minimise(self._guess(here, problem, alpha))

@@ -36,11 +36,10 @@ inline constexpr EffectParameter pivot_depth{.name = "pivot",
                                              .role = Role::shape,
                                              .meaning = "depth behind the front of the plate about which it tilts"};
 
-/// Tilt [rad] under a moment [N m]: `tilt` along it, reached at about `size`, plus compliance times the moment.
+/// Tilt [rad] under a moment [N m]: `tilt` along `direction`, plus compliance times the moment.
 template <class P>
-[[nodiscard]] std::array<P, 2> tilt_under(const std::array<P, 2>& moment, const P& tilt, const P& size,
-                                          const P& compliance) noexcept {
-  const std::array<P, 2> direction = saturated(moment, size);
+[[nodiscard]] std::array<P, 2> tilt_under(const std::array<P, 2>& moment, const P& tilt,
+                                          const std::array<P, 2>& direction, const P& compliance) noexcept {
   return {tilt * direction[0] + compliance * moment[0], tilt * direction[1] + compliance * moment[1]};
 }
 
@@ -72,12 +71,12 @@ inline constexpr EffectInfo info{
     .title = "Clearance between the tubes",
     .physics = "Tubes fit loosely: where an outer tube ends, the inner ones lean to one side.",
     .signature =
-        "A kink of constant size whose direction follows a bending moment: it does not grow with the moment. "
-        "It turns with the tubes, with a load or without.",
+        "A kink whose direction follows a bending moment and whose size grows less than in proportion to it. It turns "
+        "with the tubes, with a load or without.",
     .measure = "Turn one tube against the others; load with different weights: a kink stays, a compliance grows.",
     .look_alikes = "entry_clearance softening sensor_offset",
-    .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709",
-    .starts = {{{"law", 1.0}}},
+    .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709; law 2: beams in a bore",
+    .starts = {{{"law", 1.0}}, {{"law", 2.0}}},
 };
 inline constexpr std::array parameters{
     EffectParameter{.name = "tilt",
@@ -87,12 +86,15 @@ inline constexpr std::array parameters{
                     .soft = {-0.03, 0.03},
                     .hard = {-0.2, 0.2},
                     .per_tube = true,
-                    .meaning = "largest tilt at the tip of a tube (none at the innermost)"},
-    detail::saturation_moment,
+                    .meaning =
+                        "tilt of the inner tubes at the tip of a tube (none at the innermost); with laws 0 and 1 "
+                        "at most"},
+    detail::saturation_moment.named("moment", "at which 76 % of the tilt is reached; with law 2 all of it"),
     detail::contact_compliance,
-    two_laws.named("law",
-                   "moment along which the tubes lean: 0 the one that the inner tubes carry out of the outer "
-                   "tube; 1 the one that the outer tube carries just before its end and hands over there"),
+    choice_of_law(3,
+                  "the moment along which the tubes lean, and how far: 0 the one that the inner tubes carry out of the "
+                  "outer tube, up to the tilt; 1 the one that the outer tube carries just before its end and hands "
+                  "over there, up to the tilt; 2 the latter, and the tilt grows with its square root"),
 };
 }  // namespace clearance
 
@@ -147,16 +149,24 @@ inline constexpr std::array parameters{
 /// Where a tube ends, the tubes inside it tilt within its clearance: along the moment that they carry on, or along the one
 /// that the ending tube hands over to them. Without a load and beyond all curved parts the first one is zero; the second one
 /// is how hard the tubes bend each other.
+///
+/// Law 2 is that of beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones
+/// (EI = k together) there with the force F, and holds them l behind it, across the gap, with -F l = M. Between, their
+/// curvatures part by c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the
+/// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)). `tools/oracle/bore.py`
+/// finds the same without these assumptions.
 template <int N, class P = double>
 struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
   void breakpoint(Breakpoint<P, N>& b) const noexcept {
     if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
-    const bool hands_over = value(this->template get<3>()) > 0.5;
+    const double law = value(this->template get<3>());
+    const P& size = this->template get<1>();
+    const std::array<P, 2>& moment = law > 0.5 ? b.near_moment[std::size_t(b.tube)] : b.moment;
     detail::kink(
-        b, detail::tilt_under(hands_over ? b.near_moment[std::size_t(b.tube)] : b.moment, this->template get<0>(b.tube),
-                              this->template get<1>(), this->template get<2>()));
+        b, detail::tilt_under(moment, this->template get<0>(b.tube),
+                              law > 1.5 ? rooted(moment, size) : saturated(moment, size), this->template get<2>()));
   }
 };
 
@@ -182,9 +192,10 @@ struct EntryClearance : EffectValues<entry_clearance::parameters, N, P> {
     if (b.kind != Breakpoint<P, N>::Kind::plate) return;
     const P& depth = this->template get<3>();
     const auto moment = detail::moment_about(b, depth);
-    detail::kink_about(
-        b, detail::tilt_under(moment, this->template get<0>(), this->template get<1>(), this->template get<2>()),
-        depth);
+    detail::kink_about(b,
+                       detail::tilt_under(moment, this->template get<0>(), saturated(moment, this->template get<1>()),
+                                          this->template get<2>()),
+                       depth);
   }
 };
 

@@ -61,9 +61,11 @@ struct EffectParameter {
   }
 };
 
-/// Selects one of two constitutive laws; its meaning says which.
-inline constexpr EffectParameter two_laws{
-    .name = "law", .neutral = 0, .sigma = 1, .soft = {0, 1}, .hard = {0, 1}, .role = Role::choice};
+/// Selects one of several constitutive laws, numbered from 0; the meaning says which.
+[[nodiscard]] constexpr EffectParameter choice_of_law(int laws, std::string_view meaning) {
+  const Interval numbers{0.0, laws - 1.0};
+  return {.name = "law", .soft = numbers, .hard = numbers, .role = Role::choice, .meaning = meaning};
+}
 
 /// What measurements must have for an effect to be seen.
 struct Needs {

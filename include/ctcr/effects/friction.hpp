@@ -66,9 +66,9 @@ inline constexpr std::array parameters{
                     .meaning =
                         "weight of sliding by insertion against sliding by rotation: 0 insertion does not matter, "
                         "1 it counts as much as rotation at the outer radius of the inner tube"},
-    two_laws.named("law",
-                   "constitutive law: 0 a bristle, stiffness decreasing towards the limit (Dahl); 1 elastic with "
-                   "constant stiffness up to the limit, which rotation and insertion share"),
+    choice_of_law(2,
+                  "constitutive law: 0 a bristle, stiffness decreasing towards the limit (Dahl); 1 elastic with "
+                  "constant stiffness up to the limit, which rotation and insertion share"),
 };
 }  // namespace friction
 

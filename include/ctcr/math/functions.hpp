@@ -46,6 +46,15 @@ std::array<S, 2> saturated(const std::array<S, 2>& v, const S& size) noexcept {
   return {f * v[0], f * v[1]};
 }
 
+/// sqrt(|v|/size) v/|v|, but in proportion to v where |v| is much smaller than `size`; of length 1 at |v| = size.
+template <class S>
+std::array<S, 2> rooted(const std::array<S, 2>& v, const S& size) noexcept {
+  const S scale = inverse(size), z = (v[0] * v[0] + v[1] * v[1]) * (scale * scale);
+  const double f = std::sqrt(std::sqrt(2 / (1 + value(z))));
+  const S along = mapped(z, f, -0.25 * f / (1 + value(z))) * scale;
+  return {along * v[0], along * v[1]};
+}
+
 /// x kept within [low, high]; at a limit it has the limit's derivatives.
 template <class S>
 S clamped(const S& x, const S& low, const S& high) noexcept {
