@@ -26,12 +26,8 @@ from robot import Robot
 
 ELEMENT_LENGTH = 3e-3  # [m]
 GUIDE = 40e-3  # [m] behind the plate: a lean dies out within some ten millimetres
-CONTACT_STIFFNESS = (
-    1e5,
-    1e7,
-    1e9,
-    1e10,
-)  # [N/m per metre]: the last one yields by a tenth of a micrometre, those before lead to it
+# [N/m per metre]: tubes that press with 10 N on a millimetre yield to the last one by a micrometre; the rest lead to it
+CONTACT_STIFFNESS = (1e5, 1e7, 1e9, 1e10)
 
 
 def radial_gaps(robot: Robot) -> np.ndarray:
@@ -86,8 +82,7 @@ def loose(robot: Robot, beta: np.ndarray, alpha: np.ndarray, force: np.ndarray, 
     start = np.maximum(beta, -GUIDE)
     behind = np.unique(np.concatenate([np.linspace(-GUIDE, 0.0, round(GUIDE / ELEMENT_LENGTH)), start[start < 0]]))
     behind = behind[behind >= start[0]]
-    s = np.concatenate([behind[:-1], np.cumsum(np.concatenate([[0.0], grid.h]))]) if behind.size else grid.h
-    plate = max(behind.size - 1, 0)
+    s, plate = np.concatenate([behind, np.cumsum(grid.h)]), behind.size - 1
     h = np.diff(s)
     first = np.array([int(np.argmin(np.abs(s - b))) for b in start])
     first[-1] = plate
@@ -128,9 +123,8 @@ class LooseEnergy:
         width[1:] += 0.5 * robot.h
         width[:-1] += 0.5 * robot.h
         self._weight = contact_stiffness * width
-        self._held = [np.arange(max(robot.first[i + 1], 1), robot.tip[i + 1] + 1) for i in range(robot.n - 1)]
-        if robot.n > 1:  # the outermost tube holds its neighbour behind the plate as well
-            self._held[-1] = np.arange(max(int(robot.first[-2]), 1), robot.tip[-1] + 1)
+        begins = np.append(robot.first[1:-1], robot.first[-2:-1])  # the outermost tube holds behind the plate, too
+        self._held = [np.arange(max(a, 1), b + 1) for a, b in zip(begins, robot.tip[1:], strict=True)]
 
     def value(self, x: np.ndarray) -> float:
         """[J] up to a constant."""
