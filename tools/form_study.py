@@ -52,7 +52,7 @@ file is exact and the readings are free of noise, so all that is left is the err
 the variance of the signal at the tip that the fitted effect takes away; 99 % leave a tenth of the amplitude, 90 % a
 third. Written by `tools/form_study.py --keep`.
 
-| effect | the fuller model | signal [mm RMS] | explained, median | least | laws chosen |
+| effect | the fuller model | signal [mm RMS] | explained [%], median | least [%] | laws chosen |
 |---|---|---|---|---|---|"""
 OF_FRICTION = f"""
 ## The limit of friction
@@ -63,7 +63,7 @@ the limit is Coulomb's coefficient times the radius times the contact forces, wh
 the root of the gap. So the catalogue's coefficient belongs to a pair of tubes, not to a material, and is a twentieth to
 a sixth of Coulomb's. {CONFIGURATIONS} random configurations each:
 
-| robot | gaps | tubes | coefficient / Coulomb's | explained |
+| robot | gaps | tubes | coefficient / Coulomb's | explained [%] |
 |---|---|---|---|---|"""
 
 
@@ -176,12 +176,12 @@ def page(found: list[Explained], limits: list[tuple[str, float, int, float, floa
         laws = ", ".join(f"{law:.0f}" for law in sorted({one.law for one in mine if one.law is not None}))
         shares = [one.share for one in mine]
         lines.append(
-            f"| {identity} | {physics} | {median(one.signal_mm for one in mine):.2f} | {100 * median(shares):.1f} % "
-            f"| {100 * min(shares):.1f} % | {laws} |"
+            f"| {identity} | {physics} | {median(one.signal_mm for one in mine):.2f} | {100 * median(shares):.1f} "
+            f"| {100 * min(shares):.1f} | {laws} |"
         )
     lines.append(OF_FRICTION)
     for robot, scale, pair, coefficient, share in limits:
-        lines.append(f"| {robot} | x {scale:g} | {pair + 1} in {pair + 2} | {coefficient:.3f} | {100 * share:.0f} % |")
+        lines.append(f"| {robot} | x {scale:g} | {pair + 1} in {pair + 2} | {coefficient:.3f} | {100 * share:.0f} |")
     return "\n".join(lines) + "\n"
 
 
