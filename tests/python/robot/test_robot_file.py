@@ -52,6 +52,12 @@ def test_si_units():
     assert known["tubes.3.bending_stiffness"] == 0
 
 
+@pytest.mark.parametrize("key", ["-0.25", "true", "null", "2026-01-01"])
+@pytest.mark.parametrize("name", ["accuracy_95_deg", "name", "length_mm", "translation_mm_per_rev", "tracker_frame_mm"])
+def test_a_key_that_is_no_text_is_a_fault(name, key):
+    assert faults(re.sub(rf"\b{name}:", f"{key}:", TEXT, count=1))
+
+
 def test_bending_stiffness():
     """A given bending stiffness replaces modulus and diameters."""
     lines = [line for line in TEXT.splitlines() if "diameter_mm" not in line and "density" not in line]

@@ -101,7 +101,7 @@ def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
     roll, roll_deg = tracker.get("sensor_roll", "known"), tracker.get("sensor_roll_deg")
     if roll not in ("known", "unknown") or not isinstance(roll_deg, int | float | None):  # faults of their own
         return data
-    kept = {key: value for key, value in tracker.items() if not key.startswith("sensor_roll")}
+    kept = {key: value for key, value in tracker.items() if key not in ("sensor_roll", "sensor_roll_deg")}
     if roll_deg is not None or roll == "unknown":
         kept["sensor_rotation_vector_rad"] = None if roll_deg is None else [0.0, 0.0, radians(roll_deg)]
     if roll == "unknown" and isinstance(uncertainty, dict):
