@@ -19,8 +19,8 @@ from itertools import pairwise
 
 import numpy as np
 from backbone import Backbone, dead_load_gradient, dead_load_hessian, dead_load_work, make_backbone
-from energy import SHORTEST_TRANSMISSION
-from equilibrium import Pose, minimise
+from energy import SHORTEST_TRANSMISSION, add_springs
+from equilibrium import Pose, minimise, turned
 from grid import make_grid
 from robot import Robot
 
@@ -174,8 +174,7 @@ class LooseEnergy:
         energy += 0.5 * np.sum(stiffness * stretch**2)
         np.add.at(gradient, turn + 1, stiffness * stretch)
         np.add.at(gradient, turn, -stiffness * stretch)
-        for a, b, sign in ((0, 0, 1), (1, 1, 1), (0, 1, -1), (1, 0, -1)):
-            hessian[turn + a, turn + b] += sign * stiffness
+        add_springs(hessian, turn, turn + 1, stiffness)
         base = robot.base_stiffness[tube]
         energy += 0.5 * base * (theta[0] - robot.alpha[tube]) ** 2
         gradient[node] += base * (theta[0] - robot.alpha[tube])
@@ -213,7 +212,8 @@ class LooseEnergy:
 
     def _contact(self, x: np.ndarray, pair: int, gradient: np.ndarray, hessian: np.ndarray) -> float:
         robot, held, gap = self.robot, self._held[pair], self.robot.gap[pair]
-        apart, distance = self._apart(x, pair), self.distance(x, pair)
+        apart = self._apart(x, pair)
+        distance = np.linalg.norm(apart, axis=1)
         touching = distance > gap
         if not np.any(touching):
             return 0.0
@@ -270,7 +270,6 @@ def loose_pose(
 
 def tip_of(here: Loose, x: np.ndarray, tube: int = 0) -> Pose:
     """Pose of the tip of a tube in the base frame."""
-    backbone, node, angle = make_backbone(here.along(x, tube), here.h), here.tip[tube], here.theta(x, tube)[-1]
-    c, s = np.cos(angle), np.sin(angle)
-    turned = backbone.rotation[node] @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return Pose(backbone.position[node] + np.array([0.0, 0.0, here.s[0]]), turned)
+    backbone, node = make_backbone(here.along(x, tube), here.h), here.tip[tube]
+    turn = turned(backbone.rotation[node], here.theta(x, tube)[-1])
+    return Pose(backbone.position[node] + np.array([0.0, 0.0, here.s[0]]), turn)

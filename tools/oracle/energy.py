@@ -127,7 +127,7 @@ class Energy:
         hessian[diagonal, diagonal] += np.repeat(h * self.grid.stiffness, 2)
         for i, (start, tip) in enumerate(zip(self.grid.curved_node, self.grid.tip_node, strict=True)):
             node = self.offset[i] + np.arange(tip)
-            _add_springs(hessian, node, node + 1, self._twist_stiffness[i])
+            add_springs(hessian, node, node + 1, self._twist_stiffness[i])
             hessian[self.offset[i], self.offset[i]] += self._base_stiffness[i]
             element, node = np.arange(start, tip), node[start:]
             quarter = 0.25 * h[start:tip] * np.sum(u[start:tip] * own[i], axis=1)
@@ -149,7 +149,8 @@ class Energy:
         return force, stiffness
 
 
-def _add_springs(hessian: np.ndarray, a: np.ndarray, b: np.ndarray, stiffness: np.ndarray) -> None:
+def add_springs(hessian: np.ndarray, a: np.ndarray, b: np.ndarray, stiffness: np.ndarray) -> None:
+    """Springs (n,) between the unknowns a and b (n,), no unknown twice in either."""
     hessian[a, a] += stiffness
     hessian[b, b] += stiffness
     hessian[a, b] -= stiffness

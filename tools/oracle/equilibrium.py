@@ -123,9 +123,13 @@ def carry_over(last: Energy, x: np.ndarray, energy: Energy) -> np.ndarray:
 def tip_pose(energy: Energy, x: np.ndarray, tube: int) -> Pose:
     """Pose of the tip of one tube; its material frame is the Bishop frame turned by the tube's angle."""
     backbone, node = energy.backbone(x), energy.grid.tip_node[tube]
-    c, s = np.cos(energy.theta(x, tube)[-1]), np.sin(energy.theta(x, tube)[-1])
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return Pose(backbone.position[node], backbone.rotation[node] @ turn)
+    return Pose(backbone.position[node], turned(backbone.rotation[node], energy.theta(x, tube)[-1]))
+
+
+def turned(frame: np.ndarray, angle: float) -> np.ndarray:
+    """A torsion-free frame (3, 3) turned by a tube's angle: its material frame."""
+    c, s = np.cos(angle), np.sin(angle)
+    return frame @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _extrapolate(poses: list[Pose], refinements: tuple[int, ...]) -> Pose:

@@ -49,7 +49,8 @@ class Mechanics:
     drive_hardening: float = 0.0  # [1/(N m)^2] relative loss of drive compliance per squared torque
     entry: Joint | None = None
     sleeve: dict[int, Joint] = field(default_factory=dict)  # at the end of tube i, which the inner ones leave
-    bore_gap: np.ndarray | None = None  # (N-1,) [m] radial: each tube has its own centre line in the bore of the next
+    # (N-1,) [m] radial: tubes with own centre lines, each in the bore of the next. Of the rest tip_force alone acts.
+    bore_gap: np.ndarray | None = None
     tip_force: np.ndarray = field(default_factory=lambda: np.zeros(3))  # [N] base frame, constant
     cable_pull: float = 0.0  # [N] along the tip's tangent, backwards
     obstacle: np.ndarray | None = None  # (O, 5) centre, radius [m], Hertz stiffness [N/m^2.5]

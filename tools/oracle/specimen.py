@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 from bore import loose_pose
-from equilibrium import Pose
+from equilibrium import Pose, turned
 from grid import COINCIDENT
 from kernel import Problem
 from mechanics import Configuration, Mechanics, configure
@@ -199,6 +199,5 @@ def _places(here: Configuration) -> dict[Place, int]:
 
 def _pose(here: Configuration, problem: Problem, x: np.ndarray, tube: int) -> Pose:
     position, rotation = problem.frames(x)
-    node, angle = here.tip_node[tube], problem.theta(x, tube)[-1]
-    c, s = np.cos(angle), np.sin(angle)
-    return Pose(position[node], rotation[node] @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    node = here.tip_node[tube]
+    return Pose(position[node], turned(rotation[node], problem.theta(x, tube)[-1]))

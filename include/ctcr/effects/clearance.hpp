@@ -151,7 +151,7 @@ inline constexpr std::array parameters{
 /// is how hard the tubes bend each other.
 ///
 /// Law 2 is that of beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones
-/// (EI = k together) there with the force F, and holds them l behind it, across the gap, with -F l = M. Between, their
+/// (EI = k together) there with the force F, and holds them l behind it, across the gap, with F l = |M|. Between, their
 /// curvatures part by c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the
 /// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)). `tools/oracle/bore.py`
 /// finds the same without these assumptions.
