@@ -69,7 +69,7 @@ def make(number: int) -> Path:
     from mechanics import Mechanics
     from robot import from_description
     from ruamel.yaml import YAML
-    from session import Setup, draw_noise, draw_plan, run_session
+    from session import Habit, Setup, draw_noise, draw_plan, run_session
     from simulate import SHARE_OF_UNCERTAINTY, draw_bench
     from tables import write_robot, write_table
 
@@ -80,7 +80,7 @@ def make(number: int) -> Path:
     sheet = description(ROBOTS[number % len(ROBOTS)], rng)
     wide = {key: value / SHARE_OF_UNCERTAINTY for key, value in sheet["uncertainty"].items()}
     bench = draw_bench(sheet | {"uncertainty": wide}, rng)
-    plan = draw_plan(joint_range(sheet), rng)
+    plan = draw_plan(joint_range(sheet), rng, Habit())
     poses = list(run_session(Setup(bench, plan, Mechanics(from_description(bench.description)))))
     position, rotation = np.array([p for p, _ in poses]), Rotation.concatenate([r for _, r in poses])
     kind = NOISES[number // len(ROBOTS) % 2]

@@ -51,6 +51,7 @@ def oracle_case(random: np.random.Generator):
     from ctcr.table import measurements
     from kernel import NoEquilibriumError
     from make_set import NOISES, Order, write_set
+    from session import Habit
     from wrong_conventions import Case
 
     effect = random.choice([None, *ORACLE_EFFECTS])
@@ -59,7 +60,7 @@ def oracle_case(random: np.random.Generator):
         seed=int(random.integers(2**31)),
         noise=str(random.choice(NOISES)),
         robot=str(random.choice(ROBOTS)),
-        loads=bool(random.integers(2)),
+        habit=Habit(loads=bool(random.integers(2))),
         wrong_sheet=bool(random.random() < 0.25),
     )
     with TemporaryDirectory() as folder:

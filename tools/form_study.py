@@ -89,7 +89,7 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
     from mechanics import Mechanics
     from robot import from_description
     from scipy.spatial.transform import Rotation
-    from session import Setup, draw_plan, run_session
+    from session import Habit, Setup, draw_plan, run_session
     from simulate import Bench
     from tables import pose_fields, write_robot, write_table
 
@@ -99,7 +99,7 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
     tracker = description["tracker"]
     turn = Rotation.from_rotvec(tracker["rotation_vector_rad"])
     bench = Bench(description, np.zeros(n), np.zeros(n), 1e-3 * np.array(tracker["position_mm"]), turn)
-    plan = draw_plan(joint_range(description), np.random.default_rng([41, seed]))
+    plan = draw_plan(joint_range(description), np.random.default_rng([41, seed]), Habit())
     setup, plain = (Setup(bench, plan, Mechanics(from_description(description))) for _ in range(2))
     hide(setup, cause, float(size or 1), np.random.default_rng([43, seed]))
     poses, without = list(run_session(setup)), list(run_session(plain))

@@ -63,8 +63,25 @@ def answer(folder: Path, answers: Path, seconds: int) -> dict | None:
     return json.loads(target.read_text())
 
 
-def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
-    """By score: whether this set of a group counts for it and passes; a score that is absent does not apply."""
+def judged_varied(said: dict | None, truth: dict) -> list[tuple[str, bool]]:
+    """The scores of a set with any robot, any way to measure and any number of causes; one for each cause and name."""
+    classes = [set(effect["class"]) for effect in (said or {}).get("effects", [])]
+    hidden = [set(cause["ids"]) for cause in truth["causes"] if cause["ids"]]
+    seen = [set(cause["ids"]) for cause in truth["causes"] if cause["ids"] and cause["chi_square"] > VISIBLE]
+    if said and said["verdict"] == "wrong_convention":  # a frame that far off is to be corrected first
+        return [("varied, wrong sheets: a fix only where one is needed", truth["wrong_sheet"])]
+    number = "no cause" if not seen else "one cause" if len(seen) == 1 else "two causes" if len(seen) == 2 else "more"
+    scores = [(f"varied, {number}: causes named", any(ids & members for members in classes)) for ids in seen]
+    scores += [(f"varied, {number}: names right", any(ids & members for ids in hidden)) for members in classes]
+    if not hidden:
+        scores.append(("varied: nothing named where nothing is hidden", bool(said) and not classes))
+    return scores
+
+
+def judged(said: dict | None, truth: dict, group: str) -> list[tuple[str, bool]]:
+    """Scores for which this set of a group counts, and whether it passes."""
+    if group == "varied":
+        return judged_varied(said, truth)
     classes, hidden = [effect["class"] for effect in (said or {}).get("effects", [])], truth["classes"]
     word = said["verdict"] if said else "failed"
     found = [any(identity in members for members in classes) for identity in hidden]
@@ -101,7 +118,7 @@ def judged(said: dict | None, truth: dict, group: str) -> dict[str, bool]:
         limit = 1.1 if truth["noise"] == "jitter" else 1.25
         within = said["rms_mm"]["with_effects"] <= limit * floor_mm(truth)
         scores["locked error within its limit of the floor"] = within
-    return scores
+    return [*scores.items()]
 
 
 def floor_mm(truth: dict) -> float:
@@ -189,7 +206,7 @@ def report(chosen: list[str], said: dict[str, dict | None], truths: dict[str, di
     hits, counts, confusion = Counter(), Counter(), Counter()
     for name in chosen:
         truth = truths[name]
-        for score, passed in judged(said[name], truth, groups[name]).items():
+        for score, passed in judged(said[name], truth, groups[name]):
             hits[score, truth["noise"]] += passed
             counts[score, truth["noise"]] += 1
         named = " + ".join("|".join(e["class"]) for e in (said[name] or {}).get("effects", [])) or "nothing"

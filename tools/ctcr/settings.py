@@ -205,7 +205,6 @@ CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least
 
 # ---- Diagnosis: probabilities of explanations
 
-FORM_ERROR = 0.15  # part of an effect's signal that its form errs by: lumped laws follow full mechanics to 10 to 20 %
 FORM_MENDED = 0.1  # mean share of what is left that an effect explains which mends the form of another
 OUTSIDE_CATALOGUE = 0.1  # prior odds of a cause outside the catalogue
 SECOND_CAUSE = 0.5  # prior odds of a second cause beside the first

@@ -27,7 +27,7 @@ _TUBES = {
 _MODULUS = {"table2": 58.0, "B": 62.0, "two_tubes": 60.0, "four_tubes": 55.0}  # [GPa]
 ROBOTS = tuple(_TUBES)
 # [m] from the home position; the outermost tip stays in front of the plate
-_RETRACTION = {2: (0.055, 0.050), 3: (0.060, 0.045, 0.045), 4: (0.060, 0.045, 0.040, 0.040)}
+_RETRACTION = {1: (0.045,), 2: (0.055, 0.050), 3: (0.060, 0.045, 0.045), 4: (0.060, 0.045, 0.040, 0.040)}
 _KEYS = ("inner_diameter_mm", "outer_diameter_mm", "length_mm", "curved_length_mm", "curvature_per_m")
 _MATERIAL = {"poisson_ratio": 0.3, "density_kg_m3": 6450.0}
 _TRACKER = {
@@ -73,15 +73,18 @@ class JointRange:
                 return np.concatenate([beta, rng.uniform(-np.pi, np.pi, beta.size)])
 
 
-def describe(robot: str) -> dict:
-    """Content of the robot.yaml of one of ROBOTS."""
-    tubes, (position, rotation) = _TUBES[robot], _PLACE[robot]
+def describe(robot: str, rng: np.random.Generator | None = None) -> dict:
+    """Content of the robot.yaml of one of ROBOTS, or of one that is drawn: drawn1 to drawn4, by the number of tubes."""
+    if robot.startswith("drawn"):
+        tubes, modulus = _draw_tubes(int(robot.removeprefix("drawn")), rng), float(rng.integers(50, 71))
+        position, rotation = rng.uniform([-60, -60, -180], [60, 60, -90]).round().tolist(), rng.uniform(-1.2, 1.2, 3)
+    else:
+        tubes, modulus, (position, rotation) = _TUBES[robot], _MODULUS[robot], _PLACE[robot]
     return {
         "name": robot,
         "gravity": [0.0, -9.80665, 0.0],
         "tubes": [
-            {"youngs_modulus_GPa": _MODULUS[robot]} | _MATERIAL | dict(zip(_KEYS, tube[:5], strict=True))
-            for tube in tubes
+            {"youngs_modulus_GPa": modulus} | _MATERIAL | dict(zip(_KEYS, tube[:5], strict=True)) for tube in tubes
         ],
         "actuation": {
             "translation_mm_per_rev": 2.0,
@@ -89,9 +92,25 @@ def describe(robot: str) -> dict:
             "home_translation_mm": [tube[5] - tube[2] for tube in tubes],
             "home_rotation_deg": [0.0 for _ in tubes],
         },
-        "tracker": _TRACKER | {"position_mm": position, "rotation_vector_rad": rotation},
+        "tracker": _TRACKER | {"position_mm": position, "rotation_vector_rad": np.round(rotation, 2).tolist()},
         "uncertainty": dict(_UNCERTAINTY),
     }
+
+
+def _draw_tubes(n_tubes: int, rng: np.random.Generator) -> list[tuple[float, ...]]:
+    """Tubes as in _TUBES, rounded as a data sheet has them."""
+    bore, diameters = rng.uniform(0.5, 1.0), []
+    for _ in range(n_tubes):
+        outer = bore + 2 * rng.uniform(0.09, 0.18)
+        diameters.append((bore, outer))
+        bore = outer + rng.uniform(0.06, 0.2)
+    outermost = 1e3 * _RETRACTION[n_tubes][-1] + rng.uniform(12.0, 22.0)  # what stays in front of the plate
+    steps = np.append(rng.uniform(40.0, 55.0, n_tubes - 1), outermost)
+    tips = np.cumsum(steps[::-1])[::-1].round()
+    bases = -np.cumsum(np.append(rng.uniform(110.0, 150.0), rng.uniform(60.0, 90.0, n_tubes - 1)))[::-1].round()
+    curved = rng.uniform(38.0, 62.0, n_tubes).round()
+    curvatures = np.append(rng.uniform(7.0, 11.0), rng.uniform(3.0, 6.0, n_tubes - 1)).round(1)
+    return np.column_stack([np.round(diameters, 2), tips - bases, curved, curvatures, tips]).tolist()
 
 
 def joint_range(description: dict) -> JointRange:

@@ -39,9 +39,10 @@ def n_tubes(setup: Setup) -> int:
     return len(setup.mechanics.robot.tubes)
 
 
-def signed(setup: Setup, rng: np.random.Generator) -> np.ndarray:
-    """(N,) about 1 in size, either sign."""
-    return rng.choice([-1.0, 1.0], n_tubes(setup)) * rng.uniform(0.7, 1.3, n_tubes(setup))
+def signed(setup: Setup, rng: np.random.Generator, at_least: int = 1) -> np.ndarray:
+    """(N,), or more, about 1 in size, either sign."""
+    count = max(n_tubes(setup), at_least)
+    return rng.choice([-1.0, 1.0], count) * rng.uniform(0.7, 1.3, count)
 
 
 def unit(rng: np.random.Generator) -> np.ndarray:

@@ -12,7 +12,7 @@ from specimen import Specimen
 
 @cause("sensor_offset")
 def sensor_offset(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
-    offset = 1e-3 * size * np.append(signed(setup, rng)[:2], rng.uniform(-0.5, 0.5))
+    offset = 1e-3 * size * np.append(signed(setup, rng, 2)[:2], rng.uniform(-0.5, 0.5))
     setup.sensings.append(lambda position, rotation, time: (position + rotation.apply(offset), rotation))
     return {"offset_m": offset}
 

@@ -9,7 +9,7 @@ FOLDER/../truth/NAME.yaml (elsewhere with --truth).
 import argparse
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +21,12 @@ from mechanics import Mechanics
 from robot import from_description
 from ruamel.yaml import YAML
 from scipy.spatial.transform import Rotation
-from session import Noise, Plan, Setup, draw_noise, draw_plan, run_session
+from session import Habit, Noise, Plan, Setup, draw_noise, draw_plan, run_session
 from simulate import Bench, draw_bench
-from tables import pose_fields, write_robot, write_table
+from tables import POSE, pose_fields, write_robot, write_table
 
 NOISES = ("jitter", "realistic")
+DESIGN = 1000  # part of the seed that draws a robot: beyond those of the hidden causes
 
 
 @dataclass(frozen=True)
@@ -36,14 +37,13 @@ class Order:
     seed: int
     noise: str = "jitter"
     robot: str = "table2"
-    loads: bool = True
-    stream: bool = False
+    habit: Habit = field(default_factory=Habit)
     modulus_scatter: float = 1.0  # of the true moduli, relative to what the description promises
     wrong_sheet: bool = False  # whether the description is wrong by far more than it says
 
-    @property
-    def streamed(self) -> bool:
-        return self.stream or any(CAUSES[name].streamed for name, _ in self.effects)
+    def __post_init__(self) -> None:
+        if any(CAUSES[name].streamed for name, _ in self.effects):
+            object.__setattr__(self, "habit", replace(self.habit, stream=True, scattered=False))
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ def measure(order: Order, *, even: bool = False) -> Session:
     bench_rng, plan_rng, noise_rng, *hidden_rng = (
         np.random.default_rng([order.seed, part]) for part in range(3 + len(order.effects))
     )
-    description = describe(order.robot)
-    plan = draw_plan(joint_range(description), plan_rng, loads=order.loads, stream=order.streamed)
+    description = describe(order.robot, np.random.default_rng([order.seed, DESIGN]))
+    plan = draw_plan(joint_range(description), plan_rng, order.habit)
     promised = description | {"uncertainty": dict(description["uncertainty"])}
     promised["uncertainty"]["youngs_modulus_percent"] *= order.modulus_scatter
     bench = draw_bench(promised, bench_rng, wrong=order.wrong_sheet)
@@ -101,6 +101,7 @@ def answer(order: Order, session: Session) -> dict:
     turned = session.rotation[::THINNED] * Rotation.concatenate([rotation for _, rotation in plain]).inv()
     inliers = ~session.noise.outlier
     left = detectability(session.bench, few, session.description["tracker"], order.noise, moved, turned)
+    alone = [left.chi_square] if len(order.effects) == 1 else _each_alone(order, session, few)
     ids = {name: CAUSES[name].ids for name, _ in order.effects}
     in_catalogue = sorted({i for name in ids for i in ids[name]})
     missing = [name for name in ids if not CAUSES[name].absorbed]
@@ -110,16 +111,18 @@ def answer(order: Order, session: Session) -> dict:
         "verdict": "not_in_catalogue" if strange else "identified" if in_catalogue else "nothing_missing",
         "classes": in_catalogue,
         "causes": [
-            {"name": name, "ids": list(ids[name]), "size": size, "values": _plain(truth)}
-            for (name, size), truth in zip(order.effects, session.truths, strict=True)
+            {"name": name, "ids": list(ids[name]), "size": size, "chi_square": chi_square, "values": _plain(truth)}
+            for (name, size), chi_square, truth in zip(order.effects, alone, session.truths, strict=True)
         ],
         "robot": order.robot,
         "noise": order.noise,
         "seed": order.seed,
         "half": "reporting" if order.seed % 2 else "tuning",
         "wrong_sheet": order.wrong_sheet,
-        "loads": order.loads,
-        "streamed": order.streamed,
+        "loads": order.habit.loads,
+        "streamed": order.habit.stream,
+        "scattered": order.habit.scattered,
+        "orientation": order.habit.orientation,
         "rows": len(session.plan.time),
         "outliers": np.flatnonzero(session.noise.outlier).tolist(),
         "rms_mm": {
@@ -132,6 +135,19 @@ def answer(order: Order, session: Session) -> dict:
         "chi_square_after_calibration": left.chi_square,
         "bench": bench_facts(session.bench),
     }
+
+
+def _each_alone(order: Order, session: Session, few: Plan) -> list[float]:
+    """Chi-square after calibration of what each cause adds to the others."""
+    out = []
+    for k in range(len(order.effects)):
+        others = tuple((name, size if j != k else 0.0) for j, (name, size) in enumerate(order.effects))
+        without = measure(replace(order, effects=others))
+        moved = (session.position - without.position)[::THINNED]
+        turned = session.rotation[::THINNED] * without.rotation[::THINNED].inv()
+        tracker = session.description["tracker"]
+        out.append(detectability(session.bench, few, tracker, order.noise, moved, turned).chi_square)
+    return out
 
 
 def bench_facts(bench: Bench) -> dict:
@@ -158,7 +174,8 @@ def write_set(order: Order, folder: Path, truth: Path) -> dict:
     session = measure(order)
     n_tubes = len(session.description["tubes"])
     write_robot(folder / "robot.yaml", session.description)
-    write_table(folder / "measurements.csv", session.rows(), n_tubes, ("force",), ("t_s", "run"))
+    pose = POSE if order.habit.orientation else POSE[:3]
+    write_table(folder / "measurements.csv", session.rows(), n_tubes, ("force",), ("t_s", "run"), pose)
     content = answer(order, session)
     truth.parent.mkdir(parents=True, exist_ok=True)
     unfinished = truth.with_suffix(".unfinished")
@@ -174,9 +191,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--size", action="append", default=[], type=float, help="one for each effect; 1 if left out")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", choices=NOISES, default="jitter")
-    parser.add_argument("--robot", choices=ROBOTS, default="table2")
+    drawn = [f"drawn{n}" for n in range(1, 5)]
+    parser.add_argument("--robot", choices=[*ROBOTS, *drawn], default="table2", help="drawn3: a random one of 3 tubes")
+    parser.add_argument("--runs", type=int, default=Habit.runs)
+    parser.add_argument("--stops", type=int, default=Habit.stops, help="of a run on the way out")
     parser.add_argument("--loads", action=argparse.BooleanOptionalAction, default=True, help="hung masses")
     parser.add_argument("--stream", action="store_true", help="readings in motion, as a delay needs them")
+    parser.add_argument("--scattered", action="store_true", help="random places instead of paths out and back")
+    parser.add_argument("--orientation", action=argparse.BooleanOptionalAction, default=True, help="of the sensor")
     parser.add_argument("--wrong-sheet", action="store_true", help="robot.yaml is wrong by far more than it says")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--truth", type=Path)
@@ -185,8 +207,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if len(sizes) != len(given.effect):
         parser.error(f"{len(given.effect)} effects but {len(sizes)} sizes")
     effects = tuple(zip(given.effect, sizes, strict=True))
-    plan = {"loads": given.loads, "stream": given.stream, "wrong_sheet": given.wrong_sheet}
-    order = Order(effects, given.seed, given.noise, given.robot, **plan)
+    habit = Habit(given.runs, given.stops, given.loads, given.stream, given.scattered, given.orientation)
+    order = Order(effects, given.seed, given.noise, given.robot, habit, wrong_sheet=given.wrong_sheet)
     truth = given.truth or given.out.parent / "truth" / f"{given.out.name}.yaml"
     content = write_set(order, given.out, truth)
     print(f"{given.out}: {content['rows']} rows; effect {content['rms_mm']['effect']:.3f} mm RMS; answer in {truth}")

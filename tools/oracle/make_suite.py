@@ -22,8 +22,10 @@ from time import monotonic
 for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are too small for more
     os.environ.setdefault(_threads, "1")
 
+import numpy as np  # noqa: E402
 from hidden import CAUSES  # noqa: E402
 from make_set import Order, write_set  # noqa: E402
+from session import Habit  # noqa: E402
 
 SUITE = Path(__file__).resolve().parents[2] / "build" / "suite"
 SIZES = (0.5, 1.0, 2.0)
@@ -84,6 +86,20 @@ WRONG_SHEETS = (
     ("precurvature_profile",),
     ("friction", "tip_load"),
 )
+# What cannot act in one robot: of each of these at most one. The mechanics of tubes in bores has no other cause yet.
+IN_BORES = (
+    "friction softening anisotropy clearance torsional_compliance entry_compliance entry_clearance contact "
+    "precurvature_profile straight_curvature helical_precurvature"
+).split()
+EXCLUSIVE = (
+    ("precurvature_profile", "straight_curvature", "helical_precurvature"),
+    ("entry_compliance", "entry_clearance"),
+    *(("loose_bores", name) for name in IN_BORES),
+)
+OF_SEVERAL_TUBES = ("friction", "clearance", "loose_bores", "torsional_compliance")
+# Runs and stops of each: 28 to 1000 rows on paths, 40 to 400 scattered.
+PATHS, SCATTERED = ((12, 14), (1, 14), (3, 20), (25, 20), (6, 10)), ((1, 40), (1, 120), (8, 25), (10, 40), (4, 15))
+VARIED = 48
 ROBOTS = ("table2", "B", "table2", "two_tubes", "table2", "four_tubes", "table2", "B", "table2")  # in turn
 
 
@@ -111,7 +127,8 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
     for noise, n in (("jitter", 12), ("realistic", 12)):
         for k in range(n):
             scatter = 1.35 if k in (4, 5) else 1.0
-            yield ("control", order(noise=noise, modulus_scatter=scatter, loads=k not in (6, 7), stream=k == 11))
+            habit = Habit(loads=k not in (6, 7), stream=k == 11)
+            yield "control", order(noise=noise, modulus_scatter=scatter, habit=habit)
     for k, name in enumerate(REALISTIC_EFFECTS):
         for n, size in enumerate(SIZES):
             seed = 10000 * shift + 3000 + 10 * k + 2 * n + (k + n) % 2
@@ -128,7 +145,7 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
                 yield "look_alike", order((name, 1.5), seed=seed, robot="table2")
     for name in UNLOADED_LOOK_ALIKES:
         for _ in range(2):
-            yield "look_alike", order((name, 1.0), loads=False)
+            yield "look_alike", order((name, 1.0), habit=Habit(loads=False))
     for noise in ("jitter", "realistic"):
         for name in STRANGE:
             yield "strange", order((name, 1.0), noise=noise)
@@ -140,6 +157,30 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
         for share_of_gap in (0.1, 0.3, 1.0):
             for _ in range(2):
                 yield "fuller_model", order(("loose_bores", share_of_gap), noise=noise)
+    for _ in range(VARIED):
+        yield "varied", varied(next(seeds))
+
+
+def varied(seed: int) -> Order:
+    """Anything that a laboratory may bring: any robot, any way to measure, none to five causes of any size."""
+    rng = np.random.default_rng([seed, 77])
+    n_tubes = int(rng.integers(1, 5))
+    scattered = bool(rng.random() < 0.5)
+    runs, stops = (SCATTERED if scattered else PATHS)[rng.integers(5)]
+    loads, orientation = bool(rng.random() < 0.7), bool(rng.random() < 0.7)
+    noise = ("jitter", "realistic")[rng.integers(2)]
+    possible = [name for name in (*EFFECTS, "loose_bores") if n_tubes > 1 or name not in OF_SEVERAL_TUBES]
+    if scattered:
+        possible.remove("delay")
+    if noise == "realistic":
+        possible.remove("field_distortion")
+    chosen: list[str] = []
+    for name in rng.permutation(possible)[: rng.choice(6, p=(0.2, 0.3, 0.2, 0.1, 0.1, 0.1))].tolist():
+        if not any(name in rivals and not set(rivals).isdisjoint(chosen) for rivals in EXCLUSIVE):
+            chosen.append(name)
+    effects = tuple((name, float(np.exp(rng.uniform(np.log(0.5), np.log(2.0))).round(2))) for name in chosen)
+    habit = Habit(runs, stops, loads, scattered=scattered, orientation=orientation)
+    return Order(effects, seed, noise, f"drawn{n_tubes}", habit, wrong_sheet=bool(rng.random() < 0.2))
 
 
 def entries(shift: int = 0) -> list[Entry]:
@@ -182,8 +223,8 @@ def write_index(folder: Path, suite: Sequence[Entry]) -> None:
                     order.robot,
                     order.seed,
                     half,
-                    int(order.loads),
-                    int(order.streamed),
+                    int(order.habit.loads),
+                    int(order.habit.stream),
                 )
             )
     os.replace(unfinished, path)

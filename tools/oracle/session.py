@@ -1,7 +1,8 @@
 """A measurement session with something hidden: the plan, the way of the joints in time, what the tracker reads.
 
-A set has 12 runs with hung masses in turn. At stops: 14 stops on a straight line in joint space, out, back, and the
-seventh once more from the outward side. Streamed: the same way without stopping, at two speeds, read at 8 Hz.
+A set usually has 12 runs with hung masses in turn. At stops: 14 stops on a straight line in joint space, out, back, and
+the seventh once more from the outward side. Streamed: the same way without stopping, at two speeds, read at 8 Hz.
+Scattered: random places, each visited once.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from simulate import FIELD_LENGTH, QUANTILE_95, Bench
 from specimen import Specimen, small_moves
 
-RUNS, STOPS, REVISITED = 12, 14, 6
 MASSES = (0.0, 0.010, 0.020)  # [kg]
 DWELL, APPROACH, RETURN = 2.0, 9.0, 6.0  # [s] from stop to stop, to the next run, to the revisited stop
 SETTLED = 1.5  # [s] of rest before a reading at a stop
@@ -28,6 +28,18 @@ SMALLEST_SWEEP = np.deg2rad(40.0)
 
 Drive = Callable[[np.ndarray], np.ndarray]  # joints (2N,) wanted -> joints had; may remember
 Sensing = Callable[[np.ndarray, Rotation, float], tuple[np.ndarray, Rotation]]  # position, rotation, time [s]
+
+
+@dataclass(frozen=True)
+class Habit:
+    """How a laboratory measures."""
+
+    runs: int = 12
+    stops: int = 14  # on the way out, or scattered places, of each run; streamed runs have none
+    loads: bool = True  # hung masses in turn: of runs, or of parts of a run where there are too few
+    stream: bool = False
+    scattered: bool = False
+    orientation: bool = True  # whether the sensor tells it
 
 
 @dataclass(frozen=True)
@@ -51,16 +63,20 @@ class Plan:
         return np.vstack([between, self.at(end)])
 
 
-def draw_plan(allowed: JointRange, rng: np.random.Generator, *, loads: bool = True, stream: bool = False) -> Plan:
-    """A plan at stops or streamed, with hung masses in turn or without."""
+def draw_plan(allowed: JointRange, rng: np.random.Generator, habit: Habit) -> Plan:
+    """A plan at stops, streamed or scattered, with hung masses in turn or without."""
     rows, knots = [], [(0.0, np.concatenate([allowed.home, np.zeros(allowed.home.size)]))]
     time = 0.0
-    for run in range(RUNS):
-        start, end = _draw_line(allowed, rng)
-        mass = MASSES[run % len(MASSES)] if loads else 0.0
+    for run in range(habit.runs):
+        mass = MASSES[run % len(MASSES)] if habit.loads else 0.0
         time += APPROACH
+        if habit.scattered:
+            visits = [allowed.draw(rng).round(9) for _ in range(habit.stops)]
+            start = visits[0]
+        else:
+            start, end = _draw_line(allowed, rng)
         knots.append((time - SETTLED, start))
-        if stream:
+        if habit.stream:
             length = STREAM_TIMES[run % 2]
             knots += [(time, start), (time + length / 2, end), (time + length, start)]
             for moment in np.arange(0.0, length + 1e-9, STREAM_PERIOD):
@@ -68,11 +84,15 @@ def draw_plan(allowed: JointRange, rng: np.random.Generator, *, loads: bool = Tr
                 rows.append((time + moment, run, start + part * (end - start), mass))
             time += length
             continue
-        stops = start + np.linspace(0, 1, STOPS)[:, None] * (end - start)
-        visits = [*stops, *stops[-2::-1], stops[REVISITED]]
+        if not habit.scattered:
+            stops = start + np.linspace(0, 1, habit.stops)[:, None] * (end - start)
+            visits = [*stops, *stops[-2::-1], stops[(habit.stops - 1) // 2]]
         for k, stop in enumerate(visits):
-            time += 0.0 if k == 0 else RETURN if k == len(visits) - 1 else DWELL
+            far = habit.scattered or k == len(visits) - 1
+            time += 0.0 if k == 0 else RETURN if far else DWELL
             knots += [(time - SETTLED, stop), (time, stop)]
+            if habit.loads and habit.runs < len(MASSES):
+                mass = MASSES[k * len(MASSES) // len(visits)]
             rows.append((time, run, stop, mass))
     knots = [knot for k, knot in enumerate(knots) if k == 0 or knot[0] > knots[k - 1][0]]
     return Plan(

@@ -17,14 +17,19 @@ def pose_fields(position: np.ndarray, rotation: np.ndarray) -> list[float]:
 
 
 def write_table(
-    path: Path, rows: Iterable[Iterable[float]], n_tubes: int, loads: tuple[str, ...], leading: tuple[str, ...] = ()
+    path: Path,
+    rows: Iterable[Iterable[float]],
+    n_tubes: int,
+    loads: tuple[str, ...],
+    leading: tuple[str, ...] = (),
+    pose: tuple[str, ...] = POSE,
 ) -> None:
-    """Rows of (leading, beta, alpha, loads, pose) as CSV with 12 significant digits."""
+    """Rows of (leading, beta, alpha, loads, pose) as CSV with 12 significant digits; pose: its columns."""
     tubes = range(1, n_tubes + 1)
     names = [*leading, *(f"beta{i}_m" for i in tubes), *(f"alpha{i}_rad" for i in tubes)]
-    names += [column for load in loads for column in LOADS[load]] + list(POSE)
+    names += [column for load in loads for column in LOADS[load]] + list(pose)
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = [",".join(names)] + [",".join(f"{float(value) + 0.0:.12g}" for value in row) for row in rows]
+    lines = [",".join(names)] + [",".join(f"{float(value) + 0.0:.12g}" for value in row[: len(names)]) for row in rows]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

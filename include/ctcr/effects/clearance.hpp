@@ -76,6 +76,7 @@ inline constexpr EffectInfo info{
     .measure = "Turn one tube against the others; load with different weights: a kink stays, a compliance grows.",
     .look_alikes = "entry_clearance softening sensor_offset",
     .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709; law 2: beams in a bore",
+    .form_error = 0.3,
     .starts = {{{"law", 1.0}}, {{"law", 2.0}}},
 };
 inline constexpr std::array parameters{

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import make_suite
@@ -17,7 +18,7 @@ from mechanics import Mechanics
 from numpy.testing import assert_allclose, assert_array_equal
 from robot import from_description
 from scipy.spatial.transform import Rotation
-from session import Plan, Setup, draw_noise, draw_plan, run_session
+from session import Habit, Plan, Setup, draw_noise, draw_plan, run_session
 from simulate import draw_bench
 
 ROOT = Path(__file__).parents[3]
@@ -25,7 +26,7 @@ ROOT = Path(__file__).parents[3]
 
 def plan_of(seed: int, every: int, robot: str = "table2", **kind: bool) -> Plan:
     """A plan with fewer readings on the same way."""
-    plan = draw_plan(joint_range(describe(robot)), np.random.default_rng([seed, 1]), **kind)
+    plan = draw_plan(joint_range(describe(robot)), np.random.default_rng([seed, 1]), Habit(**kind))
     few = slice(None, None, every)
     return replace(plan, time=plan.time[few], run=plan.run[few], joints=plan.joints[few], mass=plan.mass[few])
 
@@ -165,7 +166,7 @@ def test_field_error_is_smooth():
 def test_plan(robot):
     """A plan visits every stop twice and keeps the order of the tubes."""
     allowed = joint_range(describe(robot))
-    plan, n = draw_plan(allowed, np.random.default_rng(5)), allowed.home.size
+    plan, n = draw_plan(allowed, np.random.default_rng(5), Habit()), allowed.home.size
     assert len(plan.time) == 12 * 28 and np.all(np.diff(plan.time) > 0) and np.all(np.diff(plan.knot_time) > 0)
     for run in range(12):
         joints = plan.joints[plan.run == run]
@@ -177,10 +178,9 @@ def test_plan(robot):
         assert_allclose(plan.at(time), joints, atol=1e-12)
 
 
-def test_reproducible(tmp_path, monkeypatch):
+def test_reproducible(tmp_path):
     """The same order gives the same set, another seed another one."""
-    monkeypatch.setattr("session.RUNS", 1)
-    order = Order((("backlash_rotation", 1.0), ("sensor_offset", 0.5)), 4, "realistic", "two_tubes")
+    order = Order((("backlash_rotation", 1.0), ("sensor_offset", 0.5)), 4, "realistic", "two_tubes", Habit(1))
     tables = []
     for name, seed in (("a", 4), ("b", 4), ("c", 5)):
         write_set(replace(order, seed=seed), tmp_path / name, tmp_path / "truth" / f"{name}.yaml")
@@ -189,10 +189,9 @@ def test_reproducible(tmp_path, monkeypatch):
     assert (tmp_path / "a" / "robot.yaml").read_text() == (tmp_path / "c" / "robot.yaml").read_text()
 
 
-def test_hiding(monkeypatch):
+def test_hiding():
     """A hidden effect changes neither the bench nor the plan."""
-    monkeypatch.setattr("session.RUNS", 1)
-    plain, hidden = measure(Order((), 6)), measure(Order((("sensor_offset", 1.0),), 6))
+    plain, hidden = (measure(Order(effects, 6, habit=Habit(1))) for effects in ((), (("sensor_offset", 1.0),)))
     assert_array_equal(plain.plan.joints, hidden.plan.joints)
     assert_array_equal(plain.noise.position, hidden.noise.position)
     offset = plain.rotation.inv().apply(hidden.position - plain.position)
@@ -229,3 +228,25 @@ def test_suite():
         assert sum(entry.order.wrong_sheet for entry in own) >= 20
     ids = {i for name in make_suite.EFFECTS for i in CAUSES[name].ids}
     assert ids == set(make_suite.EFFECTS)
+
+
+@pytest.mark.parametrize("tubes", range(1, 5))
+def test_drawn_robots(tubes):
+    """A drawn robot nests, its outermost tip stays in front of the plate, and the product reads its file."""
+    for seed in range(40):
+        description = describe(f"drawn{tubes}", np.random.default_rng(seed))
+        robot = from_description(description)
+        assert len(robot.tubes) == tubes
+        for inner, outer in pairwise(robot.tubes):
+            assert inner.outer_diameter < outer.inner_diameter
+        allowed = joint_range(description)
+        assert np.all(allowed.length[-1] + allowed.home[-1] - allowed.retraction[-1] > 0.01)
+        assert len(draw_plan(allowed, np.random.default_rng(seed), Habit(2, 5, scattered=True)).time) == 10
+
+
+def test_scattered_plan():
+    """Scattered places are visited once each, and masses change within a single run."""
+    allowed = joint_range(describe("table2"))
+    plan = draw_plan(allowed, np.random.default_rng(5), Habit(1, 30, scattered=True))
+    assert len(np.unique(plan.joints, axis=0)) == 30 and sorted(set(plan.mass)) == [0.0, 0.01, 0.02]
+    assert np.all(np.diff(plan.knot_time) > 0)

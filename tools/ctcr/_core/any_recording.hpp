@@ -68,6 +68,7 @@ struct CatalogueParameter {
 struct CatalogueEntry {
   std::string id, title, physics, signature, measure, look_alikes, reference;
   bool order, time, orientation, loads, gravity;
+  double form_error;
   std::vector<std::string> acts_on;                   ///< as ActsOn
   std::vector<std::vector<std::string>> variants;     ///< names of parameters; at least one
   std::vector<std::map<std::string, double>> starts;  ///< values of parameters; may be empty

@@ -66,7 +66,7 @@ std::vector<CatalogueEntry> catalogue() {
     const EffectInfo& i = effect.info;
     out.push_back({std::string(i.id), std::string(i.title), std::string(i.physics), std::string(i.signature),
                    std::string(i.measure), std::string(i.look_alikes), std::string(i.reference), i.needs.order,
-                   i.needs.time, i.needs.orientation, i.needs.loads, i.needs.gravity, acts_on_of<Effect>(),
+                   i.needs.time, i.needs.orientation, i.needs.loads, i.needs.gravity, i.form_error, acts_on_of<Effect>(),
                    variants_of(i, effect.parameters), starts_of(i)});
   });
   return out;
@@ -98,6 +98,7 @@ void bind_effects(nb::module_& m) {
       .def_ro("orientation", &CatalogueEntry::orientation)
       .def_ro("loads", &CatalogueEntry::loads)
       .def_ro("gravity", &CatalogueEntry::gravity)
+      .def_ro("form_error", &CatalogueEntry::form_error, "Part of its signal by which its form errs.")
       .def_ro("acts_on", &CatalogueEntry::acts_on, "Of joints, rod, tip, reading: where its hooks act.")
       .def_ro("variants", &CatalogueEntry::variants,
               "Names of the parameters of each way in which it may act; at least one.")

@@ -4,16 +4,16 @@ An explanation is noise alone, a set of effects, or a cause that no effect of th
 effects. Four likelihoods weigh them:
 
 - the log evidence of the joint fits. The form of an effect is known only to a part of its signal, so differences
-  smaller than what an error of the form makes decide nothing: they are divided by 1 + FORM_ERROR^2 times the evidence;
+  smaller than what an error of the form makes decide nothing: they are divided by 1 + form_error^2 times the evidence;
 - the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
-  FORM_ERROR if nothing else acts, uniform if something does;
+  the form error of the effects if nothing else acts, uniform if something does;
 - the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
   for an imitation (2 (1 - s)), and exponential with mean FORM_MENDED for one that only mends the form of another;
 - the test of the residual against the noise as stated.
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,7 @@ from ctcr import settings
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import CandidateFit, Round
 from ctcr.diagnose.selection import Accepted
+from ctcr.effects import catalogue
 from ctcr.show.wording import join
 
 
@@ -68,7 +69,7 @@ def weighed(
     if accepted:
         share = float(np.median([*explained])) if residual.structured and explained else 1.0
         left = math.sqrt(min(max(1 - share, 0.0), 1.0))
-        complete = _form(left)
+        complete = _form(left, form_error(accepted))
     else:
         complete = _noise(residual)
     values = sum(_plausible(a.best) for a in accepted)
@@ -83,14 +84,15 @@ def weighed(
         own, others = refitted[a.id].score, complete + values - _plausible(a.best)
         for rival in (one for one in refitted.values() if one.id not in found):  # in place of it
             behind = 0.0 if rival.id in a.ids else max(own - rival.score, 0.0)
-            tempered = behind / (1 + settings.FORM_ERROR**2 * max(own, 0.0))
+            tempered = behind / (1 + catalogue.get(a.id).form_error ** 2 * max(own, 0.0))
             weigh(found - {a.id} | {rival.id}, others - tempered + _plausible(rival))
         mends = _mends(a.explained) if len(accepted) > 1 else np.inf
         weigh(found - {a.id}, others - min(a.log_evidence - cost, mends))
     for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
         gain, remains = further.score - cost, left * math.sqrt(1 - min(max(further.explained, 0.0), 1.0))
         gain = min(gain, _mends(further.explained)) if accepted else min(gain, 0.0)
-        weigh(found | {further.id}, rejects + gain + _form(remains) + values + _plausible(further))
+        alone = _form(remains, form_error([*accepted, further]))
+        weigh(found | {further.id}, rejects + gain + alone + values + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects
     shares = [1 - left**2, *(a.explained for a in accepted[1:])] if accepted else []
@@ -120,10 +122,21 @@ def _noise(residual: Residual) -> float:
     return math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
 
 
-def _form(left: float) -> float:
-    """Log density of the amplitude that an error of the form leaves."""
-    z = left / settings.FORM_ERROR
-    return math.log(2 / (settings.FORM_ERROR * math.sqrt(2 * math.pi))) - z * z / 2
+def form_error(effects: Sequence[Accepted | CandidateFit]) -> float:
+    """Part of the amplitude of their common signal by which the forms of effects err, as a standard deviation: each
+    errs by its own part of what it explains of the variance that those before it left."""
+    errors, remains, square = [catalogue.get(one.id).form_error for one in effects], 1.0, 0.0
+    for one, error in zip(effects, errors, strict=True):
+        explained = remains * min(max(one.explained, 0.0), 1.0)
+        remains -= explained
+        square += explained * error**2
+    return math.sqrt(square / (1 - remains)) if remains < 1 else max(errors)
+
+
+def _form(left: float, error: float) -> float:
+    """Log density of the amplitude that errors of the forms leave."""
+    z = left / error
+    return math.log(2 / (error * math.sqrt(2 * math.pi))) - z * z / 2
 
 
 def _density(share: float) -> float:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ctcr import settings
-from ctcr.diagnose.explanations import Explanation, probability, weighed
+from ctcr.diagnose.explanations import Explanation, form_error, probability, weighed
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import Round
 from ctcr.diagnose.selection import Accepted
@@ -75,7 +75,8 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     if odd:
         sentences.append(f"The data ask for implausible values: {listed(odd)}.")
     if residual.rejected:
-        odd = [run for run, share in explained.items() if share < 1 - (2 * settings.FORM_ERROR) ** 2]
+        usual = 1 - (2 * form_error(accepted)) ** 2
+        odd = [run for run, share in explained.items() if share < usual]
         sentences += [f"More than noise is left{f', most of it in {listed(odd)}' if odd else ''}."]
     if any(len(ids) > 1 for ids in classes):
         return Verdict("ambiguous", present, every, ["These data cannot tell some effects apart.", *sentences])

@@ -18,7 +18,7 @@ from ctcr.robot.description import Robot
 
 NEEDS = ("order", "time", "orientation", "loads", "gravity")  # that data must have for some effects
 # What is taken from the library as it is.
-KEPT_OF_EFFECTS = ("id", "title", "physics", "signature", "measure", "reference")
+KEPT_OF_EFFECTS = ("id", "title", "physics", "signature", "measure", "reference", "form_error")
 KEPT_OF_PARAMETERS = ("name", "unit", "meaning", "neutral", "sigma", "per_tube", "kind", "quantity")
 
 
@@ -52,6 +52,7 @@ class Effect:
     measure: str
     look_alikes: tuple[str, ...]  # effects that look alike in the data
     reference: str
+    form_error: float  # part of the amplitude of its signal by which its form errs, as a standard deviation
     needs: frozenset[str]  # some of NEEDS
     acts_on: frozenset[str]  # some of joints, rod, tip, reading
     parameters: tuple[EffectParameter, ...]

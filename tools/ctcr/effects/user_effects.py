@@ -110,6 +110,7 @@ class Effect:
     look_alikes: ClassVar[tuple[str, ...]] = ()
     reference: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
+    form_error: ClassVar[float] = 0.15  # part of the amplitude of its signal by which its form errs; as in the library
     parameters: ClassVar[list[Parameter]] = []
 
     @property
@@ -136,6 +137,7 @@ class Effect:
             **{name: " ".join(getattr(self, name).split()) for name in TEXTS},
             look_alikes=tuple(self.look_alikes),
             needs=frozenset(self.needs),
+            form_error=self.form_error,
             acts_on=frozenset(ACTS_ON[hook] for hook in self.hooks),
             parameters=parameters,
         )
