@@ -139,10 +139,9 @@ FIRST_UNASKED = 5.0  # ... and the first effect: what nothing asks for is mostly
 EXPLAINED = 0.25  # fraction of the unexplained chi-square that a further effect must explain: less is mostly spurious
 FIRST_EXPLAINED = 0.1  # the same for the first effect, beside which others may act
 SUSPECT_EXPLAINED = 0.5  # the same for a look-alike of an effect whose law is open: it imitates part of another law
-BEYOND_CROSS_VALIDATION = 200.0  # log evidence of a further effect that a linearised cross-validation cannot outweigh
 IMPROVEMENT = 0.1  # fraction of the error of left-out runs beyond jitter that a further effect must remove
 SURELY_NEEDED = 100.0  # log evidence of an earlier effect from which later ones surely did not make it superfluous
-MAX_EFFECTS = 4  # more causes than that no session can tell apart
+MAX_EFFECTS = 6  # more causes than that no session can tell apart
 
 # ---- Diagnosis: course of the forward selection
 

@@ -26,6 +26,7 @@ from simulate import Bench, draw_bench
 from tables import POSE, pose_fields, write_robot, write_table
 
 NOISES = ("jitter", "realistic")
+WRONG_SHEET_MARGIN = 12e-3  # [m] between ends of tubes whose lengths and homes are wrong by far
 DESIGN = 1000  # part of the seed that draws a robot: beyond those of the hidden causes
 
 
@@ -79,7 +80,10 @@ def measure(order: Order, *, even: bool = False) -> Session:
         np.random.default_rng([order.seed, part]) for part in range(3 + len(order.effects))
     )
     description = describe(order.robot, np.random.default_rng([order.seed, DESIGN]))
-    plan = draw_plan(joint_range(description), plan_rng, order.habit)
+    allowed = joint_range(description)
+    if order.wrong_sheet and order.robot not in ROBOTS:
+        allowed = replace(allowed, margin=WRONG_SHEET_MARGIN)
+    plan = draw_plan(allowed, plan_rng, order.habit)
     promised = description | {"uncertainty": dict(description["uncertainty"])}
     promised["uncertainty"]["youngs_modulus_percent"] *= order.modulus_scatter
     bench = draw_bench(promised, bench_rng, wrong=order.wrong_sheet)

@@ -24,6 +24,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are
 
 import numpy as np  # noqa: E402
 from hidden import CAUSES  # noqa: E402
+from kernel import NoEquilibriumError  # noqa: E402
 from make_set import Order, write_set  # noqa: E402
 from session import Habit  # noqa: E402
 
@@ -94,6 +95,7 @@ IN_BORES = (
 EXCLUSIVE = (
     ("precurvature_profile", "straight_curvature", "helical_precurvature"),
     ("entry_compliance", "entry_clearance"),
+    ("softening", "anisotropy"),  # the oracle's section has one law
     *(("loose_bores", name) for name in IN_BORES),
 )
 OF_SEVERAL_TUBES = ("friction", "clearance", "loose_bores", "torsional_compliance")
@@ -189,9 +191,11 @@ def entries(shift: int = 0) -> list[Entry]:
 
 
 def make(entry: Entry, folder: Path) -> tuple[str, str]:
-    """Make one set; its name, and what went wrong or nothing."""
+    """Make one set; its name, and what went wrong or nothing. A drawn robot that snaps has no set."""
     try:
         write_set(entry.order, folder / entry.name, _truth(entry, folder))
+    except NoEquilibriumError:
+        return entry.name, "" if entry.group == "varied" else "no equilibrium was found"
     except Exception as error:  # one set that cannot be made must not lose the others
         return entry.name, f"{type(error).__name__}: {error}"
     return entry.name, ""

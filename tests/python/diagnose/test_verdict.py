@@ -109,7 +109,8 @@ def test_found_beside_an_unknown_cause(tip_load):
     own = next(tried for tried in first.tried if tried.id == one.id)
     other = replace(own, candidate=replace(own.candidate, id="friction"))
     rounds = [first, replace(first, tried=[other], accepted=other, ids=["friction"]), *tip_load.rounds[1:]]
-    many = [replace(one, explained=0.8), replace(one, best=other, ids=["friction"], explained=0.8)]
+    best, other = (replace(fit, explained=0.8) for fit in (one.best, other))
+    many = [replace(one, best=best), replace(one, best=other, ids=["friction"])]
     explained = dict.fromkeys(RUNS, 0.6)
     assert judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, 0.3)).word == "stand_in"
     both = judged(tip_load, rounds=rounds, accepted=many, residual=left, explained=explained)

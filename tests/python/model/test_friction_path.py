@@ -127,7 +127,7 @@ def test_other_variant(robot, plan):
         fit = engine.fit(fitted)
         gain = Gain(0.0, *4 * [np.zeros(1)])
         entered = CandidateFit(Candidate("friction", fitted), gain, fit=fit)
-        one = Accepted(entered, ["friction"], 100.0, 50.0, 0.5)
+        one = Accepted(entered, ["friction"], 100.0, 50.0)
         selection = Selection(engine, accepted=[one], fit=fit)
         selection.refine_form(one)
         after = selection.fit

@@ -8,12 +8,13 @@ effects. Four likelihoods weigh them:
 - the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
   the form error of the effects if nothing else acts, uniform if something does;
 - the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
-  for an imitation (2 (1 - s)), and exponential with mean FORM_MENDED for one that only mends the form of another;
+  for an imitation (2 (1 - s)), and exponential with mean FORM_MENDED for one that only mends the forms of the others,
+  which leave no more than they may err by;
 - the test of the residual against the noise as stated.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,7 @@ import numpy as np
 from scipy.special import softmax
 
 from ctcr import settings
+from ctcr.diagnose.form_errors import form_error, log_density, log_density_of_cause, log_odds_of_mend
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import CandidateFit, Round
 from ctcr.diagnose.selection import Accepted
@@ -69,7 +71,7 @@ def weighed(
     if accepted:
         share = float(np.median([*explained])) if residual.structured and explained else 1.0
         left = math.sqrt(min(max(1 - share, 0.0), 1.0))
-        complete = _form(left, form_error(accepted))
+        complete = log_density(left, form_error(accepted))
     else:
         complete = _noise(residual)
     values = sum(_plausible(a.best) for a in accepted)
@@ -79,26 +81,25 @@ def weighed(
         weights[effects, outside] = max(weights.get((effects, outside), -np.inf), weight)
 
     accepts = {round_.accepted.id: round_ for round_ in rounds if round_.accepted}
-    for a in accepted:
+    for k, a in enumerate(accepted):
         refitted = _refitted(accepts[a.id])
         own, others = refitted[a.id].score, complete + values - _plausible(a.best)
         for rival in (one for one in refitted.values() if one.id not in found):  # in place of it
             behind = 0.0 if rival.id in a.ids else max(own - rival.score, 0.0)
             tempered = behind / (1 + catalogue.get(a.id).form_error ** 2 * max(own, 0.0))
             weigh(found - {a.id} | {rival.id}, others - tempered + _plausible(rival))
-        mends = _mends(a.explained) if len(accepted) > 1 else np.inf
-        weigh(found - {a.id}, others - min(a.log_evidence - cost, mends))
+        mends = log_odds_of_mend(a.explained, accepted[:k]) if k else -np.inf
+        weigh(found - {a.id}, others - min(a.log_evidence - cost, -mends))
     for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
-        gain, remains = further.score - cost, left * math.sqrt(1 - min(max(further.explained, 0.0), 1.0))
-        gain = min(gain, _mends(further.explained)) if accepted else min(gain, 0.0)
-        alone = _form(remains, form_error([*accepted, further]))
-        weigh(found | {further.id}, rejects + gain + alone + values + _plausible(further))
+        mends = log_odds_of_mend(further.explained, accepted) if accepted else 0.0
+        gain = min(further.score - cost, -mends)
+        weigh(found | {further.id}, weights[found, False] + rejects + gain + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects
     shares = [1 - left**2, *(a.explained for a in accepted[1:])] if accepted else []
-    weigh(none, outside + sum(_density(1 - s) for s in shares), True)
+    weigh(none, outside + sum(log_density_of_cause(1 - s) for s in shares), True)
     if accepted:
-        weigh(found, outside + math.log(settings.SECOND_CAUSE) + values + sum(map(_density, shares)), True)
+        weigh(found, outside + math.log(settings.SECOND_CAUSE) + values + sum(map(log_density_of_cause, shares)), True)
     every = [Explanation(*what, p) for what, p in zip(weights, softmax([*weights.values()]).tolist(), strict=True)]
     return sorted(every, key=lambda one: -one.probability)
 
@@ -120,33 +121,6 @@ def _noise(residual: Residual) -> float:
     "Calibration of p values for testing precise null hypotheses"."""
     p = min(max(residual.p_value, 1e-300), settings.CLUSTER_SIGNIFICANCE if residual.clusters else 1.0)
     return math.log(-math.e * p * math.log(p)) if p < 1 / math.e else 0.0
-
-
-def form_error(effects: Sequence[Accepted | CandidateFit]) -> float:
-    """Part of the amplitude of their common signal by which the forms of effects err, as a standard deviation: each
-    errs by its own part of what it explains of the variance that those before it left."""
-    errors, remains, square = [catalogue.get(one.id).form_error for one in effects], 1.0, 0.0
-    for one, error in zip(effects, errors, strict=True):
-        explained = remains * min(max(one.explained, 0.0), 1.0)
-        remains -= explained
-        square += explained * error**2
-    return math.sqrt(square / (1 - remains)) if remains < 1 else max(errors)
-
-
-def _form(left: float, error: float) -> float:
-    """Log density of the amplitude that errors of the forms leave."""
-    z = left / error
-    return math.log(2 / (error * math.sqrt(2 * math.pi))) - z * z / 2
-
-
-def _density(share: float) -> float:
-    """Log density of the share that a cause explains of what was left before it."""
-    return math.log(2 * min(max(share, 1e-3), 1 - 1e-3))
-
-
-def _mends(share: float) -> float:
-    """Log Bayes factor of a cause, by the share that it explains, over one that mends the form of another effect."""
-    return _density(share) + math.log(settings.FORM_MENDED) + min(max(share, 0.0), 1.0) / settings.FORM_MENDED
 
 
 def _plausible(one: CandidateFit) -> float:

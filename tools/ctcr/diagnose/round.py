@@ -1,5 +1,6 @@
 """One round of forward selection: all candidates screened, the best ones fitted with the calibration, one accepted."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
@@ -10,10 +11,13 @@ from ctcr.arrays import Array
 from ctcr.diagnose import segment_delays, starts
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine, effects_in, values_of
+from ctcr.diagnose.form_errors import log_odds_of_cause
 from ctcr.diagnose.held_out import predicts_better
 from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
+
+SURE = math.log(settings.SURE / (1 - settings.SURE))  # as log odds
 
 
 @dataclass(frozen=True)
@@ -140,8 +144,9 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    decide(round_, len({c.id for c in candidates}), bool(accepted), joint.rejects(before), _suspects(engine, accepted))
-    unsure = round_.accepted and accepted and round_.accepted.score < settings.BEYOND_CROSS_VALIDATION
+    n_effects = len({c.id for c in candidates})
+    decide(round_, n_effects, bool(accepted), joint.rejects(before), _suspects(engine, accepted))
+    unsure = round_.accepted and accepted and log_odds_of_cause(round_.accepted.explained, accepted, n_effects) < SURE
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
         round_.accepted, round_.ids = None, []

@@ -22,13 +22,17 @@ class Accepted:
     ids: list[str]
     log_evidence: float
     margin: float
-    explained: float  # fraction of the unexplained chi-square
     residual: Array | None = None  # (M, 3) [m] with it and those accepted before
     rejected_variants: dict[str, float] = field(default_factory=dict)  # fitted values of its other variants
 
     @property
     def id(self) -> str:
         return self.best.id
+
+    @property
+    def explained(self) -> float:
+        """Fraction of what those before it left of the unexplained chi-square."""
+        return self.best.explained
 
 
 @dataclass
@@ -91,7 +95,7 @@ class Selection:
         best, engine, before = round_.accepted, self.engine, self.fit
         engine.robust = True
         variants = round_.rejected_variants
-        one = Accepted(best, round_.ids, best.refit, round_.margin, best.explained, rejected_variants=variants)
+        one = Accepted(best, round_.ids, best.refit, round_.margin, rejected_variants=variants)
         self.accepted.append(one)
         names, fixed = parameters_of(self.fits)
         converged = best.fit
@@ -131,8 +135,9 @@ class Selection:
                 break
         self.fit, best, freed = max(ended, key=lambda end: end[0].log_evidence)
         if self.fit is not fit:
-            one.best = replace(best, fit=freed.without_readings())
-            one.explained += (1 - one.explained) * fraction_explained(fit, freed, len(freed.names) - len(fit.names))
+            more = fraction_explained(fit, freed, len(freed.names) - len(fit.names))
+            explained = best.explained + (1 - best.explained) * more
+            one.best = replace(best, fit=freed.without_readings(), explained=explained)
 
     def _with(self, one: Accepted, best: CandidateFit) -> list[CandidateFit]:
         """The accepted effects, one of them in another form."""

@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ctcr import settings
-from ctcr.diagnose.explanations import Explanation, form_error, probability, weighed
+from ctcr.diagnose.explanations import Explanation, probability, weighed
+from ctcr.diagnose.form_errors import form_error
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import Round
 from ctcr.diagnose.selection import Accepted

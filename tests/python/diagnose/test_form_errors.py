@@ -1,0 +1,48 @@
+"""A further effect is a cause the more, the more it explains, and the less the forms of the others can err by."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from ctcr.diagnose.form_errors import form_error, left_by, log_density, log_odds_of_cause, log_odds_of_mend
+from scipy.integrate import quad
+
+
+@dataclass
+class Found:
+    id: str
+    explained: float
+
+
+SHARES = np.linspace(0.0, 1.0, 101)
+
+
+def test_left():
+    """Effects explain, one after the other, parts of what is left."""
+    found = [Found("softening", 0.84), Found("clearance", 0.75)]
+    assert left_by(found) == pytest.approx(0.2)
+    assert left_by([]) == 1.0 and left_by([Found("softening", 1.3)]) == 0.0
+
+
+def test_form_error():
+    """That of several effects lies between theirs, nearer to that of the larger signal."""
+    exact, loose = (form_error([Found(name, 0.9)]) for name in ("softening", "clearance"))
+    mostly = [form_error([Found("softening", part), Found("clearance", 1.0)]) for part in (0.1, 0.5, 0.9)]
+    assert exact < mostly[2] < mostly[1] < mostly[0] < loose
+    assert form_error([Found("clearance", 0.0)]) == loose
+
+
+def test_density():
+    """What errors of a form leave is a distribution."""
+    assert quad(lambda left: np.exp(log_density(left, 0.15)), 0, 5)[0] == pytest.approx(1, abs=1e-9)
+
+
+def test_odds():
+    """Monotone in the share, and where the forms of the others can err by less than what is left."""
+    little, much = [Found("softening", 0.99)], [Found("softening", 0.5)]
+    for before in (little, much):
+        odds = [log_odds_of_cause(share, before, 20) for share in SHARES]
+        assert np.all(np.diff(odds) >= 0) and odds[0] < 0 < odds[-1]
+    assert log_odds_of_mend(0.5, little) > log_odds_of_mend(0.5, much)
+    assert log_odds_of_mend(0.5, [Found("clearance", 0.9)]) > log_odds_of_mend(0.5, [Found("softening", 0.9)])
+    assert log_odds_of_cause(0.5, little, 40) < log_odds_of_cause(0.5, little, 2)

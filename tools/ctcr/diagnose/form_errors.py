@@ -1,0 +1,69 @@
+"""How far the forms of effects err, and whether a further effect is a cause or only mends these errors."""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Protocol
+
+from ctcr import settings
+from ctcr.effects import catalogue
+
+
+class Explaining(Protocol):
+    """An effect with the fraction that it explains of the unexplained chi-square before it."""
+
+    @property
+    def id(self) -> str: ...
+
+    @property
+    def explained(self) -> float: ...
+
+
+def left_by(effects: Iterable[Explaining]) -> float:
+    """Part of the amplitude of the unexplained signal that effects leave, one after the other."""
+    return math.sqrt(math.prod(1 - _share(one) for one in effects))
+
+
+def form_error(effects: Sequence[Explaining]) -> float:
+    """Part of the amplitude of their common signal by which the forms of effects err, as a standard deviation: each
+    errs by its own part of what it explains of the variance that those before it left."""
+    errors, remains, square = [catalogue.get(one.id).form_error for one in effects], 1.0, 0.0
+    for one, error in zip(effects, errors, strict=True):
+        explained = remains * _share(one)
+        remains -= explained
+        square += explained * error**2
+    return math.sqrt(square / (1 - remains)) if remains < 1 else max(errors)
+
+
+def log_density(left: float, error: float) -> float:
+    """Log density of the amplitude that errors of the forms leave: half-normal."""
+    z = left / error
+    return math.log(2 / (error * math.sqrt(2 * math.pi))) - z * z / 2
+
+
+def log_density_of_cause(share: float) -> float:
+    """Log density of the share that a cause explains of what was left before it: likely large."""
+    return math.log(2 * min(max(share, 1e-3), 1 - 1e-3))
+
+
+def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
+    """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the share that it
+    explains of what these left: their errors leave little, and a mend explains little of it."""
+    mend = -math.log(settings.FORM_MENDED) - min(max(share, 0.0), 1.0) / settings.FORM_MENDED
+    return mend + log_density(left_by(before), form_error(before)) - log_density_of_cause(share)
+
+
+def log_odds_of_imitation(share: float) -> float:
+    """Log odds of an effect that imitates a further cause outside the catalogue over a cause, by the share that it
+    explains of what was left."""
+    outside = math.log(settings.OUTSIDE_CATALOGUE * settings.SECOND_CAUSE)
+    return outside + log_density_of_cause(1 - share) - log_density_of_cause(share)
+
+
+def log_odds_of_cause(share: float, before: Sequence[Explaining], candidates: int) -> float:
+    """Log odds that the best of many candidates, which explains this share of what the effects before it left, is a
+    cause: over one that mends their forms, and over one that imitates a cause outside the catalogue."""
+    return -max(log_odds_of_mend(share, before) + math.log(candidates), log_odds_of_imitation(share))
+
+
+def _share(one: Explaining) -> float:
+    return min(max(one.explained, 0.0), 1.0)
