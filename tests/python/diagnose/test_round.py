@@ -105,14 +105,17 @@ def candidate_fit(identity, score, *, shape=(), explained=0.9, columns=None, **c
     return CandidateFit(candidate, gain, refit=score, explained=explained, fit=object(), **changes)
 
 
-def decided(*tried, is_further=False, is_rejected=True, suspects=()):
+def decided(*tried, before=(), is_rejected=True, suspects=()):
+    """A round beside effects that explained all but a thousandth each."""
     round_ = Round(None, sorted(tried, key=lambda one: -one.score))
-    rounds.decide(round_, 20, is_further, is_rejected, suspects)
+    accepted = [candidate_fit(identity, 500.0, explained=0.999) for identity in before]
+    rounds.decide(round_, 20, accepted, is_rejected, suspects)
     return round_
 
 
+FRICTION = ("friction",)
 SCORES, FRACTIONS = np.linspace(0, 30, 61), np.linspace(0, 1, 51)
-STRICTER = ({}, {"is_rejected": False}, {"is_further": True}, {"is_further": True, "suspects": ("delay",)})
+STRICTER = ({}, {"is_rejected": False}, {"before": FRICTION}, {"before": FRICTION, "suspects": ("delay",)})
 
 
 def accepted_over(scores=(100.0,), fractions=(0.9,), **options):
@@ -141,7 +144,7 @@ def test_stricter():
     by_score = [accepted_over(SCORES, **options).sum() for options in STRICTER]
     by_fraction = [accepted_over(fractions=FRACTIONS, **options).sum() for options in STRICTER]
     assert by_score[0] > by_score[1] and by_fraction[0] > by_fraction[2] > by_fraction[3]
-    assert accepted_over(SCORES, is_further=True, is_rejected=False).sum() < by_score[1]
+    assert accepted_over(SCORES, before=FRICTION, is_rejected=False).sum() < by_score[1]
 
 
 def test_hopeless():
@@ -178,9 +181,9 @@ def test_implausible_further_effect():
     """A further effect that needs an implausible value is not accepted, and the value is named."""
     wants = candidate_fit("tip_load", 600.0, implausible=(f"{MASS} = 3 kg",))
     assert decided(wants).accepted
-    assert f"{MASS} = 3 kg" in decided(wants, is_further=True).why_not
+    assert f"{MASS} = 3 kg" in decided(wants, before=FRICTION).why_not
     plausible = candidate_fit("delay", 100.0)
-    assert decided(wants, plausible, is_further=True).ids[0] == "delay"
+    assert decided(wants, plausible, before=FRICTION).ids[0] == "delay"
 
 
 def test_penalty():

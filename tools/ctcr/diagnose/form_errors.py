@@ -59,10 +59,10 @@ def log_odds_of_imitation(share: float) -> float:
     return outside + log_density_of_cause(1 - share) - log_density_of_cause(share)
 
 
-def log_odds_of_cause(share: float, before: Sequence[Explaining], candidates: int) -> float:
-    """Log odds that the best of many candidates, which explains this share of what the effects before it left, is a
-    cause: over one that mends their forms, and over one that imitates a cause outside the catalogue."""
-    return -max(log_odds_of_mend(share, before) + math.log(candidates), log_odds_of_imitation(share))
+def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
+    """Log odds that an effect, which explains this share of what those before it left, is a cause: over one that mends
+    their forms, and over one that imitates a cause outside the catalogue."""
+    return -max(log_odds_of_mend(share, before), log_odds_of_imitation(share))
 
 
 def _share(one: Explaining) -> float:

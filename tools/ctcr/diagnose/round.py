@@ -17,8 +17,6 @@ from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
 
-SURE = math.log(settings.SURE / (1 - settings.SURE))  # as log odds
-
 
 @dataclass(frozen=True)
 class CandidateFit:
@@ -144,9 +142,8 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    n_effects = len({c.id for c in candidates})
-    decide(round_, n_effects, bool(accepted), joint.rejects(before), _suspects(engine, accepted))
-    unsure = round_.accepted and accepted and log_odds_of_cause(round_.accepted.explained, accepted, n_effects) < SURE
+    decide(round_, len({c.id for c in candidates}), accepted, joint.rejects(before), _suspects(engine, accepted))
+    unsure = round_.accepted and accepted and not _is_sure(round_.accepted, accepted)
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
         round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
         round_.accepted, round_.ids = None, []
@@ -301,17 +298,19 @@ def _suspects(engine: Engine, accepted: list[CandidateFit]) -> set[str]:
     return {identity for effect in known if effect.choices for identity in effect.look_alikes}
 
 
-def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, suspects: Collection[str] = ()) -> None:
+def decide(
+    round_: Round, n_effects: int, accepted: list[CandidateFit], is_rejected: bool, suspects: Collection[str] = ()
+) -> None:
     """Accepts the best candidate, with all that the data cannot tell from it, or says why not.
 
-    n_effects that were looked at; is_further: whether others are in the model already; is_rejected: whether the noise
-    as stated does not explain the residual; suspects: ids that may imitate the unknown law of an accepted effect.
+    n_effects that were looked at; is_rejected: whether the noise as stated does not explain the residual; suspects: ids
+    that may imitate the unknown law of an accepted effect.
     """
     round_.needed = settings.DECISIVE + np.log(n_effects)
-    unasked = settings.UNASKED if is_further else settings.FIRST_UNASKED
+    unasked = settings.UNASKED if accepted else settings.FIRST_UNASKED
     threshold = round_.needed + (0.0 if is_rejected else unasked)
     refitted = [one for one in round_.tried if one.fit is not None]
-    fitted = [one for one in refitted if not (is_further and one.implausible)]
+    fitted = [one for one in refitted if not (accepted and one.implausible)]
     if not fitted:
         round_.reason = "no candidate explains anything"
         if refitted:
@@ -326,10 +325,10 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
         )
         return
-    needed = settings.EXPLAINED if is_further else settings.FIRST_EXPLAINED
+    needed = settings.EXPLAINED if accepted else settings.FIRST_EXPLAINED
     if best.id in suspects:
         needed = settings.SUSPECT_EXPLAINED
-    if best.explained < needed:
+    if best.explained < needed and not (accepted and _is_sure(best, accepted)):
         round_.is_spurious = best.explained + 2 * best.explained_sd < needed
         round_.reason = (
             f"the best candidate, {best.id}, explains {best.explained:.0%} of the unexplained chi-square: less than "
@@ -343,6 +342,11 @@ def decide(round_: Round, n_effects: int, is_further: bool, is_rejected: bool, s
     round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
     others = [one.score for one in rivals if one.id not in round_.ids]
     round_.margin = best.score - max(others, default=-np.inf)
+
+
+def _is_sure(one: CandidateFit, accepted: list[CandidateFit]) -> bool:
+    """Whether a further effect surely is a cause by what it explains of what the others left."""
+    return log_odds_of_cause(one.explained, accepted) >= math.log(settings.SURE / (1 - settings.SURE))
 
 
 def imitated(one: CandidateFit, by: CandidateFit) -> float:
