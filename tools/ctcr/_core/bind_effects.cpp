@@ -66,8 +66,8 @@ std::vector<CatalogueEntry> catalogue() {
     const EffectInfo& i = effect.info;
     out.push_back({std::string(i.id), std::string(i.title), std::string(i.physics), std::string(i.signature),
                    std::string(i.measure), std::string(i.look_alikes), std::string(i.reference), i.needs.order,
-                   i.needs.time, i.needs.orientation, i.needs.loads, i.needs.gravity, i.form_error, acts_on_of<Effect>(),
-                   variants_of(i, effect.parameters), starts_of(i)});
+                   i.needs.time, i.needs.orientation, i.needs.loads, i.needs.gravity, i.form_error,
+                   acts_on_of<Effect>(), variants_of(i, effect.parameters), starts_of(i)});
   });
   return out;
 }
