@@ -253,6 +253,7 @@ def test_load(file, robot, tmp_path):
         (('"mine"', '"friction"'), "the library has an effect of this id"),
         (('"t"', '""'), "mine.title: needs a text"),
         (("sigma=0.1", "sigma=0"), "sigma = 0: needs a number above 0"),
+        (("    parameters", "    form_error = 0\n    parameters"), "form_error: 0: needs a number above 0"),
         (("sigma=0.1", "sigma=1, bounds=(1, 2)"), "with the neutral value 0 between"),
         (("sigma=0.1", "sigma=1, shape=True"), "an amplitude of the effect"),
         (("def joints", "def other"), "needs at least one of the functions joints"),

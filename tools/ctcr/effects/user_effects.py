@@ -275,6 +275,8 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
             say("needs a text", name)
     for need in [need for need in found.needs if need not in catalogue.NEEDS][:1]:
         say(f"{shown(need)} is none of {', '.join(catalogue.NEEDS)}", "needs")
+    if not isinstance(found.form_error, int | float) or not 0 < found.form_error < inf:
+        say(f"{shown(found.form_error)}: needs a number above 0; no form is exact", "form_error")
     if not any(callable(getattr(found, name, None)) for name in HOOKS):
         say(f"needs at least one of the functions {', '.join(HOOKS)}")
     if not found.parameters or not all(isinstance(p, Parameter) for p in found.parameters):
