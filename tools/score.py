@@ -70,7 +70,7 @@ def judged_varied(said: dict | None, truth: dict) -> list[tuple[str, bool]]:
     seen = [set(cause["ids"]) for cause in truth["causes"] if cause["ids"] and cause["chi_square"] > VISIBLE]
     if said and said["verdict"] == "wrong_convention":  # a frame that far off is to be corrected first
         return [("varied, wrong sheets: a fix only where one is needed", truth["wrong_sheet"])]
-    number = "no cause" if not seen else "one cause" if len(seen) == 1 else "two causes" if len(seen) == 2 else "more"
+    number = ("no cause", "one cause", "two causes", "more")[min(len(seen), 3)]
     scores = [(f"varied, {number}: causes named", any(ids & members for members in classes)) for ids in seen]
     scores += [(f"varied, {number}: names right", any(ids & members for ids in hidden)) for members in classes]
     if not hidden:

@@ -28,6 +28,7 @@ _MODULUS = {"table2": 58.0, "B": 62.0, "two_tubes": 60.0, "four_tubes": 55.0}  #
 ROBOTS = tuple(_TUBES)
 # [m] from the home position; the outermost tip stays in front of the plate
 _RETRACTION = {1: (0.045,), 2: (0.055, 0.050), 3: (0.060, 0.045, 0.045), 4: (0.060, 0.045, 0.040, 0.040)}
+DRAWN = {f"drawn{n}": n for n in _RETRACTION}  # random robots, with their numbers of tubes
 _KEYS = ("inner_diameter_mm", "outer_diameter_mm", "length_mm", "curved_length_mm", "curvature_per_m")
 _MATERIAL = {"poisson_ratio": 0.3, "density_kg_m3": 6450.0}
 _TRACKER = {
@@ -74,9 +75,9 @@ class JointRange:
 
 
 def describe(robot: str, rng: np.random.Generator | None = None) -> dict:
-    """Content of the robot.yaml of one of ROBOTS, or of one that is drawn: drawn1 to drawn4, by the number of tubes."""
-    if robot.startswith("drawn"):
-        tubes, modulus = _draw_tubes(int(robot.removeprefix("drawn")), rng), float(rng.integers(50, 71))
+    """Content of the robot.yaml of one of ROBOTS, or of one of DRAWN by random numbers."""
+    if robot in DRAWN:
+        tubes, modulus = _draw_tubes(DRAWN[robot], rng), float(rng.integers(50, 71))
         position, rotation = rng.uniform([-60, -60, -180], [60, 60, -90]).round().tolist(), rng.uniform(-1.2, 1.2, 3)
     else:
         tubes, modulus, (position, rotation) = _TUBES[robot], _MODULUS[robot], _PLACE[robot]

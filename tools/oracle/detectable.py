@@ -24,6 +24,8 @@ _TUBE_KEYS = {
     "youngs_modulus_percent": "youngs_modulus_GPa",
 }
 
+Calibration = tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]  # as calibration_of
+
 
 @dataclass(frozen=True)
 class Detectability:
@@ -40,10 +42,10 @@ def thinned(plan: Plan) -> Plan:
 
 
 def detectability(
-    bench: Bench, plan: Plan, tracker: dict, noise: str, moved: np.ndarray, turned: Rotation
+    calibration: Calibration, tracker: dict, noise: str, moved: np.ndarray, turned: Rotation
 ) -> Detectability:
     """Of displacements (R, 3) [m] and rotations (R) of the readings of a thinned plan, in the tracker frame."""
-    place, columns = _columns(bench, plan)
+    place, columns = calibration
     cause = moved, turned.as_rotvec()
     left, _ = _left(_noise_factors(tracker, "jitter", place), cause, columns)
     _, chi_square = _left(_noise_factors(tracker, noise, place), cause, columns)
@@ -81,7 +83,7 @@ def _noise_factors(tracker: dict, noise: str, place: np.ndarray) -> tuple[np.nda
     return factors[0], factors[1]
 
 
-def _columns(bench: Bench, plan: Plan) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+def calibration_of(bench: Bench, plan: Plan) -> Calibration:
     """Tips (R, 3) [m], and how one standard deviation of each parameter moves (R, 3, P) [m] and turns them [rad]."""
     sigma, n = bench.description["uncertainty"], plan.joints.shape[1] // 2
     offset = np.concatenate([bench.beta_offset, bench.alpha_offset])

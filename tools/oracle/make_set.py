@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from benches import ROBOTS, describe, joint_range
-from detectable import THINNED, detectability, thinned
+from benches import DRAWN, ROBOTS, describe, joint_range
+from detectable import THINNED, Calibration, calibration_of, detectability, thinned
 from hidden import hide
 from hidden_cause import CAUSES, Truth
 from mechanics import Mechanics
@@ -81,7 +81,7 @@ def measure(order: Order, *, even: bool = False) -> Session:
     )
     description = describe(order.robot, np.random.default_rng([order.seed, DESIGN]))
     allowed = joint_range(description)
-    if order.wrong_sheet and order.robot not in ROBOTS:
+    if order.wrong_sheet and order.robot in DRAWN:  # the others were chosen so that theirs is enough
         allowed = replace(allowed, margin=WRONG_SHEET_MARGIN)
     plan = draw_plan(allowed, plan_rng, order.habit)
     promised = description | {"uncertainty": dict(description["uncertainty"])}
@@ -104,8 +104,9 @@ def answer(order: Order, session: Session) -> dict:
     moved = session.position[::THINNED] - np.array([position for position, _ in plain])
     turned = session.rotation[::THINNED] * Rotation.concatenate([rotation for _, rotation in plain]).inv()
     inliers = ~session.noise.outlier
-    left = detectability(session.bench, few, session.description["tracker"], order.noise, moved, turned)
-    alone = [left.chi_square] if len(order.effects) == 1 else _each_alone(order, session, few)
+    calibration = calibration_of(session.bench, few)
+    left = detectability(calibration, session.description["tracker"], order.noise, moved, turned)
+    alone = [left.chi_square] if len(order.effects) == 1 else _each_alone(order, session, calibration)
     ids = {name: CAUSES[name].ids for name, _ in order.effects}
     in_catalogue = sorted({i for name in ids for i in ids[name]})
     missing = [name for name in ids if not CAUSES[name].absorbed]
@@ -141,16 +142,15 @@ def answer(order: Order, session: Session) -> dict:
     }
 
 
-def _each_alone(order: Order, session: Session, few: Plan) -> list[float]:
+def _each_alone(order: Order, session: Session, calibration: Calibration) -> list[float]:
     """Chi-square after calibration of what each cause adds to the others."""
-    out = []
+    tracker, out = session.description["tracker"], []
     for k in range(len(order.effects)):
         others = tuple((name, size if j != k else 0.0) for j, (name, size) in enumerate(order.effects))
         without = measure(replace(order, effects=others))
         moved = (session.position - without.position)[::THINNED]
         turned = session.rotation[::THINNED] * without.rotation[::THINNED].inv()
-        tracker = session.description["tracker"]
-        out.append(detectability(session.bench, few, tracker, order.noise, moved, turned).chi_square)
+        out.append(detectability(calibration, tracker, order.noise, moved, turned).chi_square)
     return out
 
 
@@ -195,8 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--size", action="append", default=[], type=float, help="one for each effect; 1 if left out")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--noise", choices=NOISES, default="jitter")
-    drawn = [f"drawn{n}" for n in range(1, 5)]
-    parser.add_argument("--robot", choices=[*ROBOTS, *drawn], default="table2", help="drawn3: a random one of 3 tubes")
+    parser.add_argument("--robot", choices=(*ROBOTS, *DRAWN), default="table2", help="drawn3: a random one of 3 tubes")
     parser.add_argument("--runs", type=int, default=Habit.runs)
     parser.add_argument("--stops", type=int, default=Habit.stops, help="of a run on the way out")
     parser.add_argument("--loads", action=argparse.BooleanOptionalAction, default=True, help="hung masses")

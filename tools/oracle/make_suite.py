@@ -87,7 +87,7 @@ WRONG_SHEETS = (
     ("precurvature_profile",),
     ("friction", "tip_load"),
 )
-# What cannot act in one robot: of each of these at most one. The mechanics of tubes in bores has no other cause yet.
+# Causes that exclude each other: at most one of each group acts. Tubes in bores take no other mechanical cause yet.
 IN_BORES = (
     "friction softening anisotropy clearance torsional_compliance entry_compliance entry_clearance contact "
     "precurvature_profile straight_curvature helical_precurvature"
@@ -95,7 +95,7 @@ IN_BORES = (
 EXCLUSIVE = (
     ("precurvature_profile", "straight_curvature", "helical_precurvature"),
     ("entry_compliance", "entry_clearance"),
-    ("softening", "anisotropy"),  # the oracle's section has one law
+    ("softening", "anisotropy"),  # a section of the oracle has one law
     *(("loose_bores", name) for name in IN_BORES),
 )
 OF_SEVERAL_TUBES = ("friction", "clearance", "loose_bores", "torsional_compliance")
@@ -191,7 +191,7 @@ def entries(shift: int = 0) -> list[Entry]:
 
 
 def make(entry: Entry, folder: Path) -> tuple[str, str]:
-    """Make one set; its name, and what went wrong or nothing. A drawn robot that snaps has no set."""
+    """Make one set; its name, and what went wrong or nothing. A drawn robot without an equilibrium gives no set."""
     try:
         write_set(entry.order, folder / entry.name, _truth(entry, folder))
     except NoEquilibriumError:

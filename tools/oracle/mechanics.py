@@ -49,7 +49,7 @@ class Mechanics:
     drive_hardening: float = 0.0  # [1/(N m)^2] relative loss of drive compliance per squared torque
     entry: Joint | None = None
     sleeve: dict[int, Joint] = field(default_factory=dict)  # at the end of tube i, which the inner ones leave
-    # (N-1,) [m] radial: tubes with own centre lines, each in the bore of the next. Of the rest tip_force alone acts.
+    # (N-1,) [m] radial: tubes with own centre lines, each in the bore of the next. Beside them only tip_force acts.
     bore_gap: np.ndarray | None = None
     tip_force: np.ndarray = field(default_factory=lambda: np.zeros(3))  # [N] base frame, constant
     cable_pull: float = 0.0  # [N] along the tip's tangent, backwards

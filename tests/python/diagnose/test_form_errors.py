@@ -1,10 +1,10 @@
-"""A further effect is a cause the more, the more it explains, and the less the forms of the others can err by."""
+"""A further effect is the likelier a cause, the more it explains and the less the forms of the others may err by."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from ctcr.diagnose.form_errors import form_error, left_by, log_density, log_odds_of_cause, log_odds_of_mend
+from ctcr.diagnose.form_errors import form_error, left_by, log_density_of_errors, log_odds_of_cause, log_odds_of_mend
 from scipy.integrate import quad
 
 
@@ -34,11 +34,11 @@ def test_form_error():
 
 def test_density():
     """What errors of a form leave is a distribution."""
-    assert quad(lambda left: np.exp(log_density(left, 0.15)), 0, 5)[0] == pytest.approx(1, abs=1e-9)
+    assert quad(lambda left: np.exp(log_density_of_errors(left, 0.15)), 0, 5)[0] == pytest.approx(1, abs=1e-9)
 
 
 def test_odds():
-    """Monotone in the share, and where the forms of the others can err by less than what is left."""
+    """A larger share makes a cause likelier, and so do more that is left and exacter forms of the others."""
     little, much = [Found("softening", 0.99)], [Found("softening", 0.5)]
     for before in (little, much):
         odds = [log_odds_of_cause(share, before) for share in SHARES]

@@ -1,9 +1,10 @@
 """What the catalogue says of the error of a form is what fuller models measured."""
 
 import math
+from collections import Counter
 from pathlib import Path
 
-from ctcr.effects import catalogue
+from ctcr.effects import catalogue, user_effects
 
 PAGE = Path(__file__).parents[3] / "docs" / "effect_forms.md"
 
@@ -16,3 +17,9 @@ def test_form_errors():
     for identity, explained in measured:
         left = math.sqrt(1 - explained / 100)
         assert left <= 1.1 * catalogue.get(identity).form_error, identity
+
+
+def test_usual_form_error():
+    """Users' effects begin with what most effects of the library have."""
+    usual = Counter(effect.form_error for effect in catalogue.catalogue(1).values()).most_common(1)[0][0]
+    assert user_effects.Effect.form_error == usual

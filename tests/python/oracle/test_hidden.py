@@ -9,7 +9,7 @@ import make_suite
 import numpy as np
 import pytest
 from benches import ROBOTS, describe, joint_range
-from detectable import detectability
+from detectable import calibration_of, detectability
 from drives import Play
 from field import coil_fields, induced_fields, misread
 from hidden import CAUSES, hide
@@ -94,7 +94,7 @@ def test_detectability(noise):
 
     def judge(moved: np.ndarray):
         turned = Rotation.from_rotvec(np.zeros_like(moved))
-        return detectability(bench, plan, description["tracker"], noise, moved, turned)
+        return detectability(calibration_of(bench, plan), description["tracker"], noise, moved, turned)
 
     shift = np.tile([0.5e-3, 0, 0], (len(plan.time), 1))  # one standard deviation of the frame's uncertainty
     own = judge(shift)

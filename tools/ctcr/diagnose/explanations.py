@@ -22,7 +22,7 @@ import numpy as np
 from scipy.special import softmax
 
 from ctcr import settings
-from ctcr.diagnose.form_errors import form_error, log_density, log_density_of_cause, log_odds_of_mend
+from ctcr.diagnose.form_errors import form_error, log_density_of_cause, log_density_of_errors, log_odds_of_mend
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import CandidateFit, Round
 from ctcr.diagnose.selection import Accepted
@@ -71,7 +71,7 @@ def weighed(
     if accepted:
         share = float(np.median([*explained])) if residual.structured and explained else 1.0
         left = math.sqrt(min(max(1 - share, 0.0), 1.0))
-        complete = log_density(left, form_error(accepted))
+        complete = log_density_of_errors(left, form_error(accepted))
     else:
         complete = _noise(residual)
     values = sum(_plausible(a.best) for a in accepted)

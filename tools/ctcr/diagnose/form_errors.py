@@ -20,21 +20,19 @@ class Explaining(Protocol):
 
 def left_by(effects: Iterable[Explaining]) -> float:
     """Part of the amplitude of the unexplained signal that effects leave, one after the other."""
-    return math.sqrt(math.prod(1 - _share(one) for one in effects))
+    return math.sqrt(max(1 - sum(_parts(effects)), 0.0))
 
 
 def form_error(effects: Sequence[Explaining]) -> float:
     """Part of the amplitude of their common signal by which the forms of effects err, as a standard deviation: each
     errs by its own part of what it explains of the variance that those before it left."""
-    errors, remains, square = [catalogue.get(one.id).form_error for one in effects], 1.0, 0.0
-    for one, error in zip(effects, errors, strict=True):
-        explained = remains * _share(one)
-        remains -= explained
-        square += explained * error**2
-    return math.sqrt(square / (1 - remains)) if remains < 1 else max(errors)
+    errors, parts = [catalogue.get(one.id).form_error for one in effects], _parts(effects)
+    if not any(parts):
+        return max(errors)
+    return math.sqrt(sum(part * error**2 for part, error in zip(parts, errors, strict=True)) / sum(parts))
 
 
-def log_density(left: float, error: float) -> float:
+def log_density_of_errors(left: float, error: float) -> float:
     """Log density of the amplitude that errors of the forms leave: half-normal."""
     z = left / error
     return math.log(2 / (error * math.sqrt(2 * math.pi))) - z * z / 2
@@ -49,7 +47,7 @@ def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
     """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the share that it
     explains of what these left: their errors leave little, and a mend explains little of it."""
     mend = -math.log(settings.FORM_MENDED) - min(max(share, 0.0), 1.0) / settings.FORM_MENDED
-    return mend + log_density(left_by(before), form_error(before)) - log_density_of_cause(share)
+    return mend + log_density_of_errors(left_by(before), form_error(before)) - log_density_of_cause(share)
 
 
 def log_odds_of_imitation(share: float) -> float:
@@ -65,5 +63,10 @@ def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
     return -max(log_odds_of_mend(share, before), log_odds_of_imitation(share))
 
 
-def _share(one: Explaining) -> float:
-    return min(max(one.explained, 0.0), 1.0)
+def _parts(effects: Iterable[Explaining]) -> list[float]:
+    """Part of the unexplained variance that each explains, one after the other."""
+    parts, remains = [], 1.0
+    for one in effects:
+        parts.append(remains * min(max(one.explained, 0.0), 1.0))
+        remains -= parts[-1]
+    return parts
