@@ -64,6 +64,18 @@ def test_contenders_converge(weighted, monkeypatch):
     assert all(one.fit.iterations <= 1 for one in tried if one.score < settings.CONTENDS * best.score)
 
 
+def test_free_shape(robot, plan):
+    """A candidate is refitted in its best shape: one whose usual shape is wrong does not lose for that alone."""
+    knee = {"gamma.1": 0.01, "gamma.2": 0.01, "gamma.3": 0.01, "plateau": 0.35, "sharpness": 7.0}
+    engine = engine_for(robot, plan, {f"effects.softening.{name}": value for name, value in knee.items()})
+    before = engine.fit()
+    screened = rounds.screen(engine, before, pool(engine, "softening"), {})
+    (one,) = rounds.Refits(engine, before, {}).of_all(screened)
+    held = engine.fit_like(before, screened[0].candidate.names)
+    assert set(one.candidate.names) > set(screened[0].candidate.names)
+    assert one.fit.log_evidence > held.log_evidence + settings.DECISIVE
+
+
 def test_best_of_few_rows(robot, plan, monkeypatch):
     """The candidate that is best on a part of many rows is refitted to all, even without evidence for it."""
     monkeypatch.setattr(settings, "FEW_ROWS", 20)
@@ -214,6 +226,18 @@ def test_form_keeps_its_start(robot, plan):
         [form] = forms(get("delay", robot.n_tubes), candidate)
         assert form.names == ("effects.delay.delay", SPREAD)
         assert form.shape == candidate.shape
+
+
+def test_with_shape():
+    """The amplitudes stay first; a local source, which has a variant of its own, is not added to others."""
+    for effect in catalogue.all_effects(3).values():
+        source = set(effect.names_with("source"))
+        for names in effect.variants or [tuple(p.name for p in effect.parameters if p.kind == "amplitude")]:
+            candidate = Candidate(effect.id, tuple(effect.names(*names)))
+            free = candidate.with_shape(3)
+            assert free.names[: len(candidate.names)] == candidate.names and free.with_shape(3) == free
+            assert set(free.names) - set(candidate.names) <= set(effect.of_kind("shape")) - source
+            assert set(effect.of_kind("shape")) - source <= set(free.names)
 
 
 def test_variety_first():

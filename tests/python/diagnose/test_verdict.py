@@ -115,3 +115,17 @@ def test_found_beside_an_unknown_cause(tip_load):
     assert judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, 0.3)).word == "stand_in"
     both = judged(tip_load, rounds=rounds, accepted=many, residual=left, explained=explained)
     assert both.word == "probable" and both.explanations[0].outside and both.explanations[0].effects
+
+
+def test_further_effect(tip_load):
+    """An effect that was not accepted completes an explanation only if hardly anything is left with it."""
+    first, left = tip_load.rounds[0], replace(tip_load.residual, p_value=0.0)
+    own = next(tried for tried in first.tried if tried.id == "tip_load")
+    accepted = [replace(tip_load.accepted[0], best=replace(own, explained=0.3))]
+    found = []
+    for share in (0.1, 0.5, 0.9, 0.999):
+        further = replace(own, candidate=replace(own.candidate, id="friction"), explained=share)
+        rounds = [*tip_load.rounds[:1], replace(first, tried=[further], accepted=None, ids=[])]
+        every = judged(tip_load, rounds=rounds, accepted=accepted, residual=left, explained=dict.fromkeys(RUNS, 0.3))
+        found.append(probability(every.explanations, [["tip_load"], ["friction"]], outside=False))
+    assert found == sorted(found) and found[0] < 0.01 and found[-1] > 0.9

@@ -4,7 +4,7 @@ A variant may have few parameters or all: the evidence pays for the parameters t
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,12 @@ class Candidate:
         shown = own if len(own) <= SHOWN else [*own[:3], f"{len(own) - 3} more"]
         held = (f"{name.split('.')[2]} {value:g}" for name, value in self.shape if name not in self.names)
         return ", ".join([*shown, *held])
+
+    def with_shape(self, n_tubes: int) -> "Candidate":
+        """The same with the shape of its effect fitted too; that of a local source has a variant of its own."""
+        effect = catalogue.get(self.id, n_tubes)
+        shape = [name for name in effect.of_kind("shape") if name not in effect.names_with("source")]
+        return replace(self, names=tuple(dict.fromkeys([*self.names, *shape])))
 
     @property
     def label(self) -> str:

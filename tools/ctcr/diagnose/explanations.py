@@ -22,7 +22,13 @@ import numpy as np
 from scipy.special import softmax
 
 from ctcr import settings
-from ctcr.diagnose.form_errors import form_error, log_density_of_cause, log_density_of_errors, log_odds_of_mend
+from ctcr.diagnose.form_errors import (
+    form_error,
+    log_density_of_cause,
+    log_density_of_errors,
+    log_density_of_mend,
+    log_odds_of_mend,
+)
 from ctcr.diagnose.residual import Residual
 from ctcr.diagnose.round import CandidateFit, Round
 from ctcr.diagnose.selection import Accepted
@@ -91,8 +97,11 @@ def weighed(
         mends = log_odds_of_mend(a.explained, accepted[:k]) if k else -np.inf
         weigh(found - {a.id}, others - min(a.log_evidence - cost, -mends))
     for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
-        mends = log_odds_of_mend(further.explained, accepted) if accepted else 0.0
-        gain = min(further.score - cost, -mends)
+        gain = further.score - cost
+        if accepted:  # what the two leave is an error of their forms, not what the accepted ones alone leave
+            share = min(max(further.explained, 0.0), 1.0)
+            leaves = log_density_of_errors(left * math.sqrt(1 - share), form_error([*accepted, further]))
+            gain = min(gain, leaves - complete + log_density_of_cause(share) - log_density_of_mend(share))
         weigh(found | {further.id}, weights[found, False] + rejects + gain + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects

@@ -220,12 +220,26 @@ class Refits:
     def of_all(self, chosen: list[CandidateFit]) -> list[CandidateFit]:
         """Each after its fit. Those that contend are fitted to convergence: a candidate that is slow to fit must not
         lose to one that is quick."""
-        tried = [self._of(one, settings.FIRST_ITERATIONS) for one in chosen]
-        near = settings.CONTENDS * max((one.score for one in tried), default=0.0)
-        return [
-            self._of(one, settings.ITERATIONS) if one.fit and not one.fit.converged and one.score > near else one
-            for one in tried
-        ]
+        tried = [self._in_each_shape(self._of(one, settings.FIRST_ITERATIONS)) for one in chosen]
+        near = settings.CONTENDS * max((one.score for forms in tried for one in forms), default=0.0)
+        return [self._converged(forms, near) for forms in tried]
+
+    def _in_each_shape(self, one: CandidateFit) -> list[CandidateFit]:
+        """With its usual shape, and first with a free one where the readings ask for that."""
+        candidate = one.candidate.with_shape(self.engine.robot.n_tubes)
+        if one.fit is None or candidate == one.candidate:
+            return [one]
+        freed = self._of(replace(one, candidate=candidate), settings.FIRST_ITERATIONS)
+        return [freed, one] if freed.score > one.score + settings.SAME_FORM else [one]
+
+    def _converged(self, forms: list[CandidateFit], near: float) -> CandidateFit:
+        """The first form whose values are plausible, or else the last one."""
+        for one in forms:
+            if one.fit and not one.fit.converged and one.score > near:
+                one = self._of(one, settings.ITERATIONS)
+            if not one.implausible:
+                break
+        return one
 
     def _of(self, one: CandidateFit, iterations: int) -> CandidateFit:
         engine, before, candidate = self.engine, self.before, one.candidate
@@ -236,7 +250,7 @@ class Refits:
             "tolerance": settings.COARSE,
             "near": one.fit is not None,
         }
-        first = values_of(one.fit) if one.fit else linearised_end(engine, before, one)
+        first = dict(candidate.shape) | values_of(one.fit) if one.fit else linearised_end(engine, before, one)
         for start in (first, values_of(before)):
             try:
                 fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start, **options)

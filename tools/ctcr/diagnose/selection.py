@@ -72,9 +72,7 @@ class Selection:
             self.rounds.append(round_)
             if round_.accepted is None:
                 break
-            rejected = self._accept(round_)
-            if rejected and self.accepted[0].explained < settings.HARDLY_EXPLAINED:
-                break  # no effect is stacked on one that hardly explains anything
+            self._accept(round_)
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
         self.finished = True
@@ -90,8 +88,8 @@ class Selection:
             return round_
         return run_round(engine, fit, open_to, self.fits)
 
-    def _accept(self, round_: Round) -> bool:
-        """Adds the effect of a round in its best form; whether the noise rejected the fit in the form of the round."""
+    def _accept(self, round_: Round) -> None:
+        """Adds the effect of a round in its best form."""
         best, engine, before = round_.accepted, self.engine, self.fit
         engine.robust = True
         variants = round_.rejected_variants
@@ -104,13 +102,11 @@ class Selection:
         self.fit = self.calibrate(self.fits, values_of(converged))
         if self.fit.log_evidence < converged.log_evidence - settings.LOST_TO_OUTLIERS:
             self.fit = engine.fit_like(before, names, values_of(converged), fixed=fixed)
-        rejected = joint.rejects(self.fit)
         needs_history = "order" in catalogue.get(one.id, engine.robot.n_tubes).needs
         if needs_history and engine.revise_initial_history(self.fit, names, fixed):
             self.fit = self.calibrate(self.fits, values_of(self.fit))
         self.refine_form(one)
         one.residual = self.fit.residual[:, :3]
-        return rejected
 
     def refine_form(self, one: Accepted) -> None:
         """Frees the shape of an accepted effect, and tries its other constitutive laws, where that helps.
