@@ -123,7 +123,7 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
         fit = joint.fit(
             with_effect, table, free, noise=noise_of(nominal, field=False), weights=np.ones((len(table), 2)), scales={}
         )
-        law = start.get("law", 0.0) if effect.choices else None
+        law = start.get("law", 0.0) if effect.laws else None
         left[float(np.sum(fit.residual[:, :3] ** 2))] = law
     total, least = float(np.sum(signal**2)), min(left)
     return Explained(form[0], float(1e3 * np.sqrt(total / len(signal))), 1 - least / total, left[least])

@@ -228,6 +228,14 @@ def test_form_keeps_its_start(robot, plan):
         assert form.shape == candidate.shape
 
 
+def test_moment_is_no_law():
+    """A jump keeps the moment at which it was found, and its look-alikes need no more than those of other effects."""
+    effect = get("frame_jump", 3)
+    candidate = Candidate(effect.id, tuple(effect.amplitudes), (("effects.frame_jump.when", 0.3),))
+    assert {form.shape for form in forms(effect, candidate)} == {candidate.shape}
+    assert not effect.laws and get("friction", 3).laws == ["effects.friction.law"]
+
+
 def test_with_shape():
     """The amplitudes stay first; a local source, which has a variant of its own, is not added to others."""
     for effect in catalogue.all_effects(3).values():

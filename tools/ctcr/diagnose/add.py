@@ -320,7 +320,7 @@ class _Fitter:
             screened = [one for one in screen(*engine.thinned(there), plain, {}) if one.candidate.shape]
             found += [(one, linearised_end(engine, there, one)) for one in screened[: settings.ADDED_STARTS]]
         if found:
-            choices = catalogue.get(identity, self.robot.n_tubes).choices
+            choices = catalogue.get(identity, self.robot.n_tubes).of_kind("choice")
             chosen = {name: x for name, x in found[0][0].candidate.shape if name in choices}
             self.robot = catalogue.with_values(self.robot, [identity], chosen)
         return [start for _, start in found]

@@ -64,7 +64,7 @@ def forms(effect: Effect, candidate: Candidate, rejected_variants: Collection[st
     """What an accepted candidate may become: each constitutive law of the effect with its shape free, by the amplitudes
     with which it entered or by all of a wider variant. A local source is fitted only where a variant had found its
     position, in the candidate or among the full names `rejected_variants`."""
-    source, laws = set(effect.names_with("source")), set(effect.choices)
+    source, laws = set(effect.names_with("source")), set(effect.laws)
     rest = {name: value for name, value in candidate.shape if name not in laws}
     starts = [candidate.shape]
     for start in _starts(effect):
@@ -83,7 +83,7 @@ def forms(effect: Effect, candidate: Candidate, rejected_variants: Collection[st
 
 def other_amplitudes(effect: Effect, candidate: Candidate) -> list[Candidate]:
     """The same by amplitudes of other variants, disjoint from its own, of an effect with several constitutive laws."""
-    variants = _variants(effect) if effect.choices and len(effect.variants) > 1 else []
+    variants = _variants(effect) if effect.laws and len(effect.variants) > 1 else []
     own = {name for names in variants for name in names} & set(candidate.names)
     return [Candidate(effect.id, names, candidate.shape) for names in variants if own.isdisjoint(names)]
 

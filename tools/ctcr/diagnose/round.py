@@ -309,7 +309,7 @@ def _without_candidate(
 def _suspects(engine: Engine, accepted: list[CandidateFit]) -> set[str]:
     """Look-alikes of accepted effects whose constitutive law is open: it may be none of those that are offered."""
     known = (catalogue.get(one.id, engine.robot.n_tubes) for one in accepted)
-    return {identity for effect in known if effect.choices for identity in effect.look_alikes}
+    return {identity for effect in known if effect.laws for identity in effect.look_alikes}
 
 
 def decide(

@@ -81,9 +81,9 @@ class Effect:
         return [name for p in self.parameters if p.quantity == quantity for name in p.full_names]
 
     @property
-    def choices(self) -> list[str]:
-        """Selectors of a constitutive law."""
-        return self.of_kind("choice")
+    def laws(self) -> list[str]:
+        """Selectors of a constitutive law: its choices, but for a moment."""
+        return [name for name in self.of_kind("choice") if name not in self.names_with("moment")]
 
 
 def full_names(effect: str, parameter: str, per_tube: bool, n_tubes: int) -> tuple[str, ...]:
