@@ -20,7 +20,7 @@ inline constexpr std::array parameters{
                     .unit = "m^2",
                     .neutral = 0,
                     .sigma = 0.004,
-                    .soft = {0, 0.03},  // a knee from 5 1/m on: a strain of 0.4 % in a tube of 1.5 mm
+                    .soft = {0, 0.03},  // a knee at 5 1/m: 0.4 % strain at a diameter of 1.5 mm
                     .hard = {0, 0.08},
                     .per_tube = true,
                     .meaning = "part of the stiffness that is lost per square of the change of curvature, as long as "

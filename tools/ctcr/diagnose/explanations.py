@@ -24,6 +24,7 @@ from scipy.special import softmax
 from ctcr import settings
 from ctcr.diagnose.form_errors import (
     form_error,
+    left_by,
     log_density_of_cause,
     log_density_of_errors,
     log_density_of_mend,
@@ -98,10 +99,10 @@ def weighed(
         weigh(found - {a.id}, others - min(a.log_evidence - cost, -mends))
     for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
         gain = further.score - cost
-        if accepted:  # what the two leave is an error of their forms, not what the accepted ones alone leave
-            share = min(max(further.explained, 0.0), 1.0)
-            leaves = log_density_of_errors(left * math.sqrt(1 - share), form_error([*accepted, further]))
-            gain = min(gain, leaves - complete + log_density_of_cause(share) - log_density_of_mend(share))
+        if accepted:  # then the forms of all of them together have to account for what is left
+            leaves = log_density_of_errors(left * left_by([further]), form_error([*accepted, further]))
+            share = log_density_of_cause(further.explained) - log_density_of_mend(further.explained)
+            gain = min(gain, leaves - complete + share)
         weigh(found | {further.id}, weights[found, False] + rejects + gain + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects

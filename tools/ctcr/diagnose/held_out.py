@@ -72,16 +72,16 @@ def unexplained_of(fit: joint.Fit, rows: Mask, *, positions_alone: bool = False)
     """The unexplained chi-square of a residual (M, 6) in some rows (M,) that were not fitted, as a function of it.
 
     In units of the noise as stated, the tracker's smooth error included: where that is large, millimetres say little.
-    What the parameters may be off by, given the fitted rows, is explained too. Outliers of the fit, the better the
-    model, count for little.
+    The uncertainty of the fitted parameters counts as explained. Outliers of the fit, the better the model, count for
+    little.
     """
     weights = joint.linear_fit(fit, only=rows, max_iterations=0).weights.copy()
     if positions_alone:
         weights[:, 1] = 0.0
     noise = joint.linear_fit(fit, only=rows, weights=weights, inflation=np.ones(2), max_iterations=0)
 
-    by_parameters = noise.whiten(np.nan_to_num(fit.jacobian_all[np.repeat(rows, 6)]).reshape(-1, 6, len(fit.names)))
-    expected = len(by_parameters) + float(np.sum(by_parameters @ fit.covariance * by_parameters))
+    _, jacobian = noise.whitened()
+    expected = len(jacobian) + float(np.sum(jacobian @ fit.covariance * jacobian))
 
     def unexplained(residual: Array) -> float:
         whitened = noise.whiten(np.nan_to_num(residual[rows]))

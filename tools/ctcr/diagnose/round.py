@@ -225,7 +225,7 @@ class Refits:
         return [self._converged(forms, near) for forms in tried]
 
     def _in_each_shape(self, one: CandidateFit) -> list[CandidateFit]:
-        """With its usual shape, and first with a free one where the readings ask for that."""
+        """The candidate with a free shape, where the evidence gains by it, and then with its usual one."""
         candidate = one.candidate.with_shape(self.engine.robot.n_tubes)
         if one.fit is None or candidate == one.candidate:
             return [one]
@@ -233,7 +233,7 @@ class Refits:
         return [freed, one] if freed.score > one.score + settings.SAME_FORM else [one]
 
     def _converged(self, forms: list[CandidateFit], near: float) -> CandidateFit:
-        """The first form whose values are plausible, or else the last one."""
+        """The first form with plausible values, or else the last one; fitted to convergence where it contends."""
         for one in forms:
             if one.fit and not one.fit.converged and one.score > near:
                 one = self._of(one, settings.ITERATIONS)
