@@ -16,24 +16,21 @@ PALE = 0.45  # opacity of bars of linearised gains
 
 def waterfall(figure, d: Diagnosis) -> None:
     """RMS error on held-out runs, from the robot file to the expected error."""
-    axes = figure.subplots()
-    rms = d.rms_mm
+    axes, rms = figure.subplots(), d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
     for k, a in enumerate(d.accepted, start=1):
         reached = rms["with_effects"] if k == len(d.accepted) else d.rms_mm_after(a)
-        bars.append(("+ " + "\nor ".join(a.ids[:2]), reached, GOOD))
-    above = {"textcoords": "offset points", "ha": "center", "weight": "bold"}
+        bars.append((f"+ {' or '.join(a.ids[:2])}".replace("_", " "), reached, GOOD))
+    _, (name, floor) = d.floors.rows()
+    bars.append((name, floor, NOISE))
     for i, (_, value, colour) in enumerate(bars):
-        axes.bar(i, value, color=colour, width=0.62)
-        axes.annotate(f"{short(value)} mm", (i, value), (0, 3), **above)
-    last, (_, (name, floor)) = len(bars), d.floors.rows()
-    axes.bar(last, floor, color=NOISE, width=0.62)
-    axes.annotate(f"{short(floor)} mm", (last, floor), (0, 3), **above)
-    axes.axhline(floor, color=NOISE, linestyle="--", linewidth=1)
-    names = [*(name for name, _, _ in bars), name]
-    axes.set_xticks(range(last + 1), [name.replace("_", "\n") for name in names])
-    axes.set(ylabel="RMS error on held-out runs, mm", ylim=(0, 1.12 * max(floor, *(value for _, value, _ in bars))))
-    axes.grid(axis="x", visible=False)
+        axes.barh(i, value, color=colour, height=0.62)
+        axes.annotate(f"{short(value)} mm", (value, i), (4, 0), textcoords="offset points", va="center", weight="bold")
+    axes.axvline(floor, color=NOISE, linestyle="--", linewidth=1)
+    axes.set_yticks(range(len(bars)), [name for name, _, _ in bars])
+    axes.invert_yaxis()
+    axes.set(xlabel="RMS error on held-out runs, mm", xlim=(0, 1.25 * max(value for _, value, _ in bars)))
+    axes.grid(axis="y", visible=False)
 
 
 def candidates(figure, d: Diagnosis) -> bool | None:
@@ -41,8 +38,10 @@ def candidates(figure, d: Diagnosis) -> bool | None:
     rounds = [r for r in d.rounds if r.tried]
     if not rounds:
         return False
-    panels = figure.subplots(1, len(rounds), squeeze=False)[0]
-    for number, (axes, round_) in enumerate(zip(panels, rounds, strict=True), start=1):
+    panels = figure.subplots(-(-len(rounds) // PANELS), min(len(rounds), PANELS), squeeze=False).ravel()
+    for axes in panels[len(rounds) :]:
+        axes.set_visible(False)
+    for number, (axes, round_) in enumerate(zip(panels, rounds, strict=False), start=1):
         shown = round_.best[:CANDIDATES]
         for i, one in enumerate(shown):
             value = one.linear if one.refit is None else one.refit
@@ -54,7 +53,7 @@ def candidates(figure, d: Diagnosis) -> bool | None:
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
         largest = max(10.0, *(max(one.linear, one.score) for one in shown))
-        axes.set(xlim=(0, 8 * largest), xlabel="log evidence over none", title=f"round {number}")
+        axes.set(xlim=(0, 8 * largest), xticks=[], xlabel="log evidence over none", title=f"round {number}")
 
 
 def before_after(figure, d: Diagnosis) -> bool | None:

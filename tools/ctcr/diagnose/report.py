@@ -105,7 +105,7 @@ def _candidates(d: Diagnosis) -> str:
         "Every candidate was judged together with the calibration; pale: linearised, too far behind to be fitted. "
         "Boxed: accepted, with all that these data cannot tell from it."
     )
-    drawn = figure(figures.candidates, d, 10.4, 4.4, text, True)
+    drawn = figure(figures.candidates, d, 10.4, 4.4 * -(-len(d.rounds) // figures.PANELS), text, True)
     text = (
         "Fraction of a candidate's signal that another one can imitate together with calibration: where it is near 1 "
         "both ways, these data cannot tell the two apart."
