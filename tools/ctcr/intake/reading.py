@@ -3,10 +3,15 @@
 from pathlib import Path
 
 from ctcr.errors import InputError, Problem, file_faults
-from ctcr.intake import containers, text_log
+from ctcr.intake import containers, hdf5, messages, text_log
 from ctcr.intake.log import Log
 
 MAX_BYTES = 1 << 31
+_READERS = {
+    containers.MAT5: containers.read_mat,
+    (hdf5.MATLAB, hdf5.SIGNATURE): containers.read_hdf5,
+    messages.MCAP: messages.read_mcap,
+}
 
 
 def read(path: str | Path) -> Log:
@@ -17,8 +22,8 @@ def read(path: str | Path) -> Log:
         content = Path(path).read_bytes()
     if content.startswith(b"PK"):
         raise InputError(Problem("is a spreadsheet: save it as CSV", str(path)))
-    if content.startswith((containers.MAT5, containers.HDF5)):
-        return containers.read_mat(Path(path), content)
-    if content.startswith(containers.MCAP):
-        return containers.read_mcap(Path(path), content)
+    messages.refuse_bag(Path(path), content)
+    for starts, reader in _READERS.items():
+        if content.startswith(starts):
+            return reader(Path(path), content)
     return text_log.read(Path(path), content)

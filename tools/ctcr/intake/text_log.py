@@ -84,7 +84,7 @@ def _decoded(path: Path, content: bytes) -> tuple[str, list[str]]:
             notes.append("is not UTF-8: read as Windows text (cp1252)")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     if "\0" in text[:4096]:
-        raise InputError(Problem("is neither text nor a format that is known (.mat, .mcap)", str(path)))
+        raise InputError(Problem("is neither text nor a format that is known (.mat, .h5, .mcap)", str(path)))
     if not text.strip():
         raise InputError(Problem("is empty", str(path)))
     return text, notes
