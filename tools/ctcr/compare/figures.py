@@ -39,16 +39,18 @@ def course(figure: Figure, c: Comparison) -> None:
     run = c.headline.run
     starts = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
     stops = np.append(starts[1:], len(run))
-    sparse = max(1, int(np.ceil(len(starts) / 16)))
-    above = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 8, "color": NOISE}
-    for number, (start, stop) in enumerate(zip(starts, stops, strict=True)):
-        rows = np.arange(start, stop)[:: max(1, len(run) // MOST_POINTS)]
-        if number % 2:
-            axes.axvspan(x[start], x[stop - 1], color=TINT, lw=0)
-        axes.plot(x[rows], size[rows], color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
-        if len(starts) > 1 and number % sparse == 0:
-            axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), **above)
+    since = np.arange(len(run)) - np.repeat(starts, stops - starts)
+    rows = np.flatnonzero(since % max(1, len(run) // MOST_POINTS) == 0)
+    gaps = np.flatnonzero(since[rows] == 0)  # where the one line breaks: a line a run is slow where there are many
+    line = (np.insert(values[rows], gaps, np.nan) for values in (x.astype(float), size))
+    axes.plot(*line, color=ERROR, lw=0.9, marker="." if len(run) < 1000 else "", ms=3)
+    tinted = [(x[start], x[stop - 1] - x[start]) for start, stop in zip(starts[1::2], stops[1::2], strict=True)]
+    axes.broken_barh(tinted, (0, 1), transform=axes.get_xaxis_transform(), color=TINT, lw=0)
     if len(starts) > 1:
+        above = {"transform": axes.get_xaxis_transform(), "ha": "center", "fontsize": 8, "color": NOISE}
+        for number in range(0, len(starts), int(np.ceil(len(starts) / 16))):
+            start, stop = starts[number], stops[number]
+            axes.text((x[start] + x[stop - 1]) / 2, 1.01, str(run[start]), **above)
         axes.text(-0.01, 1.01, "run", transform=axes.transAxes, ha="right", fontsize=8, color=NOISE)
     if np.isfinite(c.noise.rms_mm):
         axes.axhline(c.noise.rms_mm, color=NOISE, lw=1, ls="--", label="noise, RMS")
@@ -75,9 +77,9 @@ def hysteresis(figure: Figure, c: Comparison) -> bool | None:
 
 def _both_ways(axes, c: Comparison, pairs) -> None:
     """The error component that differs most, for the run with the largest difference."""
-    runs = c.stops.run[pairs.later]
+    runs, square = c.stops.run[pairs.later], pairs.square
     names, counts = np.unique(runs, return_counts=True)
-    size = [np.median(pairs.square[runs == run]) for run in names]
+    size = [np.median(square[runs == run]) for run in names]
     run = names[np.argmax(size * (counts >= 0.5 * counts.max()))]
     mine = pairs.select(runs == run)
     mine = mine.select(np.argsort(mine.earlier + mine.weight))
