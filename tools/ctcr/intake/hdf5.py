@@ -97,7 +97,7 @@ def _joined(parts: list[Any]) -> Array | None:
     return np.squeeze(np.stack(parts))
 
 
-def _by_field(value: Array) -> Any:
+def _by_field(value: Any) -> Any:
     """A compound array by its fields; matrices along the first axis, as Python has them, go along the last one."""
     if value.dtype.names:
         return {name: _by_field(value[name]) for name in value.dtype.names}

@@ -1,5 +1,6 @@
 """Reads a log of any known format, which its content tells, not its name."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from ctcr.errors import InputError, Problem, file_faults
@@ -7,7 +8,7 @@ from ctcr.intake import containers, hdf5, messages, text_log
 from ctcr.intake.log import Log
 
 MAX_BYTES = 1 << 31
-_READERS = {
+_READERS: dict[bytes | tuple[bytes, ...], Callable[[Path, bytes], Log]] = {
     containers.MAT5: containers.read_mat,
     (hdf5.MATLAB, hdf5.SIGNATURE): containers.read_hdf5,
     messages.MCAP: messages.read_mcap,
