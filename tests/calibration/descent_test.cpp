@@ -102,17 +102,27 @@ TEST(Descent, ShortensAStepThatCannotBePredicted) {
   EXPECT_NE(fit.status.find("not converged"), std::string::npos);
 }
 
-// To the last bit, so that a prediction made there need not be made again; what lies outside comes to their edge.
+// To the last bit, so that a prediction made there need not be made again. What lies outside comes to the nearest point,
+// from which no point within lies in its direction; also where edges are nearly parallel, as those of a tube's length and
+// of its home are.
 TEST(Descent, KeepsAStartWithinItsBounds) {
   for (int seed = 0; seed < 40; ++seed) {
     test::Random random{std::uint64_t(seed)};
     constexpr Eigen::Index n = 5;
     std::vector<LinearBound> within;
-    for (int k = 0; k < 3; ++k) within.push_back({"edge", normals(n, random), -100});
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::VectorXd change = k == 2 ? within[1].change + 0.01 * normals(n, random) : normals(n, random);
+      within.push_back({"edge", change, -3});
+    }
     const detail::Bounds bounds(std::vector<FreeParameter>(n, {"p", 0, 1}), within, Eigen::VectorXd::Ones(n));
-    const Eigen::VectorXd inside = normals(n, random), outside = bounds.clamped(100 * inside);
-    EXPECT_TRUE(bounds.clamped(inside) == inside) << seed;
-    for (const LinearBound& bound : within) EXPECT_GE(bound.change.dot(outside), bound.low - 1e-6) << seed;
+    const Eigen::VectorXd outside = 5 * normals(n, random), nearest = bounds.clamped(outside);
+    for (const LinearBound& bound : within) EXPECT_GE(bound.change.dot(nearest), bound.low - 1e-6) << seed;
+    for (int other = 0; other < 100; ++other) {
+      const Eigen::VectorXd inside = 0.2 * normals(n, random);
+      if (std::ranges::any_of(within, [&](const LinearBound& b) { return b.change.dot(inside) < b.low; })) continue;
+      EXPECT_TRUE(bounds.clamped(inside) == inside) << seed;
+      EXPECT_LE((outside - nearest).dot(inside - nearest), 1e-6) << seed;
+    }
   }
 }
 

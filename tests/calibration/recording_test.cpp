@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "ctcr/calibration/identification/identify_with_exclusions.hpp"
+#include "ctcr/mechanics/all_equilibria.hpp"
 #include "support/catalogue_cases.hpp"
 #include "support/random_robots.hpp"
 #include "support/solver.hpp"
@@ -196,6 +197,78 @@ TEST(Recording, DoesNotDependOnTheThreads) {
   }
   EXPECT_EQ(residual[0], residual[1]);
   EXPECT_EQ(jacobian[0], jacobian[1]);
+}
+
+/// Two tubes, curved from end to end and opposed so that they rest in two mirror images, with the robot's frame for the
+/// tracker's.
+struct Bistable {
+  explicit Bistable(test::Random& random)
+    : system{Transmission<2>{1, 1, VecN<2>::Zero(), VecN<2>::Zero()}, Model<2>(drawn(random)), {{}, 0}, {}},
+      row{turned(0)},
+      rests(all_equilibria(system.model, joints(system.transmission, row.theta), {})) {}
+
+  /// The row with tube 2 turned.
+  [[nodiscard]] RecordedRow<2> turned(double angle) const {
+    return {motor_angles(system.transmission, Joints<2>{{0, 0}, {0, std::numbers::pi + angle}}), {}, {}};
+  }
+  [[nodiscard]] Pose reading(const RecordedRow<2>& at, Workspace<2>& ws) const {
+    Prediction<2> prediction;
+    EXPECT_EQ(predict(system, at.theta, at.load, ws, prediction), Status::ok);
+    return prediction.reading;
+  }
+
+  System<2> system;
+  RecordedRow<2> row;
+  std::vector<Equilibrium<2>> rests;
+
+private:
+  static Robot<2> drawn(test::Random& random) {
+    Robot<2> robot = test::random_robot<2>(random);
+    const double length = test::uniform(random, 0.1, 0.2);
+    for (Tube& tube : robot.tubes) {
+      tube.length = tube.curved_length = length;
+      tube.curvature = std::numbers::pi / 2 * test::uniform(random, 1.3, 2) / length;
+    }
+    return robot;
+  }
+};
+
+// Where a robot may rest in two equilibria, each row stays in that of its reading, also after a trial that snapped to the
+// other; and a recording that takes over from one which knew it begins there.
+TEST(Recording, StaysInTheEquilibriumThatWasRead) {
+  test::Random random(8);
+  ThreadPool pool(1);
+  for (int k = 0; k < test::cases(20); ++k) {
+    const Bistable robot(random);
+    ASSERT_EQ(robot.rests.size(), 2u) << k;
+    int unknown = 0, snapped = 0;
+    for (const Equilibrium<2>& rest : robot.rests) {
+      Workspace<2> ws = rest.workspace;
+      const Pose read = robot.reading(robot.row, ws);
+      const auto recording = [&] {
+        return Recording<2>(robot.system, {robot.row}, {read}, {P::index(Parameter::home_rotation, 1)}, pool);
+      };
+      const auto missed = [&](Recording<2>& readings, double turn) {
+        Eigen::VectorXd residual;
+        EXPECT_TRUE(readings(Eigen::VectorXd::Constant(1, turn), residual, nullptr)) << k;
+        return residual.norm();
+      };
+      Recording<2> cold = recording(), knowing = recording(), taught = recording();
+      unknown += missed(cold, 0) > 0.01;
+      knowing.begin_in({{rest.workspace.guess, 1.0}});
+      for (const double turn : {2.5, -2.5}) {
+        EXPECT_GT(missed(knowing, turn), 0.01) << k;
+        EXPECT_LT(missed(knowing, 0), 1e-4) << k;
+        ws = rest.workspace;
+        (void)robot.reading(robot.turned(turn), ws);
+        snapped += residual(robot.reading(robot.row, ws), read).norm() > 0.01;
+      }
+      taught.begin_in(knowing.equilibria());
+      EXPECT_LT(missed(taught, 0), 1e-4) << k;
+    }
+    EXPECT_EQ(unknown, 1) << k;  // a solve that knows nothing ends in one of them, whatever was read
+    EXPECT_GE(snapped, 1) << k;  // a robot that is turned so far and back need not come back
+  }
 }
 
 TEST(Recording, TellsWhichRowsCannotBeSolvedAndLeavesOutWhatIsAsked) {

@@ -83,7 +83,7 @@ void bind_recording(nb::module_& m) {
            "Solves friction along the recording at x; returns the largest change of a relative torsion angle [rad].")
       .def_prop_ro("friction_is_solved", &AnyRecording::friction_is_solved, "Whether friction was solved.")
       .def("begin_at", &AnyRecording::begin_at, "other"_a,
-           "Takes over the friction of another recording of the same table.")
+           "Takes over the equilibria and the friction of another recording of the same table.")
       .def("unsolved", &AnyRecording::unsolved, "Rows that could not be solved at the last call.")
       .def("residual", &residual, "x"_a, "derivatives"_a = false,
            "(residual (6 rows,), jacobian (6 rows, n) or empty, whether all rows were solved); releases the GIL")

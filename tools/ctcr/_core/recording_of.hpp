@@ -64,9 +64,16 @@ Profiles<N> profiles_of(const Table& table) {
   return out;
 }
 
+/// A recording of a robot of N tubes with any effects.
+template <int N>
+class RecordingOfTubes : public AnyRecording {
+public:
+  [[nodiscard]] virtual const std::vector<NearestEquilibrium<N>>& equilibria() const = 0;
+};
+
 /// @tparam Fx  AllEffects, or Standard: a tenth of the work
 template <int N, class Fx>
-class RecordingOf final : public AnyRecording {
+class RecordingOf final : public RecordingOfTubes<N> {
 public:
   explicit RecordingOf(const Table& table)
     : pool_(table.threads),
@@ -82,7 +89,9 @@ public:
   bool friction_is_solved() const override { return recording_.friction_is_solved(); }
   void begin_at(const AnyRecording& other) override {
     if (const auto* like = dynamic_cast<const RecordingOf*>(&other)) recording_.begin_at(like->recording_);
+    if (const auto* same = dynamic_cast<const RecordingOfTubes<N>*>(&other)) recording_.begin_in(same->equilibria());
   }
+  const std::vector<NearestEquilibrium<N>>& equilibria() const override { return recording_.equilibria(); }
   Eigen::VectorXd nominal() const override { return recording_.nominal(); }
   const std::vector<int>& unsolved() const override { return recording_.unsolved(); }
   const std::vector<bool>& active() const override { return recording_.active(); }

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ctcr import _core, settings
+from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import Candidate
@@ -15,6 +15,7 @@ from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.result import Priors
 from ctcr.fit.widening import Likelihood, Scales
 from ctcr.model import parameters, recording, user_recording
+from ctcr.model.protocol import ResidualModel
 from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -36,7 +37,7 @@ class Engine:
     steps: int = field(init=False)  # of integration
     positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
     base: list[str] = field(init=False)  # names of the calibration parameters
-    _friction_path: _core.Recording | None = field(init=False, default=None)  # of the last fit with friction
+    _last: ResidualModel | None = field(init=False, default=None)  # model of the last fit: its equilibria and friction
     _scales: Scales = field(init=False, default_factory=dict)  # on the stated uncertainties, of the last fit
 
     def __post_init__(self) -> None:
@@ -68,11 +69,13 @@ class Engine:
         noise: Any = None,
         tolerance: float | None = None,
         near: bool = False,
+        like: ResidualModel | None = None,
         **options: Any,
     ) -> joint.Fit:
         """Calibration and `added` parameters of effects together, the others of effects at their `fixed` values.
 
         near: the start is the end of a similar fit, so that a fit of a part of many rows would teach nothing.
+        like: the model of a similar fit, in whose equilibria the rows begin.
         Frozen `weights` of outliers and `inflation` of the noise make evidences comparable. Without them both follow
         the fit: where the model is wrong, the noise is inflated so that calibration stays plausible. Other options as
         in fit_joint().
@@ -82,15 +85,15 @@ class Engine:
         at = dict(zip(names, priors.mean, strict=True)) | (start or {})
         at = np.clip([at[name] for name in names], priors.low, priors.high)
         table = self.recording(names, fixed)
-        if self._friction_path is not None:
-            table.begin_at(self._friction_path)
+        for known in (like, self._last):
+            if type(known) is type(table):
+                table.begin_at(known)
         if weights is None and not self.robust:
             weights = np.ones((len(self.measurements), 2))
         options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
         options["row"] = self.measurements.row
         fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
-        if table.friction_is_solved:
-            self._friction_path = table
+        self._last = table
         if options.get("scales") is None:
             self._scales = fitted.priors.scales
         return fitted
@@ -100,7 +103,7 @@ class Engine:
     ) -> joint.Fit:
         """As fit(), at the noise, weights and inflation of another fit, so that their evidences can be compared; from
         its values or a near start."""
-        options = {"noise": other.noise, "near": True} | other.frozen | options
+        options = {"noise": other.noise, "near": True, "like": other.model} | other.frozen | options
         return self.fit(added, start=values_of(other) if start is None else start, **options)
 
     def fit_with_field(

@@ -88,8 +88,10 @@ def fit(
         return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
-        kept = like.frozen if like else given
-        return fit_joint(model(), priors, noise, positions, rows, start=start, starts=starts, **kept, **named)
+        kept, table = like.frozen if like else given, model()
+        if like:
+            table.begin_at(like.model)
+        return fit_joint(table, priors, noise, positions, rows, start=start, starts=starts, **kept, **named)
 
     start, priors = _with_frame(model(), priors, noise, positions, rows, **given, **named)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))

@@ -42,7 +42,7 @@ class ResidualModel(Protocol):
         return 0.0
 
     def begin_at(self, other: Any) -> None:
-        """Takes over the friction path of a compiled Recording of the same table."""
+        """Takes over the equilibria and the friction path of a compiled Recording of the same table."""
 
 
 class LinearModel(ResidualModel):

@@ -82,7 +82,8 @@ class SessionRecording(ResidualModel):
         return self.table.solve_friction(x)
 
     def begin_at(self, other: "SessionRecording") -> None:
-        self.table.begin_at(other.table)
+        if type(other.table) is type(self.table):
+            self.table.begin_at(other.table)
 
     def residual(self, x: Array, derivatives: bool = False) -> tuple[Array, Array, bool]:
         residual, jacobian, _ = self.table.residual(x, derivatives)

@@ -53,11 +53,13 @@ public:
     }
   }
 
-  /// z moved to within the bounds; to the last bit z where it is there already, as the descent keeps its prediction.
+  /// The nearest point within the bounds; to the last bit z where it is there already, as the descent keeps its
+  /// prediction.
   [[nodiscard]] Eigen::VectorXd clamped(const Eigen::VectorXd& z) const {
-    const Eigen::VectorXd y = T_ * z, within = y.cwiseMax(low_).cwiseMin(high_);
-    if (within == y) return z;
-    return inverse_ * within;
+    const Eigen::VectorXd y = T_ * z;
+    if (y.cwiseMax(low_).cwiseMin(high_) == y) return z;
+    // The axes of y may be nearly parallel: moving one coordinate to its bound alone could carry z far away.
+    return step(Eigen::VectorXd::Zero(z.size()), -z, Eigen::MatrixXd::Identity(z.size(), z.size()));
   }
   /// The step from z (which keeps the bounds) to the minimum within the bounds of a quadratic function with this gradient
   /// there and this positive definite Hessian. Active set: goes towards the free minimum up to the first bound, and

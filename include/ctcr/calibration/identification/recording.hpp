@@ -2,6 +2,7 @@
 // A table of readings beside what a system with other parameters would have read.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <span>
@@ -14,12 +15,23 @@
 
 namespace ctcr {
 
+/// The solution of a row that was nearest to its reading.
+template <int N>
+struct NearestEquilibrium {
+  TipGuess<N> guess;
+  double missed = std::numeric_limits<double>::infinity();  ///< |residual|^2 [m^2, rad^2]; infinite: none is known
+
+  void improve(const TipGuess<N>& other, double misses) noexcept {
+    if (misses <= missed) *this = {other, misses};
+  }
+};
+
 /// Residuals of a recording, and their exact derivatives, as functions of chosen parameters of the system.
 ///
 /// A vector of parameters x holds values of SystemParameters<N, Fx>; those of a turn from the nominal frame are one
-/// rotation vector [rad]. Rows stand in the order in which they were
-/// recorded. Each row starts from its own last solution. Answers do not depend on the number of threads. Not for several
-/// callers at once. Real time: no.
+/// rotation vector [rad]. Rows stand in the order in which they were recorded. Where a robot may rest in several
+/// equilibria, the reading tells which one it was in: each row starts from that of its solutions which was nearest to its
+/// reading. Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
 /// @tparam Fx  the effects of the system
 template <int N, class Fx = Standard>
 class Recording {
@@ -39,7 +51,7 @@ public:
       parameters_(std::move(parameters)),
       columns_(with_whole_turns(parameters_)),
       pool_(&pool),
-      start_(rows_.size()),
+      equilibria_(rows_.size()),
       predicted_(rows_.size()),
       active_(rows_.size(), true),
       workers_(std::size_t(pool.size())) {}
@@ -83,6 +95,8 @@ public:
         if (solved) {
           residual.segment<6>(at) = ctcr::residual(measured_[i], w.prediction.reading);
           predicted_[i] = w.prediction.reading;
+          const auto misses = residual.segment<6>(at).array().square();
+          equilibria_[i].improve(w.workspace.guess, misses.isFinite().select(misses, 0).sum());
         } else {
           residual.segment<6>(at).setConstant(std::numeric_limits<double>::quiet_NaN());
           if (jacobian) jacobian->middleRows<6>(at).setZero();
@@ -124,10 +138,18 @@ public:
   /// Takes over the friction of another recording of the same table: with similar values little is left to solve.
   void begin_at(const Recording& other) {
     const auto like = [](const RecordedRow<N>& a, const RecordedRow<N>& b) { return a.samples() == b.samples(); };
-    if (!std::ranges::equal(rows_, other.rows_, like)) return;
+    if (!other.friction_is_solved() || !std::ranges::equal(rows_, other.rows_, like)) return;
     for (std::size_t i = 0; i < rows_.size(); ++i) rows_[i].torsion = other.rows_[i].torsion;
     torsion_ = other.torsion_;
     solved_at_ = other.solved_at_;
+  }
+
+  /// Of each row the solution that was nearest to its reading.
+  [[nodiscard]] const std::vector<NearestEquilibrium<N>>& equilibria() const { return equilibria_; }
+  /// Takes over those of a recording of the same table, perhaps with other effects, where they are nearer.
+  void begin_in(const std::vector<NearestEquilibrium<N>>& others) {
+    if (others.size() != equilibria_.size()) return;
+    for (std::size_t i = 0; i < others.size(); ++i) equilibria_[i].improve(others[i].guess, others[i].missed);
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
@@ -139,10 +161,6 @@ public:
   [[nodiscard]] const std::vector<bool>& active() const { return active_; }
 
 private:
-  struct Start {
-    TipGuess<N> guess;
-    bool known = false;
-  };
   struct alignas(64) Worker {
     Workspace<N> workspace;
     RecordedPrediction<N, Fx> prediction;
@@ -151,14 +169,13 @@ private:
 
   bool solve_row(const System<N, Fx>& system, const HistoryOfRow& history, std::size_t i, Worker& w) noexcept {
     Workspace<N>& ws = w.workspace;
-    if (start_[i].known)
-      ws.begin_at(start_[i].guess);
+    if (std::isfinite(equilibria_[i].missed))
+      ws.begin_at(equilibria_[i].guess);
     else if (ws.warm &&
              !detail::nearby(ws, Configuration<N>{joints(system.transmission, rows_[i].theta), rows_[i].load}))
       ws.reset();
     const bool solved = predict(system, rows_[i], history, ws, w.prediction) == Status::ok;
     if (!solved) ws.reset();
-    start_[i] = {ws.guess, solved};
     return solved;
   }
 
@@ -221,7 +238,7 @@ private:
   std::vector<Pose> measured_;
   std::vector<int> parameters_, columns_;
   ThreadPool* pool_;
-  std::vector<Start> start_;
+  std::vector<NearestEquilibrium<N>> equilibria_;
   std::vector<Pose> predicted_;
   std::vector<bool> active_;
   std::vector<Worker> workers_;
