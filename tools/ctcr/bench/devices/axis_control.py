@@ -107,10 +107,11 @@ class AxisControl:
             self._watch(dt, joints)
         self.joints = joints
         if self._motion:
-            self.setpoint, self._speeds = self._motion.advance(dt)
-            if self._guarded and self._settings.limits.problem(self._motion.rest()):
+            # Before the step: a late cycle makes it long, and one that ends too near a limit cannot be undone.
+            if self._guarded and self._settings.limits.problem(self._motion.rest(dt)):
                 self.halt()
                 self.limited = True
+            self.setpoint, self._speeds = self._motion.advance(dt)
             if self._motion.is_finished:
                 self._settling += dt
                 left = np.abs(self.setpoint - joints)

@@ -58,13 +58,17 @@ class VelocityMove:
 
     def advance(self, dt: float) -> tuple[Array, Array]:
         """As StraightMove.advance."""
-        wanted = self._wanted if self._left > 0 else 0 * self._wanted
+        self._joints, self._speeds = self._after(dt)
         self._left -= dt
-        change = np.clip(wanted - self._speeds, -self._most * dt, self._most * dt)
-        self._joints = self._joints + (self._speeds + 0.5 * change) * dt
-        self._speeds = self._speeds + change
         return self._joints, self._speeds
 
-    def rest(self) -> Array:
-        """Where the joints come to rest if they brake now."""
-        return self._joints + self._speeds * np.abs(self._speeds) / (2 * self._most)
+    def rest(self, dt: float = 0.0) -> Array:
+        """Where the joints come to rest if they go on for `dt` [s] and brake then."""
+        joints, speeds = self._after(dt)
+        return joints + speeds * np.abs(speeds) / (2 * self._most)
+
+    def _after(self, dt: float) -> tuple[Array, Array]:
+        wanted = self._wanted if self._left > 0 else 0 * self._wanted
+        change = np.clip(wanted - self._speeds, -self._most * dt, self._most * dt)
+        changing, speeds = np.abs(change) / self._most, self._speeds + change
+        return self._joints + (self._speeds + 0.5 * change) * changing + speeds * (dt - changing), speeds
