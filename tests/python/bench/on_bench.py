@@ -14,6 +14,7 @@ from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.health import health_of
 from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import SimulatedPerson
+from ctcr.bench.devices.release import release
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import MASTER, private_folder
 from ctcr.bench.simulators import ethercat
@@ -237,6 +238,38 @@ def check_fault(robot, bench, folder, fault, value, says):
 def test_fault(robot, bench, folder, fault):
     """The motors stop, the message names the cause, and nothing moves before the release."""
     check_fault(robot, bench, folder, fault, *FAULTS[fault])
+
+
+def break_terminal(robot, bench, folder, **fault):
+    """A terminal reports an error while the joints rest."""
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        request(folder, "ethercat", {"faults": fault})
+        end = time.monotonic() + 5
+        while not motors.state["stopped"] and time.monotonic() < end:
+            time.sleep(0.01)
+        with pytest.raises(DeviceFault, match="A010"):
+            motors.check()
+
+
+def test_release(robot, bench, folder):
+    """It resets a terminal once the cause is mended, and says when only switching off and on helps; else it holds."""
+    break_terminal(robot, bench, folder, over_current=3)
+    with pytest.raises(DeviceFault, match=r"terminal 3 .*coil A \(A010:06\), also after a reset: switch off, check"):
+        release(folder)
+    assert emergency_stop.is_stopped(folder)
+    request(folder, "ethercat", {"faults": {"over_current": None}})
+    said = release(folder)
+    assert said[0] == "terminal 3 (EL7041): reset" and "coil A" in said[1] and not emergency_stop.is_stopped(folder)
+    with Motors(bench, robot, folder) as motors:
+        motors.connect()
+        motors.check()
+    break_terminal(robot, bench, folder, internal_error=2)
+    with pytest.raises(DeviceFault, match="also after a reset: switch the terminals off and on"):
+        release(folder)
+    for off in (True, False):
+        request(folder, "ethercat", {"faults": {"power_loss": off}})
+    assert len(release(folder)) == 1  # the terminals have forgotten their errors
 
 
 @pytest.mark.slow

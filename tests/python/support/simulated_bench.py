@@ -51,7 +51,8 @@ def run_on_bench(folder: Path, bench: list, tests: list, **environment: Path) ->
     """Runs pytest beside the simulators that `ctcr sim bench` starts with `bench`; tests find what they need in the
     environment, and the fixtures of bench_fixtures.py. Processes of different folders do not meet."""
     skip_without_bench()
-    known = {"PYTHONPATH": Path(__file__).parent, **environment}
+    paths = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    known = {"PYTHONPATH": os.pathsep.join(paths), **environment}
     for attempt in (1, 2):
         pytest_command = "-m pytest -q --durations=9 -p no:cacheprovider -p no:xdist -p bench_fixtures".split()
         program = ["--folder", folder / str(attempt), "--", sys.executable, *pytest_command, *tests]

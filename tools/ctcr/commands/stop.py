@@ -11,17 +11,17 @@ from ctcr.commands import options
 def command(release: bool, folder) -> None:
     """Stop all motors of the bench at once.
 
-    They stay stopped until `ctcr stop --release`. This stops by software. The switch that cuts the motors' power is
-    the emergency stop of the bench.
+    They stay stopped until `ctcr stop --release`, which also resets the terminals that report an error. This stops by
+    software. The switch that cuts the motors' power is the emergency stop of the bench.
 
     Example: ctcr stop
     """
     from ctcr.bench.devices import emergency_stop
 
-    if not release:
-        emergency_stop.stop(folder, "ctcr stop was called")
-        options.Output().say("stopped; release with `ctcr stop --release`")
+    if release:
+        from ctcr.bench.devices.release import release as released
+
+        options.Output().say(*released(folder))
         return
-    reason = emergency_stop.reason(folder)
-    emergency_stop.release(folder)
-    options.Output().say(f"released; the reason of the stop was: {reason}" if reason else "nothing was stopped")
+    emergency_stop.stop(folder, "ctcr stop was called")
+    options.Output().say("stopped; release with `ctcr stop --release`")

@@ -12,6 +12,8 @@ BRING_UP_US = 20000  # timeout of a frame during the bring-up; pysoem's own lose
 CYCLE_US = 2000  # and in a cycle
 STATE_US = 50000
 OP_S = 2.0  # longest way to OP
+TRIES = 20  # of a frame that must come back whole
+EDGE_S = 0.05  # for which the reset bit holds a level: many cycles of a terminal, shorter than its watchdog
 
 
 class Bus:
@@ -73,6 +75,33 @@ class Bus:
         """One cycle with the drives' commands; None for a wrong working counter."""
         return [drive.inputs() for drive in self.drives] if self._cycle() == self._master.expected_wkc else None
 
+    def inputs(self) -> list[DriveInputs]:
+        """Those of the first exchange whose frame comes back whole."""
+        for _ in range(TRIES):
+            if inputs := self.exchange():
+                return inputs
+        raise self.check_states() or self.frame_fault("frames come back damaged")
+
+    def reset(self) -> list[StepperDrive]:
+        """Resets the terminals that report an error, motors off; returns them. Raises the fault that one keeps."""
+        broken = self._broken()
+        for level in (False, True, False):
+            end = time.monotonic() + EDGE_S
+            while broken and time.monotonic() < end:
+                for drive in broken:
+                    drive.command(enable=False, speed=0.0, reset=level)
+                self._cycle()
+        for drive in self._broken():
+            kept = drive.diagnosis()
+            raise drive.fault(f"{kept.what}, also after a reset", f"{kept.remedy}, then release again", kept.code)
+        return broken
+
+    def _broken(self) -> list[StepperDrive]:
+        return [drive for drive, said in zip(self.drives, self.inputs(), strict=True) if said.error]
+
+    def frame_fault(self, what: str) -> DeviceFault:
+        return self._fault(what, "check the cables, then connect again")
+
     def check_states(self) -> DeviceFault | None:
         """The fault of a terminal that is not in OP, read from all: a right working counter does not prove OP."""
         return None if self._master.read_state() == State.OP else self._state_fault()
@@ -118,4 +147,4 @@ class Bus:
                 return drive.fault("does not answer", remedy)
             if drive.slave.state != State.OP:
                 return drive.state_fault()
-        return self._fault("frames come back damaged or not at all", "check the cable, then connect again")
+        return self.frame_fault("frames come back damaged or not at all")

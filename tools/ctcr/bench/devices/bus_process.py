@@ -7,6 +7,7 @@ of the pipe closes, it stops the motors and ends.
 
 import fcntl
 import gc
+import json
 import os
 import signal
 import time
@@ -26,6 +27,7 @@ from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.stepper_drive import DriveInputs
 from ctcr.bench.shared.real_time import BUS, Lateness, real_time
 from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
+from ctcr.show.output import write_json
 
 HOME_COUNT = 1_000_000  # of the counters at home; terminals count from 0 after power on, so 0 would prove nothing
 HOME_RANGE = 500_000  # counts: more than any axis travels
@@ -83,6 +85,20 @@ def bus_lock(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def last_bus(folder: Path) -> Bus | None:
+    """The bus that a program drove last from this folder, for programs without a bench file."""
+    try:
+        known = json.loads((folder / "bus.json").read_text(encoding="utf-8"))
+        return Bus(known["interface"], known["positions"], Motors.model_validate(known["drive"]))
+    except (OSError, ValueError, LookupError):  # none, or another version of this program wrote it
+        return None
+
+
+def _remember(settings: BusSettings, folder: Path) -> None:
+    known = {"interface": settings.interface, "positions": settings.positions, "drive": settings.drive.model_dump()}
+    write_json(known, str(folder / "bus.json"))
+
+
 def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
     """The process: sends ("ready", names of devices) or ("fault", DeviceFault), then serves until the pipe closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
@@ -90,6 +106,7 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
     try:
         with bus_lock(folder), real_time(BUS) as granted:
             try:
+                _remember(settings, folder)
                 bus.connect()
                 owner = _Owner(settings, folder, pipe, bus, granted)
                 owner.publish(time.monotonic())
@@ -108,7 +125,7 @@ class _Owner:
         self._record = state_record(folder, writer=True)
         self._real_time, self._lateness = granted, Lateness()
         self._cycles = self._bad = 0
-        self._counters = np.array([drive.counter for drive in self._first_inputs()])
+        self._counters = np.array([drive.counter for drive in bus.inputs()])
         homed = bool((np.abs(self._counters - HOME_COUNT) < HOME_RANGE).all())
         self._base = HOME_COUNT if homed else 0
         self._control = AxisControl(settings.axes, self._joints(), homed)
@@ -116,12 +133,6 @@ class _Owner:
         self._doubted = False  # the last check of the states found a fault
         self._number = 0  # of the last request
         self._open = True
-
-    def _first_inputs(self) -> list[DriveInputs]:
-        for _ in range(20):
-            if inputs := self._bus.exchange():
-                return inputs
-        raise self._bus.check_states() or self._frame_fault("frames come back damaged")
 
     def _joints(self) -> np.ndarray:
         turns = (self._counters - self._base) / self._settings.drive.encoder_counts
@@ -157,7 +168,7 @@ class _Owner:
             self._bad += 1
             if now - self._good_at > SILENCE_S and not control.fault:
                 lost = f"no frame came back whole for {1e3 * SILENCE_S:.0f} ms"
-                control.stop(bus.check_states() or self._frame_fault(lost))
+                control.stop(bus.check_states() or bus.frame_fault(lost))
             return False
         self._good_at = now
         self._counters = np.array([drive.counter for drive in inputs])
@@ -189,9 +200,6 @@ class _Owner:
             if fault and self._doubted:  # one lost frame is no fault
                 control.stop(fault)
             self._doubted = fault is not None
-
-    def _frame_fault(self, what: str) -> DeviceFault:
-        return DeviceFault(f"bus {self._settings.interface}", what, "check the cables, then connect again")
 
     # ---- requests
 

@@ -18,7 +18,7 @@ from ctcr.bench.shared.ethercat import (
 
 # Objects of outputs (0x7000) and inputs (0x6000): encoder, motor.
 _SET_COUNTER, _COUNTER_VALUE = (0x7000, 3), (0x7000, 0x11)
-_ENABLE, _VELOCITY = (0x7010, 1), (0x7010, 0x21)
+_ENABLE, _RESET, _VELOCITY = (0x7010, 1), (0x7010, 2), (0x7010, 0x21)
 _COUNTER, _COUNTER_SET = (0x6000, 0x11), (0x6000, 3)
 _READY, _ERROR = (0x6010, 2), (0x6010, 4)
 _RX, _TX = 0x1C12, 0x1C13  # PDO assignment of outputs and inputs
@@ -84,10 +84,13 @@ class StepperDrive:
 
     # ---- process data
 
-    def command(self, enable: bool, speed: float, counter: int | None = None) -> None:
-        """For the next cycle: `speed` [turns/s], cut at the full speed; `counter`: its value from now on."""
+    def command(self, enable: bool, speed: float, counter: int | None = None, reset: bool = False) -> None:
+        """For the next cycle: `speed` [turns/s], cut at the full speed; `counter`: its value from now on.
+
+        A terminal takes the rising edge of `reset` as the acknowledgement of its error.
+        """
         fraction = max(-1.0, min(1.0, speed / self.full_speed))
-        outputs = {_ENABLE: enable, _VELOCITY: round(fraction * _FULL)}
+        outputs = {_ENABLE: enable, _RESET: reset, _VELOCITY: round(fraction * _FULL)}
         if counter is not None:
             outputs |= {_SET_COUNTER: 1, _COUNTER_VALUE: counter}
         self.slave.output = self._images[_RX].pack(outputs)

@@ -33,6 +33,7 @@ FAULTS = {  # those of a motor: its number from 1; 0: none
     "over_current": 0,  # the motor has a short circuit
     "under_voltage": 0,  # the supply of the motor is off
     "encoder_jump": 0,  # the encoder of the motor jumps, once
+    "internal_error": 0,  # the terminal of the motor fails, once, and keeps its error until its power was off
 }
 
 
@@ -128,6 +129,8 @@ class EthercatSimulator(Simulator):
             motor.unpowered = faults.under_voltage == number
             if changes.get("encoder_jump") == number:
                 motor.jump(JUMP_COUNTS)
+            if changes.get("internal_error") == number:
+                terminal.fail()
 
 
 def raw_socket(interface: str) -> socket.socket:

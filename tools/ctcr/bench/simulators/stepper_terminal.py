@@ -8,7 +8,7 @@ from ctcr.bench.simulators.stepper_motor import HEATING_S, StepperMotor
 
 MAILBOX = 128  # bytes
 ENCODER, STEPPER, POSITIONING = 0x7000, 0x7010, 0x7020  # outputs; inputs are 0x1000 lower
-SATURATED, OVER_TEMPERATURE, UNDER_VOLTAGE, SHORT_CIRCUIT, STALL = 1, 2, 4, 6, 11  # subindices of DIAGNOSIS
+SATURATED, OVER_TEMPERATURE, UNDER_VOLTAGE, SHORT_CIRCUIT, OTHER, STALL = 1, 2, 4, 6, 9, 11  # subindices of DIAGNOSIS
 MOTOR_LIMIT_MA = 1500  # more burns the motor that is connected
 ABSOLUTE, ABSOLUTE_CHANGE = 1, 0x1001  # start types of the positioning interface
 RX, TX = 0x1C12, 0x1C13  # PDO assignment of outputs and inputs
@@ -66,8 +66,12 @@ class StepperTerminal(Application):
         self.objects = self._dictionary()
         self.mail = ServiceDataServer(self.objects, MAILBOX).answer
         self._outputs, self._inputs = self._images()
-        self._toggle = self._executing = self._error = self._set_done = False
+        self._toggle = self._executing = self._error = self._failed = self._set_done = False
         self.motor.power_on()
+
+    def fail(self) -> None:
+        """An error that no reset ends."""
+        self._failed = True
 
     # ---- settings
 
@@ -170,6 +174,7 @@ class StepperTerminal(Application):
             OVER_TEMPERATURE: motor.heat >= HEATING_S,
             SHORT_CIRCUIT: motor.shorted,
             UNDER_VOLTAGE: motor.unpowered,
+            OTHER: self._failed,
         }
         self._error |= any(faults.values())
         for subindex, value in (faults | {STALL: motor.stalled, SATURATED: motor.stalled}).items():
