@@ -199,15 +199,15 @@ def test_homing(robot, bench, folder):
 
 FAULTS = {  # fault: its value, what the message says
     "stall": (2, "translation of tube 2: it does not follow"),
-    "unplugged": (True, "no frame came back|does not answer"),
+    "unplugged": (True, "no terminal answers"),
     "emergency stop": (None, "somebody stopped it"),
 }
 MORE_FAULTS = {
     "encoder_jump": (4, "rotation of tube 1: (its encoder jumped|it does not follow)"),
     "over_current": (3, r"terminal 3 \(EL7041\): short circuit or over-current in coil A \(A010:06\)"),
     "under_voltage": (5, "motor supply too low"),
-    "lost_after": (4, "does not answer|no frame"),
-    "power_loss": (True, "no frame came back|does not answer"),
+    "lost_after": (4, r"terminal 4 \(EL7041\): does not answer"),
+    "power_loss": (True, "no terminal answers"),
 }
 
 

@@ -15,7 +15,8 @@ from ctcr.bench.simulators import aurora, bench, ethercat
 ROOT = Path(__file__).parents[3]
 HOMES = [3.0, -1.5, 2.5]  # rotations [deg] of the robot on the bench of test_live.py; its file says 0
 T_REF = [-59.6, 20.3, -180.5], [0.004, 1.203, 0.297]  # [mm], [rad]
-BUS_STARVED = ("no frame came back whole", "no process data for 100 ms")  # as master and terminals say it
+# As master and terminals say it.
+BUS_STARVED = ("no terminal answers", "no frame came back whole", "no process data for 100 ms")
 ROBOT = ROOT / "examples" / "data" / "demo" / "robot.yaml"
 
 

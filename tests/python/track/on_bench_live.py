@@ -93,7 +93,7 @@ FAULTS = {
     "unplugged": ("aurora", {"unplugged": True}, "the port is gone|cannot open the port|no answer"),
     "out of volume": ("aurora", {"out_of_volume": True}, "outside of the tracker's volume for 0.5 s"),
     "stall": ("ethercat", {"stall": 6}, "rotation of tube 3: it does not follow"),
-    "cable": ("ethercat", {"unplugged": True}, "no frame came back|does not answer"),
+    "cable": ("ethercat", {"unplugged": True}, "no terminal answers"),
     "emergency stop": (None, None, "somebody stopped it"),
 }
 

@@ -47,7 +47,7 @@ class Bus:
             raise self._fault("cannot be opened", remedy) from None
         self._master = master
         if master.config_init() <= 0:
-            raise self._fault("no terminal answers", "check the cable to the coupler and its power supply")
+            raise self._silence()
         self.names = [slave.name for slave in master.slaves]
         self.drives = [self._drive(position) for position in self._positions]
         for drive in self.drives:
@@ -102,9 +102,21 @@ class Bus:
     def frame_fault(self, what: str) -> DeviceFault:
         return self._fault(what, "check the cables, then connect again")
 
-    def check_states(self) -> DeviceFault | None:
-        """The fault of a terminal that is not in OP, read from all: a right working counter does not prove OP."""
-        return None if self._master.read_state() == State.OP else self._state_fault()
+    def check_states(self, silence: bool = True) -> DeviceFault | None:
+        """The fault of a terminal that is not in OP, read from all: a right working counter does not prove OP.
+
+        Without `silence` only of one that says so: where the exchange comes back whole, a state that does not is lost.
+        """
+        if self._master.read_state() == State.OP:
+            return None
+        if silence:
+            return self._state_fault()
+        left = [drive for drive in self.drives if drive.slave.state not in (0, State.OP)]
+        return left[0].state_fault() if left else None
+
+    def _silence(self) -> DeviceFault:
+        remedy = "check the cable to the coupler, its power supply and the load of this computer, then connect again"
+        return self._fault("no terminal answers", remedy)
 
     def _cycle(self) -> int:
         """The working counter of one exchange."""
@@ -141,6 +153,8 @@ class Bus:
 
     def _state_fault(self) -> DeviceFault:
         self._master.read_state()
+        if not any(slave.state for slave in self._master.slaves):
+            return self._silence()
         for drive in self.drives:
             if drive.slave.state == 0:
                 remedy = "check the plugs and the power supply from this terminal on, then connect again"

@@ -31,7 +31,7 @@ from ctcr.show.output import write_json
 
 HOME_COUNT = 1_000_000  # of the counters at home; terminals count from 0 after power on, so 0 would prove nothing
 HOME_RANGE = 500_000  # counts: more than any axis travels
-SILENCE_S = 0.06  # without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
+SILENCE_S = 0.06  # of cycles without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
 STATE_CYCLES = 25  # between two checks of the terminals' states
 READY_S = 0.5  # from enabling to ready
 LOCK_S = 3.0  # patience with a program that is just ending
@@ -125,12 +125,12 @@ class _Owner:
         self._record = state_record(folder, writer=True)
         self._real_time, self._lateness = granted, Lateness()
         self._cycles = self._bad = 0
+        self._silence = 0.0  # [s]
         self._counters = np.array([drive.counter for drive in bus.inputs()])
         homed = bool((np.abs(self._counters - HOME_COUNT) < HOME_RANGE).all())
         self._base = HOME_COUNT if homed else 0
         self._control = AxisControl(settings.axes, self._joints(), homed)
         self._enabled_at, self._new_counters = None, None
-        self._doubted = False  # the last check of the states found a fault
         self._number = 0  # of the last request
         self._open = True
 
@@ -141,9 +141,9 @@ class _Owner:
     def serve(self) -> None:
         gc.disable()  # a cycle leaves nothing to collect
         period, control = self._settings.period, self._control
-        self._good_at = now = time.monotonic()
-        last, due = now, now + period
-        while self._open or (control.is_moving and now - self._good_at < SILENCE_S):  # ends at rest, or without a bus
+        last = now = time.monotonic()
+        due = now + period
+        while self._open or (control.is_moving and self._silence < SILENCE_S):  # ends at rest, or without a bus
             wait = due - time.monotonic()
             if wait > 0:
                 time.sleep(wait)
@@ -166,11 +166,12 @@ class _Owner:
             control.stop(emergency_stop.stop_fault(self._folder))
         if inputs is None:
             self._bad += 1
-            if now - self._good_at > SILENCE_S and not control.fault:
+            self._silence += self._settings.period  # by cycles: where this process is late, nobody has been asked
+            if self._silence > SILENCE_S and not control.fault:
                 lost = f"no frame came back whole for {1e3 * SILENCE_S:.0f} ms"
                 control.stop(bus.check_states() or bus.frame_fault(lost))
             return False
-        self._good_at = now
+        self._silence = 0.0
         self._counters = np.array([drive.counter for drive in inputs])
         if self._new_counters is not None:
             if not all(drive.counter_set for drive in inputs):
@@ -196,10 +197,8 @@ class _Owner:
                 off = drive.fault("does not enable its motor", "check the motor's cable and supply")
                 control.stop(bus.check_states() or off)
         if self._cycles % STATE_CYCLES == 0:
-            fault = bus.check_states()
-            if fault and self._doubted:  # one lost frame is no fault
+            if fault := bus.check_states(silence=False):
                 control.stop(fault)
-            self._doubted = fault is not None
 
     # ---- requests
 
