@@ -4,7 +4,7 @@ import os
 import struct
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
@@ -95,7 +95,12 @@ class Aurora(AbstractContextManager):
         if not self._line:
             raise self._fault("not connected", "connect first")
         with self._port_errors():
-            return self._retried(once)
+            frame = self._retried(once)
+        for reading in frame.readings:
+            if not reading.is_possible:
+                what = f"tool {reading.handle:02X} has a pose that is none, though its reply is whole"
+                raise self._fault(what, "switch the device off and on; look at the tool and its cable")
+        return frame
 
     # ---- steps of the connection
 
@@ -116,17 +121,22 @@ class Aurora(AbstractContextManager):
         if not os.path.realpath(self.port).startswith("/dev/pts/"):
             self._line.send_break(0.3)
             self._line.timeout = RESET_S
-            message = self._until_return()
+            message = b""
+            with suppress(Garbled):
+                message = self._until_return()
             self._line.timeout = self._answer_s
             if message == ndi.RESET_MESSAGE[:-1]:
                 self._ask("INIT", "")
                 return
+        what = "no answer at any baud rate"
         for timeout in PROBES_S:
             for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
-                if self._answers_at(baud, timeout):
-                    return
-        remedy = "switch it off and on; is this the tracker's port, and the cable whole?"
-        raise self._fault("no answer at any baud rate", remedy)
+                try:
+                    if self._answers_at(baud, timeout):
+                        return
+                except Garbled:
+                    what = "something answers, but no baud rate makes it readable"
+        raise self._fault(what, "switch it off and on; is this the tracker's port, and the cable whole?")
 
     def _answers_at(self, baud: int, timeout: float) -> bool:
         self._line.baudrate, self._line.timeout = baud, timeout
@@ -136,8 +146,6 @@ class Aurora(AbstractContextManager):
                 self._send(name, "")
                 reply = self._until_return() + b"\r"
             return reply == ndi.framed(b"OKAY")
-        except Garbled:
-            return False
         finally:
             self._line.timeout = self._answer_s
 
@@ -209,10 +217,13 @@ class Aurora(AbstractContextManager):
         return self._checked(line)
 
     def _binary_reply(self) -> bytes:
-        start = self._exactly(2)
+        start = self._line.read(2)
+        if not start:
+            raise self._silence()
         if start == b"ER":  # refusals are text
             self._checked(start + self._until_return())
-        head = start + self._exactly(4)
+            raise Garbled("text")
+        head = start + self._exactly(6 - len(start))
         first, length, crc = struct.unpack("<3H", head)
         if first != ndi.BX_START or crc != ndi.crc16(head[:4]):
             raise Garbled("wrong header")
@@ -231,15 +242,14 @@ class Aurora(AbstractContextManager):
             try:
                 code = int(text[5:7], 16)
             except ValueError:
-                raise Garbled("a refusal without its code") from None
+                remedy = "switch the device off and on; is it an Aurora?"
+                raise self._fault("answers ERROR without a code", remedy) from None
             what, remedy = ndi.ERRORS.get(code, ("refused", "see the device's manual for this code"))
             raise self._fault(f"error {code:02X}, {what}", remedy, code)
         return text
 
     def _exactly(self, count: int) -> bytes:
         data = self._line.read(count)
-        if not data:
-            raise self._silence()
         if len(data) < count:
             raise Garbled("cut short")
         return data
@@ -247,6 +257,8 @@ class Aurora(AbstractContextManager):
     def _until_return(self) -> bytes:
         """A line without its end; empty after a timeout."""
         data = self._line.read_until(b"\r")
+        if data == b"\r":
+            raise Garbled("an empty line")
         if data and not data.endswith(b"\r"):
             raise Garbled("cut short")
         return data[:-1]

@@ -4,6 +4,7 @@ A command is `NAME:arguments<CRC>` or, without CRC, `NAME arguments`, then a car
 CRC and a carriage return.
 """
 
+import math
 import re
 import struct
 from dataclasses import dataclass
@@ -65,6 +66,13 @@ class ToolReading:
     @property
     def out_of_volume(self) -> bool:
         return bool(self.status & OUT_OF_VOLUME)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether the pose, where there is one, is one: finite, with a quaternion that tells a rotation."""
+        if self.position is None or self.quaternion is None:
+            return True
+        return all(map(math.isfinite, (*self.position, *self.quaternion))) and any(self.quaternion)
 
     @property
     def is_seen(self) -> bool:
