@@ -159,7 +159,9 @@ FAULTS = [
     Fault("tracker hangs for good", on("aurora", hang=True), False, "no answer"),
     Fault("bus cable pulled", on("ethercat", unplugged=True), False, "no terminal answers"),
     Fault("one terminal lost", on("ethercat", lost_after=4), False, "terminal 4 .* does not answer"),
-    Fault("power of the terminals lost", on("ethercat", power_loss=True), False, "no terminal answers", off_and_on=True),
+    Fault(
+        "power of the terminals lost", on("ethercat", power_loss=True), False, "no terminal answers", off_and_on=True
+    ),
     Fault("no process data for 0.4 s (watchdog)", starve, False, "watchdog|no frame came back|no terminal answers"),
     Fault("a motor is jammed (following error)", on("ethercat", stall=2), False, "does not follow"),
     Fault("over-current in a coil", on("ethercat", over_current=3), False, "over-current in coil A", off_and_on=True),

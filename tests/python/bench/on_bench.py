@@ -18,7 +18,7 @@ from ctcr.bench.devices.release import release
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import MASTER, private_folder
 from ctcr.bench.simulators import ethercat
-from simulated_bench import ctcr
+from simulated_bench import ctcr, survives_messages
 
 ROBOT = os.environ["ROBOT_FILE"]
 BENCH = os.environ["BENCH_FILE"]
@@ -94,6 +94,11 @@ def test_bus_lock(robot, bench, folder, monkeypatch):
         tracker, *_, bus = health_of(bench, folder)
         assert tracker.is_well and not bus.is_well and "another program drives it" in bus.about
         assert motors.state["cycles"] > 0 and not motors.state["stopped"]
+
+
+def test_wrong_messages(folder):
+    """As those to the tracker."""
+    survives_messages(folder, "ethercat")
 
 
 def test_wrong_terminal(bench, folder):

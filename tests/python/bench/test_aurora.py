@@ -1,5 +1,7 @@
 """The tracker: protocol, driver, simulator, and two independent clients that take the simulator for an Aurora."""
 
+import itertools
+import struct
 import subprocess
 import sys
 import time
@@ -25,7 +27,7 @@ from ctcr.model.model import Model
 from ctcr.robot import robot_file
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from simulated_bench import ROBOT, ctcr, running
+from simulated_bench import ROBOT, ctcr, running, survives_messages
 
 SENSOR = 0x0A
 
@@ -259,7 +261,7 @@ def test_no_device(tmp_path):
 
 
 class Line:
-    """A serial port whose device answers at once, by answer(name, arguments) of a command."""
+    """A serial port whose device answers at once, by answer(name, arguments) of a command: a text, or raw bytes."""
 
     baudrate, timeout, in_waiting = ndi.RESET_BAUD, 0, 0
 
@@ -270,7 +272,8 @@ class Line:
         self.commands += 1
         assert self.commands < 10_000, "it never ends"
         name, _, arguments = data[:-5].decode().partition(":")
-        self.reply = ndi.framed(self.answer(name, arguments).encode("latin-1"))
+        reply = self.answer(name, arguments)
+        self.reply = reply if isinstance(reply, bytes) else ndi.framed(reply.encode("latin-1"))
 
     def send_break(self, seconds: float) -> None:
         self.reply = ndi.RESET_MESSAGE
@@ -278,6 +281,10 @@ class Line:
     def read_until(self, end: bytes) -> bytes:
         line, found, self.reply = self.reply.partition(end)
         return line + found
+
+    def read(self, count: int) -> bytes:
+        data, self.reply = self.reply[:count], self.reply[count:]
+        return data
 
     def reset_input_buffer(self) -> None:
         self.reply = b""
@@ -307,6 +314,65 @@ def test_stuck_tool(on_line):
     assert line.commands < 20
 
 
+def whole(name, arguments):
+    """What an Aurora with one tool answers while it is connected."""
+    waiting = {"01": "00", "02": "00", "03": "010A001"}
+    return waiting[arguments] if name == "PHSR" else "OKAY"
+
+
+def pose_reply(*numbers) -> bytes:
+    """A whole BX reply of one tool: quaternion, position [mm], error."""
+    body = struct.pack("<BBB8fIIH", 1, SENSOR, ndi.BX_VALID, *numbers, 0x31, 7, 0)
+    head = struct.pack("<HH", ndi.BX_START, len(body))
+    return head + struct.pack("<H", ndi.crc16(head)) + body + struct.pack("<H", ndi.crc16(body))
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("command", "reply", "says"),
+    [
+        ("VER", "ERROR", "answers ERROR without a code: switch"),
+        ("PHSR", b"FF" + b"0A001" * 1000, "answers in a row came damaged"),
+        ("PHSR", "FF0A001", "answers belong to other commands"),
+        ("VER", b"\r", "answers in a row came damaged"),
+        ("VER", b"", "no answer within"),
+        ("BX", b"", "no answer within"),
+        ("BX", b"\xc4\xa5", "answers in a row came damaged"),
+        ("BX", "ER", "answers in a row came damaged"),
+        ("BX", "ERROR", "answers ERROR without a code"),
+        ("BX", pose_reply(NAN, 0, 0, 0, 1, 2, 3, 0), "tool 0A has a pose that is none"),
+        ("BX", pose_reply(1, 0, 0, 0, 1, NAN, 3, 0), "tool 0A has a pose that is none"),
+        ("BX", pose_reply(0, 0, 0, 0, 1, 2, 3, 0), "tool 0A has a pose that is none"),
+    ],
+)
+def test_wrong_replies(on_line, command, reply, says):
+    """What a device answers wrongly is named: silence, damage, a refusal, a pose that is none."""
+    aurora, line = on_line(lambda name, arguments: reply if name == command else whole(name, arguments))
+    with pytest.raises(DeviceFault, match=says):
+        aurora.connect()
+        aurora.read()
+    assert line.commands < 100
+
+
+def test_endless_tools(on_line):
+    """A device with ever new tools is a fault that names one."""
+    handles = itertools.count()
+    aurora, _ = on_line(lambda name, arguments: f"01{next(handles) % 256:02X}001" if arguments == "02" else "00")
+    with pytest.raises(DeviceFault, match="waits again"):
+        aurora.connect()
+
+
+@pytest.mark.parametrize(("noise", "says"), [(b"", "no answer at any"), (b"\xff\x00", "something answers")])
+def test_no_rate(on_line, monkeypatch, noise, says):
+    """Noise at every baud rate is told from silence, also instead of the message after a reset."""
+    monkeypatch.setattr(Line, "send_break", lambda line, seconds: setattr(line, "reply", noise))
+    aurora, _ = on_line(lambda name, arguments: noise)
+    with pytest.raises(DeviceFault, match=says):
+        aurora.connect()
+
+
 REPLIES = ["OKAY", "", "00", "010A001", "020A0010B001", "FF" + "0A001" * 255, "ERROR0C", "ERROR", "ERRORxx", "-1", "1"]
 
 
@@ -324,6 +390,7 @@ def test_any_replies(on_line, data, kinds):
     aurora, _ = on_line(lambda name, arguments: source.choice(kinds).replace("\r", ""))
     with suppress(DeviceFault):
         aurora.connect()
+        aurora.read()
 
 
 # ---- clients written by others
@@ -401,6 +468,16 @@ def test_scenario(tmp_path):
     with pytest.raises(InputError) as caught:
         load_scenario(path, FAULTS)
     assert [problem.line for problem in caught.value.problems] == [1, 2]
+
+
+def test_wrong_messages(port, folder):
+    """No message ends the simulator or changes it by half; the strongest force that is permitted does not either."""
+    survives_messages(folder, "aurora")
+    request(folder, "aurora", {"force": [999, -999, 999], "probe": [999, 0, 0]})
+    with tracker(port) as aurora:
+        aurora.connect()
+        assert len(aurora.read().readings) == 3
+    request(folder, "aurora", {"force": [0, 0, 0]})
 
 
 def test_private_folder(folder, port):

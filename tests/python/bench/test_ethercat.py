@@ -13,7 +13,7 @@ from ctcr.bench.simulators.object_dictionary import Entry, ObjectDictionary, Ser
 from ctcr.bench.simulators.segment import Segment
 from ctcr.bench.simulators.slave_controller import SlaveController
 from ctcr.bench.simulators.stepper_terminal import StepperTerminal, coupler
-from simulated_bench import ROOT, run_on_bench, skip_without_bench  # noqa: E402
+from simulated_bench import ROBOT, ROOT, ctcr, run_on_bench, skip_without_bench  # noqa: E402
 
 sys.path.insert(0, str(ROOT / "tools"))
 from bench_faults import near_the_plate  # noqa: E402
@@ -228,6 +228,16 @@ def on_bench(tmp_path, *options):
 def test_on_bench(tmp_path):
     """The tests of ON_BENCH beside running simulators."""
     on_bench(tmp_path)
+
+
+def test_ended_simulator(tmp_path):
+    """`sim bench` says at once when a simulator ends, and fails in the end."""
+    skip_without_bench()
+    kill = "kill -9 $(cut -d' ' -f2 /proc/$PPID/task/$PPID/children); sleep 1; echo over"
+    command = ctcr("sim", "bench", ROBOT, "--folder", tmp_path / "bench", "--", "sh", "-c", f"{kill} >&2")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == ["Error: the simulator ethercat has ended: nothing answers in its place", "over"]
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 """Starts simulators as processes of their own, as a user does, and stops them again."""
 
+import json
 import os
+import socket
 import subprocess
 import sys
 from contextlib import contextmanager, suppress
@@ -81,6 +83,44 @@ def running(*command):
         process.terminate()
         process.wait(10)
         process.stdout.close()
+
+
+FAULT_NAMES = "missing latency_ms lost_frames late_ms stall lost_after hang unplugged".split()
+NO_NUMBERS = "NaN Infinity -1 1.5e300 1" + 400 * "0" + ' [] "1"'
+NO_VECTORS = "0|[]|[0, 0, null]|[0, 0, NaN]|[1e308, 0, 0]|[[1, 2], 3, 4]|[true, 0, 0]".split("|")
+WRONG_MESSAGES = [
+    *(
+        b"",
+        b"\xff\0",
+        b"[" * 60_000,
+        b"3",
+        b"null",
+        b"[]",
+        b'"faults"',
+        b'{"faults": 3}',
+        b'{"faults": {"\\ud800": 1}}',
+    ),
+    *(f'{{"faults": {{"{name}": {value}}}}}'.encode() for name in FAULT_NAMES for value in NO_NUMBERS.split()),
+    *(f'{{"{name}": {value}}}'.encode() for name in ("force", "probe") for value in NO_VECTORS),
+    *(f'{{"fasten": {value}}}'.encode() for value in ("true", "1.0", "-1", "99", "{}", "NaN")),
+]
+
+
+def survives_messages(folder: Path, name: str) -> None:
+    """The simulator answers each of WRONG_MESSAGES, and is as it was before."""
+
+    def state() -> dict:
+        return {
+            key: value for key, value in request(folder, name, {}).items() if key in ("faults", "force", "deployed")
+        }
+
+    before = state()
+    for message in WRONG_MESSAGES:
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as client:
+            client.connect(str(folder / f"{name}.sock"))
+            client.send(message)
+            json.loads(client.recv(1 << 16))
+    assert state() == before
 
 
 def mended_bench() -> Path:

@@ -40,7 +40,7 @@ class ControlSocket:
                 reply = {"reply": self._handler(json.loads(connection.recv(LARGEST)))}
             except InputError as error:
                 reply = {"error": str(error)}
-            except (ValueError, OSError) as error:
+            except Exception as error:  # whatever a client sends, the device goes on
                 reply = {"error": f"not a request: {error}"}
             with suppress(OSError):  # the client has gone
                 connection.send(json.dumps(reply).encode())

@@ -21,6 +21,7 @@ SENSOR = 0x0A  # the handle of the coil at the robot's tip
 PROBE = 0x0C  # the handle of the coil in the probe
 STILL = (np.array([0.05, 0.0, -0.2]), np.array([1.0, 0.0, 0.0, 0.0]))  # pose of the other coils
 RESET_S = 0.2  # from a break to the device's message
+MOST = 1e3  # of a force [N] and a place [m]
 BREAK_S = 0.3  # silence of a host that has just fallen back to the rate after a reset
 FAULTS = {
     "missing": 0.0,  # fraction of the frames
@@ -135,7 +136,7 @@ class AuroraSimulator(Simulator):
             self._probe = points_to_tracker(self.robot.robot.tracker, point), STILL[1]
         if "fasten" in message:
             tube = message["fasten"]
-            if tube is not None and tube not in range(self.robot.robot.n_tubes):
+            if tube is not None and (type(tube) is not int or tube not in range(self.robot.robot.n_tubes)):
                 raise InputError(Problem("needs the number of a tube from 0, or null", field="fasten"))
             self.robot.fasten(tube)
         if message.get("break"):
@@ -161,6 +162,7 @@ class AuroraSimulator(Simulator):
 
 def _three(message: Settings, name: str, unit: str) -> np.ndarray:
     value = message[name]
-    if not isinstance(value, list) or len(value) != 3:
-        raise InputError(Problem(f"needs three numbers [{unit}]", field=name))
-    return np.array(value, dtype=float)
+    numbers = value if isinstance(value, list) else []
+    if len(numbers) != 3 or not all(type(x) in (int, float) and abs(x) < MOST for x in numbers):
+        raise InputError(Problem(f"needs three numbers [{unit}] below {MOST:g}", field=name))
+    return np.array(numbers, dtype=float)

@@ -6,13 +6,14 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import closing, suppress
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from threading import Thread
 
-from ctcr.bench.shared.folder import BUS, MASTER, VARIABLE
+from ctcr.bench.shared.folder import AURORA, BUS, ETHERCAT, MASTER, VARIABLE
 from ctcr.bench.simulators.aurora import AuroraSimulator
 from ctcr.bench.simulators.ethercat import EthercatSimulator
 from ctcr.bench.simulators.robot import SimulatedRobot
@@ -40,19 +41,43 @@ def run(
     make_cable()
     motors = 2 * robot.robot.n_tubes
     served = [
-        _start(lambda: AuroraSimulator(robot, folder, scenarios[0], seed)),
-        _start(lambda: EthercatSimulator(BUS, folder, motors, scenario=scenarios[1], seed=seed)),
+        _start(AURORA, lambda: AuroraSimulator(robot, folder, scenarios[0], seed)),
+        _start(ETHERCAT, lambda: EthercatSimulator(BUS, folder, motors, scenario=scenarios[1], seed=seed)),
     ]
     try:
         for _, ready in served:
             problem = ready.recv() if ready.poll(READY_S) else InputError([])
             if problem:
                 raise problem
-        return work()
+        with _watched([process for process, _ in served]) as ended:
+            code = work()
+        return code or int(bool(ended))
     finally:
         for process, _ in served:
             process.terminate()
             process.join(READY_S)
+
+
+@contextmanager
+def _watched(processes: list[BaseProcess]) -> Iterator[list[str]]:
+    """The names of those that end before the block does: each is said at once on standard error."""
+    ended: list[str] = []
+    here, there = multiprocessing.Pipe()
+
+    def watch() -> None:
+        left = {process.sentinel: process.name for process in processes}
+        while there not in (ready := wait([there, *left])):
+            for sentinel in ready:
+                ended.append(left.pop(sentinel))
+                print(f"Error: the simulator {ended[-1]} has ended: nothing answers in its place", file=sys.stderr)
+
+    watcher = Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield ended
+    finally:
+        here.close()
+        watcher.join()
 
 
 def serve(simulator: Simulator) -> None:
@@ -62,11 +87,11 @@ def serve(simulator: Simulator) -> None:
         simulator.run()
 
 
-def _start(make: Callable[[], Simulator]) -> tuple[BaseProcess, Connection]:
+def _start(name: str, make: Callable[[], Simulator]) -> tuple[BaseProcess, Connection]:
     """A process that serves, and the pipe in which it sends None once it answers, or what is wrong."""
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(make, theirs), daemon=True)
+    process = context.Process(target=_serve, args=(make, theirs), name=name, daemon=True)
     process.start()
     return process, ours
 
@@ -79,7 +104,10 @@ def _serve(make: Callable[[], Simulator], ready: Connection) -> None:
         ready.send(problem)
         return
     ready.send(None)
-    serve(simulator)
+    try:
+        serve(simulator)
+    except InputError as problem:  # such as an oracle that does not answer
+        sys.exit(f"Error: {problem}")
 
 
 # ---- network: a pair of virtual interfaces, joined like by a cable

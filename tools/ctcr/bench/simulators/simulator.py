@@ -9,10 +9,11 @@ from typing import Any
 
 from ctcr.bench.shared.control import ControlSocket
 from ctcr.bench.shared.real_time import Duty, real_time
-from ctcr.errors import InputError, Problem, suggestion
+from ctcr.errors import InputError, Problem, shown, suggestion
 from ctcr.robot import yaml_document
 
 Settings = dict[str, Any]
+MOST_DEVICES, MOST_MS = 255, 60_000  # a bus is shorter, and a program that waits longer has given up
 
 
 class Simulator:
@@ -64,8 +65,10 @@ class Simulator:
         raise NotImplementedError
 
     def _reply(self, message: Settings) -> Settings:
+        if not isinstance(message, dict) or not isinstance(faults := message.get("faults", {}), dict):
+            raise InputError(Problem("needs an object, and so do its `faults`"))
         if "faults" in message:
-            self.set_faults(message["faults"])
+            self.set_faults(faults)
         return {"faults": dict(vars(self.faults))} | self.request(message)
 
 
@@ -78,12 +81,22 @@ def checked(changes: Settings, none: Settings) -> Settings:
             problems.append(Problem(f"unknown fault: {hint}", field=name))
             continue
         values[name] = none[name] if value is None else value
-        kinds, needed = ((bool,), "true or false") if isinstance(none[name], bool) else ((int, float), "a number")
-        if type(values[name]) not in kinds:
-            problems.append(Problem(f"{value!r}: needs {needed}", field=name))
+        kinds, most, needed = _possible(name, none[name])
+        if type(values[name]) not in kinds or not 0 <= values[name] <= most:
+            problems.append(Problem(f"{shown(value)}: needs {needed}", field=name))
     if problems:
         raise InputError(problems)
     return values
+
+
+def _possible(name: str, none: Any) -> tuple[tuple[type, ...], float, str]:
+    """Types and largest value of a fault, and both in words."""
+    if isinstance(none, bool):
+        return (bool,), 1, "true or false"
+    if isinstance(none, int):
+        return (int,), MOST_DEVICES, f"a whole number, 0 to {MOST_DEVICES}"
+    most, unit = (MOST_MS, " ms") if name.endswith("_ms") else (1, "")
+    return (int, float), most, f"a number, 0 to {most}{unit}"
 
 
 def load_scenario(path: str | Path, none: Settings) -> list[tuple[float, Settings]]:
