@@ -21,30 +21,37 @@ def command() -> None:
     help="Folder of the recordings, results and the report; that of an earlier demonstration is removed.",
 )
 @click.option("--short", is_flag=True, help="Leave out the steps that only illustrate.")
-@options.folder
-def bench(target, short, folder) -> int:
+def bench(target, short) -> int:
     """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.
 
     Each step is a command, shown as you would type it, which meets the robot through the protocols of tracker and
-    motors. It takes some minutes and writes report.html.
+    motors. It takes some minutes and writes report.html. Where the computer is too busy for the simulated bus, the
+    motors stop as on a real bench; the demonstration says so and resumes.
 
     Example: ctcr demo bench
     """
+    import sys
+    from pathlib import Path
+    from tempfile import TemporaryDirectory
+
     from ctcr.bench.simulators import bench as simulated
     from ctcr.bench.simulators.robot import SimulatedRobot
     from ctcr.demo import bench_story
     from ctcr.robot import robot_file
 
     hidden = bench_story.hidden_robot(robot_file.load(bench_story.FILES / "robot.yaml"), misplaced=not short)
-    return simulated.run(lambda: _tell(target, hidden, short), SimulatedRobot(hidden), folder)
+    simulated.enter_own_network(sys.argv[1:])
+    with TemporaryDirectory(prefix="ctcr-") as wires:  # a bench of its own: that of the user keeps its stop
+        folder = Path(wires)
+        return simulated.run(lambda: _tell(target, hidden, short, folder), SimulatedRobot(hidden), folder)
 
 
-def _tell(target, hidden, short) -> int:
+def _tell(target, hidden, short, folder) -> int:
     from ctcr.demo import bench_report, bench_story
     from ctcr.demo.story import Story, new_folder
 
     out, report = options.Output(), f"{target}/report.html"
-    story = Story(new_folder(target), out.console)
+    story = Story(new_folder(target), out.console, folder)
     bench_story.tell(story, short)
     out.say(*bench_report.write(story, hidden, report), f"Report: {report}")
     return 0
