@@ -85,13 +85,14 @@ def test_command(robot, run, tmp_path):
     """`ctcr shape --all` lists and draws all, and says so where there is one."""
     file = tmp_path / "robot.yaml"
     robot_file.save(robot, file)
-    joints = ["--beta", ",".join(map(str, BETA)), "--all", "--json", "-", "-o", tmp_path / "robot.png", "--alpha"]
-    code, out, err = run("shape", file, *joints, ",".join(map(str, OPPOSED)))
+    beta = ",".join(str(1e3 * value) for value in BETA)
+    joints = ["--beta-mm", beta, "--all", "--json", "-", "-o", tmp_path / "robot.png", "--alpha-deg"]
+    code, out, err = run("shape", file, *joints, ",".join(map(str, np.rad2deg(OPPOSED))))
     shapes = Model(robot).all_shapes(BETA, OPPOSED)
     found = json.loads(out)["other_equilibria"]
     assert code == 0 and "Tips of the stable equilibria" in err
     np.testing.assert_allclose(
         [one["samples"]["position_m"][-1] for one in found], [shape.position[-1] for shape in shapes[1:]], atol=1e-9
     )
-    code, out, err = run("shape", file, *joints, ",".join(map(str, ALIGNED)))
+    code, out, err = run("shape", file, *joints, ",".join(map(str, np.rad2deg(ALIGNED))))
     assert code == 0 and json.loads(out)["other_equilibria"] == [] and "No other stable equilibrium" in err

@@ -74,7 +74,7 @@ def test_interrupted_move(robot, bench, folder):
         if not motors.state["homed"]:
             motors.set_joints(motors.settings.home)
     start = np.array(request(folder, "ethercat", {})["turns"])
-    command = ctcr("move", ROBOT, "--bench", BENCH, "--alpha=300,300,300", "--speed", 0.2)
+    command = ctcr("move", ROBOT, "--bench", BENCH, "--alpha-deg", "300,300,300", "--speed", 0.2)
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 20
     while np.abs(request(folder, "ethercat", {})["turns"] - start).max() < 0.02 and time.monotonic() < end:

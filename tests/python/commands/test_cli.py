@@ -3,6 +3,7 @@
 import inspect
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -113,21 +114,17 @@ def test_unsolved_rows(run, table, tmp_path):
     assert "pred_qz" in predicted.read_text()
 
 
-JOINTS_SI = ["--beta", "-0.33,-0.24,-0.165", "--alpha", "1.5707963267948966,0,-0.5235987755982988"]
 JOINTS = ["--beta-mm", "-330,-240,-165", "--alpha-deg", "90,0,-30"]
 
 
 def test_shape(run, tmp_path):
-    """The ends of the tubes and a picture, from joints in SI units or in mm and degrees."""
-    answers = []
-    for joints in (JOINTS_SI, JOINTS):
-        code, out, err = run("shape", ROBOT, *joints, "--force", "0,0.1,0", "--json", "-", "-o", tmp_path / "robot.png")
-        assert code == 0 and "Where the tubes end" in err
-        answers.append(json.loads(out))
-    ends = [133.0, 90.5, 34.0]
-    for data in answers:
-        np.testing.assert_allclose([1e3 * tube["tip_arc_length_m"] for tube in data["tubes"]], ends)
-        np.testing.assert_allclose([1e3 * tube["tip_position_m"][2] for tube in data["tubes"]], ends)
+    """The ends of the tubes and a picture."""
+    code, out, err = run("shape", ROBOT, *JOINTS, "--force", "0,0.1,0", "--json", "-", "-o", tmp_path / "robot.png")
+    assert code == 0 and "Where the tubes end" in err
+    ends, data = [133.0, 90.5, 34.0], json.loads(out)
+    np.testing.assert_allclose([1e3 * tube["tip_arc_length_m"] for tube in data["tubes"]], ends)
+    np.testing.assert_allclose([1e3 * tube["tip_position_m"][2] for tube in data["tubes"]], ends)
+    np.testing.assert_allclose(data["tip"]["quaternion_wxyz"], [0.5**0.5, 0, 0, 0.5**0.5])
     picture = (tmp_path / "robot.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
 
@@ -185,11 +182,10 @@ def test_faulty_robot(run, tmp_path):
     [
         (["info", "absent.yaml"], "absent.yaml: cannot read it: no such file or directory"),
         (["predict", ROBOT, ROBOT, "-o", "x.csv"], "alpha1_rad"),
-        (["shape", ROBOT], "give either --beta or --beta-mm"),
-        (["shape", ROBOT, "--beta", "-300,-200,-100", "--alpha", "0,0,0"], "--beta: -300 m: is this mm?"),
-        (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "0,0"], "--alpha: needs 3 finite numbers"),
-        (["shape", ROBOT, "--beta", "-.3,-.2,nan", "--alpha", "0,0,0"], "--beta: needs 3 finite numbers"),
-        (["shape", ROBOT, "--beta", "-.3,-.2,-.1", "--alpha", "3.1,0,0"], "no shape at these joints: not converged"),
+        (["shape", ROBOT, "--beta-mm", "-3e5,-2e5,-1e5", "--alpha-deg", "0,0,0"], "--beta-mm: -300 m: is this mm?"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "0,0"], "--alpha-deg: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,nan", "--alpha-deg", "0,0,0"], "--beta-mm: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "178,0,0"], "at these joints: not converged"),
     ],
 )
 def test_errors(run, arguments, message):
@@ -204,7 +200,8 @@ def test_errors(run, arguments, message):
         (["info"], "Missing argument 'ROBOT'"),
         (["nonsense"], "No such command 'nonsense'"),
         (["compare", "r.yaml", "t.csv", "--json", "./r.yaml"], "r.yaml is also that of '--json'"),
-        (["shape", ROBOT, "--beta", "a,b", "--alpha", "0,0,0"], "is not a list of numbers"),
+        (["shape", ROBOT], "Missing option '--beta-mm'"),
+        (["shape", ROBOT, "--beta-mm", "a,b", "--alpha-deg", "0,0,0"], "is not a list of numbers"),
         (["compare", "r.yaml", "t.csv", "--json", "a", "--report", "a"], "a is also that of '--json'"),
         (["predict", "r.yaml", "t.csv", "-o", "t.csv"], "t.csv is also that of"),
     ],
@@ -281,6 +278,25 @@ def test_options_meet_the_function(command):
     if "json_target" in given:
         given = given - {"json_target", "report"} | {"out"}
     inspect.signature(function).bind(**dict.fromkeys(given))
+
+
+def units(text: str) -> list[str]:
+    """The units in brackets."""
+    return re.findall(r"\[([^\]]+)\]", text)
+
+
+def test_one_unit():
+    """Lengths are in mm and angles in deg, in the options of all commands; a unit in a name is the one of the help."""
+    seen = {}
+    for path, command in commands():
+        for option in command.params:
+            if not isinstance(option, click.Option) or option.is_flag:
+                continue
+            said, name = units(option.help or ""), max(option.opts, key=len)
+            assert not {"m", "rad"} & set(said), (path, name)
+            named = [unit for unit in ("mm", "deg") if name.endswith(f"-{unit}")]
+            assert not named or not said or said == named, (path, name)
+            assert seen.setdefault(name, said) == said, (path, name)
 
 
 def test_help_points_to_the_formats(run):

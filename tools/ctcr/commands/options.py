@@ -35,6 +35,41 @@ class File(click.ParamType):
         return value
 
 
+class Numbers(click.ParamType):
+    """Numbers separated by commas."""
+
+    name = "A,B,.."
+
+    def convert(self, value, param, ctx) -> list[float]:
+        try:
+            return [float(part) for part in value.split(",")]
+        except ValueError:
+            self.fail(f"{value!r} is not a list of numbers such as 90,0,-30", param, ctx)
+
+
+def joints(required: bool):
+    """--beta-mm and --alpha-deg, as lists of numbers; see `finite`."""
+
+    def decorate(function):
+        alpha = "Base angles [deg], innermost tube first."
+        beta = "Grasped points [mm], <= 0, innermost tube first."
+        function = click.option("--alpha-deg", type=Numbers(), required=required, help=alpha)(function)
+        return click.option("--beta-mm", type=Numbers(), required=required, help=beta)(function)
+
+    return decorate
+
+
+def finite(option: str, values: list[float], count: int):
+    """The numbers of an option as an array (count,). Raises InputError where there are others."""
+    import numpy as np
+
+    from ctcr.errors import InputError, Problem
+
+    if len(values) != count or not np.isfinite(values).all():
+        raise InputError(Problem(f"needs {count} finite numbers, separated by commas", field=option))
+    return np.array(values)
+
+
 read, written = File(written=False), File(written=True)
 robot = click.argument("robot", type=read)
 measurements = click.argument("measurements", type=read)

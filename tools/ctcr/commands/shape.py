@@ -8,30 +8,15 @@ from ctcr.errors import InputError, Problem
 SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometres
 
 
-class Numbers(click.ParamType):
-    """Numbers separated by commas."""
-
-    name = "A,B,.."
-
-    def convert(self, value, param, ctx) -> list[float]:
-        try:
-            return [float(part) for part in value.split(",")]
-        except ValueError:
-            self.fail(f"{value!r} is not a list of numbers such as -0.3,-0.2,-0.1", param, ctx)
-
-
 @click.command(name="shape")
 @options.robot
-@click.option("--beta", type=Numbers(), help="Grasped points [m], <= 0, innermost tube first.")
-@click.option("--beta-mm", type=Numbers(), help="The same in mm.")
-@click.option("--alpha", type=Numbers(), help="Base angles [rad], innermost tube first.")
-@click.option("--alpha-deg", type=Numbers(), help="The same in degrees.")
-@click.option("--force", type=Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
+@options.joints(required=True)
+@click.option("--force", type=options.Numbers(), default="0,0,0", help="Force at the tip [N], base frame.")
 @click.option("--all", "every", is_flag=True, help="List all stable equilibria: the robot may rest in several.")
 @click.option("-o", "--output", "picture", type=options.written, metavar="FILE.png", help="Draw the robot.")
 @options.steps
 @options.json
-def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps, out) -> None:
+def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> None:
     """Solve the shape of a robot at given joints.
 
     The joints are one value a tube. Shows the pose of the tip, the ends of the tubes and the stability. The JSON
@@ -49,9 +34,9 @@ def command(robot, beta, beta_mm, alpha, alpha_deg, force, every, picture, steps
     from ctcr.robot import robot_file
 
     loaded = robot_file.load(robot)
-    beta = _joints("beta", {"beta": (beta, 1.0), "beta-mm": (beta_mm, 1e-3)}, loaded.n_tubes)
-    alpha = _joints("alpha", {"alpha": (alpha, 1.0), "alpha-deg": (alpha_deg, np.pi / 180)}, loaded.n_tubes)
-    force = _finite("force", force, 3)
+    beta = _joints("beta", "--beta-mm", 1e-3 * options.finite("--beta-mm", beta_mm, loaded.n_tubes))
+    alpha = _joints("alpha", "--alpha-deg", np.deg2rad(options.finite("--alpha-deg", alpha_deg, loaded.n_tubes)))
+    force = options.finite("--force", force, 3)
     used = effect_model.without_the_path(loaded)
     model = Model(used, steps=steps)
     tip = model.predict(beta[None], alpha[None], force[None])
@@ -126,27 +111,14 @@ def _samples(shape) -> dict:
     return {"arc_length_m": shape.arc_length, "position_m": shape.position}
 
 
-def _joints(name: str, given: dict, n_tubes: int):
-    """Joints (N,) in SI units, of the one option that was given; `given` {option: (numbers, their unit)}."""
+def _joints(name: str, option: str, joints):
+    """The joints (N,) [m] or [rad] of an option. Raises InputError where one is far from usual."""
     from ctcr.table.measurements import QUANTITIES
 
-    found = [(option, values, unit) for option, (values, unit) in given.items() if values is not None]
-    if len(found) != 1:
-        raise InputError(Problem(f"give either --{' or --'.join(given)}: {n_tubes} numbers, innermost tube first"))
-    option, values, unit = found[0]
-    joints = unit * _finite(option, values, n_tubes)
     for value in joints:
         if abs(value) > QUANTITIES[name].usual[1]:
-            raise InputError(Problem(QUANTITIES[name].doubt(value), field=f"--{option}"))
+            raise InputError(Problem(QUANTITIES[name].doubt(value), field=option))
     return joints
-
-
-def _finite(option: str, values, count: int):
-    import numpy as np
-
-    if len(values) != count or not np.isfinite(values).all():
-        raise InputError(Problem(f"needs {count} finite numbers, separated by commas", field=f"--{option}"))
-    return np.array(values)
 
 
 def _listed(values, digits: int) -> str:
