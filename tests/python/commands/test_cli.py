@@ -13,6 +13,7 @@ import click
 import numpy as np
 import pytest
 from ctcr import cli, frames
+from ctcr.commands import options
 from ctcr.model import model, table_poses
 from ctcr.robot import robot_file
 from ctcr.robot.table_ii import table_ii
@@ -204,6 +205,9 @@ def test_errors(run, arguments, message):
         (["shape", ROBOT, "--beta-mm", "a,b", "--alpha-deg", "0,0,0"], "is not a list of numbers"),
         (["compare", "r.yaml", "t.csv", "--json", "a", "--report", "a"], "a is also that of '--json'"),
         (["predict", "r.yaml", "t.csv", "-o", "t.csv"], "t.csv is also that of"),
+        (["devices", "--bench", "b.yaml", "--json", "b.yaml"], "b.yaml is also that of '--bench'"),
+        (["sensitivity", "r.yaml", "--closed-loop", "s", "--report", "s"], "s is also that of '--closed-loop'"),
+        (["sim", "aurora", ROBOT, "--oracle", "'"], "no closing quotation"),
     ],
 )
 def test_usage(run, arguments, message):
@@ -278,6 +282,18 @@ def test_options_meet_the_function(command):
     if "json_target" in given:
         given = given - {"json_target", "report"} | {"out"}
     inspect.signature(function).bind(**dict.fromkeys(given))
+
+
+FILES = {"ROBOT", "ROBOT2", "MEASUREMENTS", "SCENARIO", "LOG", "TABLE", "NEW", "FILE"}
+
+
+def test_files_are_guarded():
+    """Every option and argument that names a file takes part in the search for outputs that are inputs too."""
+    for path, command in commands():
+        for parameter in command.params:
+            name = (parameter.metavar or parameter.name).upper().removesuffix("...")
+            if name in FILES or re.search(r"\.\w+$", name):
+                assert isinstance(parameter.type, options.File), (path, parameter.opts)
 
 
 def units(text: str) -> list[str]:

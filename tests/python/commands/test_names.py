@@ -113,6 +113,27 @@ def test_errors(shows, robot, table, tmp_path):
     shows([FILE, NAME], "info", robot, fails=True)
 
 
+def test_bench(shows, robot, table, tmp_path):
+    """Files, fields and devices of a bench, faults of simulators and programs that do not exist."""
+    bench, wires = tmp_path / f"{FILE}.bench.yaml", ["--folder", tmp_path / "wires"]
+    text = (EXAMPLES / "data" / "bench" / "bench.yaml").read_text()
+    for device in ("port", "interface"):
+        text = text.replace(f"{device}: simulated", f"{device}: {json.dumps(NAME)}")
+    bench.write_text(text)
+    with_devices = ["--bench", bench, *wires]
+    for package in ("serial", "pysoem"):
+        pytest.importorskip(package, reason=f"{package} is not installed")
+    shows([NAME], "devices", *with_devices, fails=True)
+    shows([NAME], "move", robot, *with_devices, fails=True)
+    shows([NAME], "record", robot, table, *with_devices, "-o", tmp_path / f"{FILE}.recorded", fails=True)
+    bench.write_text(json.dumps({NAME: 1}))
+    shows([FILE, NAME], "devices", *with_devices, fails=True)
+    shows([FILE, NAME], "track", robot, bench, fails=True)
+    shows([FILE], "sim", "aurora", robot, "--oracle", f"'{FILE}'", *wires, fails=True)
+    shows([FILE], "sim", "aurora", robot, "--scenario", table, *wires, fails=True)
+    shows([FILE], "stop", "--folder", table, fails=True)
+
+
 class Elements(HTMLParser):
     """The tags of a page."""
 

@@ -12,7 +12,7 @@ REPEATS = 5
 
 
 @click.command(name="bench")
-@click.argument("robot", required=False)
+@click.argument("robot", type=options.read, required=False)
 @options.json
 def command(robot: str | None, out) -> None:
     """Time the model on random joints.

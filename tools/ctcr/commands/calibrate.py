@@ -18,7 +18,9 @@ def command() -> None:
 
 def _procedure(function):
     """The options that all procedures share: `robot`, `target`, `in_place` and `out`."""
-    robot = click.option("--robot", metavar="ROBOT", help="The robot file: its values are used, and updated with -o.")
+    robot = click.option(
+        "--robot", type=options.read, metavar="ROBOT", help="The robot file: its values are used, and updated with -o."
+    )
     return robot(options.new_robot(options.outputs(function)))
 
 
@@ -27,7 +29,9 @@ def _live(function):
     for option in (
         options.folder_name,
         options.setting("--readings", click.IntRange(2), 20, "With --live: readings per row."),
-        click.option("--bench", metavar="BENCH.yaml", help="With --live: the devices and their limits."),
+        click.option(
+            "--bench", type=options.read, metavar="BENCH.yaml", help="With --live: the devices and their limits."
+        ),
         click.option("--live", is_flag=True, help="Measure now: write the table row by row, or resume the one there."),
     ):
         function = option(function)
@@ -114,7 +118,12 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
 @click.argument("points", type=options.read)
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
-@click.option("--cad", metavar="CAD.csv", help="With --live: names and coordinates of the points, columns as POINTS.")
+@click.option(
+    "--cad",
+    type=options.read,
+    metavar="CAD.csv",
+    help="With --live: names and coordinates of the points, columns as POINTS.",
+)
 @options.setting("--rounds", click.IntRange(1), 1, "With --live: over all points.")
 @_procedure
 def registration(points, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, out, **target) -> None:

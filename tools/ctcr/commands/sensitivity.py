@@ -8,7 +8,7 @@ from ctcr.commands import options
 @click.command(name="sensitivity")
 @options.robot
 @click.option("--open-loop", type=click.IntRange(min=1), metavar="N", help="Predict tips at N random configurations.")
-@click.option("--closed-loop", metavar="SCENARIO", help="Track the path of this scenario file.")
+@click.option("--closed-loop", type=options.read, metavar="SCENARIO", help="Track the path of this scenario file.")
 @options.setting(
     "--accuracy", click.FloatRange(0, min_open=True), 1.0, "Wanted accuracy [mm]: which parameters need calibration?"
 )

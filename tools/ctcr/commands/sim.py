@@ -5,7 +5,10 @@ import click
 from ctcr.commands import options
 
 scenario_option = click.option(
-    "--scenario", metavar="FILE.yaml", help="Faults at set times: a list of `at_s` with the faults that change."
+    "--scenario",
+    type=options.read,
+    metavar="FILE.yaml",
+    help="Faults at set times: a list of `at_s` with the faults that change.",
 )
 
 
@@ -75,8 +78,8 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @options.folder
 @robot_options
-@click.option("--tracker-scenario", metavar="FILE.yaml", help="Faults of the tracker at set times.")
-@click.option("--bus-scenario", metavar="FILE.yaml", help="Faults of the bus at set times.")
+@click.option("--tracker-scenario", type=options.read, metavar="FILE.yaml", help="Faults of the tracker at set times.")
+@click.option("--bus-scenario", type=options.read, metavar="FILE.yaml", help="Faults of the bus at set times.")
 def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physics) -> int:
     """Simulate a whole bench around ROBOT while COMMAND runs (default: a shell); its motors move the tracked tip.
 
@@ -136,5 +139,9 @@ def _robot(robot, seed, hidden, oracle, noise):
     if oracle and hidden:
         raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
     loaded = robot_file.load(robot)
-    known = Oracle([*shlex.split(oracle), robot], loaded) if oracle else None
+    try:
+        words = shlex.split(oracle or "")
+    except ValueError as error:
+        raise click.BadParameter(str(error).lower(), param_hint="--oracle") from None
+    known = Oracle([*words, robot], loaded) if words else None
     return SimulatedRobot(options.with_effects(loaded, hidden), noise, seed, known)

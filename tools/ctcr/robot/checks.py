@@ -8,7 +8,7 @@ import numpy as np
 
 from ctcr.errors import Problem, did_you_mean, shown
 from ctcr.robot import defaults
-from ctcr.robot.description import Robot, Section
+from ctcr.robot.description import Robot, Section, path_of
 from ctcr.robot.units import LARGEST
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
@@ -28,9 +28,9 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
     missing += _missing_of_tubes(tubes, weighed)
     found: list[Fault] = []
     for error in errors:
-        path = error["loc"] or (error["input"],)  # a key that is no Unicode comes without a path
+        path, is_unknown = path_of(error)
         section, field = Robot.owner(path)
-        if error["type"] in ("extra_forbidden", "invalid_key") or not error["loc"]:
+        if is_unknown:
             meant = did_you_mean(str(field), section.model_fields)
             missing = [other for other in missing if other != (*path[:-1], meant)]  # one mistake, one fault
             found.append((path, _unknown(section, str(field), meant)))

@@ -46,6 +46,14 @@ Each = Annotated[
 ]  # one number for all, or a list of one for each
 
 
+def path_of(error: Mapping[str, Any]) -> tuple[FieldPath, bool]:
+    """The field at which pydantic found a fault, and whether the section has no such field.
+
+    A key that is no Unicode comes without a path.
+    """
+    return error["loc"] or (error["input"],), error["type"] in ("extra_forbidden", "invalid_key") or not error["loc"]
+
+
 class Section(BaseModel):
     """A part of the file: its keys are exactly the fields, its numbers finite and possible."""
 

@@ -17,7 +17,7 @@ from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.robot import yaml_document
 from ctcr.robot.checks import problems
-from ctcr.robot.description import Section, Three
+from ctcr.robot.description import Section, Three, path_of
 from ctcr.robot.units import Quantity
 
 # All twelve edges of a cube: three are travelled twice, as each of its eight corners has three edges. Bit k of a
@@ -171,9 +171,9 @@ def _scenario(document: yaml_document.YamlDocument, n_tubes: int) -> Scenario:
 
 def _fault(error: dict) -> tuple[tuple, str]:
     """Path and message of a fault that pydantic found."""
-    path = error["loc"]
+    path, is_unknown = path_of(error)
     section, field = Scenario.owner(path)
-    if error["type"] == "extra_forbidden":
+    if is_unknown:
         meant = did_you_mean(str(field), section.model_fields)
         return path, f"unknown field{f': did you mean {meant}?' if meant else ''}"
     expected = section.expected(field) if field in section.model_fields else "its fields"

@@ -108,8 +108,8 @@ class Aurora(AbstractContextManager):
         serial = needed("pyserial", "serial", f"tracker {self.port}")
         try:
             self._line = serial.Serial(self.port, ndi.RESET_BAUD, timeout=self._answer_s, exclusive=True)
-        except OSError as error:  # SerialException is one
-            reason = os.strerror(error.errno) if error.errno else str(error)
+        except (OSError, ValueError) as error:  # SerialException is an OSError; ValueError: a name that no file has
+            reason = os.strerror(error.errno) if getattr(error, "errno", None) else str(error)
             remedy = "is it plugged in and switched on, and is the user in the port's group (usually dialout)?"
             raise self._fault(f"cannot open the port ({reason.lower()})", remedy) from None
 

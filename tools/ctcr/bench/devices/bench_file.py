@@ -12,7 +12,7 @@ from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.shared.folder import AURORA, MASTER
 from ctcr.errors import InputError, Problem, did_you_mean
 from ctcr.robot import yaml_document
-from ctcr.robot.description import MAX_TUBES, Robot, Section
+from ctcr.robot.description import MAX_TUBES, Robot, Section, path_of
 from ctcr.robot.units import Quantity
 
 SIMULATED = "simulated"
@@ -116,17 +116,17 @@ def load(path: str | Path) -> Bench:
     try:
         return Bench.model_validate(document.data)
     except ValidationError as error:
-        raise InputError(
-            Problem(_complaint(fault), file, document.line(fault["loc"]), ".".join(map(str, fault["loc"])))
-            for fault in error.errors(include_url=False)
-        ) from None
+        raise InputError(_problem(fault, document, file) for fault in error.errors(include_url=False)) from None
 
 
-def _complaint(fault: dict) -> str:
-    """What pydantic found, and what the field needs."""
-    section, field = Bench.owner(fault["loc"])
-    if fault["type"] == "extra_forbidden":
+def _problem(fault: dict, document: yaml_document.YamlDocument, file: str) -> Problem:
+    """What pydantic found, where, and what the field needs."""
+    path, is_unknown = path_of(fault)
+    section, field = Bench.owner(path)
+    if is_unknown:
         meant = did_you_mean(str(field), section.model_fields)
-        return "unknown field" + (f": did you mean {meant}?" if meant else "")
-    complaint = "is missing" if fault["type"] == "missing" else fault["msg"].lower()
-    return f"{complaint}: needs {section.expected(str(field))}"
+        text = "unknown field" + (f": did you mean {meant}?" if meant else "")
+    else:
+        complaint = "is missing" if fault["type"] == "missing" else fault["msg"].lower()
+        text = f"{complaint}: needs {section.expected(str(field))}"
+    return Problem(text, file, document.line(path), ".".join(map(str, path)))

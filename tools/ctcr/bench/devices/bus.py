@@ -42,7 +42,7 @@ class Bus:
         master = soem.Master()
         try:
             master.open(self.interface)
-        except ConnectionError:
+        except (ConnectionError, UnicodeError):
             remedy = "does it exist, is it up, and may this program use raw sockets? See docs/hardware.md"
             raise self._fault("cannot be opened", remedy) from None
         self._master = master
