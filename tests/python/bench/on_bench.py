@@ -80,7 +80,7 @@ def test_interrupted_move(robot, bench, folder):
     while np.abs(request(folder, "ethercat", {})["turns"] - start).max() < 0.02 and time.monotonic() < end:
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    assert process.wait(20) == 1 and "stopped" in process.stderr.read()
+    assert process.wait(20) == 130 and "stopped" in process.stderr.read()
     moved = np.abs(np.array(request(folder, "ethercat", {})["turns"]) - start)
     assert 0.02 <= moved.max() < 0.5
     assert request(folder, "ethercat", {})["states"][1] < OP

@@ -1,6 +1,7 @@
 """The tracker: protocol, driver, simulator, and two independent clients that take the simulator for an Aurora."""
 
 import itertools
+import signal
 import struct
 import subprocess
 import sys
@@ -255,6 +256,14 @@ def test_no_device(tmp_path):
     pytest.importorskip("serial", reason="pyserial is not installed")
     with pytest.raises(DeviceFault, match="cannot open the port .*dialout"):
         tracker(str(tmp_path / "nothing")).connect()
+
+
+def test_end(tmp_path):
+    """SIGTERM is the end of a simulator, Ctrl+C an interruption as of any command."""
+    for sign, code in ((signal.SIGTERM, 0), (signal.SIGINT, cli.STOPPED)):
+        with running(*ctcr("sim", "aurora", ROBOT, "--folder", tmp_path / "wires")) as process:
+            process.send_signal(sign)
+            assert process.wait(20) == code and not list((tmp_path / "wires").glob("*.sock"))
 
 
 # ---- driver on a line of the test's

@@ -48,7 +48,7 @@ def test_kills(tmp_path):
         process = context.Process(target=_append_for_ever, args=(path, group, theirs))
         process.start()
         theirs.close()
-        ours.recv()
+        reported = ours.recv()
         time.sleep(rng.uniform(0, 0.01))
         os.kill(process.pid, signal.SIGKILL)
         process.join()
@@ -60,7 +60,7 @@ def test_kills(tmp_path):
         lines = path.read_text().splitlines()[1:]
         assert len(lines) >= reported * group
         assert [int(float(line.split(",")[0])) for line in lines] == list(range(len(lines)))
-    assert reported > 100
+    assert reported >= 100  # each process has written one at least
 
 
 @pytest.mark.parametrize("cut", [1, 20, 70, 150])

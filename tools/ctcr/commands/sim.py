@@ -44,8 +44,7 @@ def aurora(robot, folder, scenario, seed, **physics) -> None:
     from ctcr.bench.simulators.bench import serve
 
     simulator = AuroraSimulator(_robot(robot, seed, **physics), folder, scenario, seed)
-    options.Output().say(f"tracker: {simulator.line.link}")
-    serve(simulator)
+    serve(simulator, lambda: options.Output().say(f"tracker: {simulator.line.link}"))
 
 
 @command.command(name="ethercat")
@@ -69,8 +68,9 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
     if not interface:
         make_cable()
     simulator = EthercatSimulator(interface or BUS, folder, motors, variant, scenario, seed)
-    options.Output().say(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
-    serve(simulator)
+    serve(
+        simulator, lambda: options.Output().say(f"bus on {interface}" if interface else f"bus: drive it from {MASTER}")
+    )
 
 
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -80,10 +80,11 @@ def _watched(processes: list[BaseProcess]) -> Iterator[list[str]]:
         watcher.join()
 
 
-def serve(simulator: Simulator) -> None:
-    """Runs a simulator until SIGTERM or Ctrl+C."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with closing(simulator), suppress(KeyboardInterrupt):
+def serve(simulator: Simulator, ready: Callable[[], object]) -> None:
+    """Runs a simulator until SIGTERM, or Ctrl+C; calls `ready` when it answers to both."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit())
+    with closing(simulator):
+        ready()
         simulator.run()
 
 
@@ -103,9 +104,8 @@ def _serve(make: Callable[[], Simulator], ready: Connection) -> None:
     except InputError as problem:
         ready.send(problem)
         return
-    ready.send(None)
     try:
-        serve(simulator)
+        serve(simulator, lambda: ready.send(None))
     except InputError as problem:  # such as an oracle that does not answer
         sys.exit(f"Error: {problem}")
 
