@@ -232,6 +232,17 @@ def test_reconnects(port, folder, fault, says):
         assert aurora.read().readings[0].position is not None
 
 
+def test_slow_host(port, monkeypatch):
+    """A host that follows a change of the baud rate late has not sent a break."""
+    from ctcr.bench.devices import aurora
+
+    slow = SimpleNamespace(sleep=lambda seconds: time.sleep(10 * seconds), monotonic=time.monotonic)
+    monkeypatch.setattr(aurora, "time", slow)
+    with tracker(port) as one:
+        one.connect()
+        assert one.read().readings[0].position is not None
+
+
 @pytest.mark.slow
 def test_bad_line(port, folder):
     """Connects with 10 % of the replies damaged."""

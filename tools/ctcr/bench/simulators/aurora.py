@@ -47,7 +47,7 @@ class AuroraSimulator(Simulator):
         self._probe = STILL
         self.line = SerialLine(folder / AURORA)
         self._motors, self._input = shared_motors(folder), b""
-        self._slow_since = time.monotonic()
+        self._slow_since, self._met_at = time.monotonic(), ndi.RESET_BAUD  # the rate of both, when they last agreed
         self._next_look, self._frame = 0.0, -1
 
     def close(self) -> None:
@@ -96,9 +96,13 @@ class AuroraSimulator(Simulator):
         self.line.write(ndi.RESET_MESSAGE, RESET_S)
 
     def _guess_break(self) -> None:
-        """A host that goes back to 9600 baud while the device is faster, and then waits, has sent a break."""
-        now = time.monotonic()
-        if not self.line.plugged or self.line.baud == ndi.RESET_BAUD or self.line.host_baud() != ndi.RESET_BAUD:
+        """A host that goes back to 9600 baud from the faster rate of the device, and then waits, has sent a break."""
+        if not self.line.plugged:
+            return
+        now, host = time.monotonic(), self.line.host_baud()
+        if host == self.line.baud:
+            self._met_at = host
+        if host != ndi.RESET_BAUD or self._met_at != self.line.baud or host == self.line.baud:
             self._slow_since = now
         elif now - self._slow_since > BREAK_S:
             self._break()
@@ -157,7 +161,7 @@ class AuroraSimulator(Simulator):
             self.line.plug()
             self.line.baud = ndi.RESET_BAUD
         if self.faults.wrong_baud:
-            self.line.baud = ndi.RESET_BAUD
+            self.line.baud = self._device.next_baud = ndi.RESET_BAUD
 
 
 def _three(message: Settings, name: str, unit: str) -> np.ndarray:
