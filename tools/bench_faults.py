@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from ctcr.bench.devices import emergency_stop
+from ctcr.bench.devices.release import release
 from ctcr.bench.shared.control import request
 from ctcr.bench.simulators import aurora, ethercat
 from ctcr.robot import robot_file
@@ -94,7 +95,8 @@ class Wires:
             self.set("ethercat", power_loss=True)
         self.set("aurora", **aurora.FAULTS)
         self.set("ethercat", **ethercat.FAULTS)
-        emergency_stop.release(self.wires)
+        if emergency_stop.is_stopped(self.wires):
+            release(self.wires)
         if off_and_on:
             self.run("move", "robot.yaml", "--bench", "bench.yaml", "--home")
 
@@ -164,8 +166,8 @@ FAULTS = [
     ),
     Fault("no process data for 0.4 s (watchdog)", starve, False, "watchdog|no frame came back|no terminal answers"),
     Fault("a motor is jammed (following error)", on("ethercat", stall=2), False, "does not follow"),
-    Fault("over-current in a coil", on("ethercat", over_current=3), False, "over-current in coil A", off_and_on=True),
-    Fault("motor supply off", on("ethercat", under_voltage=5), False, "motor supply too low", off_and_on=True),
+    Fault("over-current in a coil", on("ethercat", over_current=3), False, "over-current in coil A"),
+    Fault("motor supply off", on("ethercat", under_voltage=5), False, "motor supply too low"),
     Fault("an encoder jumps", on("ethercat", encoder_jump=4), False, "encoder jumped|does not follow", off_and_on=True),
     Fault("5 % of the bus frames lost, 5 % late", on("ethercat", lost_frames=0.05, late_frames=0.05), True, ""),
     Fault("emergency stop during a move", lambda wires, _: wires.run("stop"), False, "ctcr stop was called"),
