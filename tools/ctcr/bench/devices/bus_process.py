@@ -153,8 +153,13 @@ class _Owner:
             if self._cycle(now, min(now - last, 10 * period)):
                 last = now
             if control.fault:
-                emergency_stop.stop(self._folder, str(control.fault))
+                self._stopped()
             self.publish(now)
+
+    def _stopped(self) -> DeviceFault:
+        """Latches the fault; what whoever asks for a motion is told, with the way to release it."""
+        emergency_stop.stop(self._folder, str(self._control.fault))
+        return emergency_stop.stop_fault(self._folder)
 
     def _cycle(self, now: float, dt: float) -> bool:
         """One exchange; whether it was good."""
@@ -211,7 +216,7 @@ class _Owner:
                     self._number = number
                     self._pipe.send(("ok", None))
                 except DeviceFault as fault:
-                    self._pipe.send(("fault", fault))
+                    self._pipe.send(("fault", self._stopped() if self._control.fault else fault))
         except (EOFError, OSError):  # the client has closed the pipe, or died
             self._open = False
             self._control.halt()
