@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import struct
 import subprocess
 import time
@@ -162,6 +163,15 @@ class TestMotors:
         go(motors, SMALL)
         motors.wait()
         assert motors.state["bad_cycles"] > 0 and not motors.state["stopped"]
+
+    def test_silent_client(self, motors, folder):
+        """A client of a simulator that sends nothing does not hold up the bus."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as client:
+            client.connect(str(folder / "ethercat.sock"))
+            go(motors, SMALL)
+            motors.wait()
+            assert request(folder, "ethercat", {})["states"][1] == OP
+        motors.check()
 
     def test_missed_steps(self, motors, folder):
         """The position loop, closed on the encoders, corrects them."""

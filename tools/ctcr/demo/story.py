@@ -67,7 +67,7 @@ class Story:
             stops += 1
             if stops > MOST_STOPS or not (self._bench and emergency_stop.is_stopped(self._bench)):
                 raise failed
-            self._console.print(*(f"    {line}" for line in release(self._bench)), sep="\n", style="yellow")
+            self._console.print(f"    {release(self._bench)[-1]}; the same command again", style="yellow")
         if answer:
             told = self.answers[answer] = json.loads((self.folder / f"{answer}.json").read_text(encoding="utf-8"))
         words = found(told) if callable(found) else found.format_map(told or {})

@@ -2,7 +2,7 @@
 
 import json
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ LARGEST = 1 << 16  # bytes of a message
 
 
 class ControlSocket:
-    """Listens as `folder/name.sock`; wait for `fileno` and then call `answer`."""
+    """Listens as `folder/name.sock`; wait for one of `sources` and then call `answer`, which never waits."""
 
     def __init__(self, folder: Path, name: str, handler: Callable[[dict[str, Any]], Any]):
         """`handler` gets the request and returns the reply; its InputErrors are sent back to who asked."""
@@ -27,15 +27,25 @@ class ControlSocket:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.bind(str(self.path))
         self._socket.listen(8)
+        self._clients: list[socket.socket] = []  # that have sent nothing yet
 
-    def fileno(self) -> int:
-        return self._socket.fileno()
+    @property
+    def sources(self) -> list[socket.socket]:
+        return [self._socket, *self._clients]
 
-    def answer(self) -> None:
-        """Answers one request."""
-        connection, _ = self._socket.accept()
+    def answer(self, ready: Container[object]) -> None:
+        """Answers the requests of the `sources` that are ready."""
+        for client in self._clients[:]:
+            if client in ready:
+                self._clients.remove(client)
+                self._answer(client)
+        if self._socket in ready:
+            client, _ = self._socket.accept()
+            client.setblocking(False)
+            self._clients.append(client)
+
+    def _answer(self, connection: socket.socket) -> None:
         with connection:
-            connection.settimeout(0.2)  # a client that sends nothing must not stop the device
             try:
                 reply = {"reply": self._handler(json.loads(connection.recv(LARGEST)))}
             except InputError as error:
@@ -46,7 +56,8 @@ class ControlSocket:
                 connection.send(json.dumps(reply).encode())
 
     def close(self) -> None:
-        self._socket.close()
+        for source in self.sources:
+            source.close()
         self.path.unlink(missing_ok=True)
 
 

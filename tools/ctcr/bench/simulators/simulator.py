@@ -41,11 +41,10 @@ class Simulator:
     def step(self) -> None:
         """Waits for the next thing to do, and does it."""
         sources, wait = self.waits_for()
-        ready, _, _ = select.select([self._control, *sources], [], [], max(0.0, wait))
+        ready, _, _ = select.select([*self._control.sources, *sources], [], [], max(0.0, wait))
         while self._scenario and self._scenario[0][0] <= time.monotonic() - self._start:
             self.set_faults(self._scenario.pop(0)[1])
-        if self._control in ready:
-            self._control.answer()
+        self._control.answer(ready)
         self.work(bool(sources) and sources[0] in ready)
 
     def waits_for(self) -> tuple[list, float]:
