@@ -37,7 +37,8 @@ class Engine:
     steps: int = field(init=False)  # of integration
     positions: Array = field(init=False)  # of the sensor (M, 3) [m], tracker frame
     base: list[str] = field(init=False)  # names of the calibration parameters
-    _last: ResidualModel | None = field(init=False, default=None)  # model of the last fit: its equilibria and friction
+    _equilibria: ResidualModel | None = field(init=False, default=None)  # those of the last fit, in its model
+    _friction_path: ResidualModel | None = field(init=False, default=None)  # of the last fit with friction
     _scales: Scales = field(init=False, default_factory=dict)  # on the stated uncertainties, of the last fit
 
     def __post_init__(self) -> None:
@@ -85,7 +86,7 @@ class Engine:
         at = dict(zip(names, priors.mean, strict=True)) | (start or {})
         at = np.clip([at[name] for name in names], priors.low, priors.high)
         table = self.recording(names, fixed)
-        for known in (like, self._last):
+        for known in (like, self._equilibria, self._friction_path):
             if type(known) is type(table):
                 table.begin_at(known)
         if weights is None and not self.robust:
@@ -93,7 +94,9 @@ class Engine:
         options |= {"start": at, "weights": weights, "tolerance": tolerance or self.tolerance, "few_first": not near}
         options["row"] = self.measurements.row
         fitted = joint.fit_joint(table, priors, noise or self.noise, self.positions, self.fitted, **options)
-        self._last = table
+        self._equilibria = table
+        if table.friction_is_solved:
+            self._friction_path = table
         if options.get("scales") is None:
             self._scales = fitted.priors.scales
         return fitted
