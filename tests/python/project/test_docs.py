@@ -1,6 +1,7 @@
 """Runs what the documents tell the reader to run, and the examples: commands, C++ blocks, Python blocks.
 
-Commands that build or test everything (`tools/dev ...`) are only looked up in the command's own help.
+What a document says that commands print stands in a block `output` behind them, and they must print it. Commands that
+build or test everything (`tools/dev ...`) are only looked up in the command's own help.
 """
 
 import os
@@ -26,8 +27,13 @@ def name(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
+def all_blocks_of(document: Path) -> list[tuple[str, str]]:
+    """Language and body of each, in their order."""
+    return BLOCK.findall(document.read_text())
+
+
 def blocks(document: Path, language: str) -> list[str]:
-    return [body for kind, body in BLOCK.findall(document.read_text()) if kind == language] if document.exists() else []
+    return [body for kind, body in all_blocks_of(document) if kind == language]
 
 
 def all_blocks(language: str) -> list:
@@ -38,9 +44,22 @@ def all_blocks(language: str) -> list:
     ]
 
 
-def commands(document: Path) -> list[str]:
-    lines = [line for body in blocks(document, "sh") for line in body.replace("\\\n", " ").splitlines()]
+def commands(block: str) -> list[str]:
+    lines = block.replace("\\\n", " ").splitlines()
     return [line.split(" #")[0].strip() for line in lines if line.startswith(("tools/dev", ".venv/bin/ctcr"))]
+
+
+def missing_lines(excerpt: str, printed: str) -> list[str]:
+    """Lines of an excerpt that do not stand in the output, in this order; blanks and the ends of lines do not count."""
+    rest, missing = " ".join(printed.split()), []
+    for line in excerpt.splitlines():
+        words = " ".join(line.split())
+        before, found, behind = rest.partition(words)
+        if found:
+            rest = behind
+        else:
+            missing.append(line)
+    return missing
 
 
 @pytest.fixture
@@ -56,7 +75,7 @@ def run(command: list, folder: Path) -> str:
     done = subprocess.run(
         command,
         cwd=folder,
-        env=os.environ | {"MPLBACKEND": "Agg"},
+        env=os.environ | {"MPLBACKEND": "Agg", "COLUMNS": "80"},
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -67,7 +86,7 @@ def run(command: list, folder: Path) -> str:
 
 
 def test_readme_opens_with_the_two_commands():
-    assert commands(ROOT / "README.md")[:2] == ["tools/dev demo", "tools/dev test"]
+    assert commands(blocks(ROOT / "README.md", "sh")[0]) == ["tools/dev demo", "tools/dev test"]
 
 
 @pytest.mark.parametrize("language", ["cpp", "python"])
@@ -75,16 +94,30 @@ def test_readme_shows(language):
     assert blocks(ROOT / "README.md", language)
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=name)
+def test_excerpt():
+    """An excerpt holds words of the output in their order, whatever the spaces between them."""
+    printed = "error  1.44 mm\n  RMS over\n560 readings"
+    assert not missing_lines("error 1.44 mm RMS\n560   readings", printed)
+    assert missing_lines("560 readings\nerror 1.45 mm\nerror 1.44 mm", printed) == ["error 1.45 mm", "error 1.44 mm"]
+
+
+@pytest.mark.parametrize("document", [path for path in DOCUMENTS if blocks(path, "sh")], ids=name)
 def test_commands(document, project):
+    """They run, and print what the document shows behind them."""
     usage = run([ROOT / "tools/dev", "--help"], project)
-    for command in commands(document):
-        if command.startswith("tools/dev"):
-            _, subcommand, *rest = command.split()
-            for word in (subcommand, *(word for word in rest if word.startswith("-"))):
-                assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
-        else:
-            run(["bash", "-c", command], project)
+    printed = ""
+    for language, body in all_blocks_of(document):
+        if language == "output":
+            assert not missing_lines(body, printed), printed
+        elif language == "sh":
+            printed = ""
+            for command in commands(body):
+                if command.startswith("tools/dev"):
+                    _, subcommand, *rest = command.split()
+                    for word in (subcommand, *(word for word in rest if word.startswith("-"))):
+                        assert re.search(rf"(?<![\w-]){word}(?![\w-])", usage), f"{command}: not in tools/dev"
+                else:
+                    printed += run(["bash", "-c", command], project)
 
 
 @pytest.mark.parametrize("block", all_blocks("python"))
