@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -157,6 +158,13 @@ def test_benchmark_report():
         ]
     }
     assert bench.cpu_times(report) == {"a": 2000.0}
+
+
+def test_instructions_told():
+    """The README of the library tells the counts that are recorded."""
+    rows = re.findall(r"^\| (?:instructions|with every effect).*", (ROOT / "include/ctcr/README.md").read_text(), re.M)
+    told = [int(cell) for row in rows for cell in row.split("|") if cell.strip().isdigit()]
+    assert told == list(json.loads(counting.BASELINE.read_text())["instructions_per_step"].values())
 
 
 @pytest.mark.parametrize(
