@@ -11,6 +11,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import ctcr
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[3]
@@ -189,3 +191,43 @@ def test_scores_told_are_those_kept():
     assert f"right effect first in {right} of {sets}" in " ".join(told.split())
     quiet, controls = of("controls: nothing named")
     assert quiet == controls and f"none in {controls} that hide nothing" in " ".join(told.split())
+
+
+@pytest.mark.parametrize("document", ["README.md", "docs/calibration.md"])
+def test_coverage_told(document):
+    """The share of true values within two standard deviations, as the page of the study keeps it."""
+    page = (ROOT / "docs" / "calibration_study.md").read_text()
+    counts = re.findall(r"^\| \w+ \| (\d+) \| (\d+)/(\d+) =", page, re.MULTILINE)
+    robots, within, values = (sum(int(count) for count in column) for column in zip(*counts, strict=True))
+    told = " ".join((ROOT / document).read_text().replace("[", "").split())
+    assert f"on {robots} random robots" in told.lower() and f"in {100 * within / values:.0f} % of the cases" in told
+
+
+def test_demonstration_told():
+    """How wrong the model without friction is, with the robot file as it is and with the true parameters."""
+    folder = ROOT / "examples" / "data" / "demo"
+    told = (folder / "README.md").read_text()
+    rows = re.findall(r"^\| ([^|,]+),? \S+ \|([\d.| -]+)\|$", told, re.MULTILINE)
+    truth = {name: [float(value) for value in values.split("|")] for name, values in rows}
+    frame = [
+        [float(number) for number in re.search(rf"{words} \(([^)]+)\)", told).group(1).split(",")]
+        for words in ("position", r"rotation\s+vector")
+    ]
+
+    def error(robot):
+        off = 1e3 * (ctcr.predict(robot, table, frame="tracker").position - table.position)
+        return f"{np.sqrt(np.mean(np.sum(off**2, axis=1))):.1f} mm"
+
+    robot, table = ctcr.load(folder / "robot.yaml"), ctcr.read(folder / "measurements.csv")
+    believed = error(robot)
+    for i, tube in enumerate(robot.tubes):
+        tube.youngs_modulus_GPa, tube.length_mm = truth["Young's modulus"][i], truth["length"][i]
+        tube.curved_length_mm, tube.curvature_per_m = truth["curved length"][i], truth["curvature"][i]
+    homes = robot.actuation
+    homes.recorded_home_translation_mm = homes.home_translation_mm
+    homes.recorded_home_rotation_deg = homes.home_rotation_deg
+    homes.home_translation_mm = list(np.add(homes.home_translation_mm, truth["translation offset"]))
+    homes.home_rotation_deg = list(np.add(homes.home_rotation_deg, truth["rotation offset"]))
+    robot.tracker.position_mm, robot.tracker.rotation_vector_rad = frame
+    words = f"wrong by {error(robot)} RMS, with `robot.yaml` as it is by {believed}"
+    assert words in " ".join(told.split())
