@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 from ctcr.robot import robot_file
 from ctcr.track import scenario
 from ctcr.track.runs import run_once, system_values
@@ -20,4 +19,4 @@ for controller in ("unknown", "estimated"):
     run = run_once(wanted, system_values(robot), system_values(plant), mass_g=20.0)
     error = 1e3 * run.counted
     print(f"{controller:10} mean {error.mean():.3f} mm, largest {error.max():.3f} mm: {run.verdict()}")
-print("force the controller found:", np.round(1e3 * run.force[-1]), "mN")
+print("force the controller found:", (1e3 * run.force[-1]).round(), "mN")

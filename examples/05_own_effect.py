@@ -4,9 +4,11 @@ The same file serves the command line: ctcr add .. --effects examples/05_own_eff
 """
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
-from ctcr.user_effects import Effect, Parameter, load
+from ctcr.arrays import Array
+from ctcr.user_effects import Effect, Parameter, Rows, load
 
 HOME = np.array([-0.298, -0.2205, -0.145])  # [m] translations at which the angles are set to zero
 
@@ -22,7 +24,7 @@ class RotationPickup(Effect):
         Parameter("gain", unit="rad/m", sigma=1.0, bounds=(-5, 5), per_tube=True, meaning="turn per insertion")
     ]
 
-    def joints(self, rows, values):
+    def joints(self, rows: Rows, values: SimpleNamespace) -> tuple[Array, Array]:
         """What the tubes get where the controller asks for rows.beta and rows.alpha."""
         return rows.beta, rows.alpha + values.gain * (rows.beta - HOME)
 

@@ -44,7 +44,7 @@ def without_pose(table: Measurements) -> list[str]:
     if not len(rows) or len(rows) == len(table):
         return []
     count = "1 row holds" if len(rows) == 1 else f"{len(rows)} rows hold"
-    return [f"{count} no pose ({listed(rows)}): the robot moves through them, and nothing is fitted there."]
+    return [f"{count} no pose ({listed(rows.tolist())}): the robot moves through them, and nothing is fitted there."]
 
 
 def to_fit(

@@ -19,7 +19,10 @@ from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.conventions import Finding as Convention
 from ctcr.errors import InputError, Problem
 from ctcr.frames import rigid_motion
+from ctcr.model.model import Prediction
+from ctcr.robot.description import Robot
 from ctcr.show.result import Glance, Result, frame
+from ctcr.table.measurements import Measurements
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -141,9 +144,9 @@ class Comparison(Result):
 
 
 def compare(
-    robot,
-    measurements,
-    prediction,
+    robot: Robot,
+    measurements: Measurements,
+    prediction: Prediction,
     notices: Sequence[str] = (),
     conventions: Sequence[Convention] = (),
     sessions: Sequence[str] = (),

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 from ctcr import settings
 from ctcr.model import parameters
@@ -83,8 +84,8 @@ def in_si(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
     }
 
 
-def fitted(fit) -> list[Fitted]:
-    """The parameters of a fit."""
+def fitted(fit: Any) -> list[Fitted]:
+    """The parameters of a fit, a `ctcr.fit.result.Fit`."""
     rows = []
     for i, name in enumerate(fit.names):
         field = field_of(name)
@@ -95,7 +96,7 @@ def fitted(fit) -> list[Fitted]:
     return rows
 
 
-def changes(fit, before: Robot, after: Robot) -> list[Change]:
+def changes(fit: Any, before: Robot, after: Robot) -> list[Change]:
     """What a fit changes in the file; a turn of the tracker frame, or of the sensor, changes its rotation vector."""
     made = []
     for name, sd in zip(fit.names, fit.sd, strict=True):
