@@ -2,8 +2,8 @@
 
     python tools/site/build.py [-o build/site]
 
-Copies the documents and what they show to FOLDER/source, with the pages of this folder at its root, and runs Sphinx
-(extra `docs`) and, where it is installed, Doxygen. Warnings are errors.
+Copies the documents and what they show to FOLDER/source, with the pages of this folder at its root, makes the gallery
+of reports, and runs Sphinx (extra `docs`) and, where it is installed, Doxygen. Warnings are errors.
 """
 
 import argparse
@@ -11,6 +11,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+
+import gallery
 
 ROOT = Path(__file__).parents[2]
 COPIED = (
@@ -55,6 +57,7 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=lambda text: Path(text).resolve(), default=ROOT / "build" / "site")
     out = parser.parse_args().out
     stage(out / "source")
+    gallery.build(out / "source" / "gallery.md", out / "source" / "gallery")
     html = out / "html"
     sphinx = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", out / "source", html]
     if status := subprocess.run(sphinx).returncode:

@@ -10,6 +10,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphin
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 3
 html_theme = "furo"
+html_extra_path = ["gallery"]  # the folder of reports and their pictures
 html_title = f"ctcr {release}"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
