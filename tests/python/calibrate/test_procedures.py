@@ -207,7 +207,7 @@ def test_in_place(run, tmp_path):
     robot = tmp_path / "robot.yaml"
     robot.write_bytes(ROBOT.read_bytes())
     code, _, err = run("home", DATA / "home.csv", "--robot", robot, "-o", robot)
-    assert code == 1 and "--in-place" in err and robot.read_bytes() == ROBOT.read_bytes()
+    assert code == 2 and "--in-place" in err and robot.read_bytes() == ROBOT.read_bytes()
     assert run("home", DATA / "home.csv", "--robot", robot, "--in-place")[0] == 0
     assert len(robot_file.load(robot).history) == 1
 

@@ -11,10 +11,10 @@ import pytest
 ROOT = Path(__file__).parents[3]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 # A package that installs a module of another name.
-PART_OF = {"mpl_toolkits": "matplotlib", "serial": "pyserial"}
+PART_OF = {"PIL": "pillow", "mpl_toolkits": "matplotlib", "serial": "pyserial"}
 FOLDERS = {
     "tools/ctcr": ["bench", "cluster", "pandas"],
-    "tools": ["dev", "bench", "cluster", "pandas"],
+    "tools": ["dev", "bench", "cluster", "docs", "pandas"],
     "tests": ["dev", "bench", "pandas"],
     "examples": ["dev"],
 }

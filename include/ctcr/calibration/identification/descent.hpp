@@ -145,7 +145,8 @@ inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bou
 ///
 /// Where a tube's curve begins at the plate, or a load lifts off, derivatives jump, and the minimum may lie at such a
 /// kink, where they never vanish. So a step that fails yields the derivatives on the other side, and the next one follows
-/// the kink or finds that nothing is left to gain.
+/// the kink or finds that nothing is left to gain. That ends the descent only where short steps on this side, too, gain
+/// nothing or next to nothing.
 /// @param tolerance  of the cost; it may be left to gain at a kink. Elsewhere 0.15 times as many posterior sd may
 /// @param goal       ends the descent where it is about to arrive there; or null
 /// Ref: damping as in Nielsen, "Damping parameter in Marquardt's method", 1999; the model beyond a kink is an aggregated
@@ -153,7 +154,7 @@ inline Quadratic upper(const Quadratic& a, const Quadratic& b, const Bounds& bou
 inline Descent descend(Objective& objective, const Bounds& bounds, int max_iterations, double tolerance,
                        Eigen::VectorXd& z, const Goal* goal = nullptr) {
   constexpr double arrived = 0.1, most_damping = 1e10;
-  const double settled = 0.15 * tolerance;
+  const double settled = 0.15 * tolerance, negligible = 0.01 * tolerance;
   Descent out;
   z = bounds.clamped(z);
   Linearised here, there;
@@ -172,18 +173,14 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
     for (double growth = 2; damping < most_damping && !moved; damping *= moved ? 1 : growth, growth *= 2) {
       const Eigen::VectorXd step = model.minimum(bounds, z, damping * diagonal);
       const double foreseen = -model(step);
-      if (kinked && foreseen < tolerance) {
-        if (doubted) {
-          out.at_kink = out.converged = true;
-          return out;
-        }
-        // A cost that is not convex looks like a kink: short steps on this side distinguish them.
+      if (kinked && !doubted && foreseen < tolerance) {
+        // A cost that is not convex, or a valley that bends, looks like a kink: short steps on this side distinguish them.
         doubted = true;
         model = {0, here.gradient, here.hessian};
         damping = std::max(damping, 1.0), growth = 15;
         continue;
       }
-      const double gain = (here.cost - objective.cost(z + step)) / foreseen;
+      const double gained = here.cost - objective.cost(z + step), gain = gained / foreseen;
       if (!(gain > 0.1)) {
         if (doubted || !objective.linearise(z + step, there)) continue;
         kinked = true;
@@ -199,7 +196,11 @@ inline Descent descend(Objective& objective, const Bounds& bounds, int max_itera
       objective.hold(z);
       out.cost = here.cost;
       moved = true;
+      out.at_kink = doubted && gained < negligible;
     }
+    out.at_kink = out.at_kink || (doubted && !moved);
+    out.converged = out.at_kink;
+    if (out.at_kink) break;
   }
   return out;
 }

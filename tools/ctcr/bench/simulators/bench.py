@@ -19,6 +19,7 @@ from ctcr.bench.simulators.ethercat import EthercatSimulator
 from ctcr.bench.simulators.robot import SimulatedRobot
 from ctcr.bench.simulators.simulator import Simulator
 from ctcr.errors import InputError, Problem
+from ctcr.show.output import Terminal
 
 READY_S = 20.0
 _INSIDE = "CTCR_OWN_NETWORK"
@@ -62,6 +63,7 @@ def run(
 def _watched(processes: list[BaseProcess]) -> Iterator[list[str]]:
     """The names of those that end before the block does: each is said at once on standard error."""
     ended: list[str] = []
+    errors = Terminal(stderr=True, soft_wrap=True)
     here, there = multiprocessing.Pipe()
 
     def watch() -> None:
@@ -69,7 +71,7 @@ def _watched(processes: list[BaseProcess]) -> Iterator[list[str]]:
         while there not in (ready := wait([there, *left])):
             for sentinel in ready:
                 ended.append(left.pop(sentinel))
-                print(f"Error: the simulator {ended[-1]} has ended: nothing answers in its place", file=sys.stderr)
+                errors.print(f"Error: the simulator {ended[-1]} has ended: nothing answers in its place")
 
     watcher = Thread(target=watch, daemon=True)
     watcher.start()
