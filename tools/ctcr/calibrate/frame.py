@@ -1,4 +1,9 @@
-"""The tracker frame T_ref from poses of the tip, with no start: a registration in closed form, then a joint fit."""
+"""The tracker frame T_ref from poses of the tip, with no start: a registration in closed form, then a fit.
+
+Homes and tubes keep the values of the robot file, as the frame alone is written there: fitted with it, they could move
+far where the model misses something, and the frame would move far to make up for them. Their uncertainty counts in that
+of the frame (consider covariance). Ref: Tapley, Schutz and Born, "Statistical Orbit Determination", 2004, chapter 6.
+"""
 
 import numpy as np
 
@@ -11,9 +16,11 @@ from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.errors import InputError, Problem
-from ctcr.fit import joint
+from ctcr.fit import folds, joint
+from ctcr.fit.result import Fit, Priors
+from ctcr.fit.sessions import uncertain
 from ctcr.frames import matrix_from_quaternion, nearest_rotation, of_sensor
-from ctcr.model import parameters
+from ctcr.model import parameters, user_recording
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.show.wording import sentence
@@ -24,15 +31,20 @@ SD = parameters.ANYWHERE | {"position": settings.CONVENTION_ANYWHERE}  # [m], [r
 
 
 def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
-    """T_ref where the frame may be anywhere, and homes and tubes as far off as the robot file's uncertainty says.
+    """T_ref, wherever it is, that fits best with the homes and tubes of the robot file; its standard deviation where
+    these are as far off as the file's uncertainty says.
 
     Raises InputError where fewer than three positions can be predicted.
     """
     start = registered(robot, readings)
     names = [f"tracker.{kind}.{axis}" for kind in SD for axis in AXES]
-    fit = joint.fit(start, readings, "standard", sd={name: SD[name.split(".")[1]] for name in names})
+    anywhere = {name: SD[name.split(".")[1]] for name in names}
+    # Where the sensor is lost too, a fit of frame and sensor alone may stop far off; free homes and tubes lead it on.
+    near = joint.fit(start, readings, "standard", rows=folds.few_of(readings.measured), sd=anywhere)
+    start = start.model_copy(update={"tracker": near.apply(start).tracker})
+    fit = joint.fit(start, readings, names, sd=anywhere)
     own = [fit.names.index(name) for name in names]
-    found, covariance = fit.apply(robot=start).tracker, fit.covariance[np.ix_(own, own)]
+    found, covariance = fit.apply(robot=start).tracker, considered(start, readings, fit)[np.ix_(own, own)]
     before, after = sensor_pose.placed(robot, readings)[0], robot.model_copy(update={"tracker": found})
     rows, sd = [], np.sqrt(np.diag(covariance))
     for field, text, unit, values, widths in (
@@ -44,14 +56,24 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
             rows.append(Row(f"{text}, {axis}", unit, float(values[i]), float(widths[i]), in_file(robot, path), path))
     before_mm, after_mm = (rms_mm(one, readings) for one in (before, after))
     rows.append(Row("error of the tip, RMS", "mm", after_mm, old=before_mm))
-    rows.append(Row("error with homes and tubes fitted too, RMS", "mm", fit.rms_mm()))
-    figures = {
-        "rms_mm": {"before": before_mm, "after": after_mm, "calibrated": fit.rms_mm()},
-        "rotation_sd_deg": np.degrees(sd[3:]).tolist(),
-    }
+    figures = {"rms_mm": {"before": before_mm, "after": after_mm}, "rotation_sd_deg": np.degrees(sd[3:]).tolist()}
     notices = [*map(sentence, [*unknown(covariance), *fit.warnings])]
     view = frame_scene(readings, tips.predicted(robot, readings), {"robot file": robot.tracker, "found": after.tracker})
     return Outcome("Tracker frame", rows, notices, figures, view=view)
+
+
+def considered(robot: Robot, readings: Measurements, fit: Fit) -> Array:
+    """Covariance (n, n) of a fit to the readings that left homes and tubes as they are, with their uncertainty."""
+    others = [name for name in uncertain(robot) if name not in fit.names]
+    if not others:
+        return fit.covariance
+    robot, readings, _ = sensor_pose.usable(fit.apply(robot), readings)
+    recorded = user_recording.recording_of(robot, readings, others)
+    recorded.activate(fit.used.tolist())
+    by_others = recorded.residual(recorded.nominal(), True)[1].reshape(len(readings), 6, -1)
+    factor = Priors.of(robot, others, readings.beta).factor
+    moved = fit.covariance @ fit.whitened()[1].T @ fit.whiten(by_others) @ factor
+    return fit.covariance + moved @ moved.T
 
 
 def registered(robot: Robot, readings: Measurements) -> Robot:

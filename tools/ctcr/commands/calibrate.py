@@ -158,8 +158,9 @@ def frame(robot, measurements, anyway, target, in_place, out) -> None:
     """The tracker frame T_ref from poses of the tip alone, wherever ROBOT says that the tracker is.
 
     A registration in closed form of the predicted tips on those of MEASUREMENTS gives a start; then a fit finds
-    position_mm and rotation_vector_rad, with homes and tubes as uncertain as the robot file says. Says what the
-    readings do not tell. Stops where another convention is wrong, as `ctcr compare` says.
+    position_mm and rotation_vector_rad. Homes and tubes keep their values, and their uncertainty in the robot file
+    counts in that of the frame. Says what the readings do not tell. Stops where another convention is wrong, as
+    `ctcr compare` says.
 
     Example: ctcr calibrate frame robot.yaml measurements.csv -o new.yaml
     """
