@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ctcr import settings
 from ctcr.diagnose import sessions
 from ctcr.fit import joint
 from ctcr.frames import product, quaternion_from_rotation_vector
+from ctcr.show import wording
 from hidden_sessions import measured
 from scipy.spatial.transform import Rotation
 
@@ -29,6 +31,32 @@ def test_own_frames(robot, seed):
     found, said = sessions.of_runs(robot, moved(plain, random))
     assert found.sessions.homes is None and "The runs do not share a frame: " in said[0] and len(said) == 1
     assert joint.fit(robot, found).rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
+
+
+def test_far_runs(robot):
+    """So are those of a run so far off that a fit takes it for outliers."""
+    random = np.random.default_rng(6)
+    plain = measured(robot, random, {})
+    near = moved(plain, random)
+    far = replace(near, position=near.position + np.where(near.run == 3, 0.1, 0.0)[:, None] * [0, 0, 1])
+    found, said = sessions.of_runs(robot, far)
+    assert "The runs do not share a frame: " in said[0]
+    assert joint.fit(robot, found).rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
+
+
+def test_many_runs(robot):
+    """So are those of more runs than are looked at: all of them lie in one frame, and the sentence says how well."""
+    random = np.random.default_rng(7)
+    plain = measured(robot, random, {})
+    copies = np.arange(settings.CONVENTION_MOST_RUNS // 8 + 2)
+    many = plain.rows(np.tile(np.arange(len(plain)), len(copies)))
+    many = replace(
+        many, run=many.run + 8 * np.repeat(copies, len(plain)), t=np.arange(len(many)), row=np.arange(len(many))
+    )
+    found, said = sessions.of_runs(robot, moved(many, random))
+    left = joint.fit(robot, found, rows=found.run < 8)
+    assert left.rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
+    assert said[0].endswith(f"to {wording.mm(left.rms_mm())}.")
 
 
 def test_own_homes(robot):

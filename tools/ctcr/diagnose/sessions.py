@@ -12,13 +12,13 @@ from ctcr import settings
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.round import fraction_explained, unexplained
+from ctcr.diagnose.round import fraction_explained, parameters_of, unexplained
 from ctcr.diagnose.selection import Selection
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
 from ctcr.fit import joint
-from ctcr.fit.result import Fit
-from ctcr.fit.sessions import as_sessions, part_of_runs, rows_of_runs, some_runs, uncertain
+from ctcr.fit.result import Fit, rms
+from ctcr.fit.sessions import as_sessions, part_of_runs, sessions_at, some_runs, uncertain
 from ctcr.model import user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.sessions import home_names
@@ -48,25 +48,21 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     located = np.isfinite(every.positions).all(axis=1)
     if asked is False or len(np.unique(every.run[located])) < 2:
         return readings, []
-    noise, free, usable = noise_of_readings(robot, every), uncertain(robot), some_runs(every)
-    if asked is None:
-        table, rows = part_of_runs(robot, usable)
-        part = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
-        one = part.fit()
-        if not (joint.rejects(one) and _may_win(part, one)):
-            return readings, []
-    engine = Engine(robot, usable, noise, rows_of_runs(usable), free=free, tolerance=settings.COARSE)
+    table, rows = part_of_runs(robot, some_runs(every))
+    noise, free = noise_of_readings(robot, every), uncertain(robot)
+    engine = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
     one = engine.fit()
-    framed = replace(engine, measurements=as_sessions(robot, usable))
+    if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
+        return readings, []
+    framed = replace(engine, measurements=as_sessions(robot, table))
     if asked is None and not _wins(engine, one, framed):
         return readings, []
     own, shared, said = framed.fit(), "a frame", []
     homes = tuple(home_names(robot.n_tubes))
     explained = _explained_by_run(framed, own)
-    if homes in explained:
-        homed = replace(engine, measurements=as_sessions(robot, usable, homes=True))
-        if _held_out(homed) < (1 - settings.EXPLAINED) * _held_out(framed):
-            framed, own, shared, explained = homed, homed.fit(), "a frame and homes", {}
+    homed = _with_homes(framed) if homes in explained else None
+    if homed:
+        own, shared, explained = homed.fit(), "a frame and homes", {}
     if explained:
         best = max(explained.values())
         alike = [names for names in explained if explained[names] > settings.IN_REACH * best]
@@ -74,12 +70,10 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
             f"{wording.percent(best)} of what is left looks as if the runs did not share "
             f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes changed, or homed anew?"
         ]
-    before, after = (wording.mm(fit.rms_mm()) for fit in (one, own))
+    taken = sessions_at(own.apply(robot), every, homes=homed is not None)
+    before, after = (wording.mm(_rms_mm(fit.apply(robot), of)) for fit, of in ((one, every), (own, taken)))
     text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
-    sessions = framed.measurements.sessions
-    if len(usable) < len(readings):
-        sessions = as_sessions(robot, every, homes=sessions.homes is not None).sessions
-    return sessions.taken_out(readings), [text, *said]
+    return taken.sessions.taken_out(readings), [text, *said]
 
 
 def _may_win(engine: Engine, one: Fit) -> bool:
@@ -113,8 +107,13 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
     chosen = Selection(replace(engine), fit=one)
     chosen.grow(pool)
-    own = framed.fit_with_field([], values_of(own))
-    return own.log_evidence + _cost(own) > chosen.fit.log_evidence + settings.DECISIVE
+    effects, own = chosen.fit, framed.fit_with_field([], values_of(own))
+    # What a model misses it takes for noise and outliers. Here a reading is one only where neither explains it.
+    names, fixed = parameters_of(chosen.fits)
+    weights, inflation = np.maximum(own.weights, effects.weights), np.minimum(own.inflation, effects.inflation)
+    by_effects = engine.fit_like(own, names, values_of(effects), fixed=fixed, weights=weights, inflation=inflation)
+    by_frames = framed.fit_like(own, start=values_of(own), weights=weights, inflation=inflation)
+    return by_frames.log_evidence + _cost(by_frames) > by_effects.log_evidence + settings.DECISIVE
 
 
 def _cost(own: Fit) -> float:
@@ -131,6 +130,16 @@ def _cost(own: Fit) -> float:
         return -0.5 * float(determinant + np.sum(values**2) / part**2)
 
     return max(map(cost, settings.SESSION_PARTS))
+
+
+def _with_homes(framed: Engine) -> Engine | None:
+    """With homes of each run's own beside its frame, where these predict left-out runs better."""
+    try:
+        homed = replace(framed, measurements=as_sessions(framed.robot, framed.measurements, homes=True))
+        better = _held_out(homed) < (1 - settings.EXPLAINED) * _held_out(framed)
+    except joint.NoFit:  # such homes ask for joints that the tubes cannot have
+        return None
+    return homed if better else None
 
 
 def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
@@ -169,6 +178,12 @@ def _held_out(engine: Engine) -> float:
             fit = replace(engine, rows=rows & ~out).fit()
             square[out] = np.sum(fit.residual[out, :3] ** 2, axis=1)
     return float(np.nanmean(square))
+
+
+def _rms_mm(robot: Robot, readings: Measurements) -> float:
+    """RMS position error of all readings, those that no fit saw too."""
+    recorded = user_recording.recording_of(robot, readings)
+    return 1e3 * rms(recorded.residual(recorded.nominal())[0].reshape(-1, 6)[:, :3])
 
 
 def _named(names: tuple[str, ...]) -> str:

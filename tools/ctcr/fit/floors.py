@@ -12,7 +12,7 @@ from ctcr.audit import sensor_pose
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
-from ctcr.fit.sessions import part_of_runs, uncertain
+from ctcr.fit.sessions import part_of_runs, some_runs, uncertain
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.sessions import told
@@ -53,7 +53,7 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     robot, readings, _ = sensor_pose.trusted(robot, readings)
     if not np.isfinite(readings.positions).any():
         return Floors(jitter)
-    readings, chosen = part_of_runs(robot, readings)
+    readings, chosen = part_of_runs(robot, some_runs(readings))
     try:
         noise = noise_of_readings(robot, readings)
         names = told(uncertain(robot), readings)

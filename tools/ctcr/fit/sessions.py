@@ -19,19 +19,27 @@ def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) ->
 
     Raises NoFit where none is possible.
     """
-    sessions, at = Sessions.alike(robot, readings, homes), robot
+    part, rows = part_of_runs(robot, some_runs(readings))
+    # At the robot file's values first: within a fit, what is left of the frames acts linearly.
+    sessions = _aligned(robot, part, Sessions.alike(robot, part, homes), settings.SESSION_ALIGNMENTS)
+    fit = joint.fit(robot, sessions.taken_out(part), uncertain(robot), rows=rows)
+    return sessions_at(fit.apply(robot), readings, homes=homes)
 
-    def aligned(steps: int) -> Sessions:
-        found = sessions
-        for _ in range(steps):
-            recorded = user_recording.recording_of(at, found.taken_out(readings))
-            found = found.moved(recorded.moves(np.empty(0)))
-        return found
 
-    sessions = aligned(settings.SESSION_ALIGNMENTS)  # at the robot file's values: within a fit they act linearly
-    at = joint.fit(robot, sessions.taken_out(readings), uncertain(robot), rows=rows_of_runs(readings)).apply(robot)
-    sessions = aligned(2)
-    return sessions.taken_out(readings)
+def sessions_at(robot: Robot, readings: Measurements, *, homes: bool = False) -> Measurements:
+    """The same at the values of this robot. A few rows of each run bring its frame near, a step with all rows makes it
+    exact: a solution of a long table costs more than all else."""
+    part, _ = part_of_runs(robot, readings)
+    sessions = _aligned(robot, part, Sessions.alike(robot, readings, homes), settings.SESSION_ALIGNMENTS)
+    return _aligned(robot, readings, sessions, 1).taken_out(readings)
+
+
+def _aligned(robot: Robot, readings: Measurements, sessions: Sessions, steps: int) -> Sessions:
+    """The sessions after Gauss-Newton steps towards those that fit the readings best."""
+    for _ in range(steps):
+        recorded = user_recording.recording_of(robot, sessions.taken_out(readings))
+        sessions = sessions.moved(recorded.moves(np.empty(0)))
+    return sessions
 
 
 def uncertain(robot: Robot) -> list[str]:
@@ -54,21 +62,15 @@ def some_runs(readings: Measurements) -> Measurements:
     return readings.rows(np.isin(readings.run, runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)]))
 
 
-def rows_of_runs(readings: Measurements) -> Mask:
-    """SESSION_ROWS measured rows (M,) of a long table, of the runs alike."""
+def part_of_runs(robot: Robot, readings: Measurements) -> tuple[Measurements, Mask]:
+    """A table of some rows of each run alone, which is cheap, all its rows chosen (M,); the whole one and those rows,
+    where the robot has effects of the path."""
     measured, chosen = np.flatnonzero(readings.measured), np.zeros(len(readings), bool)
     order = measured[np.argsort(readings.run[measured], kind="stable")]
-    each = np.split(order, np.flatnonzero(np.diff(readings.run[order])) + 1)
-    for rows in each:
-        chosen[rows[evenly(len(rows), max(settings.SESSION_ROWS // len(each), 1))]] = True
-    return chosen
-
-
-def part_of_runs(robot: Robot, readings: Measurements) -> tuple[Measurements, Mask]:
-    """A table of `rows_of_runs` alone, which is cheap, all its rows chosen (M,); the whole one and those rows, where
-    the robot has effects of the path."""
-    readings = some_runs(readings)
-    chosen = rows_of_runs(readings)
+    runs = np.split(order, np.flatnonzero(np.diff(readings.run[order])) + 1)
+    each = settings.SESSION_ROWS // min(len(runs), settings.CONVENTION_MOST_RUNS)
+    for rows in runs:
+        chosen[rows[evenly(len(rows), each)]] = True
     if effect_model.of_the_path(robot):
         return readings, chosen
     return readings.rows(chosen), np.ones(np.sum(chosen), bool)
