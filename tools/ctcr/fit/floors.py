@@ -47,7 +47,7 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     """The floors of readings of a robot, of what its file states alone: no fit and no residual changes them.
 
     The expected error is that of the standard calibration, by least squares, to readings of a right model: noise less
-    what parameters take of it, by the same rows in every command.
+    what parameters, and frames that each run has of its own, take of it, by the same rows in every command.
     """
     jitter = sqrt(3) * (robot.tracker.jitter_mm or nan)
     robot, readings, _ = sensor_pose.trusted(robot, readings)
@@ -71,7 +71,9 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     jitters = np.where(axis < 3, noise.position_jitter, noise.rotation_jitter)
     fields = np.where(axis < 3, noise.position_field, noise.rotation_field)
     J = jacobian[known.ravel()] * sd
-    gain = np.linalg.solve((J.T / jitters**2) @ J + np.eye(len(names)), J.T / jitters**2)
+    if readings.sessions is not None:  # the frames of the runs are fitted too
+        J = np.hstack([J, recorded.columns(residual)[known.ravel()]])
+    gain = np.linalg.solve((J.T / jitters**2) @ J + np.eye(J.shape[1]), J.T / jitters**2)
     square = jitters**2 * (1 - 2 * np.sum(J * gain.T, axis=1))
     square += np.sum((J @ ((gain * jitters**2) @ gain.T)) * J, axis=1)
     if fields.any():
