@@ -4,11 +4,11 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import ctcr
 import numpy as np
 import pytest
 from ctcr import cli
 from ctcr.audit import spikes
-from ctcr.diagnose import diagnose
 from ctcr.effects import catalogue
 from ctcr.model import simulation
 from ctcr.robot import robot_file
@@ -126,12 +126,20 @@ def test_diagnosis(robot, paths):
     """A diagnosis finds the hidden effect in spite of spikes, and reports them."""
     table = measured(robot, paths, "softening")
     rows = interior(np.random.default_rng(5), 10)
-    plain, result = (diagnose(robot, readings) for readings in (table, struck(table, rows)))
+    plain, result = (ctcr.diagnose(robot, readings) for readings in (table, struck(table, rows)))
     assert result.verdict.word == plain.verdict.word
     assert [a.ids for a in result.accepted] == [a.ids for a in plain.accepted] == [["softening"]]
     assert result.rms_mm["with_effects"] == pytest.approx(plain.rms_mm["with_effects"], rel=0.1)
     assert result.judged.sum() < plain.judged.sum() and not result.judged[rows].any()
-    assert any("spikes of the tracker" in notice for notice in result.notices)
+    assert any("spikes of the tracker" in said for said in result.verdict.sentences)
+
+
+def test_calibrate(robot, paths):
+    """A calibration fits the readings that `ctcr compare` compares."""
+    table = struck(measured(robot, paths), rows := [7, 60])
+    fitted, compared = ctcr.calibrate(robot, table, hold_out=0, halves=False), ctcr.compare(robot, table)
+    assert fitted.n_readings == compared.position_mm.count == len(table) - len(rows)
+    assert any("spikes of the tracker" in notice for notice in fitted.notices)
 
 
 def test_compare(robot, paths, tmp_path, capsys):

@@ -1,7 +1,7 @@
 """How wrong a model is: `ctcr.compare`, and the command of that name."""
 
-from ctcr.api.reviewed import reviewed, without_repeated
-from ctcr.audit import missing_motion, sensor_pose, spikes
+from ctcr.api.reviewed import reviewed, without_false_poses
+from ctcr.audit import missing_motion, sensor_pose
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
 from ctcr.conventions import Review
@@ -9,6 +9,7 @@ from ctcr.diagnose import sessions
 from ctcr.fit.floors import floors
 from ctcr.model.table_poses import predict
 from ctcr.robot.description import Robot
+from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements, check_of
 
 
@@ -26,16 +27,15 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     if table.refusal:
         robot, readings = found.robot, found.readings
         corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
-    readings, repeated = without_repeated(readings, found)
+    prediction = predict(robot.standard, readings, steps=steps)
+    readings, excluded = without_false_poses(robot, readings, found, prediction.position)
     robot, placed = sensor_pose.placed(robot, readings)
     own, floor = _fitted(robot, readings, found)
-    prediction = predict(robot.standard, readings, steps=steps)
-    readings, excluded = spikes.left_out(robot, readings, prediction.position)
     added: list[str] = []
     if robot.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
-    notices = [f"{said}." for said in (*corrected, *placed, *excluded, *added)] + repeated
+    notices = [*map(sentence, (*corrected, *placed)), *excluded, *map(sentence, added)]
     return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
 
 

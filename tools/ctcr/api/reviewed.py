@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctcr.arrays import Array
+from ctcr.audit import spikes
 from ctcr.conventions import Finding, Review, review
 from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
@@ -31,11 +33,17 @@ def reviewed(robot: Robot, table: Measurements) -> Review:
     return replace(found, readings=replace(found.readings, refusal=None))
 
 
-def without_repeated(table: Measurements, found: Review) -> tuple[Measurements, list[str]]:
-    """The readings without poses that the tracker repeated, and sentences on that."""
+def without_false_poses(
+    robot: Robot, table: Measurements, found: Review, predicted: Array | None = None
+) -> tuple[Measurements, list[str]]:
+    """The readings without poses that the tracker repeated and without its spikes, and sentences on that.
+
+    predicted    tips (M, 3) [m] of all rows by the standard model, base frame, where they are known already
+    """
     rows = [row for one in found.frozen for row in one.rows]
     said = [sentence(f"{one.text}: left out") for one in found.frozen]
-    return (table.without_poses(np.isin(table.row, rows)) if rows else table), said
+    table, leaps = spikes.left_out(robot, table.without_poses(np.isin(table.row, rows)) if rows else table, predicted)
+    return table, [*said, *map(sentence, leaps)]
 
 
 def without_pose(table: Measurements) -> list[str]:
@@ -57,7 +65,7 @@ def to_fit(
 ) -> tuple[Measurements, list[str], Review]:
     """The readings as a fit takes them, sentences on what was left out, and the review of the conventions.
 
-    Left out are poses that the tracker repeated, and where the runs are sessions, what each has of its own.
+    Left out are poses that the tracker repeated, spikes, and where the runs are sessions, what each has of its own.
     frame_per_run    whether each run has a frame of its own; None: where the readings say so
     finds            kinds of wrong conventions that the fit itself corrects
     Raises WrongConventions where a convention is wrong, unless `anyway`.
@@ -68,7 +76,7 @@ def to_fit(
         raise WrongConventions(found, wrong, table)
     if table.refusal:
         raise table.refusal
-    readings, said = without_repeated(table, found)
+    readings, said = without_false_poses(robot, table, found)
     said += without_pose(table)
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
     return readings, [*said, *more], found
