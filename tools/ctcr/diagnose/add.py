@@ -185,7 +185,7 @@ def add(
     fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
-    after, name = fit.apply(stage.robot), _name_of(readings, held_out)
+    after, name = fit.apply(stage.robot), folds.named(readings, held_out)
     floor, own = floors(robot.with_effects(after.effects), given), readings.sessions
     return Added(unchanged, placed(after, own), given.files, list(ids), fit, stages, name, notices, own, floor)
 
@@ -333,15 +333,6 @@ class _Fitter:
         fit = self.engine.fit(own, start=first, near=True, tolerance=settings.COARSE)
         fits = [fit, *(self.engine.fit_like(fit, own, other, tolerance=settings.COARSE) for other in others)]
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
-
-
-def _name_of(readings: Measurements, held_out: Mask) -> str:
-    if not held_out.any():
-        return ""
-    runs = np.unique(readings.run[held_out])
-    if np.isin(readings.run[~held_out], runs).any():
-        return "one of every four blocks of time"
-    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
 
 
 def _stage(name: str, residual: Array, rows: Mask) -> Stage:

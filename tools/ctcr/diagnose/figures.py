@@ -15,7 +15,7 @@ PALE = 0.45  # opacity of bars of linearised gains
 
 
 def waterfall(figure, d: Diagnosis) -> None:
-    """RMS error on held-out runs, from the robot file to the expected error."""
+    """RMS error on held-out readings, from the robot file to the expected error."""
     axes, rms = figure.subplots(), d.rms_mm
     bars = [("robot file", rms["nominal"], FAINT), ("calibrated", rms["calibrated"], ERROR)]
     for k, a in enumerate(d.accepted, start=1):
@@ -29,7 +29,7 @@ def waterfall(figure, d: Diagnosis) -> None:
     axes.axvline(floor, color=NOISE, linestyle="--", linewidth=1)
     axes.set_yticks(range(len(bars)), [name for name, _, _ in bars])
     axes.invert_yaxis()
-    axes.set(xlabel="RMS error on held-out runs, mm", xlim=(0, 1.25 * max(value for _, value, _ in bars)))
+    axes.set(xlabel="RMS error on held-out readings, mm", xlim=(0, 1.25 * max(value for _, value, _ in bars)))
     axes.grid(axis="y", visible=False)
 
 
@@ -129,5 +129,5 @@ def course(figure, d: Diagnosis) -> None:
     for start, end in zip(edges, edges[1:], strict=False):
         if end > start and d.held_out[start]:
             axes.axvspan(start + 0.5, end + 0.5, color=TINT, zorder=0)
-    axes.set(xlabel="reading (grey: held-out runs)", ylabel="error, mm", ylim=(0, None))
+    axes.set(xlabel="reading (grey: held out)", ylabel="error, mm", ylim=(0, None))
     axes.legend(markerscale=3)

@@ -111,5 +111,5 @@ def explained_by_run(engine: Engine, before: joint.Fit, after: joint.Fit) -> dic
     if not fractions and every.any():
         unexplained, scatter = unexplained_of(after, every, positions_alone=True), np.sqrt(6 * np.sum(every))
         worse = max(unexplained(after.residual) - 3 * scatter, 0.0)
-        fractions = {"the held-out runs": 1 - worse / max(unexplained(before.residual), scatter)} if worse else {}
+        fractions = {"the held-out readings": 1 - worse / max(unexplained(before.residual), scatter)} if worse else {}
     return fractions

@@ -30,7 +30,7 @@ from ctcr.fit.widening import Widened, widened
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.show.result import Glance, Result, frame
-from ctcr.show.wording import sentence
+from ctcr.show.wording import counted, sentence
 from ctcr.table.measurements import Measurements
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Diagnosis(Result):
         rows = [[name.replace("_", " "), f"{size:.3f}"] for name, size in self.rms_mm.items() if name != "noise_floor"]
         rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows()]
         notes = [*self.verdict.sentences, *map(sentence, self.notices)]
-        return Glance(line, ["error on held-out runs", "mm RMS"], rows, notes)
+        return Glance(line, ["error on held-out readings", "mm RMS"], rows, notes)
 
     @property
     def mistakes_effect_for_outliers(self) -> bool:
@@ -106,6 +106,12 @@ class Diagnosis(Result):
     def judged(self) -> Mask:
         """Held-out rows that hold a reading, without isolated outliers (M,)."""
         return self.held_out & ~self.isolated & self.measurements.measured
+
+    @property
+    def judged_on(self) -> str:
+        """How many readings these are, and of which runs or blocks of time."""
+        groups = folds.named(self.measurements, self.held_out)
+        return f"{counted(int(self.judged.sum()), 'held-out reading')} ({groups})"
 
     @property
     def rms_mm(self) -> dict[str, float]:
@@ -258,7 +264,7 @@ def _diagnose(
     residual = residual_of(engine, chosen.calibrated, corrected, corrections)
 
     # Prediction of the held-out runs without and with effects.
-    progress("prediction of held-out runs")
+    progress("prediction of held-out readings")
     calibrated = with_effects = fit_to_predict(engine, chosen.calibrated, {})
     if accepted:
         with_effects = fit_to_predict(engine, fit, fixed)

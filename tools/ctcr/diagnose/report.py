@@ -45,7 +45,7 @@ def _opening(d: Diagnosis) -> str:
     return (
         paragraph(" " + " ".join(d.verdict.sentences), "lead", bold=f"{verdict}.")
         + cards(numbers)
-        + f'<p class="soft">Errors of {int(d.judged.sum())} readings of held-out runs. '
+        + f'<p class="soft">Errors of {d.judged_on}. '
         f"{d.floors.MEANING.capitalize()}; sensor jitter alone: {short(d.floors.sensor_jitter_mm)} mm.</p>"
     )
 
@@ -69,7 +69,7 @@ def _explanations(d: Diagnosis) -> str:
 
 
 def _errors(d: Diagnosis) -> str:
-    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out runs.")
+    left = figure(figures.waterfall, d, 5.2, 3.8, "RMS error on held-out readings.")
     right = figure(figures.course, d, 5.2, 3.8, "The error of every reading, in the order measured.")
     text = (
         "The error after calibration over the quantities that predict it best, and its part that the effects explain."

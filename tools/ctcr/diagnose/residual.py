@@ -50,7 +50,7 @@ class Residual:
         if not self.structured:
             return [*self.corrections, "The residual is noise."]
         on = ", ".join(item.label for item in self.after.chosen)
-        depends = f"it depends on {on}" if on else "no quantity alone predicts its size on held-out runs"
+        depends = f"it depends on {on}" if on else "no quantity alone predicts its size on held-out readings"
         rejected = [f"The residual is more than noise; {depends}."] if self.rejected else []
         return rejected + self.corrections + self.about_clusters
 

@@ -19,7 +19,7 @@ from ctcr.fit.joint import Fit, likeliest_field
 from ctcr.table.measurements import Measurements
 
 CORRECTED = (
-    "Errors with the effects found are corrected for that: readings of held-out runs count as late as the readings "
+    "Errors with the effects found are corrected for that: held-out readings count as late as the readings "
     "before and after them."
 )
 

@@ -14,7 +14,7 @@ from ctcr.effects import catalogue
 from ctcr.fit.joint import Fit
 from ctcr.model.noise import Noise, changed, with_field
 
-CORRECTED = "Errors with the effects found are corrected for it: those of held-out runs by readings nearby."
+CORRECTED = "Errors with the effects found are corrected for it: those of held-out readings by others nearby."
 
 
 def likeliest_noise(engine: Engine, fit: Fit) -> Noise | None:

@@ -66,9 +66,7 @@ def _explanations(result: Diagnosis) -> Any:
 def _errors(result: Diagnosis) -> Any:
     rows = [[STAGES[name], f"{value:.3f}"] for name, value in result.rms_mm.items() if name in STAGES]
     rows += [[name, f"{value:.3f}"] for name, value in result.floors.rows()]
-    runs = len(set(result.measurements.run[result.judged].tolist()))
-    title = f"Position error (RMS) on {result.judged.sum()} readings of {runs} held-out run(s)"
-    return output.table(title, ["model", "mm"], rows)
+    return output.table(f"Position error (RMS) on {result.judged_on}", ["model", "mm"], rows)
 
 
 def _candidates(number_: int, round_: Round) -> Any:

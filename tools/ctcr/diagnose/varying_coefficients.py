@@ -89,7 +89,7 @@ class VaryingModel:
         explained = "all" if self.explained > 0.995 else f"{self.explained:.0%}"
         return (
             f"It looks as if these were not constant, which explains {explained} of the unexplained chi-square of "
-            "held-out runs (linearised)"
+            "held-out readings (linearised)"
         )
 
 

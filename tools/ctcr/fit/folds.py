@@ -118,6 +118,16 @@ def held_out_rows(robot: Robot, measurements: Measurements, turn: int = 0, fitte
     return np.isin(group, held_out)
 
 
+def named(measurements: Measurements, held_out: Mask) -> str:
+    """The groups of some held-out rows (M,) for people; empty without any."""
+    if not held_out.any():
+        return ""
+    runs = np.unique(measurements.run[held_out])
+    if np.isin(measurements.run[~held_out], runs).any():
+        return "one of every four blocks of time"
+    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
+
+
 def _regions(readings: Measurements, lever: float) -> Integers:
     """The region of joint space of each row (M,), numbered from 0."""
     motion = follow(readings.t, readings.run, readings.beta, readings.alpha, lever)

@@ -68,7 +68,7 @@ def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> 
         return
     most = max(stage.rms_mm for stage in stages)
     width = max(len(stage.name) for stage in stages)
-    console.print("Error, mm RMS, on held-out runs where there were any")
+    console.print("Error, mm RMS, on held-out readings where there were any")
     for before, stage in zip([None, *stages], stages, strict=False):
         bar = "█" * max(1, round(_BAR * stage.rms_mm / most))
         console.print(f"  {stage.name:{width}}  {stage.rms_mm:7.3f}  {bar}{_change(before, stage)}")

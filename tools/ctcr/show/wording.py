@@ -62,6 +62,16 @@ def mm(value: float) -> str:
     return f"{value:.1f} mm" if value >= 10 else f"{value:.2f} mm" if value >= 0.1 else f"{value:.3f} mm"
 
 
+def counted(count: int, noun: str) -> str:
+    """1 row, 3 rows."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def times(factor: float) -> str:
+    """A factor to two digits: 1.3 times, 170 times."""
+    return f"{float(f'{factor:.2g}'):g} times"
+
+
 def percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.1f} %"
 
