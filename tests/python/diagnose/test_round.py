@@ -159,6 +159,15 @@ def test_stricter():
     assert accepted_over(SCORES, before=FRICTION, is_rejected=False).sum() < by_score[1]
 
 
+def test_why_stricter():
+    """A rejection says what the limit is for, and beside that of a further effect that of the first one."""
+    alone = decided(candidate_fit("delay", 100.0, explained=0.0)).why_not
+    after = decided(candidate_fit("delay", 100.0, explained=0.0), before=FRICTION).why_not
+    assert f"{settings.FIRST_EXPLAINED:.0%} that a first effect must explain" in alone
+    assert f"{settings.EXPLAINED:.0%} that a further effect must explain" in after
+    assert f"a first effect needs {settings.FIRST_EXPLAINED:.0%}" in after
+
+
 def test_hopeless():
     """More readings may save a round that only lacks evidence, not one whose best candidate is surely spurious."""
     few = decided(candidate_fit("delay", 3.0))

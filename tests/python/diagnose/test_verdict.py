@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from ctcr.diagnose import verdict
 from ctcr.diagnose.explanations import probability, weighed
+from ctcr.show.wording import most
 
 ROOT = Path(__file__).parents[3]
 RUNS = ("run 3", "run 5", "run 8")
@@ -112,7 +113,8 @@ def test_found_beside_an_unknown_cause(tip_load):
     best, other = (replace(fit, explained=0.8) for fit in (one.best, other))
     many = [replace(one, best=best), replace(one, best=other, ids=["friction"])]
     explained = dict.fromkeys(RUNS, 0.6)
-    assert judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, 0.3)).word == "stand_in"
+    imitates = judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, 0.3))
+    assert imitates.word == "stand_in" and f"(probability {most(imitates.probability)})" in imitates.sentences[0]
     both = judged(tip_load, rounds=rounds, accepted=many, residual=left, explained=explained)
     assert both.word == "probable" and both.explanations[0].outside and both.explanations[0].effects
 

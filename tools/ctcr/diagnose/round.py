@@ -145,7 +145,7 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     decide(round_, len({c.id for c in candidates}), accepted, joint.rejects(before), _suspects(engine, accepted))
     unsure = round_.accepted and accepted and not _is_sure(round_.accepted, accepted)
     if unsure and not predicts_better(engine, before, round_.accepted.fit):
-        round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out runs better"
+        round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out readings better"
         round_.accepted, round_.ids = None, []
     round_.release_memory()
     return round_
@@ -339,14 +339,20 @@ def decide(
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
         )
         return
-    needed = settings.EXPLAINED if accepted else settings.FIRST_EXPLAINED
+    needed, why = settings.FIRST_EXPLAINED, "a first effect must explain, beside which others may act"
+    if accepted:
+        needed, first = settings.EXPLAINED, needed
+        why = (
+            f"a further effect must explain: so little mostly makes up for the form of earlier ones (a first effect "
+            f"needs {first:.0%}, as others may act beside it)"
+        )
     if best.id in suspects:
-        needed = settings.SUSPECT_EXPLAINED
+        needed, why = settings.SUSPECT_EXPLAINED, "an effect must explain that may imitate the law of an earlier one"
     if best.explained < needed and not (accepted and _is_sure(best, accepted)):
         round_.is_spurious = best.explained + 2 * best.explained_sd < needed
         round_.reason = (
-            f"the best candidate, {best.id}, explains {best.explained:.0%} of the unexplained chi-square: less than "
-            f"{needed:.0%} suggests a spurious attribution"
+            f"the best candidate, {best.id}, explains {best.explained:.0%} of the unexplained chi-square, less than "
+            f"the {needed:.0%} that {why}"
         )
         return
     rivals = [one for one in refitted if one.id != best.id]

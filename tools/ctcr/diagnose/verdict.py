@@ -61,8 +61,9 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     if likeliest.outside and not likeliest.effects:
         if accepted:
             names = join([a.id for a in accepted])
-            imitated = f"{names} can explain a part of the error, but a cause outside the catalogue is likelier"
-            return Verdict("stand_in", outside, every, [f"{imitated} ({most(likeliest.probability)})."])
+            beside = "it" if len(accepted) == 1 else "them"
+            acts = f"a cause outside the catalogue acts, alone or beside {beside} (probability {most(outside)})"
+            return Verdict("stand_in", outside, every, [f"{names} can explain a part of the error, but {acts}."])
         missing = "Something is missing that no effect of the catalogue explains."
         return Verdict("not_in_catalogue", outside, every, [missing, *residual.about_clusters])
     if not accepted:
