@@ -68,6 +68,16 @@ def test_own_homes(robot):
     assert joint.fit(robot, found).rms_mm() < 1.5 * joint.fit(robot, plain).rms_mm()
 
 
+def test_question():
+    """Who reads what the runs seem not to share is asked about that alone."""
+    homes, tube = ("actuation.home_rotation.1", "actuation.home_rotation.2"), ("tubes.1.length", "tubes.1.curvature")
+    asked = [sessions._not_shared(found)[0] for found in ({tube: 0.4}, {homes: 0.4}, {homes: 0.48, tube: 0.5})]
+    assert asked[0].endswith("were tubes changed between runs?") and "share tube 1." in asked[0]
+    assert asked[1].endswith("were tubes homed anew between runs?") and "share their homes." in asked[1]
+    assert asked[2].endswith("were tubes changed or homed anew between runs?")
+    assert sessions._not_shared({}) == []
+
+
 @pytest.mark.parametrize(
     "hidden",
     [

@@ -4,6 +4,7 @@ What each run may have of its own competes with the effects of the catalogue by 
 which every number of every run has its cost. So a load, a jump or a drift is not taken for a frame of each run.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -57,23 +58,16 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     framed = replace(engine, measurements=as_sessions(robot, table))
     if asked is None and not _wins(engine, one, framed):
         return readings, []
-    own, shared, said = framed.fit(), "a frame", []
+    own, shared = framed.fit(), "a frame"
     homes = tuple(home_names(robot.n_tubes))
     explained = _explained_by_run(framed, own)
     homed = _with_homes(framed) if homes in explained else None
     if homed:
         own, shared, explained = homed.fit(), "a frame and homes", {}
-    if explained:
-        best = max(explained.values())
-        alike = [names for names in explained if explained[names] > settings.IN_REACH * best]
-        said = [
-            f"{wording.percent(best)} of what is left looks as if the runs did not share "
-            f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes changed, or homed anew?"
-        ]
     taken = sessions_at(own.apply(robot), every, homes=homed is not None)
     before, after = (wording.mm(_rms_mm(fit.apply(robot), of)) for fit, of in ((one, every), (own, taken)))
     text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
-    return taken.sessions.taken_out(readings), [text, *said]
+    return taken.sessions.taken_out(readings), [text, *_not_shared(explained)]
 
 
 def _may_win(engine: Engine, one: Fit) -> bool:
@@ -184,6 +178,20 @@ def _rms_mm(robot: Robot, readings: Measurements) -> float:
     """RMS position error of all readings, those that no fit saw too."""
     recorded = user_recording.recording_of(robot, readings)
     return 1e3 * rms(recorded.residual(recorded.nominal())[0].reshape(-1, 6)[:, :3])
+
+
+def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:
+    """What may differ between runs beside their frames, in a sentence with a question; none where nothing does."""
+    if not explained:
+        return []
+    best = max(explained.values())
+    alike = [names for names in explained if explained[names] > settings.IN_REACH * best]
+    of_tubes = [names[0].startswith("tubes.") for names in alike]
+    asked = " or ".join(["changed"] * any(of_tubes) + ["homed anew"] * (not all(of_tubes)))
+    return [
+        f"{wording.percent(best)} of what is left looks as if the runs did not share "
+        f"{' or '.join(map(_named, alike))}. One robot file cannot hold that: were tubes {asked} between runs?"
+    ]
 
 
 def _named(names: tuple[str, ...]) -> str:
