@@ -18,6 +18,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.model import parameters
 from ctcr.robot.description import Robot
+from ctcr.show.wording import times
 
 WORDS = {
     "tracker_frame_mm": "the position of the tracker frame",
@@ -50,7 +51,7 @@ class Widened:
         which = "" if index is None else f" ({'xyz'[index] if axes else f'tube {index + 1}'})"
         unit = key.rsplit("_", 1)[-1].replace("percent", "%")
         of = f"The stated uncertainty of {WORDS[key]}{which}, {self.stated:g} {unit}"
-        return f"{of}, is contradicted by the data: widened {self.factor:.2g} times."
+        return f"{of}, is contradicted by the data: widened {times(self.factor)}."
 
 
 def widened(robot: Robot, scales: Scales) -> list[Widened]:
