@@ -12,7 +12,6 @@ import argparse
 import json
 import os
 from collections.abc import Callable
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ import ctcr  # noqa: E402
 import numpy as np  # noqa: E402
 from ctcr.api.reviewed import reviewed  # noqa: E402
 from ctcr.conventions import Review  # noqa: E402
-from ctcr.frames import rigid_motion  # noqa: E402
 from ctcr.show.output import atomic_writer, write_json  # noqa: E402
 from ctcr.show.style import ERROR, FAINT, GOOD, NOISE, picture  # noqa: E402
 from ctcr.show.wording import most, short  # noqa: E402
@@ -55,38 +53,6 @@ def corrected(folder: Path) -> Review:
     return reviewed(robot, ctcr.read(folder / "measurements.csv", robot.n_tubes))
 
 
-def repeated(table: ctcr.Measurements) -> list[dict[str, float]]:
-    """For two runs with the same joints: how far their mean tips lie apart [mm], as they are and after the rigid motion
-    that brings them closest, free of its six numbers. This needs no model, and no model that runs share can be better
-    than half of it.
-    """
-    located = np.isfinite(table.positions).all(axis=1)
-    _, joints = np.unique(np.round(table.joint_space, 4), axis=0, return_inverse=True)
-    tips: dict[int, dict[int, np.ndarray]] = {}
-    for run in np.unique(table.run).tolist():
-        rows = located & (table.run == run)
-        tips[run] = {k: 1e3 * table.positions[rows & (joints == k)].mean(axis=0) for k in set(joints[rows].tolist())}
-    found = []
-    for one, other in combinations(tips, 2):
-        both = sorted(tips[one].keys() & tips[other].keys())
-        if len(both) < 3:
-            continue
-        source, target = (np.array([tips[run][k] for k in both]) for run in (one, other))
-        rotation, shift = rigid_motion(source, target)
-        left = target - source @ rotation.T - shift
-        free = 1 - 2 / len(both)
-        found.append(
-            {
-                "run": one,
-                "other": other,
-                "joints": len(both),
-                "apart_mm": np.sqrt(np.mean(np.sum((target - source) ** 2, axis=1))),
-                "moved_mm": np.sqrt(np.mean(np.sum(left**2, axis=1)) / free),
-            }
-        )
-    return found
-
-
 def questions(found: Review, every: int) -> dict[str, Callable[[], Any]]:
     """What is asked of a robot, by name; a diagnosis of one of `every` so many readings."""
     robot, table = found.robot, found.readings
@@ -94,7 +60,6 @@ def questions(found: Review, every: int) -> dict[str, Callable[[], Any]]:
     anywhere = robot.model_copy(update={"tracker": tracker})
     return {
         "conventions": lambda: [one.as_dict() for one in found.wrong],
-        "repeated": lambda: repeated(table),
         "compared": lambda: ctcr.compare(robot, table).as_dict(),
         "calibrated": lambda: ctcr.calibrate(robot, table).as_dict(),
         "one_frame": lambda: ctcr.calibrate(robot, table, frame_per_run=False).as_dict(),
@@ -136,7 +101,7 @@ def again(distance: str) -> Callable[[Answer], str]:
     """The median of a distance over all pairs of runs with the same joints."""
 
     def cell(answer: Answer) -> str:
-        pairs = answer["repeated"]
+        pairs = answer["compared"]["same_joints"]
         return short(float(np.median([pair[distance] for pair in pairs]))) if pairs else "no such runs"
 
     return cell

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 from compare_bench import JITTER_MM, bench, outward, stop_and_go, stream, tips
 from ctcr import settings
-from ctcr.compare import compare
+from ctcr.compare import compare, terminal
+from ctcr.compare.same_joints import pairs_of_runs
 from ctcr.compare.summary import differs, findings, headline, is_noise, limits, quiet
 from ctcr.errors import InputError
 from ctcr.frames import product, quaternion_from_rotation_vector
+from ctcr.model import status_text
 from ctcr.show import output
+from scipy.spatial.transform import Rotation
+
+NOT_CONVERGED = 3
 
 
 def constant(vector_mm):
@@ -194,7 +199,39 @@ def test_runs_in_their_own_region():
     joints, run, t = stop_and_go(random, runs=12, shared=True)
     joints[np.isin(run, (3, 7)), 2] += 100.0
     result = compare(*bench(random, (joints, run, t), off_in_two_runs))
-    assert result.run_offsets.outlying == ()
+    assert result.run_offsets.outlying == () and result.run_offsets.elsewhere == (3, 7)
+
+
+def test_one_run_in_its_own_region():
+    """Beside a run that surely is off, one that is as far off at joints of its own is named too, and why it is less
+    sure."""
+    random = np.random.default_rng(11)
+    joints, run, t = stop_and_go(random, runs=12, shared=True)
+    joints[run == 7, 2] += 100.0
+    result = compare(*bench(random, (joints, run, t), off_in_two_runs))
+    assert result.run_offsets.outlying == (3,) and result.run_offsets.elsewhere == (7,)
+    [text] = [item.text for item in findings(result) if "Run 3 lies about 40.0 mm" in item.text]
+    assert "Run 7 lies far from them too" in text
+
+
+@pytest.mark.parametrize("bends_mm", [0.0, 1.0])
+def test_same_joints(bends_mm):
+    """Frames of the runs change how far the same joints lie apart, but not what a rigid motion leaves of that: nothing
+    of one robot, and all of a robot that changes."""
+    random = np.random.default_rng(12)
+    changes = 1e-3 * bends_mm * random.normal(size=(6, 3))
+    path = stop_and_go(random, runs=6, shared=True)
+    _, fixed, _ = bench(random, path, lambda q, t, run: changes[run] * np.cos(3 * q[:, 2:3]), noise_mm=0.0)
+    moved = fixed.position.copy()
+    for number in range(6):
+        turn, shift = Rotation.from_rotvec(random.normal(0, 0.05, 3)), random.normal(0, 4e-3, 3)
+        moved[path[1] == number] = turn.apply(moved[path[1] == number]) + shift
+    before, after = (pairs_of_runs(readings) for readings in (fixed, replace(fixed, position=moved)))
+    assert len(after) == 15 and all(pair.joints == 9 for pair in after)
+    assert min(pair.apart_mm for pair in after) > 1
+    left = [pair.moved_mm for pair in after]
+    np.testing.assert_allclose(left, [pair.moved_mm for pair in before], rtol=1e-6, atol=1e-9)
+    assert min(left) > 0.1 if bends_mm else max(left) < 1e-9
 
 
 def test_gross_frame():
@@ -236,13 +273,15 @@ def test_rows_left_out():
     random = np.random.default_rng(14)
     robot, readings, prediction = bench(random, stop_and_go(random))
     readings.position[[3, 20]] = np.nan
-    prediction.status[[5, 20]] = 3
+    prediction.status[[5, 20]] = NOT_CONVERGED
     prediction.position[5] = np.nan
     result = compare(robot, readings, prediction)
     assert result.sample.not_measured.tolist() == [5, 22]
     assert result.sample.not_solved.tolist() == [7]
     assert result.position_mm.count == len(readings.row) - 3
     assert result.as_dict()["rows"] == {"compared": 177, "not_measured": [5, 22], "not_solved": [7]}
+    said = terminal.left_out(result, 10)
+    assert said == ["2 rows not measured: 5, 22", f"1 row not solved ({status_text(NOT_CONVERGED)}): 7"]
     readings.position[:] = np.nan
     with pytest.raises(InputError, match="no row can be compared"):
         compare(robot, readings, prediction)

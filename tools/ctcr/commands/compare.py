@@ -25,7 +25,6 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     """
     from ctcr.api.compare import compare
     from ctcr.compare import terminal
-    from ctcr.robot import robot_file
 
     loaded, readings = options.load_any(robot, measurements)
     result = compare(loaded, readings, steps=steps)
@@ -33,5 +32,4 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     out.write_json(result.as_dict())
     terminal.show(out.console, result)
     out.say(*readings.warnings)
-    if doubts := robot_file.warnings(loaded):
-        out.say(f"{len(doubts)} values look wrong in the robot file: ctcr info {robot}")
+    out.say(*options.doubtful(loaded, robot))

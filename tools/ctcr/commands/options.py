@@ -165,6 +165,16 @@ def load_any(robot: str, table: str):
     return loaded, measurements.read(table, loaded.n_tubes)
 
 
+def doubtful(loaded, path: str) -> list[str]:
+    """A line on the values of a robot file that look wrong; none where none do."""
+    from ctcr.robot import robot_file
+    from ctcr.show.wording import counted
+
+    count = len(robot_file.warnings(loaded))
+    look = "looks" if count == 1 else "look"
+    return [f"{counted(count, 'value')} {look} wrong in the robot file: ctcr info {path}"] if count else []
+
+
 def with_effects(robot, given):
     """The robot with the effects of texts such as friction.coefficient=0.02."""
     from ctcr.effects import catalogue

@@ -33,7 +33,6 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
     Example: ctcr predict robot.yaml measurements.csv -o predicted.csv
     """
     from ctcr.model.table_poses import predictions
-    from ctcr.robot import robot_file
     from ctcr.show.output import atomic_writer
 
     loaded, readings = options.load(robot, table)
@@ -43,8 +42,7 @@ def command(robot: str, table: str, target: str, frame: str, steps: int, out) ->
     rows = [{"row": row, "status": status} for row, status in unsolved]
     out.write_json({"rows": len(readings), "solved": solved, "frame": frame, "steps": steps, "unsolved": rows})
     out.say(f"{solved} of {len(readings)} rows predicted in the {frame} frame: {target}")
-    if doubts := robot_file.warnings(loaded):
-        out.say(f"{len(doubts)} values look wrong in the robot file: ctcr info {robot}")
+    out.say(*options.doubtful(loaded, robot))
     counts = Counter(status for _, status in unsolved).most_common()
     out.say(*(f"not solved: {count} rows, {status}" for status, count in counts))
     out.say(*(f"  row {row}: {status}" for row, status in unsolved[:LISTED_ROWS]))

@@ -14,6 +14,7 @@ from ctcr.compare.crossvalidation import group_means, group_quantiles, make_fold
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
 from ctcr.compare.offsets import FrameTurn, RunOffsets, Shift, find_run_offsets, find_shift, find_turn
+from ctcr.compare.same_joints import PairOfRuns, pairs_of_runs
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.compare.visits import Revisits, Stops, find_revisits, find_stops
 from ctcr.conventions import Finding as Convention
@@ -27,7 +28,9 @@ from ctcr.table.measurements import Measurements
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-NUMBERS = "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets".split()
+NUMBERS = (
+    "robot position_mm percent_of_length angle_deg angle_kind runs noise direction shift turn run_offsets same_joints"
+).split()
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,7 @@ class Comparison(Result):
     shift: Shift | None  # None when there are too few readings to judge
     turn: FrameTurn | None  # where gross, everything but the errors themselves is computed with the frame fitted
     run_offsets: RunOffsets  # where found, the dependences are those of the error about each run's mean
+    same_joints: list[PairOfRuns]
     ranking: Ranking
     fixed: list[str]  # joints and loads that never change here
     has_time: bool
@@ -79,7 +83,7 @@ class Comparison(Result):
     sample: Sample  # the same, with the frame fitted where it is grossly wrong
     stops: Stops
     revisits: Revisits
-    notices: Sequence[str]  # changes made to the table before it was compared
+    notices: Sequence[str]  # what was done before: readings left out, a pose found for the sensor
     conventions: Sequence[Convention]  # that are wrong, the clearest first
     floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
@@ -153,7 +157,7 @@ def compare(
     floors: Mapping[str, float] | None = None,
     files: Sequence[str] = (),
 ) -> Comparison:
-    """Compare measured with predicted tip poses; `notices` tell how the table was changed before, `conventions` what
+    """Compare measured with predicted tip poses; `notices` tell what was done before, `conventions` what
     `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
     `ctcr.fit.floors` as_dict(), `files` what is compared.
 
@@ -208,6 +212,7 @@ def compare(
         shift=shift,
         turn=turn,
         run_offsets=run_offsets,
+        same_joints=pairs_of_runs(measurements),
         ranking=ranking,
         fixed=fixed_names(sample),
         has_time=bool(np.isfinite(sample.t).any()),

@@ -58,6 +58,7 @@ class RunOffsets:
     noise_mm: float  # difference of two visits by noise, with which they are compared where too few are inside a run
     share: float  # of the squared error explained by one vector a run, in sample
     outlying: tuple[int, ...]  # runs whose mean error is an outlier, though others came near their joints
+    elsewhere: tuple[int, ...]  # runs whose mean error is an outlier too, near whose joints no other run came
     outlying_mm: float  # their usual distance from the others
     found: bool  # whether the runs do not share one frame and homing
 
@@ -104,7 +105,10 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
     means = group_means(error, label)
     around = np.sum((error - error.mean(axis=0)) ** 2)
     distance = np.linalg.norm(means - np.median(means, axis=0), axis=1)
-    far = _far_runs(sample, label, distance) if len(names) >= settings.FEWEST_BLOCKS else np.zeros(len(names), bool)
+    # the median length of a 3-D Gaussian vector is 1.54 standard deviations
+    distant = distance > settings.OUTLYING_RUN * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
+    distant &= len(names) >= settings.FEWEST_BLOCKS
+    far = _far_runs(sample, label, distant)
     return RunOffsets(
         pairs_between=len(between),
         pairs_within=len(within),
@@ -113,21 +117,20 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
         p_value=p_value,
         noise_mm=float(np.sqrt(6) * noise.axis_mm),
         share=float(1 - np.sum((error - means[label]) ** 2) / max(around, 1e-300)),
-        outlying=tuple(int(name) for name in names[far]),
+        outlying=tuple(names[far].tolist()),
+        elsewhere=tuple(names[distant & ~far].tolist()),
         outlying_mm=float(np.median(distance[far])) * 1e3 if far.any() else 0.0,
         found=bool(p_value <= settings.LEVEL or far.any()),
     )
 
 
-def _far_runs(sample: Sample, label: Integers, distance: Array) -> Mask:
-    """Runs whose mean error is an outlier that their joints cannot explain.
+def _far_runs(sample: Sample, label: Integers, distant: Mask) -> Mask:
+    """Those of the runs whose mean error is an outlier that their joints cannot explain.
 
     Runs visit different joints, so their errors may differ. But between two readings the error hardly changes by more
     than the tip moves: a change far beyond the joint distance to the nearest reading of another run belongs to the run.
     """
-    # the median length of a 3-D Gaussian vector is 1.54 standard deviations
-    far = distance > settings.OUTLYING_RUN * np.sqrt(3) * max(np.median(distance) / 1.54, 1e-12)
-    near, error = ~far[label], sample.error
+    far, near, error = distant.copy(), ~distant[label], sample.error
     tree = cKDTree(sample.motion.scaled[near])
     for run in np.flatnonzero(far):
         mine = np.flatnonzero(label == run)[:: max(1, int(np.sum(label == run)) // 500)]

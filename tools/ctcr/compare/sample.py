@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.frames import base_to_tracker, conjugate, matrix_from_quaternion, product
+from ctcr.model.model import status_text
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Sample:
     motion: Motion
     not_measured: Integers  # file lines
     not_solved: Integers  # file lines
+    why: list[str]  # the model has no solution there, in words
 
     @property
     def error(self) -> Array:
@@ -73,7 +75,8 @@ def take_sample(robot, measurements, prediction) -> Sample:
     lengths = np.array([tube.length for tube in robot.tubes])
     position = np.asarray(prediction.position, float)
     known = np.isfinite(m.positions).all(axis=1)
-    solved = (np.asarray(prediction.status) == 0) & np.isfinite(position).all(axis=1)
+    status = np.asarray(prediction.status)
+    solved = (status == 0) & np.isfinite(position).all(axis=1)
     keep = known & solved
     lever = np.sqrt(np.mean(np.sum(position[solved, :2] ** 2, axis=1))) if solved.any() else 0.0
     lever = max(float(lever), 1e-3)
@@ -98,6 +101,7 @@ def take_sample(robot, measurements, prediction) -> Sample:
         motion=follow(m.t, m.run, m.beta, m.alpha, lever).rows(keep),
         not_measured=np.setdiff1d(m.row[~known], m.row[known]),
         not_solved=np.asarray(m.row)[known & ~solved],
+        why=[status_text(code) for code in status[known & ~solved].tolist()],
     )
 
 

@@ -3,7 +3,7 @@
 Findings describe the error and name possible causes, never the cause.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from ctcr import settings
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.noise import DirectionDifference
-from ctcr.show.wording import join, mm, most, percent, probability
+from ctcr.show.wording import counted, join, listed, mm, most, percent, probability
 
 MOST = 6
 _MOTIONS = ("rotating only", "translating only", "doing both")  # in the order of DirectionDifference.moved
@@ -85,9 +85,7 @@ def held_out(c: Comparison) -> str:
 
 def _all(c: Comparison) -> Iterator[Finding]:
     if c.sessions:
-        r = c.run_offsets
-        apart = f" The same joints lie {mm(r.rms_between_mm)} RMS apart in different runs ({r.pairs_between} pairs)."
-        text = " ".join(c.sessions) + (apart if r.pairs_between else "")
+        text = " ".join([*c.sessions, *_same_joints_text(c)])
         yield Finding(f"{text} All that follows is computed with a frame for each run.", 1.0)
     shifted = c.shift if c.shift and c.shift.p_value <= settings.LEVEL else None
     if c.turn and c.turn.gross:
@@ -115,6 +113,19 @@ def _all(c: Comparison) -> Iterator[Finding]:
         yield Finding(_dependence_text(item, c), item.share * before)
 
 
+def _same_joints_text(c: Comparison) -> list[str]:
+    """Whether frames differ between runs, or the robot; none without joints that two runs share."""
+    pairs = c.same_joints
+    if not pairs:
+        return []
+    apart, moved = (float(np.median([getattr(pair, name) for pair in pairs])) for name in ("apart_mm", "moved_mm"))
+    return [
+        f"At the same joints, two runs lie {mm(apart)} RMS apart, and {mm(moved)} after the rigid motion that brings "
+        f"them closest (median of {counted(len(pairs), 'pair')} of runs). Other frames do not explain what remains "
+        f"beyond the scatter of a reading: there the robot changed."
+    ]
+
+
 def _run_text(c: Comparison) -> str:
     r = c.run_offsets
     text = "The runs do not share one frame or homing. "
@@ -127,12 +138,22 @@ def _run_text(c: Comparison) -> str:
             f"({r.pairs_between} pairs), but {within}. "
         )
     if r.outlying:
-        names = ", ".join(map(str, r.outlying[:8])) + (" and others" if len(r.outlying) > 8 else "")
-        text += f"The runs {names} lie about {mm(r.outlying_mm)} from the others. "
+        text += f"{_runs(r.outlying)} about {mm(r.outlying_mm)} from the others. "
+    if r.outlying and r.elsewhere:
+        text += (
+            f"{_runs(r.elsewhere)} far from them too, but at joints that no other run came near: these may be the "
+            f"cause. "
+        )
+    text += "".join(f"{said} " for said in _same_joints_text(c))
     return text + (
         f"One offset for each run explains {percent(r.share)} of the squared error about its mean; dependences are "
         f"examined without it."
     )
+
+
+def _runs(names: Sequence[int]) -> str:
+    """The subject and the verb of a sentence on where they lie."""
+    return f"Run {names[0]} lies" if len(names) == 1 else f"The runs {listed(names, 8)} lie"
 
 
 def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.summary import findings, headline, held_out, limits, quiet
 from ctcr.show.output import table
-from ctcr.show.wording import listed
+from ctcr.show.wording import counted, listed
 
 SHOWN_RUNS = 15
 SHOWN_FORMS = 10
@@ -49,13 +49,16 @@ def show(console, c: Comparison) -> None:
 
 def remarks(c: Comparison) -> list[tuple[str, Sequence[str]]]:
     """Lists of sentences with their titles, beside the findings."""
-    return [("No finding", quiet(c)), ("Limits of these data", [*limits(c)]), ("Changes to the table first", c.notices)]
+    return [("No finding", quiet(c)), ("Limits of these data", [*limits(c)]), ("Before the comparison", c.notices)]
 
 
 def left_out(c: Comparison, most: int) -> list[str]:
-    """Sentences on the rows that could not be compared, at most `most` of them by number."""
-    kinds = {"not measured": c.sample.not_measured, "not solved": c.sample.not_solved}
-    return [f"{len(rows)} rows {kind}: {listed(rows, most)}" for kind, rows in kinds.items() if len(rows)]
+    """Sentences on the rows that could not be compared and why, at most `most` of each kind by number."""
+    sample = c.sample
+    kinds = {"not measured": sample.not_measured.tolist()}
+    for row, why in zip(sample.not_solved.tolist(), sample.why, strict=True):
+        kinds.setdefault(f"not solved ({why})", []).append(row)
+    return [f"{counted(len(rows), 'row')} {kind}: {listed(rows, most)}" for kind, rows in kinds.items() if rows]
 
 
 def errors(c: Comparison) -> Table:
