@@ -153,7 +153,7 @@ def some(readings, keep):
 
 
 def said(calibration) -> str:
-    return " ".join([*calibration.notices, *report.undetermined(calibration), *fields.doubts(calibration.fitted)])
+    return " ".join([*calibration.notices, *report.undetermined(calibration), *calibration.doubts])
 
 
 def test_one_run(robot, readings):
@@ -243,6 +243,23 @@ def test_few_rows(robot, readings):
     found = outcome(robot, some(readings, np.arange(5)), ["standard"])
     assert "only 30 numbers were measured for 24 parameters: few are left" in said(found).lower()
     assert "numbers were measured" not in said(outcome(robot, some(readings, np.arange(20)), ["standard"]))
+
+
+def test_at_a_bound(robot, readings):
+    """A value that ends at a bound is a doubt, and its note says so in the table."""
+    found = outcome(robot, readings, [*FEW, "tubes.*.poisson_ratio"], sd={"tubes.*.poisson_ratio": 5.0})
+    stopped = [item for item in found.fitted if item.flag == "at a bound"]
+    assert stopped and all(item.value == 0.5 for item in stopped)
+    assert any(text.startswith("Ended at a bound") and stopped[0].name in text for text in found.doubts)
+    assert "bound" not in " ".join(found.notices)
+
+
+def test_outlying_run(robot, readings):
+    """A run that is off as a whole is named, not only its rows."""
+    position = readings.position + 0.01 * (readings.run == 2)[:, None] * np.array([0.0, 1.0, 0.0])
+    notices = outcome(robot, replace(readings, position=position)).notices
+    [text] = [text for text in notices if "look like outliers" in text]
+    assert text.endswith("hardly counted: 10 of 10 in run 2.")
 
 
 def test_frame_refused(robot, readings):
@@ -394,7 +411,7 @@ def test_malformed_sd(capsys):
 def doubtful(name: str, value: float, shift: float = 0.0, ratio: float = 0.5) -> list[fields.Fitted]:
     """A fitted parameter by itself; `value` in SI."""
     one = {"prior_mean": 0.3, "values": value, "sd": 0.05, "shift": shift, "ratio": ratio}
-    priors = SimpleNamespace(stated=np.array([0.1]), scale=np.ones(1))
+    priors = SimpleNamespace(stated=np.array([0.1]), scale=np.ones(1), low=np.array([-0.5]), high=np.array([np.inf]))
     fit = SimpleNamespace(names=[name], priors=priors, **{key: np.array([number]) for key, number in one.items()})
     return fields.fitted(fit)
 
@@ -405,6 +422,7 @@ def doubtful(name: str, value: float, shift: float = 0.0, ratio: float = 0.5) ->
         (("tubes.2.poisson_ratio", -0.1), "implausible", "tubes.2.poisson_ratio: -0.10 is negative, which no tube is"),
         (("tubes.1.youngs_modulus", 400e9), "implausible", "tubes.1.youngs_modulus: 400 GPa is unusual"),
         (("tubes.1.length", 0.3, -2.4), "moved far", "tubes.1.length (-2.4)"),
+        (("tracker.position.x", -0.5), "at a bound", "at a bound of what is possible"),
         (("tracker.position.x", 0.3, 0.1, 0.95), "unknown", "The data say nothing of tracker.position.x."),
         (("tracker.position.x", 0.3), "", ""),
     ],

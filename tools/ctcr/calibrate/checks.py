@@ -18,6 +18,8 @@ from ctcr.show.wording import listed, numbers, sentence
 from ctcr.table.measurements import Measurements
 
 LISTED = 12
+STOPPED = "the fit stopped where"  # as the warnings of a fit begin that ended at a limit of several parameters
+SAID_AS_DOUBTS = ("moved by more than", "stopped at a bound", STOPPED)
 
 
 def start(robot: Robot, readings: Measurements) -> float:
@@ -83,18 +85,33 @@ def outlier_rows(fit: Fit, readings: Measurements) -> list[int]:
 
 def notices(robot: Robot, readings: Measurements, fit: Fit, few: Fit) -> list[str]:
     """What the user should know of a fit, in sentences; `few`: the fit to a part of its rows, where they are many."""
-    said_as_doubts = "prior standard deviations"
     unexplained = any(text.startswith(floors.UNEXPLAINED) for text in fit.warnings)
     explained = not unexplained or floors.explains(few, noise_of_readings(robot, readings))
     said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
-    said += [sentence(text) for text in floors.warnings(fit, explained) if said_as_doubts not in text]
+    said += [sentence(text) for text in floors.warnings(fit, explained) if not text.startswith(SAID_AS_DOUBTS)]
     if not fit.converged:
         said.append(f"The fit did not converge: {fit.status}.")
     outliers = outlier_rows(fit, readings)
     if outliers:
         share = len(outliers) / max(int(np.sum(fit.used)), 1)
-        said.append(f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted.")
+        text = f"{_rows(np.array(outliers))} look like outliers ({wording.percent(share)}) and hardly counted"
+        said.append(text + _of_runs(readings, fit.used, np.isin(readings.row, outliers)) + ".")
     return said
+
+
+def limits(fit: Fit) -> list[str]:
+    """Where a limit of several parameters together stopped a fit, in sentences."""
+    return [sentence(text) for text in fit.warnings if text.startswith(STOPPED)]
+
+
+def _of_runs(readings: Measurements, used: Mask, outlying: Mask) -> str:
+    """How many of the used readings of each run are outliers, most first: a run that is off as a whole shows."""
+    runs, count = np.unique(readings.run[outlying], return_counts=True)
+    if len(np.unique(readings.run)) < 2:
+        return ""
+    every = [int(np.sum(used & (readings.run == run))) for run in runs]
+    order = np.argsort(-count, kind="stable")
+    return f": {listed([f'{count[k]} of {every[k]} in run {runs[k]}' for k in order])}"
 
 
 def _rows(rows: Integers) -> str:

@@ -80,7 +80,7 @@ def shifts(figure, c: Calibration) -> None:
     items = c.fitted[:MOST_NAMES][::-1]
     axes = figure.subplots()
     for y, item in enumerate(items):
-        colour = ERROR if item.implausible or item.moved_far else FAINT if item.says_nothing else OUT
+        colour = ERROR if item.implausible or item.at_bound or item.moved_far else FAINT if item.says_nothing else OUT
         axes.hlines(y, item.shift - item.sd_left, item.shift + item.sd_left, color=colour, lw=2.2)
         axes.plot(item.shift, y, "o", color=colour, ms=4.5)
     reach = max(3.0, 1.1 * max(abs(item.shift) + item.sd_left for item in items))

@@ -106,7 +106,12 @@ class Calibration(Result):
         first, last = self.stages[0].rms_mm, stages[-1].rms_mm
         held = " on held-out readings" if self.held_out else ""
         line = f"Calibration {self.before.name}: {len(self.fitted)} parameters, {first:.3g} to {last:.3g} mm RMS{held}"
-        return Glance(line, ["error", "mm RMS"], rows, [*fields.doubts(self.fitted), *self.notices])
+        return Glance(line, ["error", "mm RMS"], rows, [*self.doubts, *self.notices])
+
+    @property
+    def doubts(self) -> list[str]:
+        """What speaks against the values, in sentences."""
+        return [*checks.limits(self.fit), *fields.doubts(self.fitted)]
 
     @property
     def unexplained(self) -> Stage:
@@ -245,7 +250,7 @@ def _change(c: Calibration) -> tuple[list[ledger.Change], ledger.Entry, dict[str
     if np.isfinite(c.floor.rms_deg):
         figures["rms_deg"] = c.rms("rms_deg")
     wider = [one.sentence for one in widening.widened(c.before, c.fit.priors.scales)]
-    entry = ledger.Entry("ctcr calibrate fit", c.readings.files, figures, " ".join([*wider, *fields.doubts(c.fitted)]))
+    entry = ledger.Entry("ctcr calibrate fit", c.readings.files, figures, " ".join([*wider, *c.doubts]))
     changes = fields.changes(c.fit, c.before, c.after)
     effects = c.after.effects if c.after.effects != c.before.effects else None
     return changes, entry, effects

@@ -6,7 +6,6 @@ import numpy as np
 
 from ctcr.calibrate import figures
 from ctcr.calibrate.joint_fit import Calibration, Stage
-from ctcr.model.fields import doubts
 from ctcr.show import html_page, output
 from ctcr.show.html_page import bullets, cards, figure, paragraph, table
 from ctcr.show.wording import deviation, mm, number
@@ -44,7 +43,7 @@ def show(console, c: Calibration) -> None:
     made.columns[-1].justify = "left"
     console.width = max(console.width, NEEDED_WIDTH)
     console.print(made)
-    lists = ("Doubts", doubts(c.fitted)), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
+    lists = ("Doubts", c.doubts), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
     for title, lines in lists:
         if lines:
             console.print(title, style="bold")
@@ -110,7 +109,7 @@ def _sizes(stage: Stage) -> list[str]:
 def page(c: Calibration) -> str:
     """The whole HTML text."""
     title = f"Calibration: {c.before.name}"
-    lists = ("Doubts", doubts(c.fitted)), ("To know", c.notices)
+    lists = ("Doubts", c.doubts), ("To know", c.notices)
     known = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
     sections = [_opening(c), *known, *_fit(c), _halves(c), _residuals(c), _numbers(c)]
     return html_page.page(title, sections, c.files)
@@ -136,7 +135,7 @@ def _fit(c: Calibration) -> list[str]:
     gain = "From the robot file's values to the expected error. The error that counts is the one of held-out readings."
     values = (
         "Fitted values and their standard deviations, in standard deviations of the robot file's values (grey: one and "
-        "two of them). Red: further than two, or implausible. Pale: the data say nothing."
+        "two of them). Red: further than two, implausible or at a bound. Pale: the data say nothing."
     )
     together = "Dark red and dark blue: the data determine only the sum or the difference of the two."
     return [

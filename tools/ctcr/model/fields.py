@@ -33,6 +33,7 @@ class Fitted:
     shift: float  # in prior standard deviations as stated
     ratio: float
     implausible: str  # why no real robot has this value, or empty
+    at_bound: bool  # whether the fit ended where no larger or smaller value is possible
     widened: float  # factor on the stated deviation, which the readings contradict; 1: as stated
 
     @property
@@ -55,6 +56,8 @@ class Fitted:
         """The gravest doubt in a word or two."""
         if self.implausible:
             return "implausible"
+        if self.at_bound:
+            return "at a bound"
         if self.moved_far:
             return "moved far"
         return "widened" if self.widened > 1 else "unknown" if self.says_nothing else ""
@@ -63,6 +66,12 @@ class Fitted:
 def doubts(items: list[Fitted]) -> list[str]:
     """The doubts of all parameters in sentences."""
     said = [f"{item.name}: {item.implausible}." for item in items if item.implausible]
+    bounded = [f"{item.name} ({item.value:.4g} {item.unit}".rstrip() + ")" for item in items if item.at_bound]
+    if bounded:
+        said.append(
+            f"Ended at a bound of what is possible: {', '.join(bounded)}. Beyond it the error would be smaller, so the "
+            f"model misses something, or the data hardly determine the value."
+        )
     far = [f"{item.name} ({item.shift:+.1f})" for item in items if item.moved_far]
     if far:
         said.append(
@@ -86,13 +95,15 @@ def in_si(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
 
 def fitted(fit: Any) -> list[Fitted]:
     """The parameters of a fit, a `ctcr.fit.result.Fit`."""
-    rows = []
+    rows, margin = [], 1e-6 * fit.sd  # as the compiled fit allows for rounding
     for i, name in enumerate(fit.names):
         field = field_of(name)
         numbers = [float(field.factor * of[i]) for of in (fit.prior_mean, fit.priors.stated, fit.values, fit.sd)]
         scale = float(fit.priors.scale[i])
         against_prior = scale * float(fit.shift[i]), float(fit.ratio[i])
-        rows.append(Fitted(name, field.unit, *numbers, *against_prior, _implausible(field, numbers[2]), scale))
+        at_bound = not fit.priors.low[i] + margin[i] < fit.values[i] < fit.priors.high[i] - margin[i]
+        doubt = _implausible(field, numbers[2])
+        rows.append(Fitted(name, field.unit, *numbers, *against_prior, doubt, at_bound, scale))
     return rows
 
 
