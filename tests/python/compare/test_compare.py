@@ -214,6 +214,19 @@ def test_one_run_in_its_own_region():
     assert "Run 7 lies far from them too" in text
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_frame_or_robot(shared):
+    """Runs with frames of their own that visit the same joints get the distance that a rigid motion leaves; others
+    do not."""
+    random = np.random.default_rng(10)
+    planted = bench(
+        random, stop_and_go(random, runs=6, shared=shared), lambda q, t, run: 1e-3 * run[:, None] * q[:, :3]
+    )
+    [first, *_] = findings(compare(*planted, sessions=["The runs do not share a frame."]))
+    assert first.text.startswith("The runs do not share a frame.")
+    assert ("after the rigid motion" in first.text and "median of 15 pairs" in first.text) == shared
+
+
 @pytest.mark.parametrize("bends_mm", [0.0, 1.0])
 def test_same_joints(bends_mm):
     """Frames of the runs change how far the same joints lie apart, but not what a rigid motion leaves of that: nothing

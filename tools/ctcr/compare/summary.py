@@ -119,10 +119,11 @@ def _same_joints_text(c: Comparison) -> list[str]:
     if not pairs:
         return []
     apart, moved = (float(np.median([getattr(pair, name) for pair in pairs])) for name in ("apart_mm", "moved_mm"))
+    scatter = f" ({mm(c.noise.rms_mm)} RMS)" if np.isfinite(c.noise.rms_mm) else ""
     return [
         f"At the same joints, two runs lie {mm(apart)} RMS apart, and {mm(moved)} after the rigid motion that brings "
-        f"them closest (median of {counted(len(pairs), 'pair')} of runs). Other frames do not explain what remains "
-        f"beyond the scatter of a reading: there the robot changed."
+        f"them closest (median of {counted(len(pairs), 'pair')} of runs). The motion takes away what frames differ; "
+        f"what remains beyond the scatter of a reading{scatter} is a robot that changed."
     ]
 
 
