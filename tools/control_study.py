@@ -8,8 +8,8 @@ the calibration and with the effects that the diagnosis found drive it along the
 from pathlib import Path
 
 import numpy as np
-from ctcr.diagnose import add, diagnose
-from ctcr.effects import catalogue, settings
+from ctcr import add, diagnose
+from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.frames import points_to_base, points_to_tracker
 from ctcr.model import simulation
@@ -48,8 +48,7 @@ def candidates(robot: Robot, session: Measurements) -> tuple[dict[str, Robot], s
     known = {"robot file": robot, "calibrated": joint.fit(robot, session).apply(robot)}
     result = diagnose(robot, session)
     if result.accepted:
-        ids, fixed, start = settings.found(result.as_dict(), robot)
-        known["with the effects found"] = add.add(robot, session, ids, fixed=fixed, start=start).robot
+        known["with the effects found"] = add(robot, result, session).robot
     return known, f"{result.verdict.word}: {' + '.join(a.id for a in result.accepted) or 'nothing'}"
 
 
