@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.fit.folds import Coverage, groups, held_out_rows
+from ctcr.fit.folds import Coverage, groups, held_out_rows, named
 from ctcr.model import parameters, recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot import robot_file
@@ -29,6 +29,16 @@ def test_by_run(robot):
         assert np.ptp(held_out[table.run == run].astype(int)) == 0
     one = dataclasses.replace(table, run=np.zeros_like(table.run))
     assert len(np.unique(groups(one))) == 12 and np.all(np.diff(groups(one)) >= 0)
+
+
+def test_named(robot):
+    """Held-out rows are named by their runs, or as the blocks of time that they are where there are few runs."""
+    table = measured_session(robot)
+    assert named(table, table.run == 3) == "run 3"
+    assert named(table, np.isin(table.run, (3, 5))) == "runs 3, 5"
+    one = dataclasses.replace(table, run=np.zeros_like(table.run))
+    assert named(one, held_out_rows(robot, one)) == "one of every four blocks of time"
+    assert named(table, table.run < 0) == ""
 
 
 def test_no_alternation(robot):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from ctcr.fit import joint
 from ctcr.fit.result import Priors
-from ctcr.fit.widening import Likelihood
+from ctcr.fit.widening import Likelihood, Widened
 from ctcr.model.noise import Noise
 from ctcr.model.protocol import LinearModel
 from scipy.stats import multivariate_normal
@@ -91,3 +91,9 @@ def test_frozen():
     fit = fitted(np.random.default_rng(5), np.repeat([1.0, 10.0, 1.0], 3))
     again = joint.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
     assert again.priors.scales == fit.priors.scales and again.log_evidence == pytest.approx(fit.log_evidence, abs=1e-6)
+
+
+@pytest.mark.parametrize("factor, words", [(1.26, "1.3 times."), (17.2, "17 times."), (173.2, "170 times.")])
+def test_factor_in_words(factor, words):
+    """A factor has two digits and no exponent, however large it is."""
+    assert Widened("length_mm[1]", 0.5, factor).sentence.endswith(f"widened {words}")
