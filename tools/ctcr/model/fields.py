@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from ctcr import settings
 from ctcr.model import parameters
 from ctcr.model.parameters import Field, field_of, value_at
@@ -95,13 +97,14 @@ def in_si(values: Mapping[str, float], robot: Robot) -> dict[str, float]:
 
 def fitted(fit: Any) -> list[Fitted]:
     """The parameters of a fit, a `ctcr.fit.result.Fit`."""
-    rows, margin = [], 1e-6 * fit.sd  # as the compiled fit allows for rounding
+    rows, margin = [], 1e-6 * np.nan_to_num(fit.sd, posinf=0.0)  # as the compiled fit allows for rounding
     for i, name in enumerate(fit.names):
         field = field_of(name)
         numbers = [float(field.factor * of[i]) for of in (fit.prior_mean, fit.priors.stated, fit.values, fit.sd)]
         scale = float(fit.priors.scale[i])
         against_prior = scale * float(fit.shift[i]), float(fit.ratio[i])
-        at_bound = not fit.priors.low[i] + margin[i] < fit.values[i] < fit.priors.high[i] - margin[i]
+        room = min(fit.values[i] - fit.priors.low[i], fit.priors.high[i] - fit.values[i])
+        at_bound = bool(room <= margin[i])
         doubt = _implausible(field, numbers[2])
         rows.append(Fitted(name, field.unit, *numbers, *against_prior, doubt, at_bound, scale))
     return rows
