@@ -29,23 +29,21 @@ def _live(function):
     for option in (
         options.folder_name,
         options.setting("--readings", click.IntRange(2), 20, "With --live: readings per row."),
-        click.option(
-            "--bench", type=options.read, metavar="BENCH.yaml", help="With --live: the devices and their limits."
-        ),
+        options.bench("With --live: the devices and their limits.", required=False),
         click.option("--live", is_flag=True, help="Measure now: write the table row by row, or resume the one there."),
     ):
         function = option(function)
     return function
 
 
-def _desk(bench, folder, out):
+def _desk(bench_path, folder, out):
     from ctcr.bench.devices import bench_file, person
     from ctcr.bench.shared.folder import private_folder
     from ctcr.calibrate.live import Desk
 
-    if not bench:
+    if not bench_path:
         raise click.UsageError("--live needs --bench")
-    devices, place = bench_file.load(bench), private_folder(folder)
+    devices, place = bench_file.load(bench_path), private_folder(folder)
     return Desk(devices, place, person.person_of(devices, place), out.say)
 
 
@@ -89,7 +87,9 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
 @options.setting("--step-deg", click.FloatRange(1, 90), 20.0, "With --live: angle between rows.")
 @_length("--deployed-mm", None, "With --live: deployed length; default: the curved length.", least=1)
 @_procedure
-def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg, deployed_mm, out, **target) -> None:
+def rotation_offset(
+    table, robot, ratio, live, bench_path, readings, folder, step_deg, deployed_mm, out, **target
+) -> None:
     """Home rotations from circles: one tube alone stands out of the plate and turns, forward and backward.
 
     TABLE: motor_angle_deg, x_mm, y_mm, z_mm of the tip (tracker frame). Optional: tube (default 1), direction (1 or -1,
@@ -110,7 +110,7 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
             raise click.UsageError("--live needs --robot")
         deployed = None if deployed_mm is None else 1e-3 * deployed_mm
         circles = Circles(math.radians(step_deg), readings, deployed)
-        rotation_table(table, robot_file.load(robot), _desk(bench, folder, out), circles)
+        rotation_table(table, robot_file.load(robot), _desk(bench_path, folder, out), circles)
     _run("rotation_offsets", table, robot, out=out, ratio=ratio, **target)
 
 
@@ -126,7 +126,9 @@ def rotation_offset(table, robot, ratio, live, bench, readings, folder, step_deg
 )
 @options.setting("--rounds", click.IntRange(1), 1, "With --live: over all points.")
 @_procedure
-def registration(points, robot, placement_sd_mm, live, bench, readings, folder, cad, rounds, out, **target) -> None:
+def registration(
+    points, robot, placement_sd_mm, live, bench_path, readings, folder, cad, rounds, out, **target
+) -> None:
     """The tracker frame T_ref from named points on the robot, read with a probe.
 
     POINTS: point (its name), cad_x_mm, cad_y_mm, cad_z_mm (base frame), x_mm, y_mm, z_mm (reading, tracker frame);
@@ -144,7 +146,7 @@ def registration(points, robot, placement_sd_mm, live, bench, readings, folder, 
 
         if not cad:
             raise click.UsageError("--live needs --cad")
-        point_table(points, tables.read(cad, CAD_POINTS), _desk(bench, folder, out), readings, rounds)
+        point_table(points, tables.read(cad, CAD_POINTS), _desk(bench_path, folder, out), readings, rounds)
     _run("registration", points, robot, out=out, placement_sd_mm=placement_sd_mm, **target)
 
 

@@ -6,14 +6,7 @@ from ctcr.commands import options
 
 
 @click.command(name="devices")
-@click.option(
-    "--bench",
-    "bench_path",
-    type=options.read,
-    required=True,
-    metavar="BENCH.yaml",
-    help="Where the devices are connected.",
-)
+@options.bench("Where the devices are connected.")
 @options.folder
 @options.json
 def command(bench_path: str, folder, out) -> int:

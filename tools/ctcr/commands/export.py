@@ -8,12 +8,12 @@ from ctcr.commands import options
 @click.command(name="export")
 @click.argument("source", type=options.read)
 @click.option("--cpp", type=options.written, metavar="FILE.hpp", help="Write the robot of SOURCE as a C++ header.")
-@click.option("--bench", type=options.read, metavar="BENCH.yaml", help="With --cpp: the bench whose limits it holds.")
+@options.bench("With --cpp: the bench whose limits it holds.", required=False)
 @options.setting("--namespace", str, "robot", "With --cpp: the namespace of what the header declares.")
 @click.option(
     "-o", "--output", "target", type=options.written, metavar="FILE.mcap", help="Write the recording of SOURCE as MCAP."
 )
-def command(source, cpp, bench, namespace, target) -> None:
+def command(source, cpp, bench_path, namespace, target) -> None:
     """Write a robot as a C++ header, or a recording as MCAP.
 
     With --cpp SOURCE is a robot file. The header holds its tubes, homes, frames and effects as constants, where they
@@ -36,7 +36,7 @@ def command(source, cpp, bench, namespace, target) -> None:
         from ctcr.show.output import write_text
 
         robot = robot_file.load(source)
-        write_text(cpp_header(robot, namespace, bench_file.load(bench) if bench else None), cpp)
+        write_text(cpp_header(robot, namespace, bench_file.load(bench_path) if bench_path else None), cpp)
         out.say(f"{namespace}::system(): {cpp}")
         return
     from ctcr.track.recording import write_mcap

@@ -7,14 +7,7 @@ from ctcr.commands import options
 
 @click.command(name="move")
 @options.robot
-@click.option(
-    "--bench",
-    "bench_path",
-    type=options.read,
-    required=True,
-    metavar="BENCH.yaml",
-    help="The devices and their limits.",
-)
+@options.bench("The devices and their limits.")
 @options.joints(required=False)
 @click.option("--home", is_flag=True, help="Home the joints: retract each tube until its tip is flush with the plate.")
 @click.option("--at-home", is_flag=True, help="Take the present joints, set to their marks by hand, for home.")

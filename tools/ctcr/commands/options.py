@@ -109,6 +109,11 @@ frames = click.option(
 anyway = click.option("--anyway", is_flag=True, help="Go on where a wrong convention is found (see ctcr compare).")
 
 
+def bench(what: str, required: bool = True):
+    """--bench, as `bench_path`: the file of a bench."""
+    return click.option("--bench", "bench_path", type=read, required=required, metavar="BENCH.yaml", help=what)
+
+
 def folder(function):
     """--folder, as `folder`: the private folder of a bench, made where it does not exist."""
 

@@ -11,14 +11,7 @@ from ctcr.commands import options
 @click.option(
     "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
 )
-@click.option(
-    "--bench",
-    "bench_path",
-    type=options.read,
-    required=True,
-    metavar="BENCH.yaml",
-    help="The devices and their limits.",
-)
+@options.bench("The devices and their limits.")
 @options.setting("--dwell", click.FloatRange(0), 0.5, "Rest before the first reading [s].")
 @options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")
 @options.setting("--speed", click.FloatRange(0.01, 1), 1.0, "Fraction of the highest speed.")

@@ -12,7 +12,7 @@ from ctcr.commands import options
     "--plant", type=options.read, metavar="ROBOT2", help="The robot that is controlled, where it differs from ROBOT."
 )
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
-@click.option("--bench", "bench_path", type=options.read, metavar="BENCH.yaml", help="The devices and their limits.")
+@options.bench("The devices and their limits.", required=False)
 @click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; one that is there is resumed.")
 @options.setting("--patience", click.FloatRange(0.1), 2.0, "How long the tracker may lose the sensor [s].")
 @options.setting("--most-error-mm", click.FloatRange(1), 20.0, "Stop where the tip is farther from its reference [mm].")
