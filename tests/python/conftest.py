@@ -1,11 +1,15 @@
 """What all tests share.
 
 One BLAS thread a process: the tests run in parallel processes, whose BLAS threads would only wait for each other.
+Ctrl+C as in a terminal: a shell lets what it starts in the background ignore it, and programs that tests interrupt
+would inherit that.
 """
 
 import os
+import signal
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from dataclasses import replace  # noqa: E402
 from pathlib import Path  # noqa: E402
