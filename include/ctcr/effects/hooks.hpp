@@ -185,6 +185,11 @@ struct HasId {
     return wanted(Effect::info.id);
   }
 };
+/// One copy for all effects, which would fill tens of kilobytes if each unrolled its own.
+template <class From, class To, class Seed>
+CTCR_NOINLINE inline void seed_all(std::span<const From> from, std::span<To> to, int first, const Seed& seed) noexcept {
+  for (std::size_t k = 0; k < from.size(); ++k) to[k] = seed(from[k], first + int(k));
+}
 }  // namespace detail
 
 /// Effects that act together, in their order.
@@ -259,11 +264,10 @@ struct EffectList {
       [[maybe_unused]] const auto seed_if_wanted = [&]<class To>(const auto& from, std::type_identity<To>) {
         if constexpr (Chosen::template contains<To>) {
           To& to = std::get<To>(r.list);
-          for (std::size_t k = 0; k < to.values.size(); ++k) to.values[k] = value(from.values[k], first + int(k));
+          detail::seed_all<P, S>(from.values, to.values, first, value);
           if constexpr (requires { to.profiles = from.profiles; }) to.profiles = from.profiles;
           to.active = acts(to);
-          for (std::size_t i = 0; to.active && i < to.history.state.size(); ++i)
-            to.history.state[i] = history(from.history.state[i], first_state + int(i));
+          if (to.active) detail::seed_all<P, S>(from.history.state, to.history.state, first_state, history);
         }
         first += from.count;
         first_state += from.states;

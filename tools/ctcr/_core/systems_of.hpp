@@ -5,6 +5,7 @@
 #include <ctcr/derivatives/parameters.hpp>
 #include <ctcr/effects/catalogue.hpp>
 #include <ctcr/effects/profile_table.hpp>
+#include <ctcr/friction/relative_torsion.hpp>
 #include <ctcr/recording/derivatives.hpp>
 #include <ctcr/system/parameters.hpp>
 
@@ -18,6 +19,8 @@ struct WithProfiles<EffectList<E...>> {
   using type = EffectList<E..., ProfileTable>;
 };
 using AllEffects = WithProfiles<Catalogue>::type;
+template <int N>
+using AllCoefficients = EffectCoefficients<N, AllEffects>;
 
 /// (w, x, y, z) with w >= 0.
 inline Eigen::RowVector4d quaternion(const Mat3& rotation) {
@@ -59,32 +62,31 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
 
 }  // namespace ctcr::python
 
-#define CTCR_SOLVE(kind, function, D, N)                                                                               \
-  kind Status function<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
+#define CTCR_SOLVE(kind, N)                                                                                            \
+  kind Status solve<Derivatives::none, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
                                                      Solution<N>&, const Settings&) noexcept;
-#define CTCR_EFFECT_COEFFICIENTS(N) EffectCoefficients<N, python::AllEffects>
-#define CTCR_EVALUATE(kind, D, N)                                                                                \
-  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                             \
-      const Coefficients<N>&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&,             \
-      Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;                                                 \
-  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                                             \
-      const CTCR_EFFECT_COEFFICIENTS(N)&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&, \
+#define CTCR_EVALUATE(kind, D, C, N)                                                   \
+  kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                   \
+      const C&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&, \
       Evaluation<N, Loading::weight, Derivatives::D>&) noexcept;
-#define CTCR_STABILITY(kind, C, N)                                                                       \
+#define CTCR_EVALUATIONS(kind, C, N)                                                                     \
+  CTCR_EVALUATE(kind, none, C, N)                                                                        \
+  CTCR_EVALUATE(kind, jacobian, C, N)                                                                    \
+  CTCR_EVALUATE(kind, compliance, C, N)                                                                  \
   kind bool detail::is_stable<MagnusRk4>(const C&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, \
                                          const Steps<N>&) noexcept;
 #define CTCR_SOLVERS(kind, N)                                                                                          \
   namespace ctcr {                                                                                                     \
-  CTCR_STABILITY(kind, Coefficients<N>, N)                                                                             \
-  CTCR_STABILITY(kind, CTCR_EFFECT_COEFFICIENTS(N), N)                                                                 \
-  CTCR_EVALUATE(kind, none, N)                                                                                         \
-  CTCR_EVALUATE(kind, jacobian, N)                                                                                     \
-  CTCR_EVALUATE(kind, compliance, N)                                                                                   \
-  CTCR_SOLVE(kind, solve, none, N)                                                                                     \
-  CTCR_SOLVE(kind, solve, jacobian, N)                                                                                 \
-  CTCR_SOLVE(kind, solve, compliance, N)                                                                               \
-  CTCR_SOLVE(kind, step, jacobian, N)                                                                                  \
-  CTCR_SOLVE(kind, step, compliance, N)                                                                                \
+  kind class Model<N, python::AllEffects>;                                                                             \
+  kind class MomentSharing<N, double>;                                                                                 \
+  kind class MomentSharing<N, Dual<4>>;                                                                                \
+  kind class EffectRod<N, double, python::AllEffects>;                                                                 \
+  kind class EffectRod<N, Dual<4>, python::AllEffects>;                                                                \
+  kind TorsionDerivatives<N> torsion_derivatives<N, python::AllEffects>(const Model<N, python::AllEffects>&,           \
+                                                                        const Workspace<N>&) noexcept;                 \
+  CTCR_EVALUATIONS(kind, Coefficients<N>, N)                                                                           \
+  CTCR_EVALUATIONS(kind, python::AllCoefficients<N>, N)                                                                \
+  CTCR_SOLVE(kind, N)                                                                                                  \
   kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept; \
   kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,           \
                                               Mat6&) noexcept;                                                         \
