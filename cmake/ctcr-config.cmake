@@ -1,4 +1,4 @@
-# find_package(ctcr): ctcr::ctcr. find_package(ctcr COMPONENTS calibration): ctcr::calibration too, which needs Ceres.
+# find_package(ctcr): ctcr::ctcr. find_package(ctcr COMPONENTS calibration): ctcr::calibration too, which needs Ceres's headers.
 include(CMakeFindDependencyMacro)
 find_dependency(Eigen3 3.4)
 find_dependency(Threads)
@@ -7,7 +7,7 @@ foreach(component IN LISTS ctcr_FIND_COMPONENTS)
   set(component_targets ${CMAKE_CURRENT_LIST_DIR}/ctcr-${component}-targets.cmake)
   if(EXISTS ${component_targets})
     if(component STREQUAL calibration)
-      find_dependency(Ceres 2.1)
+      include(${CMAKE_CURRENT_LIST_DIR}/ceres_headers.cmake)
     endif()
     include(${component_targets})
     set(ctcr_${component}_FOUND TRUE)

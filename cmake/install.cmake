@@ -11,4 +11,5 @@ install(FILES ${PROJECT_BINARY_DIR}/ctcr-config-version.cmake cmake/ctcr-config.
 if(CTCR_CALIBRATION)
   install(TARGETS ctcr_calibration EXPORT ctcr-calibration-targets FILE_SET HEADERS)
   install(EXPORT ctcr-calibration-targets NAMESPACE ctcr:: DESTINATION ${package_dir})
+  install(FILES cmake/ceres_headers.cmake DESTINATION ${package_dir})
 endif()

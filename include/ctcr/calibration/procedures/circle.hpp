@@ -8,9 +8,9 @@
 #include <optional>
 #include <vector>
 
-#include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
+#include "ctcr/calibration/procedures/small_problem.hpp"
 #include "ctcr/calibration/statistics.hpp"
 #include "ctcr/core/types.hpp"
 
@@ -84,22 +84,26 @@ inline Circle approximate_circle(const std::vector<CircleReading>& readings, con
 
 /// Residual of one reading, model - measured in units of `scale`, by offset, centre, radius and the tilt of the normal.
 struct CircleResidual {
+  static constexpr int size = 3;
+  // Parameters: the offset of each series first.
+  static constexpr int centre = 2, radius = 5, tilt = 6, parameters = 8;
+
   CircleReading reading;
   Circle start;  ///< its normal + tilt[0] x + tilt[1] y is the fitted one's direction
   double scale;  ///< [m]
 
   template <class T>
-  bool operator()(const T* offset, const T* centre, const T* radius, const T* tilt, T* residual) const {
+  void operator()(const T* p, T* residual) const {
     using V = Eigen::Matrix<T, 3, 1>;
     const Mat3 R = start.frame();
-    const V normal = (R.col(2).cast<T>() + tilt[0] * R.col(0).cast<T>() + tilt[1] * R.col(1).cast<T>()).normalized();
+    const V normal =
+        (R.col(2).cast<T>() + p[tilt] * R.col(0).cast<T>() + p[tilt + 1] * R.col(1).cast<T>()).normalized();
     const V reference = start.reference.cast<T>();
     const V x = (reference - reference.dot(normal) * normal).normalized(), y = normal.cross(x);
     using std::cos, std::sin;
-    const T angle = *offset + reading.angle;
-    const V error = Eigen::Map<const V>(centre) + *radius * (cos(angle) * x + sin(angle) * y) - reading.position;
+    const T angle = p[reading.series] + reading.angle;
+    const V error = Eigen::Map<const V>(p + centre) + p[radius] * (cos(angle) * x + sin(angle) * y) - reading.position;
     Eigen::Map<V>{residual} = error / T(scale);
-    return true;
   }
 };
 
@@ -114,34 +118,33 @@ struct CircleFit {
 /// less (Cauchy), which is good for finding them, not for the last digit.
 inline CircleFit refined_circle(const std::vector<CircleReading>& readings, const Circle& start,
                                 const KnownCircle& known, double scale, double loss) {
+  using R = CircleResidual;
+  Eigen::Vector<double, R::parameters> x;
+  x << start.offset[0], start.offset[1], start.centre, start.radius, 0, 0;
+  const auto has = [&](int series) {
+    return std::ranges::find(readings, series, &CircleReading::series) != readings.end();
+  };
   CircleFit fit{.circle = start};
-  Circle& circle = fit.circle;
-  Eigen::Vector2d tilt(0, 0);
-  ceres::Problem problem;
-  for (const CircleReading& reading : readings) {
-    using Cost = ceres::AutoDiffCostFunction<CircleResidual, 3, 1, 3, 1, 2>;
-    problem.AddResidualBlock(new Cost(new CircleResidual{reading, start, scale}),
-                             loss > 0 ? new ceres::CauchyLoss(loss / scale) : nullptr, &circle.offset[reading.series],
-                             circle.centre.data(), &circle.radius, tilt.data());
-  }
-  const std::array<double*, 5> blocks{&circle.offset[0], &circle.offset[1], circle.centre.data(), &circle.radius,
-                                      tilt.data()};
-  const std::array<bool, 5> is_free{problem.HasParameterBlock(blocks[0]), problem.HasParameterBlock(blocks[1]),
-                                    !known.centre, !known.radius, !known.normal};
-  std::vector<double*> free_blocks;
-  for (std::size_t k = 0, columns = 0; k < blocks.size(); ++k) {
-    if (is_free[k]) {
-      fit.column[k] = int(columns);
-      columns += std::size_t(problem.ParameterBlockSize(blocks[k]));
-      free_blocks.push_back(blocks[k]);
-    } else if (problem.HasParameterBlock(blocks[k])) {
-      problem.SetParameterBlockConstant(blocks[k]);
-    }
-  }
-  minimise(problem, scale, 1e-13, loss > 0 ? 1e-6 : 0);
-  fit.J = scale * jacobian(problem, free_blocks);
-  const Mat3 R = start.frame();
-  circle.normal = (R * Vec3(tilt[0], tilt[1], 1)).normalized();
+  std::vector<int> free;
+  const auto release = [&](std::size_t part, bool is_free, int first, int count) {
+    if (!is_free) return;
+    fit.column[part] = int(free.size());
+    for (int k = 0; k < count; ++k) free.push_back(first + k);
+  };
+  for (const int series : {0, 1}) release(std::size_t(series), has(series), series, 1);
+  release(2, !known.centre, R::centre, 3);
+  release(3, !known.radius, R::radius, 1);
+  release(4, !known.normal, R::tilt, 2);
+
+  SmallProblem<R, R::parameters> problem(x, free);
+  for (const CircleReading& reading : readings) problem.add({reading, start, scale}, loss / scale);
+  problem.minimise(scale, 1e-13);
+  x = problem.parameters();
+  fit.J = scale * problem.jacobian();
+  fit.circle.offset = x.head<2>();
+  fit.circle.centre = x.segment<3>(R::centre);
+  fit.circle.radius = x[R::radius];
+  fit.circle.normal = (start.frame() * Vec3(x[R::tilt], x[R::tilt + 1], 1)).normalized();
   return fit;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 // Registration of the base frame to the tracker: from fiducials, whose CAD positions are known, touched with a probe.
-#include <ceres/manifold.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
@@ -10,9 +9,9 @@
 #include <limits>
 #include <span>
 
-#include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
+#include "ctcr/calibration/procedures/small_problem.hpp"
 #include "ctcr/calibration/statistics.hpp"
 
 namespace ctcr {
@@ -204,35 +203,35 @@ inline Eigen::Index worst_outlier(const Pairs& pairs, double sd) {
   return variance_ratio_score(saved / 3 / std::max(fewest / degrees, floor), 3, degrees) > needed ? worst : -1;
 }
 
-/// Residual of one point, T_ref base - tracker, in units of its sd.
+/// Residual of one point, T_ref base - tracker, in units of its sd. Parameters: the start turns by the quaternion that is
+/// (1, w / 2) normalised, and moves by p.
 struct PointResidual {
-  Vec3 base, tracker;  ///< [m]
-  double sd;           ///< [m]
+  static constexpr int size = 3, parameters = 6;
+  Vec3 turned, tracker;  ///< by the start's rotation, and measured [m]
+  double sd;             ///< [m]
 
   template <class T>
-  bool operator()(const T* rotation, const T* position, T* residual) const {
+  void operator()(const T* w, T* residual) const {
     using V = Eigen::Matrix<T, 3, 1>;
-    const Eigen::Map<const Eigen::Quaternion<T>> q(rotation);
-    const V p = Eigen::Map<const V>(position);
-    Eigen::Map<V>{residual} = (q * base.cast<T>() + p - tracker.cast<T>()) / T(sd);
-    return true;
+    const V p = Eigen::Map<const V>(w + 3);
+    Eigen::Map<V>{residual} = (rotation(w) * turned.cast<T>() + p - tracker.cast<T>()) / T(sd);
+  }
+  template <class T>
+  static Eigen::Quaternion<T> rotation(const T* w) {
+    return Eigen::Quaternion<T>(T(1), 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]).normalized();
   }
 };
 
 /// Least squares on SE(3) from `start`.
 inline Pose refined(const Pairs& pairs, const Eigen::VectorXd& sd, double loss_scale, const Pose& start) {
-  Eigen::Quaterniond rotation(start.rotation);
-  Vec3 position = start.position;
-  ceres::Problem problem;
-  problem.AddParameterBlock(rotation.coeffs().data(), 4, new ceres::EigenQuaternionManifold);
-  for (Eigen::Index i = 0; i < pairs.count(); ++i) {
-    using Cost = ceres::AutoDiffCostFunction<PointResidual, 3, 4, 3>;
-    problem.AddResidualBlock(new Cost(new PointResidual{pairs.base.col(i), pairs.tracker.col(i), sd[i]}),
-                             loss_scale > 0 ? new ceres::CauchyLoss(loss_scale / sd[i]) : nullptr,
-                             rotation.coeffs().data(), position.data());
-  }
-  minimise(problem, sd.minCoeff(), 1e-14);
-  return {rotation.normalized().toRotationMatrix(), position};
+  Vec6 x;
+  x << Vec3::Zero(), start.position;
+  SmallProblem<PointResidual, PointResidual::parameters> problem(x, {0, 1, 2, 3, 4, 5});
+  for (Eigen::Index i = 0; i < pairs.count(); ++i)
+    problem.add({start.rotation * pairs.base.col(i), pairs.tracker.col(i), sd[i]}, loss_scale / sd[i]);
+  problem.minimise(sd.minCoeff(), 1e-14);
+  x = problem.parameters();
+  return {PointResidual::rotation(x.data()).toRotationMatrix() * start.rotation, x.tail<3>()};
 }
 
 }  // namespace registration

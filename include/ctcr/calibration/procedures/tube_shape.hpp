@@ -8,9 +8,9 @@
 #include <optional>
 #include <span>
 
-#include "ctcr/calibration/procedures/ceres_problem.hpp"
 #include "ctcr/calibration/procedures/notice.hpp"
 #include "ctcr/calibration/procedures/propagation.hpp"
+#include "ctcr/calibration/procedures/small_problem.hpp"
 #include "ctcr/calibration/statistics.hpp"
 
 namespace ctcr {
@@ -87,13 +87,14 @@ inline double arc_position(const Vec2& point, const LineAndArc& bend) {
   return (angle < 0 ? angle + 2 * std::numbers::pi : angle) / k;
 }
 
+/// By junction, heading and curvature.
 struct LineAndArcResidual {
+  static constexpr int size = 1, parameters = 4;
   Vec2 point;
   double scale;
   template <class T>
-  bool operator()(const T* junction, const T* heading, const T* curvature, T* residual) const {
-    *residual = distance(point, junction, *heading, *curvature) / T(scale);
-    return true;
+  void operator()(const T* p, T* residual) const {
+    *residual = distance(point, p, p[2], p[3]) / T(scale);
   }
 };
 
@@ -108,15 +109,12 @@ struct Refined {
 };
 
 inline Refined refined(std::span<const Vec2> points, LineAndArc bend, double scale, double loss) {
-  ceres::Problem problem;
-  for (const Vec2& point : points) {
-    using Cost = ceres::AutoDiffCostFunction<LineAndArcResidual, 1, 2, 1, 1>;
-    problem.AddResidualBlock(new Cost(new LineAndArcResidual{point, scale}),
-                             loss > 0 ? new ceres::CauchyLoss(loss / scale) : nullptr, bend.junction.data(),
-                             &bend.heading, &bend.curvature);
-  }
-  minimise(problem, scale, 1e-9 * scale, loss > 0 ? 1e-6 : 0);
-  return {bend, scale * jacobian(problem, {bend.junction.data(), &bend.heading, &bend.curvature})};
+  SmallProblem<LineAndArcResidual, LineAndArcResidual::parameters> problem(
+      {bend.junction.x(), bend.junction.y(), bend.heading, bend.curvature}, {0, 1, 2, 3});
+  for (const Vec2& point : points) problem.add({point, scale}, loss / scale);
+  problem.minimise(scale, 1e-9 * scale);
+  const auto& x = problem.parameters();
+  return {{{x[0], x[1]}, x[2], x[3]}, scale * problem.jacobian()};
 }
 
 inline double median_distance(std::span<const Vec2> points, const LineAndArc& bend) {
