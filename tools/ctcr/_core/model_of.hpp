@@ -144,11 +144,12 @@ public:
 
   Poses predict(const Configurations& rows, const PredictOptions& options) const override {
     check<N>(rows, options, ParameterVector<N>::count);
+    if (options.derivatives) return predict_by<Derivatives::compliance, MagnusRk4>(rows, options);
     switch (options.integrator) {
-      case Integrator::standard: return predict_by<MagnusRk4>(rows, options);
-      case Integrator::ssp_rk3: return predict_by<SspRk3>(rows, options);
-      case Integrator::classical_rk4: return predict_by<ClassicalRk4>(rows, options);
-      case Integrator::prince_dormand8: return predict_by<PrinceDormand8>(rows, options);
+      case Integrator::standard: return predict_by<Derivatives::none, MagnusRk4>(rows, options);
+      case Integrator::ssp_rk3: return predict_by<Derivatives::none, SspRk3>(rows, options);
+      case Integrator::classical_rk4: return predict_by<Derivatives::none, ClassicalRk4>(rows, options);
+      case Integrator::prince_dormand8: return predict_by<Derivatives::none, PrinceDormand8>(rows, options);
     }
     throw std::invalid_argument("no such integrator");
   }
@@ -159,23 +160,28 @@ public:
   }
 
 private:
-  template <class Stepper>
+  template <Derivatives D, class Stepper>
   Poses predict_by(const Configurations& rows, const PredictOptions& options) const {
     Poses out;
     PoseWriter<N> writer(out, rows.beta.rows(), options);
     const Settings settings{.steps = options.steps};
     const auto input = [&rows](std::ptrdiff_t i) { return configuration<N>(rows, i); };
     const auto output = [&](std::ptrdiff_t i, const Solution<N>& s, const Workspace<N>& ws) {
-      if (!options.derivatives) return writer.put(i, s);
-      TipDerivatives<N> tip;
-      PoseDerivatives<N> by;
-      (void)differentiate_tip(model_, ws, options.tip_of, tip, by.compliance);
-      by.jacobian = tip.by_joints;
-      by.by_parameters = tip.by_parameters(Eigen::all, options.by_parameters);
-      writer.put(i, s, &by);
+      if constexpr (D == Derivatives::compliance) {
+        TipDerivatives<N> tip{s.jacobian};
+        PoseDerivatives<N> by;
+        by.compliance = s.compliance;
+        if (options.tip_of > 0 || !options.by_parameters.empty())
+          (void)differentiate_tip(model_, ws, options.tip_of, tip, by.compliance);
+        by.jacobian = tip.by_joints;
+        by.by_parameters = tip.by_parameters(Eigen::all, options.by_parameters);
+        writer.put(i, s, &by);
+      } else {
+        writer.put(i, s);
+      }
     };
     ThreadPool pool(rows.beta.rows() <= batch_chunk ? 1 : options.threads);
-    solve_batch<Derivatives::none, Stepper>(model_, rows.beta.rows(), input, output, pool, settings);
+    solve_batch<D, Stepper>(model_, rows.beta.rows(), input, output, pool, settings);
     return out;
   }
 

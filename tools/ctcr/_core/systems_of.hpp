@@ -62,9 +62,9 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
 
 }  // namespace ctcr::python
 
-#define CTCR_SOLVE(kind, N)                                                                                            \
-  kind Status solve<Derivatives::none, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
-                                                     Solution<N>&, const Settings&) noexcept;
+#define CTCR_SOLVE(kind, D, N)                                                                                      \
+  kind Status solve<Derivatives::D, MagnusRk4, N>(const Model<N>&, const Joints<N>&, const TipLoad&, Workspace<N>&, \
+                                                  Solution<N>&, const Settings&) noexcept;
 #define CTCR_EVALUATE(kind, D, C, N)                                                   \
   kind void evaluate<Derivatives::D, Loading::weight, MagnusRk4, N>(                   \
       const C&, const Joints<N>&, const TipLoad&, const TipGuess<N>&, const Steps<N>&, \
@@ -86,7 +86,8 @@ System<N, AllEffects> with_constant_effects(const System<N>& standard, const Eig
                                                                         const Workspace<N>&) noexcept;                 \
   CTCR_EVALUATIONS(kind, Coefficients<N>, N)                                                                           \
   CTCR_EVALUATIONS(kind, python::AllCoefficients<N>, N)                                                                \
-  CTCR_SOLVE(kind, N)                                                                                                  \
+  CTCR_SOLVE(kind, none, N)                                                                                            \
+  CTCR_SOLVE(kind, compliance, N)                                                                                      \
   kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&) noexcept; \
   kind Status differentiate_tip<MagnusRk4, N>(const Model<N>&, const Workspace<N>&, int, TipDerivatives<N>&,           \
                                               Mat6&) noexcept;                                                         \
