@@ -89,9 +89,10 @@ def test_implausible_values(tip_load):
 
 @pytest.mark.parametrize("rejected", [True, False])
 def test_held_out_runs(tip_load, rejected):
-    """The less effects explain of held-out runs, the less sure the verdict; noise asks for nothing."""
+    """The less effects explain of held-out runs, the less sure the verdict, and where they explain nothing they are not
+    named; noise asks for nothing."""
     left = replace(tip_load.residual, p_value=0.0 if rejected else 0.5)
-    sure = ["stand_in", "probable", "identified"]
+    sure = ["not_in_catalogue", "stand_in", "probable", "identified"]
     words = [
         judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, part)).word for part in np.linspace(-1, 1, 80)
     ]

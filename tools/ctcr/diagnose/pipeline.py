@@ -259,9 +259,13 @@ def _diagnose(
 
     # Structure of the residual, corrected for a delay that varies between time segments.
     progress("structure of the residual")
-    corrected, corrections = segment_delays.corrected(engine, fit)
-    corrections += [segment_delays.CORRECTED] if corrections else []
-    residual = residual_of(engine, chosen.calibrated, corrected, corrections)
+
+    def structure(fit: joint.Fit) -> tuple[joint.Fit, list[str], Residual]:
+        corrected, corrections = segment_delays.corrected(engine, fit)
+        corrections += [segment_delays.CORRECTED] if corrections else []
+        return corrected, corrections, residual_of(engine, chosen.calibrated, corrected, corrections)
+
+    corrected, corrections, residual = structure(fit)
 
     # Prediction of the held-out runs without and with effects.
     progress("prediction of held-out readings")
@@ -274,6 +278,10 @@ def _diagnose(
     isolated = outliers.isolated(engine.measurements, with_effects, held_out)
 
     verdict = judge(chosen.rounds, accepted, residual, explained)
+    if verdict.word == "not_in_catalogue" and accepted:  # what predicts nothing is not added
+        accepted, fit, with_effects = [], chosen.calibrated, calibrated
+        names, fixed = parameters_of([])
+        corrected, corrections, residual = structure(fit)
     floor_noise = fit.noise
 
     # A smooth field error explains many causes that have nothing to do with the field: only beside a distorted field.

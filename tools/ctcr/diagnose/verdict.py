@@ -3,8 +3,8 @@
 | word | where |
 |---|---|
 | `nothing_missing` | noise alone is the most probable explanation |
-| `not_in_catalogue` | a cause outside the catalogue is, and no effect was accepted |
-| `stand_in` | a cause outside the catalogue is, which the accepted effects imitate |
+| `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better |
+| `stand_in` | a cause outside the catalogue is, which effects imitate: with them held-out runs are predicted better |
 | `ambiguous` | effects are, and the data cannot tell some of them apart |
 | `identified` | effects are, and act with a probability of SURE without a cause outside the catalogue |
 | `probable` | effects are, with less |
@@ -59,13 +59,17 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     outside = sum(one.probability for one in every if one.outside)
     likeliest = every[0]
     if likeliest.outside and not likeliest.effects:
-        if accepted:
-            names = join([a.id for a in accepted])
+        names, verb = join([a.id for a in accepted]), "explains" if len(accepted) == 1 else "explain"
+        if accepted and not (explained and np.median([*explained.values()]) <= 0):
             beside = "it" if len(accepted) == 1 else "them"
             acts = f"a cause outside the catalogue acts, alone or beside {beside} (probability {most(outside)})"
             return Verdict("stand_in", outside, every, [f"{names} can explain a part of the error, but {acts}."])
-        missing = "Something is missing that no effect of the catalogue explains."
-        return Verdict("not_in_catalogue", outside, every, [missing, *residual.about_clusters])
+        sentences = ["Something is missing that no effect of the catalogue explains.", *residual.about_clusters]
+        if accepted:
+            sentences.append(
+                f"{names} {verb} a part of the error of the fitted readings, and none of the held-out ones."
+            )
+        return Verdict("not_in_catalogue", outside, every, sentences)
     if not accepted:
         noise = "Calibration and the tracker's noise explain these measurements."
         return Verdict("nothing_missing", every[0].probability, every, [noise])
