@@ -5,7 +5,7 @@ include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_DATADIR}/cmake/ctcr)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/ctcr-config-version.cmake
                                  COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
-install(TARGETS ctcr EXPORT ctcr-targets FILE_SET HEADERS)
+install(TARGETS ctcr ctcr_native EXPORT ctcr-targets FILE_SET HEADERS)
 install(EXPORT ctcr-targets NAMESPACE ctcr:: DESTINATION ${package_dir})
 install(FILES ${PROJECT_BINARY_DIR}/ctcr-config-version.cmake cmake/ctcr-config.cmake DESTINATION ${package_dir})
 if(CTCR_CALIBRATION)

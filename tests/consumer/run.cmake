@@ -1,4 +1,5 @@
-# Installs the library of build tree ${library} under ${build}, then configures, builds and runs the consumer there.
+# Installs the library of build tree ${library} under ${build}, then configures, builds and
+# runs the consumer there, with that and with the sources.
 file(REMOVE_RECURSE ${build})
 
 function(run)
@@ -6,7 +7,11 @@ function(run)
 endfunction()
 
 run(${CMAKE_COMMAND} --install ${library} --prefix ${build}/installed)
-run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build}/build -G ${generator}
-    -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_PREFIX_PATH=${build}/installed)
-run(${CMAKE_COMMAND} --build ${build}/build)
-run(${build}/build/consumer)
+function(consume name)
+  run(${CMAKE_COMMAND} -S ${CMAKE_CURRENT_LIST_DIR} -B ${build}/${name} -G ${generator}
+      -D CMAKE_CXX_COMPILER=${compiler} ${ARGN})
+  run(${CMAKE_COMMAND} --build ${build}/${name})
+  run(${build}/${name}/consumer)
+endfunction()
+consume(installed_package -D CMAKE_PREFIX_PATH=${build}/installed)
+consume(fetched -D CTCR_SOURCE=${CMAKE_CURRENT_LIST_DIR}/../..)

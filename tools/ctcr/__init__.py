@@ -10,6 +10,7 @@
 nothing: the compiled core and numpy load with the first name that needs them.
 """
 
+import os
 import sys
 from importlib import import_module
 from types import ModuleType
@@ -114,6 +115,21 @@ class _Package(ModuleType):
 
 
 sys.modules[__name__].__class__ = _Package
+
+
+def _runs_x86_64_v3() -> bool:
+    """Whether the processor runs what the second module of a package that travels is compiled for."""
+    try:
+        with open("/proc/cpuinfo") as info:
+            flags = next((line.split() for line in info if line.startswith("flags")), [])
+    except OSError:  # not Linux
+        return False
+    return {"avx2", "fma", "bmi2", "f16c", "abm", "movbe"} <= set(flags)
+
+
+_fast = os.path.join(os.path.dirname(__file__), "_x86_64_v3")
+if os.path.isdir(_fast) and _runs_x86_64_v3():
+    __path__.insert(0, _fast)  # where `ctcr._core` is looked for first
 
 
 if not TYPE_CHECKING:  # a checker knows the names above and no others

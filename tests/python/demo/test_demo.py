@@ -10,6 +10,7 @@ import pytest
 from ctcr.bench.devices import emergency_stop
 from ctcr.bench.record.joined import PAUSE_S, joined, start_of
 from ctcr.bench.shared.folder import VARIABLE, private_folder
+from ctcr.demo import effect_story
 from ctcr.demo.bench_story import VALUE
 from ctcr.demo.story import LOG, Story, new_folder
 from ctcr.errors import InputError, Problem
@@ -58,6 +59,17 @@ def test_story(tmp_path):
     assert (story.folder / LOG).read_text().startswith("$ ctcr info")
     with pytest.raises(InputError, match="ctcr info nothing.yaml.*cannot read it"):
         story.do("fail", "info nothing.yaml", lambda told: "")
+
+
+def test_effect_story(tmp_path, monkeypatch, capfd):
+    """It runs its commands one behind the other on files of its own, and ends with one that fails."""
+    monkeypatch.setattr(
+        effect_story, "STEPS", {"Look": "info robot.yaml", "Fail": "info no.yaml", "Rest": "info no.yaml"}
+    )
+    assert effect_story.tell(new_folder(tmp_path / "story"), Console()) == 1
+    printed = capfd.readouterr()
+    assert "$ ctcr info robot.yaml" in printed.out and "Rest" not in printed.out and "no.yaml" in printed.err
+    assert {"robot.yaml", "measurements.csv", LOG} == {path.name for path in (tmp_path / "story").iterdir()}
 
 
 def test_resumed_story(tmp_path, monkeypatch):
