@@ -62,6 +62,7 @@ class Diagnosis(Result):
     notices: list[str] = field(default_factory=list)
     seconds: float = 0.0
     conventions: Sequence[Finding] = ()  # that the review of the table found
+    without_effects: "Diagnosis | None" = None  # the same, where the effects that were accepted predict nothing
 
     @property
     def files(self) -> list[str]:
@@ -197,6 +198,7 @@ def diagnose(
                 result = again
         if result.accepted or not _has_new_errors(result):
             break
+    result = result.without_effects or result
     if not result.measurements.from_home:
         notices.append("taken to have been at rest at the first reading, not to have come from home: it fits better")
     result.notices += [*notices, *(wider.sentence for wider in result.widened)]
@@ -278,10 +280,6 @@ def _diagnose(
     isolated = outliers.isolated(engine.measurements, with_effects, held_out)
 
     verdict = judge(chosen.rounds, accepted, residual, explained)
-    if verdict.word == "not_in_catalogue" and accepted:  # what predicts nothing is not added
-        accepted, fit, with_effects = [], chosen.calibrated, calibrated
-        names, fixed = parameters_of([])
-        corrected, corrections, residual = structure(fit)
     floor_noise = fit.noise
 
     # A smooth field error explains many causes that have nothing to do with the field: only beside a distorted field.
@@ -299,7 +297,7 @@ def _diagnose(
         progress("parameters that are not constant")
         varying = varying_model(engine, chosen.calibrated if verdict.names_no_cause else fit, residual.sample)
 
-    return Diagnosis(
+    result = Diagnosis(
         robot=robot,
         measurements=engine.measurements,
         held_out=held_out,
@@ -317,3 +315,14 @@ def _diagnose(
         verdict=verdict,
         notices=outliers.messages(robot, engine.measurements, with_effects, isolated),
     )
+    if verdict.word == "not_in_catalogue" and accepted:
+        _, _, residual = structure(chosen.calibrated)
+        result.without_effects = replace(
+            result,
+            accepted=[],
+            residual=residual,
+            with_effects=one_sided.widened(calibrated),
+            final=segment_delays.widened(engine, one_sided.widened(chosen.calibrated)),
+            floors=floors(robot, measurements),
+        )
+    return result
