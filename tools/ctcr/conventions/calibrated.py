@@ -11,7 +11,8 @@ from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-JITTER_ALONE = 1.366  # typical error over the floor, where errors are jitter: exp E log sqrt(1 + chi^2_3 / 3)
+# Where errors are jitter, over the floor: the typical error, exp E log sqrt(1 + chi^2_3 / 3), and nine tenths of them.
+JITTER_ALONE, MOST_JITTER = 1.366, 1.756
 
 
 @dataclass(frozen=True)
@@ -41,24 +42,24 @@ class Calibrated:
         """The same fit, judged by some readings (K,) only."""
         return replace(self, error=self.error[rows])
 
-    @property
-    def _of_jitter(self) -> float:
-        """The typical error [m] where there is nothing but jitter."""
-        return JITTER_ALONE * max(self.floor, settings.CONVENTION_FINEST)
-
-    @property
-    def beyond_jitter(self) -> float:
-        """The part [m] of the typical error that jitter does not make."""
-        return float(np.sqrt(max(self.typical**2 - self._of_jitter**2, 0.0)))
+    def left_of(self, before: "Calibrated") -> float:
+        """The share of the error beyond jitter that is left: of the typical error or of that which nine tenths do not
+        exceed, whichever fell less, as a convention acts on all readings."""
+        jitter = np.array([JITTER_ALONE, MOST_JITTER]) * max(self.floor, settings.CONVENTION_FINEST)
+        left, all_ = (
+            np.maximum(np.array([fit.typical, np.exp(np.quantile(fit.log_error, 0.9))]) ** 2 - jitter**2, 0.0)
+            for fit in (self, before)
+        )
+        return float(np.sqrt(np.max(left / np.maximum(all_, 1e-300))))
 
     def beats(self, before: "Calibrated") -> bool:
         """Whether the error fell far towards that of jitter, and not by chance."""
-        return self.beyond_jitter < settings.CONVENTION_CLEAR * before.beyond_jitter and before._exceeds(self.typical)
+        return self.left_of(before) < settings.CONVENTION_CLEAR and before._exceeds(self.typical)
 
     @property
     def may_be_beaten(self) -> bool:
         """Whether it is more than jitter."""
-        return self._exceeds(self._of_jitter)
+        return self._exceeds(JITTER_ALONE * max(self.floor, settings.CONVENTION_FINEST))
 
     def _exceeds(self, typical: float) -> bool:
         """Whether the likelihood of a smaller typical error [m] outweighs the prior odds against a cause."""
