@@ -91,9 +91,9 @@ def judged(said: dict | None, truth: dict, group: str) -> list[tuple[str, bool]]
     if group == "look_alike" and not unseen:  # what calibration takes up is no effect
         scores["look-alikes: their class named, or none where calibration takes both up"] = exact
     if said and not truth.get("wrong_sheet"):
-        scores["right data sheets: nothing widened"] = not said["widened"]
+        scores["right data sheets: nothing widened"] = not said.get("widened")
     elif said:
-        scores["wrong data sheets: said"] = bool(said["widened"])
+        scores["wrong data sheets: said"] = bool(said.get("widened"))
     if truth["verdict"] == "nothing_missing":
         scores["controls: nothing named"] = word == "nothing_missing"
     elif truth["verdict"] == "not_in_catalogue":

@@ -1,5 +1,7 @@
 """Runs that were homed elsewhere than the others: one joint of one run is off by a constant."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ctcr import settings
@@ -30,10 +32,9 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
         return None
     others = readings.run != runs[worst]
     like, mine = calibrated(fit.robot, readings.rows(others)), readings.rows(~others)
-    before = _typical(tips.errors(like.robot, mine), like)
     scanned = sorted(_scan(like, mine, kind, tube) for kind in ("beta", "alpha") for tube in range(fit.robot.n_tubes))
     (after, kind, tube, offset), second = scanned[0], scanned[1][0] if len(scanned) > 1 else np.inf
-    if after > clear * before or clear * after > usual:
+    if clear * after > usual:
         return None
     moved = dearer(FRAME - 1, len(mine)) * _typical(_moved(like.robot, mine), like)  # the whole frame, not a joint
     if second < settings.CONVENTION_ALIKE * after or moved < after:
@@ -42,8 +43,12 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
         return None  # the others would take offsets too: something else acts
     move = offset * (np.arange(fit.robot.n_tubes) == tube)
+    mended = changed(kind, lambda q: q + move)(mine)
+    before, behind = (replace(like, error=tips.errors(like.robot, rows)) for rows in (mine, mended))
+    if behind.left_of(before) > settings.CONVENTION_CONSTANT:
+        return None
     turned = orientation.error_deg(like.robot, mine)
-    if orientation.error_deg(like.robot, changed(kind, lambda q: q + move)(mine)) > settings.CONVENTION_ALIKE * turned:
+    if orientation.error_deg(like.robot, mended) > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
     run = int(runs[worst])
     unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)
