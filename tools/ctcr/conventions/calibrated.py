@@ -42,19 +42,20 @@ class Calibrated:
         """The same fit, judged by some readings (K,) only."""
         return replace(self, error=self.error[rows])
 
-    def left_of(self, before: "Calibrated") -> float:
-        """The share of the error beyond jitter that is left: of the typical error or of that which nine tenths do not
-        exceed, whichever fell less, as a convention acts on all readings."""
+    def left_of(self, before: "Calibrated") -> Array:
+        """The share of the error beyond jitter that is left: of the typical error, and of that which nine tenths do not
+        exceed."""
         jitter = np.array([JITTER_ALONE, MOST_JITTER]) * max(self.floor, settings.CONVENTION_FINEST)
         left, all_ = (
             np.maximum(np.array([fit.typical, np.exp(np.quantile(fit.log_error, 0.9))]) ** 2 - jitter**2, 0.0)
             for fit in (self, before)
         )
-        return float(np.sqrt(np.max(left / np.maximum(all_, 1e-300))))
+        return np.sqrt(left / np.maximum(all_, 1e-300))
 
     def beats(self, before: "Calibrated") -> bool:
-        """Whether the error fell far towards that of jitter, and not by chance."""
-        return self.left_of(before) < settings.CONVENTION_CLEAR and before._exceeds(self.typical)
+        """Whether the error fell far towards that of jitter, not by chance, and that of nearly all readings fell."""
+        typical, most = self.left_of(before)
+        return bool(typical < settings.CONVENTION_CLEAR and most < 1) and before._exceeds(self.typical)
 
     @property
     def may_be_beaten(self) -> bool:

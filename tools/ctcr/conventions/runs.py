@@ -45,7 +45,7 @@ def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, C
     move = offset * (np.arange(fit.robot.n_tubes) == tube)
     mended = changed(kind, lambda q: q + move)(mine)
     before, behind = (replace(like, error=tips.errors(like.robot, rows)) for rows in (mine, mended))
-    if behind.left_of(before) > settings.CONVENTION_CONSTANT:
+    if np.max(behind.left_of(before)) > settings.CONVENTION_CONSTANT:
         return None
     turned = orientation.error_deg(like.robot, mine)
     if orientation.error_deg(like.robot, mended) > settings.CONVENTION_ALIKE * turned:

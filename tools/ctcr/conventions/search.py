@@ -142,7 +142,7 @@ def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
     """
     before, after = (_with_run_frames(one, of_runs) for one in (case, better.case))
     if all(one.frame or one.registers for one in better.wrong):
-        return better.case.fit.left_of(case.fit) < settings.CONVENTION_CONSTANT or not before.beats(better.case.fit)
+        return better.case.fit.left_of(case.fit)[0] < settings.CONVENTION_CONSTANT or not before.beats(better.case.fit)
     return better.case.fit.typical < before.typical or after.beats(before)
 
 
@@ -252,7 +252,7 @@ def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> boo
     if kind == "beta":
         sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
     right = kind == "alpha" and size % (np.pi / 2) == 0
-    constant = tried.case.fit.left_of(half) < settings.CONVENTION_CONSTANT
+    constant = tried.case.fit.left_of(half)[0] < settings.CONVENTION_CONSTANT
     return abs(size) > jump(one.frees[0], sd) and (right or constant)
 
 
