@@ -191,6 +191,8 @@ def test_scores_told_are_those_kept():
     assert f"right effect first in {right} of {sets}" in " ".join(told.split())
     quiet, controls = of("controls: nothing named")
     assert f"none in {quiet} of {controls} that hide nothing" in " ".join(told.split())
+    named, causes = np.add(of("varied, two causes: causes named"), of("varied, more: causes named"))
+    assert f"{named} of {causes} causes where two to five act together" in " ".join(told.split())
 
 
 @pytest.mark.parametrize("document", ["README.md", "docs/calibration.md"])
