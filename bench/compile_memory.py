@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Peak memory of the compiler for programs of users, which load on the machine does not change, as it does times.
+"""Peak memory of the compiler for programs of users. Unlike times, it does not depend on the load of the machine.
 
 Compiles with -O2 for AVX2, plainly and with CTCR_FAST_COMPILE. Exit code 1 when a program takes over GROWTH more than
 it did."""

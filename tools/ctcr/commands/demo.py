@@ -19,9 +19,9 @@ from ctcr.commands import options
 def command(context, target) -> int:
     """Find the effect that measurements of a robot hide, add it, and see the error fall.
 
-    Runs four commands, shown as you would type them, on files that it puts into the folder: compare, diagnose, add, and
-    compare again. It needs no hardware and takes about half a minute. `ctcr demo bench` shows the whole way on a
-    simulated bench.
+    Puts a robot file and measurements into the folder and runs compare, diagnose, add, compare again and history there.
+    Each command is shown as you would type it. It needs no hardware and takes about half a minute. `ctcr demo bench`
+    shows the whole way on a simulated bench.
 
     Example: ctcr demo
     """

@@ -11,7 +11,7 @@ from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
-# Where errors are jitter, over the floor: the typical error, exp E log sqrt(1 + chi^2_3 / 3), and nine tenths of them.
+# Where errors are jitter, over the floor: the typical error, exp E log sqrt(1 + chi^2_3 / 3), and the 90 % quantile.
 JITTER_ALONE, MOST_JITTER = 1.366, 1.756
 
 
@@ -42,18 +42,19 @@ class Calibrated:
         """The same fit, judged by some readings (K,) only."""
         return replace(self, error=self.error[rows])
 
-    def left_of(self, before: "Calibrated") -> Array:
-        """The share of the error beyond jitter that is left: of the typical error, and of that which nine tenths do not
-        exceed."""
+    @property
+    def _beyond_jitter(self) -> Array:
+        """The part [m] that jitter does not make: of the typical error, and of the one that 90 % do not exceed."""
+        sizes = np.array([self.typical, np.exp(np.quantile(self.log_error, 0.9))])
         jitter = np.array([JITTER_ALONE, MOST_JITTER]) * max(self.floor, settings.CONVENTION_FINEST)
-        left, all_ = (
-            np.maximum(np.array([fit.typical, np.exp(np.quantile(fit.log_error, 0.9))]) ** 2 - jitter**2, 0.0)
-            for fit in (self, before)
-        )
-        return np.sqrt(left / np.maximum(all_, 1e-300))
+        return np.sqrt(np.maximum(sizes**2 - jitter**2, 0.0))
+
+    def left_of(self, before: "Calibrated") -> Array:
+        """The share that is left of the error beyond jitter: typical, and of 90 % of the readings."""
+        return self._beyond_jitter / np.maximum(before._beyond_jitter, 1e-150)
 
     def beats(self, before: "Calibrated") -> bool:
-        """Whether the error fell far towards that of jitter, not by chance, and that of nearly all readings fell."""
+        """Whether the typical error fell far towards that of jitter and not by chance, and that of 90 % fell too."""
         typical, most = self.left_of(before)
         return bool(typical < settings.CONVENTION_CLEAR and most < 1) and before._exceeds(self.typical)
 

@@ -62,7 +62,7 @@ class Diagnosis(Result):
     notices: list[str] = field(default_factory=list)
     seconds: float = 0.0
     conventions: Sequence[Finding] = ()  # that the review of the table found
-    without_effects: "Diagnosis | None" = None  # the same, where the effects that were accepted predict nothing
+    without_effects: "Diagnosis | None" = None  # the answer instead, where accepted effects predict nothing
 
     @property
     def files(self) -> list[str]:

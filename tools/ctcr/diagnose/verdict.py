@@ -4,7 +4,7 @@
 |---|---|
 | `nothing_missing` | noise alone is the most probable explanation |
 | `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better |
-| `stand_in` | a cause outside the catalogue is, which effects imitate: with them held-out runs are predicted better |
+| `stand_in` | a cause outside the catalogue is; effects imitate it and predict held-out runs better |
 | `ambiguous` | effects are, and the data cannot tell some of them apart |
 | `identified` | effects are, and act with a probability of SURE without a cause outside the catalogue |
 | `probable` | effects are, with less |
@@ -59,16 +59,14 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     outside = sum(one.probability for one in every if one.outside)
     likeliest = every[0]
     if likeliest.outside and not likeliest.effects:
-        names, verb = join([a.id for a in accepted]), "explains" if len(accepted) == 1 else "explain"
+        names = join([a.id for a in accepted])
         if accepted and not (explained and np.median([*explained.values()]) <= 0):
             beside = "it" if len(accepted) == 1 else "them"
             acts = f"a cause outside the catalogue acts, alone or beside {beside} (probability {most(outside)})"
             return Verdict("stand_in", outside, every, [f"{names} can explain a part of the error, but {acts}."])
         sentences = ["Something is missing that no effect of the catalogue explains.", *residual.about_clusters]
         if accepted:
-            sentences.append(
-                f"{names} {verb} a part of the error of the fitted readings, and none of the held-out ones."
-            )
+            sentences.append(f"With {names} the fitted readings are predicted better, and the held-out ones are not.")
         return Verdict("not_in_catalogue", outside, every, sentences)
     if not accepted:
         noise = "Calibration and the tracker's noise explain these measurements."

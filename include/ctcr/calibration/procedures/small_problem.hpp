@@ -33,7 +33,8 @@ public:
   /// @param loss  residuals beyond it, as the block's norm, count ever less (Cauchy); 0: all count alike
   void add(const Residual& block, double loss = 0) { blocks_.push_back({block, loss}); }
 
-  /// Minimises until the parameters are right to `precision`. @param unit  what one unit of the residuals is in theirs
+  /// Minimises until the parameters are right to `precision`.
+  /// @param unit  change of a parameter that changes residuals by about 1; in units of the parameters, as is `precision`
   void minimise(double unit, double precision) {
     ceres::TinySolver<SmallProblem> solver;
     solver.options.max_num_iterations = 100;
@@ -107,7 +108,7 @@ private:
   struct Scaling {
     double factor = 1, slope = 0;
   };
-  /// What a block is multiplied by so that its square becomes Cauchy's loss, and its slope by the block's square.
+  /// The factor by which a block's square becomes Cauchy's loss, and the factor's derivative by the block's square.
   static Scaling scaled(double square, double loss) {
     const double c = loss * loss, z = square / c;
     if (!(loss > 0) || z == 0) return {};
