@@ -107,6 +107,7 @@ ONE_SIDED_WIDEN = 1.5  # factor of the search along a side, and sd from which a 
 ONE_SIDED_UNSEEN = 0.99  # posterior over prior sd from which a curve may lie behind the plate altogether
 ONE_SIDED_GAIN = 0.5  # log evidence that a restart across a kink must gain
 
+SESSION_EXPLAINED = 0.25  # fraction of the unexplained chi-square that terms of each run must explain: less is physics
 SESSION_PRIOR_WIDER = 10.0  # prior sd of the frame and the homes of a run over that of the robot file's
 SESSION_PARTS = (1.0, 0.3, 0.1, 0.03)  # of that sd, which the scatter of the runs about the typical one may have
 SESSION_ALIGNMENTS = 6  # Gauss-Newton steps that align the runs before the first fit
@@ -134,16 +135,9 @@ DECISIVE = 5.0  # log evidence that decides between two models: odds of 150 to 1
 TIE = 3.0  # log evidence below which candidates cannot be told apart: odds of 20 to 1
 SAME_FORM = 0.5  # log evidence below which the form of an effect with the fewest settings is taken: it means nothing
 SAME_SIGNAL = 0.95  # fraction of each other's signal that candidates imitate, from which data cannot tell them apart
-UNASKED = 10.0  # log evidence beyond DECISIVE that a further effect needs where noise explains the residual,
-FIRST_UNASKED = 5.0  # ... and the first effect: what nothing asks for is mostly a chance
-EXPLAINED = 0.25  # fraction of the unexplained chi-square that a further effect must explain: less is mostly spurious
-FIRST_EXPLAINED = 0.1  # the same for the first effect, beside which others may act
-SUSPECT_EXPLAINED = 0.5  # the same for a look-alike of an effect whose law is open: it imitates part of another law
-IMPROVEMENT = 0.1  # fraction of the error of left-out runs beyond jitter that a further effect must remove
-SURELY_NEEDED = 100.0  # log evidence of an earlier effect from which later ones surely did not make it superfluous
 MAX_EFFECTS = 6  # more causes than that no session can tell apart
 
-# ---- Diagnosis: course of the forward selection
+# ---- Diagnosis: course of the selection
 
 LINEARISATION_ROWS = 1500  # rows by whose derivatives candidates are screened where there are twice as many or more
 REFITS = 6  # effects that are refitted, the best ones by linearisation: the true one was always among them
@@ -251,6 +245,7 @@ CONVENTION_ROUGH = 1.5  # error at this first look over that of the table as it 
 CONVENTION_LIKELY = 5  # hypotheses that are calibrated: those of least error in the file's frame, and in the best one
 CONVENTION_SOLVED = 0.8  # fraction of readings that the model must solve
 CONVENTION_AT_FLOOR = 2.0  # typical error over that of jitter, below which it is noise
+CONVENTION_DECISIVE = 15.0  # log likelihood ratio of a fault: DECISIVE, and prior odds of e^10 against one kind of many
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
 CONVENTION_CONSTANT = 0.1  # of the error: what a wrong home or frame leaves at most; a physical effect leaves more

@@ -72,11 +72,11 @@ def test_rivals(tip_load):
     for behind in (300.0, 30.0, 3.0, 0.0):
         rival = replace(own, candidate=replace(own.candidate, id="contact"), refit=own.refit - behind)
         kept = [tried for tried in first.tried if tried.id == one.id]
-        rounds = [replace(first, tried=[*kept, rival]), *tip_load.rounds[1:]]
-        found.append(probability(judged(tip_load, rounds=rounds).explanations, [one.ids]))
+        beside = replace(one, round=replace(first, tried=[*kept, rival]))
+        found.append(probability(judged(tip_load, accepted=[beside]).explanations, [one.ids]))
     assert found == sorted(found, reverse=True) and found[0] > 0.9 and found[-1] == pytest.approx(0.5, abs=0.01)
-    either = [replace(one, ids=[one.id, "contact"])]
-    both = judged(tip_load, rounds=rounds, accepted=either)
+    either = replace(beside, round=replace(beside.round, ids=[one.id, "contact"]))
+    both = judged(tip_load, accepted=[either])
     assert both.word == "ambiguous" and both.probability > 0.9
 
 
@@ -110,9 +110,10 @@ def test_found_beside_an_unknown_cause(tip_load):
     first = tip_load.rounds[0]
     own = next(tried for tried in first.tried if tried.id == one.id)
     other = replace(own, candidate=replace(own.candidate, id="friction"))
-    rounds = [first, replace(first, tried=[other], accepted=other, ids=["friction"]), *tip_load.rounds[1:]]
+    second = replace(first, tried=[other], accepted=other, ids=["friction"])
+    rounds = [first, second, *tip_load.rounds[1:]]
     best, other = (replace(fit, explained=0.8) for fit in (one.best, other))
-    many = [replace(one, best=best), replace(one, best=other, ids=["friction"])]
+    many = [replace(one, best=best, beside=0.8), replace(one, best=other, round=second, beside=0.8)]
     explained = dict.fromkeys(RUNS, 0.6)
     imitates = judged(tip_load, residual=left, explained=dict.fromkeys(RUNS, 0.3))
     assert imitates.word == "stand_in" and f"(probability {most(imitates.probability)})" in imitates.sentences[0]

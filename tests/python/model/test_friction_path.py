@@ -10,7 +10,7 @@ from ctcr.diagnose import add
 from ctcr.diagnose.candidates import Candidate, forms
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain
-from ctcr.diagnose.round import CandidateFit
+from ctcr.diagnose.round import CandidateFit, Round
 from ctcr.diagnose.selection import Accepted, Selection
 from ctcr.effects import catalogue
 from ctcr.fit import joint
@@ -127,7 +127,8 @@ def test_other_variant(robot, plan):
         fit = engine.fit(fitted)
         gain = Gain(0.0, *4 * [np.zeros(1)])
         entered = CandidateFit(Candidate("friction", fitted), gain, fit=fit)
-        one = Accepted(entered, ["friction"], 100.0, 50.0)
+        round_ = Round(fit, [entered], accepted=entered, ids=["friction"])
+        one = Accepted(entered, round_, log_evidence=100.0, beside=0.9)
         selection = Selection(engine, accepted=[one], fit=fit)
         selection.refine_form(one)
         after = selection.fit

@@ -1,4 +1,4 @@
-"""Which physical effect is missing: data audit, calibration, forward selection of effects, validation, verdict."""
+"""Which physical effect is missing: data audit, calibration, stepwise selection of effects, validation, verdict."""
 
 from ctcr.diagnose.pipeline import Diagnosis, diagnose
 

@@ -87,15 +87,15 @@ def weighed(
     def weigh(effects: frozenset[str], weight: float, outside: bool = False) -> None:
         weights[effects, outside] = max(weights.get((effects, outside), -np.inf), weight)
 
-    accepts = {round_.accepted.id: round_ for round_ in rounds if round_.accepted}
-    for k, a in enumerate(accepted):
-        refitted = _refitted(accepts[a.id])
+    for a in accepted:
+        refitted = _refitted(a.round)
         own, others = refitted[a.id].score, complete + values - _plausible(a.best)
         for rival in (one for one in refitted.values() if one.id not in found):  # in place of it
             behind = 0.0 if rival.id in a.ids else max(own - rival.score, 0.0)
             tempered = behind / (1 + catalogue.get(a.id).form_error ** 2 * max(own, 0.0))
             weigh(found - {a.id} | {rival.id}, others - tempered + _plausible(rival))
-        mends = log_odds_of_mend(a.explained, accepted[:k]) if k else -np.inf
+        rest = [b for b in accepted if b is not a]
+        mends = log_odds_of_mend(a.beside, rest) if rest else -np.inf
         weigh(found - {a.id}, others - min(a.log_evidence - cost, -mends))
     for further in _refitted(rounds[-1]).values() if rounds[-1].accepted is None else ():
         gain = further.score - cost

@@ -53,7 +53,9 @@ def candidates(figure, d: Diagnosis) -> bool | None:
         axes.invert_yaxis()
         axes.set_xscale("symlog", linthresh=10)
         largest = max(10.0, *(max(one.linear, one.score) for one in shown))
-        axes.set(xlim=(0, 8 * largest), xticks=[], xlabel="log evidence over none", title=f"round {number}")
+        axes.set(
+            xlim=(0, 8 * largest), xticks=[], xlabel="log evidence over none", title=f"round {number}{round_.place}"
+        )
 
 
 def before_after(figure, d: Diagnosis) -> bool | None:

@@ -65,8 +65,9 @@ def log_odds_of_imitation(share: float) -> float:
 
 def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
     """Log odds that an effect, which explains this share of what those before it left, is a cause: over one that mends
-    their forms, and over one that imitates a cause outside the catalogue."""
-    return -max(log_odds_of_mend(share, before), log_odds_of_imitation(share))
+    their forms, where there are any, and over one that imitates a cause outside the catalogue."""
+    imitation = log_odds_of_imitation(share)
+    return -max(log_odds_of_mend(share, before), imitation) if before else -imitation
 
 
 def _parts(effects: Iterable[Explaining]) -> list[float]:

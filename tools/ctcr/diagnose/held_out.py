@@ -35,13 +35,6 @@ def typical(squares: Array) -> float:
     return float(np.exp(np.log(squares).mean()))
 
 
-def predicts_better(engine: Engine, before: joint.Fit, after: joint.Fit) -> bool:
-    """Whether a further effect removes a sufficient part of the error of left-out runs beyond jitter."""
-    jitter = 3e6 * engine.noise.position_jitter**2
-    old, new = typical(cross_validated(engine, before)), typical(cross_validated(engine, after))
-    return old - new >= settings.IMPROVEMENT * max(old - jitter, 0.0)
-
-
 def fit_to_predict(
     engine: Engine, fit: joint.Fit, fixed: dict[str, float], tolerance: float = settings.COARSE
 ) -> joint.Fit:

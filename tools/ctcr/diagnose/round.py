@@ -1,4 +1,4 @@
-"""One round of forward selection: all candidates screened, the best ones fitted with the calibration, one accepted."""
+"""One round of stepwise selection: all candidates screened, the best ones fitted with the calibration, one accepted."""
 
 import math
 from collections.abc import Collection
@@ -12,7 +12,6 @@ from ctcr.diagnose import segment_delays, starts
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.diagnose.form_errors import log_odds_of_cause
-from ctcr.diagnose.held_out import predicts_better
 from ctcr.diagnose.linearised import Gain
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
@@ -40,6 +39,11 @@ class CandidateFit:
         return -np.inf if self.refit is None else self.refit
 
     @property
+    def surely_explained(self) -> float:
+        """What it explains, less a standard deviation."""
+        return self.explained - self.explained_sd
+
+    @property
     def id(self) -> str:
         return self.candidate.id
 
@@ -52,8 +56,14 @@ class Round:
     ids: list[str] = field(default_factory=list)  # the accepted effect and those that the data cannot tell from it
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
+    anew: str = ""  # id of the effect that was accepted earlier, and in whose place this round chose
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
     is_spurious: bool = False  # whether the best candidate surely explains too little
+
+    @property
+    def place(self) -> str:
+        """For titles: in whose place it chose."""
+        return f", in the place of {self.anew}" if self.anew else ""
 
     @property
     def why_not(self) -> str:
@@ -93,6 +103,11 @@ class Round:
         best = max((one.score for one in self.tried), default=-np.inf)
         return self.accepted is None and (self.is_spurious or more * best < self.needed)
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether one effect was accepted, far ahead of all others."""
+        return len(self.ids) == 1 and self.margin >= settings.DECISIVE
+
 
 def unexplained(fit: joint.Fit) -> float:
     """Chi-square beyond what the noise as stated explains, at least its usual scatter; in units of inflated noise."""
@@ -124,8 +139,19 @@ def parameters_of(fits: Collection[CandidateFit]) -> tuple[list[str], dict[str, 
     return names, dict(pair for one in fits for pair in one.candidate.shape)
 
 
-def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], accepted: list[CandidateFit]) -> Round:
-    """Screens all candidates, refits the best jointly with calibration and accepted effects, and decides."""
+def run_round(
+    engine: Engine,
+    before: joint.Fit,
+    candidates: list[Candidate],
+    accepted: list[CandidateFit],
+    known: CandidateFit | None = None,
+    surely: bool = False,
+) -> Round:
+    """Screens all candidates, refits the best jointly with calibration and accepted effects, and decides.
+
+    known    a candidate that takes part in any case, with its fit at the weights and noise of the fit before
+    surely   as in decide()
+    """
     engine.progress("screening all candidates")
     names, fixed = parameters_of(accepted)
     if accepted:  # what a refit without a further effect finds too is no gain of one
@@ -135,18 +161,15 @@ def run_round(engine: Engine, before: joint.Fit, candidates: list[Candidate], ac
     if not screened:
         return Round(before, [], reason="no effect is left to try")
     refits = Refits(engine, before, fixed)
-    tried = refits.of_all(refits.in_reach(worth_a_refit(screened)))
+    chosen = refits.in_reach(worth_a_refit(screened))
+    tried = refits.of_all([*chosen, known] if known else chosen)
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
     fitted = [one.candidate for one in tried]
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    decide(round_, len({c.id for c in candidates}), accepted, joint.rejects(before), _suspects(engine, accepted))
-    unsure = round_.accepted and accepted and not _is_sure(round_.accepted, accepted)
-    if unsure and not predicts_better(engine, before, round_.accepted.fit):
-        round_.reason = f"in cross-validation {round_.accepted.id} does not predict held-out readings better"
-        round_.accepted, round_.ids = None, []
+    decide(round_, len({c.id for c in candidates}), accepted, joint.rejects(before), surely)
     round_.release_memory()
     return round_
 
@@ -306,23 +329,17 @@ def _without_candidate(
     return there, [one if one.fit is None else over_there(one) for one in tried]
 
 
-def _suspects(engine: Engine, accepted: list[CandidateFit]) -> set[str]:
-    """Look-alikes of accepted effects whose constitutive law is open: it may be none of those that are offered."""
-    known = (catalogue.get(one.id, engine.robot.n_tubes) for one in accepted)
-    return {identity for effect in known if effect.laws for identity in effect.look_alikes}
-
-
 def decide(
-    round_: Round, n_effects: int, accepted: list[CandidateFit], is_rejected: bool, suspects: Collection[str] = ()
+    round_: Round, n_effects: int, accepted: list[CandidateFit], is_rejected: bool, surely: bool = False
 ) -> None:
     """Accepts the best candidate, with all that the data cannot tell from it, or says why not.
 
-    n_effects that were looked at; is_rejected: whether the noise as stated does not explain the residual; suspects: ids
-    that may imitate the unknown law of an accepted effect.
+    n_effects that were looked at; is_rejected: whether the noise as stated does not explain the residual; surely:
+    whether only that counts which a candidate surely explains.
     """
+    missed = settings.REJECTION_MISSED  # where the test rejects nothing
     round_.needed = settings.DECISIVE + np.log(n_effects)
-    unasked = settings.UNASKED if accepted else settings.FIRST_UNASKED
-    threshold = round_.needed + (0.0 if is_rejected else unasked)
+    threshold = round_.needed + (0.0 if is_rejected else math.log((1 - missed) / missed))
     refitted = [one for one in round_.tried if one.fit is not None]
     fitted = [one for one in refitted if not (accepted and one.implausible)]
     if not fitted:
@@ -339,20 +356,14 @@ def decide(
             f"the best candidate, {best.id}, gains {best.score:.1f} in log evidence, less than {threshold:.1f}"
         )
         return
-    needed, why = settings.FIRST_EXPLAINED, "a first effect must explain, beside which others may act"
-    if accepted:
-        needed, first = settings.EXPLAINED, needed
-        why = (
-            f"a further effect must explain: so little mostly makes up for the form of earlier ones (a first effect "
-            f"needs {first:.0%}, as others may act beside it)"
-        )
-    if best.id in suspects:
-        needed, why = settings.SUSPECT_EXPLAINED, "an effect must explain that may imitate the law of an earlier one"
-    if best.explained < needed and not (accepted and _is_sure(best, accepted)):
-        round_.is_spurious = best.explained + 2 * best.explained_sd < needed
+    if log_odds_of_cause(best.surely_explained if surely else best.explained, accepted) < 0:
+        round_.is_spurious = log_odds_of_cause(best.explained + 2 * best.explained_sd, accepted) < 0
+        rather = "imitates a cause outside the catalogue"
+        if accepted:
+            rather = f"mends the forms of the effects before it, or {rather}"
         round_.reason = (
-            f"the best candidate, {best.id}, explains {best.explained:.0%} of the unexplained chi-square, less than "
-            f"the {needed:.0%} that {why}"
+            f"the best candidate, {best.id}, explains only {best.explained:.0%} of the unexplained chi-square: more "
+            f"probably it {rather}"
         )
         return
     rivals = [one for one in refitted if one.id != best.id]
@@ -362,11 +373,6 @@ def decide(
     round_.ids = [best.id, *dict.fromkeys(one.id for one in same)]
     others = [one.score for one in rivals if one.id not in round_.ids]
     round_.margin = best.score - max(others, default=-np.inf)
-
-
-def _is_sure(one: CandidateFit, accepted: list[CandidateFit]) -> bool:
-    """Whether a further effect surely is a cause by what it explains of what the others left."""
-    return log_odds_of_cause(one.explained, accepted) >= math.log(settings.SURE / (1 - settings.SURE))
 
 
 def imitated(one: CandidateFit, by: CandidateFit) -> float:

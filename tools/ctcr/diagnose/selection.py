@@ -1,4 +1,5 @@
-"""Forward selection of effects with a refinement of each one's form, then backward elimination."""
+"""Stepwise selection of effects: forward, with a refinement of each one's form; then exchange and elimination of those
+that the later ones show in another light."""
 
 from dataclasses import dataclass, field, replace
 
@@ -6,9 +7,9 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
-from ctcr.diagnose import segment_delays
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.form_errors import log_odds_of_cause
 from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
@@ -16,14 +17,18 @@ from ctcr.fit import folds, joint
 
 @dataclass
 class Accepted:
-    """An effect that was accepted, with all that the data cannot tell from it."""
+    """An effect that was accepted."""
 
     best: CandidateFit  # in its best form
-    ids: list[str]
-    log_evidence: float
-    margin: float
+    round: Round  # that chose it
+    log_evidence: float  # gained
+    beside: float  # fraction that it surely explains of what all others leave of the unexplained chi-square
     residual: Array | None = None  # (M, 3) [m] with it and those accepted before
-    rejected_variants: dict[str, float] = field(default_factory=dict)  # fitted values of its other variants
+
+    @property
+    def ids(self) -> list[str]:
+        """Its id, and those of effects that the data cannot tell from it."""
+        return self.round.ids
 
     @property
     def id(self) -> str:
@@ -40,15 +45,24 @@ class Selection:
     """Effects that were accepted so far, the rounds that led to them, and the fits without and with them."""
 
     engine: Engine
-    rounds: list[Round] = field(default_factory=list)
+    history: list[Round] = field(default_factory=list)  # rounds that changed what is accepted
+    last: Round | None = None  # that accepted nothing
     accepted: list[Accepted] = field(default_factory=list)
     calibrated: joint.Fit | None = None  # without effects
     fit: joint.Fit | None = None  # with the accepted effects
-    finished: bool = False  # whether another round would accept nothing
 
     @property
     def fits(self) -> list[CandidateFit]:
         return [a.best for a in self.accepted]
+
+    @property
+    def rounds(self) -> list[Round]:
+        return [*self.history, *([self.last] if self.last else [])]
+
+    @property
+    def finished(self) -> bool:
+        """Whether another round would accept nothing."""
+        return self.last is not None or len(self.accepted) == settings.MAX_EFFECTS
 
     def calibrate(self, fits: list[CandidateFit], start: dict[str, float]) -> joint.Fit:
         """Calibration and these effects together."""
@@ -56,44 +70,115 @@ class Selection:
         names, fixed = parameters_of(fits)
         return self.engine.fit_with_field(names, start, fixed)
 
-    def grow(self, pool: list[Candidate], more: float = 1.0) -> None:
+    def grow(self, pool: list[Candidate], more: float = 1.0, surely: bool = False) -> None:
         """Accepts one effect after the other.
 
         more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
-        left to them.
+        left to them. surely: as in decide()
         """
-        while len(self.accepted) < settings.MAX_EFFECTS:
+        while not self.finished:
             taken = {identity for a in self.accepted for identity in a.ids}
-            open_to = [c for c in pool if c.id not in taken]
-            round_ = self._round(open_to)
-            sure = round_.is_hopeless(more) or (len(round_.ids) == 1 and round_.margin >= settings.DECISIVE)
-            if more > 1 and not sure:
+            round_ = self._round([c for c in pool if c.id not in taken], surely)
+            if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
                 return
-            self.rounds.append(round_)
             if round_.accepted is None:
-                break
-            self._accept(round_)
+                self.last = round_
+            else:
+                self._accept(round_)
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
-        self.finished = True
 
-    def _round(self, open_to: list[Candidate]) -> Round:
+    def revise(self, pool: list[Candidate]) -> None:
+        """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
+        chosen before the later ones were known. Then drops those that are not surely causes."""
+        seen: list[set[str]] = []
+        surely = False
+        while (found := {a.id for a in self.accepted}) not in seen:
+            seen.append(found)
+            if any(self._chosen_anew(a, pool) for a in self.accepted[:-1]):
+                self.last = None
+                self.grow(pool, surely=surely)
+            elif len(found) > 1 and self._without_weakest():
+                surely, self.last = True, None
+                self.grow(pool, surely=surely)
+        if len(seen) > 1:
+            self._follow()
+
+    def _without_weakest(self) -> bool:
+        """Drops the effect that is least probably a cause beside the others, if it is more probably none."""
+
+        def log_odds(a: Accepted) -> float:
+            return log_odds_of_cause(a.beside, [b.best for b in self.accepted if b is not a])
+
+        weakest = min(self.accepted, key=log_odds)
+        if log_odds(weakest) >= 0:
+            return False
+        self.accepted = [a for a in self.accepted if a is not weakest]
+        self.fit = self.calibrate(self.fits, values_of(self.fit))
+        return True
+
+    def _chosen_anew(self, a: Accepted, pool: list[Candidate]) -> bool:
+        """Whether another effect takes the place of this one, or none needs to."""
+        self.engine.progress(f"without {a.id}")
+        others = [b for b in self.accepted if b is not a]
+        without = self._prefix(others, settings.FIRST_ITERATIONS)  # the round goes on from there
+        taken, rest = {b.id for b in others}, [b.best for b in others]
+        known = replace(a.best, fit=self.fit)
+        round_ = run_round(self.engine, without, [c for c in pool if c.id not in taken], rest, known)
+        round_.anew = a.id
+        a.log_evidence = max(one.score for one in round_.tried if one.id == a.id)
+        if a.log_evidence < settings.DECISIVE:
+            round_.accepted, round_.ids = None, []
+            round_.reason = f"{a.id} gains only {a.log_evidence:.1f} in log evidence beside the others"
+            there = replace(self, accepted=others)
+            there.fit = there.calibrate(there.fits, values_of(without))
+        elif round_.accepted is None:
+            return False
+        elif a.id in round_.ids:
+            if set(round_.ids) != set(a.ids):
+                self.history.append(round_)
+            a.round, a.beside = round_, next(one.surely_explained for one in round_.tried if one.id == a.id)
+            return False
+        else:
+            best = round_.accepted
+            one = Accepted(best, round_, best.refit, best.surely_explained)
+            there = replace(self, accepted=[*others, one])
+            there.fit = there.calibrate(there.fits, values_of(best.fit))
+            there.refine_form(one)
+            if there.fit.log_evidence <= self.fit.log_evidence:
+                return False
+        self.accepted, self.fit = there.accepted, there.fit
+        self.history.append(round_)
+        return True
+
+    def _prefix(self, some: list[Accepted], max_iterations: int = settings.ITERATIONS) -> joint.Fit:
+        """Calibration with some of the accepted effects, at the weights and noise of the fit with all."""
+        names, fixed = parameters_of([a.best for a in some])
+        options = {"fixed": fixed, "tolerance": settings.COARSE, "near": False, "max_iterations": max_iterations}
+        return self.engine.fit_like(self.fit, names, values_of(self.fit), **options)
+
+    def _follow(self) -> None:
+        """The residual with one effect after the other, in the order in which they stand now."""
+        for k, a in enumerate(self.accepted, start=1):
+            a.residual = self._prefix(self.accepted[:k]).residual[:, :3]
+
+    def _round(self, open_to: list[Candidate], surely: bool) -> Round:
         """A round before which no prior was widened for what one of its candidates may have done; where it accepts
         nothing that is likelier than the wider priors, one with these."""
         engine, fit = self.engine, self.fit
         before = engine.less_widened(fit, open_to, parameters_of(self.fits)[1])
-        round_ = run_round(engine, before, open_to, self.fits)
+        round_ = run_round(engine, before, open_to, self.fits, surely=surely)
         best = round_.accepted
         if before is fit or (best and best.fit.log_evidence > fit.log_evidence + settings.DECISIVE):
             return round_
-        return run_round(engine, fit, open_to, self.fits)
+        return run_round(engine, fit, open_to, self.fits, surely=surely)
 
     def _accept(self, round_: Round) -> None:
         """Adds the effect of a round in its best form."""
         best, engine, before = round_.accepted, self.engine, self.fit
         engine.robust = True
-        variants = round_.rejected_variants
-        one = Accepted(best, round_.ids, best.refit, round_.margin, rejected_variants=variants)
+        one = Accepted(best, round_, best.refit, best.surely_explained)
+        self.history.append(round_)
         self.accepted.append(one)
         names, fixed = parameters_of(self.fits)
         converged = best.fit
@@ -116,9 +201,10 @@ class Selection:
         given, fit = one.best.candidate, self.fit
         effect = catalogue.get(given.id, self.engine.robot.n_tubes)
         others = other_amplitudes(effect, given) if one is self.accepted[-1] else []
+        rejected = one.round.rejected_variants
         ended: list[tuple[joint.Fit, CandidateFit, joint.Fit]] = []  # calibrated anew, form, fit of the form
         for variant in (given, *others):
-            tried = [form for form in forms(effect, variant, one.rejected_variants) if form != given]
+            tried = [form for form in forms(effect, variant, rejected) if form != given]
             freed = self._fit_forms(one, tried)
             gain = max((there.log_evidence for _, there in freed), default=-np.inf) - fit.log_evidence
             if variant is given and gain < settings.TIE:
@@ -134,6 +220,7 @@ class Selection:
             more = fraction_explained(fit, freed, len(freed.names) - len(fit.names))
             explained = best.explained + (1 - best.explained) * more
             one.best = replace(best, fit=freed.without_readings(), explained=explained)
+            one.beside += (1 - one.beside) * more
 
     def _with(self, one: Accepted, best: CandidateFit) -> list[CandidateFit]:
         """The accepted effects, one of them in another form."""
@@ -147,29 +234,9 @@ class Selection:
             best = replace(one.best, candidate=form)
             names, fixed = parameters_of(self._with(one, best))
             neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
-            start = neutral | one.rejected_variants | dict(form.shape) | values_of(fit)
+            start = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit)
             found.append((best, self.engine.fit_like(fit, names, start, fixed=fixed)))
         return found
-
-    def eliminate(self) -> None:
-        """Drops one accepted effect that the later ones have made superfluous."""
-        for a in self.accepted[:-1]:
-            rest = [b.best for b in self.accepted if b is not a]
-            self.engine.progress(f"without {a.id}")
-            names, fixed = parameters_of(rest)
-            start, options = values_of(self.fit), {"fixed": fixed, "tolerance": settings.COARSE, "near": False}
-            # A fit that is far behind need not converge.
-            for iterations in (settings.FIRST_ITERATIONS, settings.ITERATIONS):
-                without = self.engine.fit_like(self.fit, names, start, max_iterations=iterations, **options)
-                evidence = segment_delays.log_evidence
-                a.log_evidence = evidence(self.engine, self.fit) - evidence(self.engine, without)
-                if a.log_evidence > settings.SURELY_NEEDED:
-                    break
-                start = values_of(without)
-            if a.log_evidence < settings.DECISIVE:
-                self.accepted.remove(a)
-                self.fit = self.calibrate(rest, values_of(without))
-                return
 
 
 def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
@@ -193,8 +260,7 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         chosen.fit = chosen.calibrate(chosen.fits, start)
     if not chosen.finished:
         chosen.grow(pool)
-    if len(chosen.accepted) > 1:
-        chosen.eliminate()
+    chosen.revise(pool)
     engine.measurements, chosen.engine = coarse.measurements, engine
     chosen.calibrated, start = chosen.calibrate([], values_of(chosen.calibrated)), values_of(chosen.fit)
     engine.robust = coarse.robust

@@ -79,7 +79,7 @@ def _may_win(engine: Engine, one: Fit) -> bool:
     linear, columns = engine.linear(one), one.whiten(columns)
     free = np.hstack([linear.jacobian, columns])  # without priors: tables that contradict the robot end here
     most = free @ np.linalg.lstsq(free, linear.residual, rcond=None)[0]
-    if np.sum(most**2) - columns.shape[1] < settings.EXPLAINED * unexplained(one):
+    if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * unexplained(one):
         return False
     gains = (linear.gain(part * columns).log_evidence for part in settings.SESSION_PARTS)
     return max(gains) > settings.DECISIVE
@@ -91,7 +91,7 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     frame = [name for name in one.names if name not in own.names]
     evidence, numbers = own.log_evidence + _cost(own), len(frame) * len(framed.measurements.sessions.run)
     beyond = evidence - one.log_evidence
-    if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.EXPLAINED:
+    if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.SESSION_EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
     options = {"rows": engine.rows, "sd": wide, "noise": one.noise, **one.frozen}
@@ -130,7 +130,7 @@ def _with_homes(framed: Engine) -> Engine | None:
     """With homes of each run's own beside its frame, where these predict left-out runs better."""
     try:
         homed = replace(framed, measurements=as_sessions(framed.robot, framed.measurements, homes=True))
-        better = _held_out(homed) < (1 - settings.EXPLAINED) * _held_out(framed)
+        better = _held_out(homed) < (1 - settings.SESSION_EXPLAINED) * _held_out(framed)
     except joint.NoFit:  # such homes ask for joints that the tubes cannot have
         return None
     return homed if better else None
@@ -155,7 +155,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
         gain = linear.gain((own[:, :, None] * of_run[:, None, :]).reshape(len(run), -1))
         removed = np.sum(residual**2) - np.sum((residual + gain.signal) ** 2)
         sure = gain.log_evidence > settings.DECISIVE + np.log(len(groups))
-        if sure and removed > settings.EXPLAINED * unexplained(fit):
+        if sure and removed > settings.SESSION_EXPLAINED * unexplained(fit):
             found[tuple(names)] = float(min(removed / unexplained(fit), 1.0))
     return found
 

@@ -52,9 +52,10 @@ class Proposal:
 
 
 def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
-    """Fits of the effects of the first round that the measurements left undecided."""
-    held: dict[str, float] = {}  # by the effects accepted before
-    for round_, accepted in zip(diagnosis.rounds, diagnosis.accepted, strict=False):
+    """Fits of the first accepted effect that the measurements left undecided, and of its rivals."""
+    shapes = [accepted.best.candidate.shape for accepted in diagnosis.accepted]
+    for k, accepted in enumerate(diagnosis.accepted):
+        round_, held = accepted.round, dict(pair for shape in shapes[:k] + shapes[k + 1 :] for pair in shape)
         rivals: dict[str, Rival] = {}
         for one in round_.tried:
             near = round_.accepted.score - one.score < settings.DECISIVE
@@ -62,7 +63,6 @@ def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
                 rivals.setdefault(one.id, Rival(one.id, one.fit, held | dict(one.candidate.shape)))
         if len(rivals) > 1:
             return [*rivals.values()]
-        held |= accepted.best.candidate.shape
     return []
 
 

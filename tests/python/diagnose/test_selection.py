@@ -1,0 +1,66 @@
+"""Effects that were accepted early are chosen anew beside those that were accepted later."""
+
+import numpy as np
+import pytest
+from ctcr import settings
+from ctcr.diagnose.candidates import candidates
+from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.selection import Selection
+from ctcr.model.noise import noise_of_readings
+from hidden_sessions import measured
+
+OFFSET = {"effects.sensor_offset.x": 8e-4, "effects.sensor_offset.y": -5e-4}
+BENT = {"effects.straight_curvature.bend_x.1": 0.6, "effects.straight_curvature.bend_x.2": -0.4}
+WEIGHT = {"effects.tip_load.mass": 3e-3}
+
+
+def selected(robot, hidden, *offered, seed=3):
+    """What was accepted when only the effects `offered` could be, one group after the other, and then all."""
+    made = measured(robot, np.random.default_rng(seed), hidden)
+    engine = Engine(robot, made, noise_of_readings(robot, made), np.ones(len(made), bool), tolerance=settings.COARSE)
+    pool, _ = candidates(robot, made)
+    chosen = Selection(engine)
+    chosen.fit = chosen.calibrated = chosen.calibrate([], {})
+    for ids in offered:
+        chosen.last = None
+        chosen.grow([c for c in pool if c.id in ids])
+    before = [a.id for a in chosen.accepted]
+    chosen.revise(pool)
+    return before, chosen
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_exchange(robot, seed):
+    """An effect that imitated the right one gives way to it, whatever was accepted in between."""
+    before, chosen = selected(robot, OFFSET | BENT, ["tip_load"], ["sensor_offset"], seed=seed)
+    assert before == ["tip_load", "sensor_offset"]
+    assert {a.id for a in chosen.accepted} == {"sensor_offset", "straight_curvature"}
+    (changed,) = [round_ for round_ in chosen.rounds if round_.anew]
+    assert changed.anew == "tip_load" and changed.accepted.id == "straight_curvature"
+
+
+def test_superfluous(robot):
+    """An effect that later ones made superfluous is dropped, and the round says so."""
+    before, chosen = selected(robot, BENT, ["tip_load"], ["straight_curvature"])
+    assert before == ["tip_load", "straight_curvature"]
+    assert [a.id for a in chosen.accepted] == ["straight_curvature"]
+    assert any(round_.anew == "tip_load" and "tip_load gains only" in round_.why_not for round_ in chosen.rounds)
+
+
+def test_right_ones_stay(robot):
+    """Right effects stay, in whatever order they were accepted."""
+    for order in (["tip_load"], ["sensor_offset"]), (["sensor_offset"], ["tip_load"]):
+        before, chosen = selected(robot, OFFSET | WEIGHT, *order)
+        assert [a.id for a in chosen.accepted] == before == [identity for (identity,) in order]
+        assert chosen.last and chosen.last.accepted is None
+        assert all(a.log_evidence > settings.DECISIVE for a in chosen.accepted)
+
+
+def test_weak(robot):
+    """The effect that is least probably a cause beside the others is dropped, and none where all surely are causes."""
+    _, chosen = selected(robot, OFFSET | WEIGHT, ["sensor_offset"], ["tip_load"])
+    assert len(chosen.accepted) == 2 and not chosen._without_weakest()
+    chosen.accepted[1].beside = 0.01
+    weakest = chosen.accepted[1].id
+    assert chosen._without_weakest() and weakest not in [a.id for a in chosen.accepted]
+    assert len(chosen.accepted) == 1 and not any(weakest in name for name in chosen.fit.names)
