@@ -35,13 +35,13 @@ def waterfall(figure, d: Diagnosis) -> None:
 
 def candidates(figure, d: Diagnosis) -> bool | None:
     """Log evidence of every candidate in each round; what the data cannot tell apart is boxed."""
-    rounds = [r for r in d.rounds if r.tried]
+    rounds = [(number, r) for number, r in enumerate(d.rounds, start=1) if r.tried]
     if not rounds:
         return False
     panels = figure.subplots(-(-len(rounds) // PANELS), min(len(rounds), PANELS), squeeze=False).ravel()
     for axes in panels[len(rounds) :]:
         axes.set_visible(False)
-    for number, (axes, round_) in enumerate(zip(panels, rounds, strict=False), start=1):
+    for axes, (number, round_) in zip(panels, rounds, strict=False):
         shown = round_.best[:CANDIDATES]
         for i, one in enumerate(shown):
             value = one.linear if one.refit is None else one.refit
@@ -54,7 +54,10 @@ def candidates(figure, d: Diagnosis) -> bool | None:
         axes.set_xscale("symlog", linthresh=10)
         largest = max(10.0, *(max(one.linear, one.score) for one in shown))
         axes.set(
-            xlim=(0, 8 * largest), xticks=[], xlabel="log evidence over none", title=f"round {number}{round_.place}"
+            xlim=(0, 8 * largest),
+            xticks=[],
+            xlabel="log evidence over none",
+            title=f"round {number}\n{round_.place.replace('_', ' ')}",
         )
 
 

@@ -111,8 +111,8 @@ def _candidates(d: Diagnosis) -> str:
         "both ways, these data cannot tell the two apart."
     )
     apart = figure(figures.overlap, d, 5.2, 4.2, text)
-    why = next((r.why_not for r in reversed(d.rounds) if r.why_not), "")
-    below = f'<div class="pair">{apart}<div>{paragraph(why)}</div></div>'
+    why = (f"Round {number}. {r.why_not}" for number, r in enumerate(d.rounds, start=1) if r.why_not)
+    below = f'<div class="pair">{apart}<div>{"".join(map(paragraph, why))}</div></div>'
     return f"<h2>All candidates</h2>{drawn}{below}" if drawn else ""
 
 

@@ -62,13 +62,14 @@ class Round:
 
     @property
     def place(self) -> str:
-        """For titles: in whose place it chose."""
-        return f", in the place of {self.anew}" if self.anew else ""
+        """In whose place it chose, for titles."""
+        return f"in the place of {self.anew}" if self.anew else "a further effect"
 
     @property
     def why_not(self) -> str:
         """A sentence; empty where an effect was accepted."""
-        return f"Nothing accepted: {self.reason}." if self.reason else ""
+        what = f"Dropped {self.anew}" if self.anew else "Nothing accepted"
+        return f"{what}: {self.reason}." if self.reason else ""
 
     @property
     def best(self) -> list[CandidateFit]:
@@ -161,7 +162,7 @@ def run_round(
     if not screened:
         return Round(before, [], reason="no effect is left to try")
     refits = Refits(engine, before, fixed)
-    chosen = refits.in_reach(worth_a_refit(screened))
+    chosen = refits.in_reach(rivals_of(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all([*chosen, known] if known else chosen)
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
@@ -215,6 +216,12 @@ def worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
         if len(same) < settings.REFIT_VARIANTS and (same or len({other.id for other in chosen}) < settings.REFITS):
             chosen.append(one)
     return chosen
+
+
+def rivals_of(known: CandidateFit, screened: list[CandidateFit]) -> list[CandidateFit]:
+    """Those worth a refit of other effects which, linearised, contend with what is known of one."""
+    least = settings.CONTENDS * max((one.linear for one in screened if one.id == known.id), default=-np.inf)
+    return [one for one in worth_a_refit(screened) if one.id != known.id and one.linear > least]
 
 
 @dataclass

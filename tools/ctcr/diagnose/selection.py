@@ -9,7 +9,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.form_errors import log_odds_of_cause
+from ctcr.diagnose.form_errors import log_odds_of_cause, log_odds_of_completeness
 from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
@@ -90,7 +90,12 @@ class Selection:
 
     def revise(self, pool: list[Candidate]) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
-        chosen before the later ones were known. Then drops those that are not surely causes."""
+        chosen before the later ones were known. Then drops those that are not surely causes.
+
+        Which effects imitate a cause outside the catalogue best matters to nobody.
+        """
+        if len(self.accepted) < 2 or log_odds_of_completeness(self.fits) < 0:
+            return
         seen: list[set[str]] = []
         surely = False
         while (found := {a.id for a in self.accepted}) not in seen:
@@ -115,6 +120,8 @@ class Selection:
             return False
         self.accepted = [a for a in self.accepted if a is not weakest]
         self.fit = self.calibrate(self.fits, values_of(self.fit))
+        why = f"it surely explains only {max(weakest.beside, 0.0):.0%} of what the others leave"
+        self.history.append(Round(self.fit.without_readings(), [], anew=weakest.id, reason=why))
         return True
 
     def _chosen_anew(self, a: Accepted, pool: list[Candidate]) -> bool:
@@ -129,7 +136,7 @@ class Selection:
         a.log_evidence = max(one.score for one in round_.tried if one.id == a.id)
         if a.log_evidence < settings.DECISIVE:
             round_.accepted, round_.ids = None, []
-            round_.reason = f"{a.id} gains only {a.log_evidence:.1f} in log evidence beside the others"
+            round_.reason = f"beside the others it gains only {a.log_evidence:.1f} in log evidence"
             there = replace(self, accepted=others)
             there.fit = there.calibrate(there.fits, values_of(without))
         elif round_.accepted is None:
