@@ -4,14 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from ctcr.diagnose.form_errors import (
-    form_error,
-    left_by,
-    log_density_of_errors,
-    log_odds_of_cause,
-    log_odds_of_completeness,
-    log_odds_of_mend,
-)
+from ctcr.diagnose.form_errors import form_error, left_by, log_density_of_errors, log_odds_of_cause, log_odds_of_mend
 from scipy.integrate import quad
 
 
@@ -52,12 +45,3 @@ def test_odds():
         assert np.all(np.diff(odds) >= 0) and odds[0] < 0 < odds[-1]
     assert log_odds_of_mend(0.5, little) > log_odds_of_mend(0.5, much)
     assert log_odds_of_mend(0.5, [Found("clearance", 0.9)]) > log_odds_of_mend(0.5, [Found("softening", 0.9)])
-
-
-def test_completeness():
-    """The more effects explain, the likelier they are all that acts; what each of several explains counts."""
-    odds = [log_odds_of_completeness([Found("softening", share), Found("tip_load", 0.8)]) for share in SHARES]
-    assert np.all(np.diff(odds) >= 0) and odds[0] < 0 < odds[-1]
-    whole, parts = [Found("softening", 0.99)], [Found("softening", 0.9), Found("tip_load", 0.9)]
-    assert left_by(whole) == pytest.approx(left_by(parts))
-    assert log_odds_of_completeness(parts) < log_odds_of_completeness(whole)

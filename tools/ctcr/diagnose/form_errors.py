@@ -63,15 +63,6 @@ def log_odds_of_imitation(share: float) -> float:
     return outside + log_density_of_cause(1 - share) - log_density_of_cause(share)
 
 
-def log_odds_of_completeness(found: Sequence[Explaining]) -> float:
-    """Log odds that these effects are causes and nothing else acts, over a cause outside the catalogue that all of them
-    imitate: by what they leave, and by what each explains."""
-    complete = log_density_of_errors(left_by(found), form_error(found))
-    return (
-        complete - math.log(settings.OUTSIDE_CATALOGUE) - sum(log_density_of_cause(1 - one.explained) for one in found)
-    )
-
-
 def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
     """Log odds that an effect, which explains this share of what those before it left, is a cause: over one that mends
     their forms, where there are any, and over one that imitates a cause outside the catalogue."""

@@ -9,7 +9,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.form_errors import log_odds_of_cause, log_odds_of_completeness
+from ctcr.diagnose.form_errors import log_odds_of_cause
 from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
@@ -90,12 +90,7 @@ class Selection:
 
     def revise(self, pool: list[Candidate]) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
-        chosen before the later ones were known. Then drops those that are not surely causes.
-
-        Which effects imitate a cause outside the catalogue best matters to nobody.
-        """
-        if len(self.accepted) < 2 or log_odds_of_completeness(self.fits) < 0:
-            return
+        chosen before the later ones were known. Then drops those that are not surely causes."""
         seen: list[set[str]] = []
         surely = False
         while (found := {a.id for a in self.accepted}) not in seen:
