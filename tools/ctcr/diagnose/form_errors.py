@@ -56,17 +56,21 @@ def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
     return by_errors + log_density_of_mend(share) - log_density_of_cause(share)
 
 
-def log_odds_of_imitation(share: float) -> float:
-    """Log odds of an effect that imitates a further cause outside the catalogue over a cause, by the share that it
-    explains of what was left."""
-    outside = math.log(settings.OUTSIDE_CATALOGUE * settings.SECOND_CAUSE)
-    return outside + log_density_of_cause(1 - share) - log_density_of_cause(share)
+def log_odds_of_imitation(shares: Sequence[float]) -> float:
+    """Log odds that effects, from one of them to the last, imitate a cause outside the catalogue over that they are
+    causes: by the shares which they explain of what was left, one after the other."""
+    odds, likeliest = 0.0, -math.inf
+    for k, share in reversed([*enumerate(shares)]):
+        odds += log_density_of_cause(1 - share) - log_density_of_cause(share)
+        prior = settings.OUTSIDE_CATALOGUE * (settings.SECOND_CAUSE if k else 1.0)
+        likeliest = max(likeliest, math.log(prior) + odds)
+    return likeliest
 
 
 def log_odds_of_cause(share: float, before: Sequence[Explaining]) -> float:
     """Log odds that an effect, which explains this share of what those before it left, is a cause: over one that mends
     their forms, where there are any, and over one that imitates a cause outside the catalogue."""
-    imitation = log_odds_of_imitation(share)
+    imitation = log_odds_of_imitation([share])
     return -max(log_odds_of_mend(share, before), imitation) if before else -imitation
 
 

@@ -90,6 +90,10 @@ class Round:
                     found |= {name: value for name, value in values_of(one.fit).items() if name in own}
         return found
 
+    def reject(self, reason: str) -> None:
+        """Accepts nothing after all."""
+        self.accepted, self.ids, self.reason = None, [], reason
+
     def release_memory(self) -> None:
         """Drops the readings of its fits: with many rows, a round would need as much memory as everything else."""
         self.before = self.before.without_readings()
@@ -158,10 +162,14 @@ def run_round(
     if accepted:  # what a refit without a further effect finds too is no gain of one
         again = engine.fit_like(before, names, fixed=fixed, tolerance=settings.COARSE)
         before = max(before, again, key=lambda fit: fit.log_evidence)
-    screened = screen(*engine.thinned(before), candidates, fixed)
+    thin, at = engine.thinned(before)
+    screened = screen(thin, at, candidates, fixed)
     if not screened:
         return Round(before, [], reason="no effect is left to try")
     refits = Refits(engine, before, fixed)
+    if known:
+        own = thin.derivatives(at, known.candidate.names, fixed | dict(known.candidate.shape))
+        known = replace(known, gain=segment_delays.linearised(thin, at).gain(at.whiten(own)))
     chosen = refits.in_reach(rivals_of(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all([*chosen, known] if known else chosen)
     if accepted:
@@ -220,7 +228,7 @@ def worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
 
 def rivals_of(known: CandidateFit, screened: list[CandidateFit]) -> list[CandidateFit]:
     """Those worth a refit of other effects which, linearised, contend with what is known of one."""
-    least = settings.CONTENDS * max((one.linear for one in screened if one.id == known.id), default=-np.inf)
+    least = settings.CONTENDS * max(one.linear for one in (known, *screened) if one.id == known.id)
     return [one for one in worth_a_refit(screened) if one.id != known.id and one.linear > least]
 
 

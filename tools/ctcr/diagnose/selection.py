@@ -9,7 +9,7 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.form_errors import log_odds_of_cause
+from ctcr.diagnose.form_errors import log_odds_of_cause, log_odds_of_imitation
 from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
@@ -79,6 +79,9 @@ class Selection:
         while not self.finished:
             taken = {identity for a in self.accepted for identity in a.ids}
             round_ = self._round([c for c in pool if c.id not in taken], surely)
+            best = round_.accepted
+            if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
+                round_.reject(f"{best.id} and others before it more probably imitate a cause outside the catalogue")
             if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
                 return
             if round_.accepted is None:
@@ -88,19 +91,19 @@ class Selection:
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
 
-    def revise(self, pool: list[Candidate]) -> None:
+    def revise(self, pool: list[Candidate], more: float = 1.0) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
-        chosen before the later ones were known. Then drops those that are not surely causes."""
+        chosen before the later ones were known. Then drops those that are not surely causes. more: as for grow()"""
         seen: list[set[str]] = []
         surely = False
         while (found := {a.id for a in self.accepted}) not in seen:
             seen.append(found)
             if any(self._chosen_anew(a, pool) for a in self.accepted[:-1]):
                 self.last = None
-                self.grow(pool, surely=surely)
+                self.grow(pool, more, surely)
             elif len(found) > 1 and self._without_weakest():
                 surely, self.last = True, None
-                self.grow(pool, surely=surely)
+                self.grow(pool, more, surely)
         if len(seen) > 1:
             self._follow()
 
@@ -130,8 +133,7 @@ class Selection:
         round_.anew = a.id
         a.log_evidence = max(one.score for one in round_.tried if one.id == a.id)
         if a.log_evidence < settings.DECISIVE:
-            round_.accepted, round_.ids = None, []
-            round_.reason = f"beside the others it gains only {a.log_evidence:.1f} in log evidence"
+            round_.reject(f"beside the others it gains only {a.log_evidence:.1f} in log evidence")
             there = replace(self, accepted=others)
             there.fit = there.calibrate(there.fits, values_of(without))
         elif round_.accepted is None:
@@ -253,7 +255,9 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         chosen.engine = replace(coarse, rows=few)
         chosen.fit = chosen.calibrate([], {})
         start_plain = values_of(chosen.fit)
-        chosen.grow(pool, more=np.sum(engine.fitted) / np.sum(few))
+        more = float(np.sum(engine.fitted) / np.sum(few))
+        chosen.grow(pool, more)
+        chosen.revise(pool, more)
         start = values_of(chosen.fit)
         coarse.measurements, chosen.engine = chosen.engine.measurements, coarse
     chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
@@ -262,7 +266,8 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         chosen.fit = chosen.calibrate(chosen.fits, start)
     if not chosen.finished:
         chosen.grow(pool)
-    chosen.revise(pool)
+    if few is None:
+        chosen.revise(pool)
     engine.measurements, chosen.engine = coarse.measurements, engine
     chosen.calibrated, start = chosen.calibrate([], values_of(chosen.calibrated)), values_of(chosen.fit)
     engine.robust = coarse.robust
