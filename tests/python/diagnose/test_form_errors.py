@@ -4,7 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from ctcr.diagnose.form_errors import form_error, left_by, log_density_of_errors, log_odds_of_cause, log_odds_of_mend
+from ctcr.diagnose.form_errors import (
+    form_error,
+    left_by,
+    log_density_of_errors,
+    log_odds_of_cause,
+    log_odds_of_imitation,
+    log_odds_of_mend,
+)
 from scipy.integrate import quad
 
 
@@ -45,3 +52,13 @@ def test_odds():
         assert np.all(np.diff(odds) >= 0) and odds[0] < 0 < odds[-1]
     assert log_odds_of_mend(0.5, little) > log_odds_of_mend(0.5, much)
     assert log_odds_of_mend(0.5, [Found("clearance", 0.9)]) > log_odds_of_mend(0.5, [Found("softening", 0.9)])
+
+
+def test_imitation():
+    """Effects are the likelier to imitate an unknown cause, the less each explains; one large share clears no other."""
+    for k in range(3):
+        odds = [log_odds_of_imitation([*np.full(k, 0.4), share, *np.full(2 - k, 0.4)]) for share in SHARES]
+        assert np.all(np.diff(odds) <= 0) and odds[0] > odds[-1]
+    weak = [log_odds_of_imitation(np.full(count, 0.3)) for count in range(2, 6)]
+    assert np.all(np.diff(weak) > 0)
+    assert log_odds_of_imitation([0.99, 0.1, 0.1]) > 0 > log_odds_of_imitation([0.99, 0.9, 0.9])

@@ -1,10 +1,13 @@
 """Effects that were accepted early are chosen anew beside those that were accepted later."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from ctcr import settings
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine
+from ctcr.diagnose.round import run_round
 from ctcr.diagnose.selection import Selection
 from ctcr.model.noise import noise_of_readings
 from hidden_sessions import measured
@@ -67,3 +70,17 @@ def test_weak(robot):
     weakest = chosen.accepted[1].id
     assert chosen._without_weakest() and weakest not in [a.id for a in chosen.accepted]
     assert len(chosen.accepted) == 1 and not any(weakest in name for name in chosen.fit.names)
+
+
+def test_known_in_a_round(robot):
+    """A known candidate is compared with the others at the readings of the round, even if it was found at fewer; and it
+    needs no others."""
+    _, chosen = selected(robot, OFFSET | WEIGHT, ["sensor_offset"], ["tip_load"])
+    one, other = chosen.accepted
+    short = replace(one.best.gain, signal=one.best.gain.signal[:7], columns=one.best.gain.columns[:7])
+    known = replace(one.best, fit=chosen.fit, gain=short)
+    pool, _ = candidates(robot, chosen.engine.measurements)
+    for offered in ([c for c in pool if c.id in ("field_distortion", "frame_drift", "sensor_offset")], []):
+        round_ = run_round(chosen.engine, chosen._fit_with([other]), offered, [other.best], known)
+        assert round_.accepted.id == one.id
+        assert len({len(tried.gain.signal) for tried in round_.tried}) == 1

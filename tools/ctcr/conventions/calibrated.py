@@ -65,7 +65,7 @@ class Calibrated:
 
     def _exceeds(self, typical: float) -> bool:
         """Whether the likelihood of a smaller typical error [m] outweighs the prior odds against a cause."""
-        return 3 * len(self.error) * np.log(self.typical / typical) > settings.CONVENTION_DECISIVE
+        return 3 * len(self.error) * np.log(self.typical / typical) > settings.DECISIVE + settings.CONVENTION_UNLIKELY
 
     @property
     def rms_mm(self) -> float:

@@ -57,8 +57,8 @@ def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
 
 
 def log_odds_of_imitation(shares: Sequence[float]) -> float:
-    """Log odds that effects, from one of them to the last, imitate a cause outside the catalogue over that they are
-    causes: by the shares which they explain of what was left, one after the other."""
+    """Log odds that the effects from some point on imitate a cause outside the catalogue, over being causes: by the
+    share that each explains of what those before it left."""
     odds, likeliest = 0.0, -math.inf
     for k, share in reversed([*enumerate(shares)]):
         odds += log_density_of_cause(1 - share) - log_density_of_cause(share)

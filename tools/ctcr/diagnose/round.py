@@ -40,7 +40,7 @@ class CandidateFit:
 
     @property
     def surely_explained(self) -> float:
-        """What it explains, less a standard deviation."""
+        """The fraction that it explains, less one standard deviation."""
         return self.explained - self.explained_sd
 
     @property
@@ -56,13 +56,13 @@ class Round:
     ids: list[str] = field(default_factory=list)  # the accepted effect and those that the data cannot tell from it
     margin: float = np.inf  # log evidence over the best candidate outside these
     reason: str = ""  # why nothing was accepted
-    anew: str = ""  # id of the effect that was accepted earlier, and in whose place this round chose
+    anew: str = ""  # id of the effect accepted earlier whose place was open in this round
     needed: float = np.inf  # log evidence below which nothing is accepted in any case
     is_spurious: bool = False  # whether the best candidate surely explains too little
 
     @property
     def place(self) -> str:
-        """In whose place it chose, for titles."""
+        """Whose place was open, for titles."""
         return f"in the place of {self.anew}" if self.anew else "a further effect"
 
     @property
@@ -155,7 +155,7 @@ def run_round(
     """Screens all candidates, refits the best jointly with calibration and accepted effects, and decides.
 
     known    a candidate that takes part in any case, with its fit at the weights and noise of the fit before
-    surely   as in decide()
+    surely   as for decide()
     """
     engine.progress("screening all candidates")
     names, fixed = parameters_of(accepted)
@@ -164,13 +164,13 @@ def run_round(
         before = max(before, again, key=lambda fit: fit.log_evidence)
     thin, at = engine.thinned(before)
     screened = screen(thin, at, candidates, fixed)
-    if not screened:
+    if not screened and known is None:
         return Round(before, [], reason="no effect is left to try")
     refits = Refits(engine, before, fixed)
     if known:
         own = thin.derivatives(at, known.candidate.names, fixed | dict(known.candidate.shape))
         known = replace(known, gain=segment_delays.linearised(thin, at).gain(at.whiten(own)))
-    chosen = refits.in_reach(rivals_of(known, screened) if known else worth_a_refit(screened))
+    chosen = refits.in_reach(contenders(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all([*chosen, known] if known else chosen)
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
@@ -178,7 +178,8 @@ def run_round(
     tried += [one for one in screened if one.candidate not in fitted]
     tried.sort(key=lambda one: (-one.score, -one.linear))
     round_ = Round(before, tried)
-    decide(round_, len({c.id for c in candidates}), accepted, joint.rejects(before), surely)
+    n_effects = len({one.id for one in (*candidates, *tried)})
+    decide(round_, n_effects, accepted, joint.rejects(before), surely)
     round_.release_memory()
     return round_
 
@@ -226,8 +227,8 @@ def worth_a_refit(screened: list[CandidateFit]) -> list[CandidateFit]:
     return chosen
 
 
-def rivals_of(known: CandidateFit, screened: list[CandidateFit]) -> list[CandidateFit]:
-    """Those worth a refit of other effects which, linearised, contend with what is known of one."""
+def contenders(known: CandidateFit, screened: list[CandidateFit]) -> list[CandidateFit]:
+    """Other effects worth a refit whose linearised gain contends with that of a known one."""
     least = settings.CONTENDS * max(one.linear for one in (known, *screened) if one.id == known.id)
     return [one for one in worth_a_refit(screened) if one.id != known.id and one.linear > least]
 
@@ -350,7 +351,7 @@ def decide(
     """Accepts the best candidate, with all that the data cannot tell from it, or says why not.
 
     n_effects that were looked at; is_rejected: whether the noise as stated does not explain the residual; surely:
-    whether only that counts which a candidate surely explains.
+    whether only the share counts that a candidate surely explains.
     """
     missed = settings.REJECTION_MISSED  # where the test rejects nothing
     round_.needed = settings.DECISIVE + np.log(n_effects)
@@ -375,7 +376,7 @@ def decide(
         round_.is_spurious = log_odds_of_cause(best.explained + 2 * best.explained_sd, accepted) < 0
         rather = "imitates a cause outside the catalogue"
         if accepted:
-            rather = f"mends the forms of the effects before it, or {rather}"
+            rather = f"makes up for errors in the forms of the effects before it, or {rather}"
         round_.reason = (
             f"the best candidate, {best.id}, explains only {best.explained:.0%} of the unexplained chi-square: more "
             f"probably it {rather}"

@@ -45,7 +45,7 @@ class Selection:
     """Effects that were accepted so far, the rounds that led to them, and the fits without and with them."""
 
     engine: Engine
-    history: list[Round] = field(default_factory=list)  # rounds that changed what is accepted
+    history: list[Round] = field(default_factory=list)  # rounds that changed what is accepted, or what is as likely
     last: Round | None = None  # that accepted nothing
     accepted: list[Accepted] = field(default_factory=list)
     calibrated: joint.Fit | None = None  # without effects
@@ -74,14 +74,15 @@ class Selection:
         """Accepts one effect after the other.
 
         more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
-        left to them. surely: as in decide()
+        left to them. surely: as for decide()
         """
         while not self.finished:
             taken = {identity for a in self.accepted for identity in a.ids}
             round_ = self._round([c for c in pool if c.id not in taken], surely)
             best = round_.accepted
             if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
-                round_.reject(f"{best.id} and others before it more probably imitate a cause outside the catalogue")
+                beside = "together with effects before it, " if self.accepted else ""
+                round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
             if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
                 return
             if round_.accepted is None:
@@ -123,10 +124,10 @@ class Selection:
         return True
 
     def _chosen_anew(self, a: Accepted, pool: list[Candidate]) -> bool:
-        """Whether another effect takes the place of this one, or none needs to."""
+        """Whether the place of this effect was given to another one, or to none."""
         self.engine.progress(f"without {a.id}")
         others = [b for b in self.accepted if b is not a]
-        without = self._prefix(others, settings.FIRST_ITERATIONS)  # the round goes on from there
+        without = self._fit_with(others, settings.FIRST_ITERATIONS)  # the round goes on from there
         taken, rest = {b.id for b in others}, [b.best for b in others]
         known = replace(a.best, fit=self.fit)
         round_ = run_round(self.engine, without, [c for c in pool if c.id not in taken], rest, known)
@@ -155,7 +156,7 @@ class Selection:
         self.history.append(round_)
         return True
 
-    def _prefix(self, some: list[Accepted], max_iterations: int = settings.ITERATIONS) -> joint.Fit:
+    def _fit_with(self, some: list[Accepted], max_iterations: int = settings.ITERATIONS) -> joint.Fit:
         """Calibration with some of the accepted effects, at the weights and noise of the fit with all."""
         names, fixed = parameters_of([a.best for a in some])
         options = {"fixed": fixed, "tolerance": settings.COARSE, "near": False, "max_iterations": max_iterations}
@@ -163,8 +164,9 @@ class Selection:
 
     def _follow(self) -> None:
         """The residual with one effect after the other, in the order in which they stand now."""
-        for k, a in enumerate(self.accepted, start=1):
-            a.residual = self._prefix(self.accepted[:k]).residual[:, :3]
+        fits = [self._fit_with(self.accepted[:k]) for k in range(1, len(self.accepted))]
+        for a, fit in zip(self.accepted, [*fits, self.fit], strict=True):
+            a.residual = fit.residual[:, :3]
 
     def _round(self, open_to: list[Candidate], surely: bool) -> Round:
         """A round before which no prior was widened for what one of its candidates may have done; where it accepts

@@ -75,7 +75,7 @@ def _candidates(number_: int, round_: Round) -> Any:
         refitted = [f"{one.refit:.1f}", f"{one.explained:.0%}"] if one.refit is not None else ["", ""]
         remark = "accepted" if one is round_.accepted else "as likely" if one.id in round_.ids else ""
         rows.append([one.id, one.candidate.summary, f"{one.linear:.1f}", *refitted, remark])
-    title = f"Round {number_}, {round_.place}: each fitted together with the calibration"
+    title = f"Round {number_}, {round_.place}: candidates, each fitted together with the calibration"
     return output.table(title, ["effect", "parameters", "linear", "fit", "explained", ""], rows, text=(0, 1, 5))
 
 
