@@ -47,8 +47,8 @@ public:
   [[nodiscard]] State state() const noexcept { return {of_torsion(effects_).history.state, here_.torsion}; }
 
   /// The equilibrium of the sample that was solved last, if it has one.
-  [[nodiscard]] std::optional<TipGuess<N>> equilibrium() const noexcept {
-    return ws_.warm ? std::optional(ws_.guess) : std::nullopt;
+  [[nodiscard]] std::optional<WarmStart<N>> equilibrium() const noexcept {
+    return ws_.warm ? std::optional<WarmStart<N>>(ws_) : std::nullopt;
   }
 
   /// Goes on to sample k with the torsion of the path, and forgets the equilibria before it.
@@ -68,7 +68,7 @@ public:
   /// @param path    the torsion of its samples is not read: other threads may be solving them
   /// @param start   where to look for the equilibrium; nothing: near that of the sample before
   void solve(const System<N, Fx>& system, const RecordedRow<N>& sample, const RelativeTorsion<N>& given,
-             const Path<N, double>& path, std::size_t k, const std::optional<TipGuess<N>>& start) noexcept {
+             const Path<N, double>& path, std::size_t k, const std::optional<WarmStart<N>>& start) noexcept {
     constexpr int most = 40;  // equilibria of a sample
     if (start) ws_.begin_at(*start);
     begin(path, k);

@@ -28,7 +28,7 @@ public:
   /// @param equilibria  of all samples: where to look for them, then where they are
   /// @param variables   as PathSolver::linearise() takes them; without any, nothing is linearised
   SolvedSamples(const System<N, Fx>& system, std::span<const RecordedRow<N>> rows, RecordedPath<N>& path,
-                std::span<std::optional<TipGuess<N>>> equilibria, const Variables<N, Fx>& variables, ThreadPool& pool)
+                std::span<std::optional<WarmStart<N>>> equilibria, const Variables<N, Fx>& variables, ThreadPool& pool)
     : system_(system), rows_(rows), path_(path), equilibria_(equilibria), variables_(variables), pool_(pool) {
     // Readings show a fraction of the torsion: it may be less exact than these.
     system_.settings.tolerance = std::max(system_.settings.tolerance, tolerance);
@@ -92,7 +92,7 @@ private:
   System<N, Fx> system_;
   std::span<const RecordedRow<N>> rows_;
   RecordedPath<N>& path_;
-  std::span<std::optional<TipGuess<N>>> equilibria_;
+  std::span<std::optional<WarmStart<N>>> equilibria_;
   const Variables<N, Fx>& variables_;
   ThreadPool& pool_;
   std::size_t first_ = 0;

@@ -95,7 +95,8 @@ Response<T> response(const Material<S>& m, const D& dx, const D& dy) noexcept {
   T k = as<T>(m.bending_stiffness);
   if (value(m.softening) == 0 && !is_dual<T>) return {{k * e[0], k * e[1]}, stiffness(m, 1)};
   const T z = dx * e[0] + dy * e[1];
-  const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness), is_dual<T>);
+  const bool by_shape = !vanishes(as<T>(m.sharpness) - value(m.sharpness));
+  const Left left = stiffness_left(value(z), value(m.softening), value(m.plateau), value(m.sharpness), by_shape);
   const double loss = 2 * value(m.bending_stiffness) * left.by_z, x = value(e[0]), y = value(e[1]);
   Slope slope = stiffness(m, left.f);
   slope += {loss * x * x, loss * x * y, loss * y * y};

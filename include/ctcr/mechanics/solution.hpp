@@ -35,33 +35,44 @@ struct Solution {
   [[nodiscard]] Pose pose() const noexcept { return {rotation, position}; }
 };
 
-/// Scratch and warm start of one thread. Reused from call to call; nothing is allocated.
+/// Where a solve may begin: a guess, and what is known of the equilibrium there. A solve nearby does not check that again,
+/// be it of other joints, loads or parameters of the robot.
 template <int N>
-struct Workspace {
+struct WarmStart {
   TipGuess<N> guess;
   Joints<N> q;  ///< joints and load that the guess belongs to
   TipLoad load;
-  bool warm = false;          ///< whether the guess may be used
-  bool knows_joints = false;  ///< whether the change of the guess with the joints is known
-  bool knows_load = false;    ///< and with the load
-  bool stable = false;        ///< whether the guess describes a stable equilibrium
-  Steps<N> steps;             ///< integration steps that the guess belongs to
+  bool stable = false;  ///< whether the guess describes a stable equilibrium
+  Steps<N> steps;       ///< integration steps that the guess belongs to
   /// Error of the tip position by these steps [m], and how far the robot has moved since it was found: turns of the tip
   /// and of the tubes [rad], travel as a part of the robot's length.
   double integration_error = std::numeric_limits<double>::infinity(), moved = 0;
+};
+
+/// Scratch and warm start of one thread. Reused from call to call; nothing is allocated.
+template <int N>
+struct Workspace : WarmStart<N> {
+  bool warm = false;          ///< whether the guess may be used
+  bool knows_joints = false;  ///< whether the change of the guess with the joints is known
+  bool knows_load = false;    ///< and with the load
   /// Change of the unknowns (turn of the tip in base axes, psi_2..N) by beta, alpha, force, moment.
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 
   void reset() noexcept {
-    warm = knows_joints = knows_load = stable = false;
-    steps = {};
-    integration_error = std::numeric_limits<double>::infinity();
+    warm = knows_joints = knows_load = false;
+    static_cast<WarmStart<N>&>(*this) = {};
   }
-  /// Lets the next solve begin at a guess, whatever was solved before.
-  void begin_at(const TipGuess<N>& other) noexcept {
+  /// Lets the next solve begin there, whatever was solved before.
+  void begin_at(const WarmStart<N>& start) noexcept {
     reset();
-    guess = other;
+    static_cast<WarmStart<N>&>(*this) = start;
     warm = true;
+  }
+  /// The same of a guess of which nothing is known.
+  void begin_at(const TipGuess<N>& other) noexcept {
+    WarmStart<N> start;
+    start.guess = other;
+    begin_at(start);
   }
 };
 

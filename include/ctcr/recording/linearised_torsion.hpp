@@ -13,10 +13,10 @@ namespace ctcr {
 /// solve_friction() found it.
 template <int N>
 struct LinearisedTorsion {
-  std::vector<std::optional<TipGuess<N>>> equilibria{};  ///< at each sample; nothing: none was found
-  std::vector<int> variables{};                          ///< the parameters, by their indices in SystemParameters
-  Eigen::VectorXd values{};                              ///< theirs at the solution; empty: there is none yet
-  Eigen::MatrixXd derivatives{};                         ///< (contacts, variables x samples)
+  std::vector<std::optional<WarmStart<N>>> equilibria{};  ///< at each sample; nothing: none was found
+  std::vector<int> variables{};                           ///< the parameters, by their indices in SystemParameters
+  Eigen::VectorXd values{};                               ///< theirs at the solution; empty: there is none yet
+  Eigen::MatrixXd derivatives{};                          ///< (contacts, variables x samples)
 
   /// Derivatives at a sample: (contacts, variables).
   [[nodiscard]] auto at(std::size_t k) { return derivatives.middleCols(first(k), Eigen::Index(variables.size())); }

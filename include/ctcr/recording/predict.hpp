@@ -47,6 +47,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
   using S = Dual<1>;
   constexpr int iterations = 30;
   Status status = solve(out.model, out.q, out.load, ws, out.solution, settings);
+  bool kept_branch = out.solution.kept_branch;
   const Vec3 known = out.load.force;
   const auto effects = out.model.effects().template seeded<S, typename Fx::OnTip>(Constant<S>{});
   Vec3 added = Vec3::Zero(), change = Vec3::Zero();
@@ -54,6 +55,7 @@ Status solve_in_surroundings(Workspace<N>& ws, RecordedPrediction<N, Fx>& out, c
   if (push.force.isZero(0.0)) return status;
   for (int k = 0; k < iterations && has_equilibrium(status); ++k) {
     status = solve<Derivatives::compliance>(out.model, out.q, out.load, ws, out.solution, settings);
+    kept_branch = out.solution.kept_branch = kept_branch && out.solution.kept_branch;
     push = surrounding_force(effects, out.solution.position);
     if (push.force.isZero(0.0)) {  // pushed out: the solution lies between
       change *= 0.5;

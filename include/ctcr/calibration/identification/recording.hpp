@@ -15,14 +15,14 @@
 
 namespace ctcr {
 
-/// The solution of a row that was nearest to its reading.
+/// The equilibrium of a row that was nearest to its reading, of those on its branch the last one.
 template <int N>
 struct NearestEquilibrium {
-  TipGuess<N> guess;
+  WarmStart<N> start;
   double missed = std::numeric_limits<double>::infinity();  ///< |residual|^2 [m^2, rad^2]; infinite: none is known
 
-  void improve(const TipGuess<N>& other, double misses) noexcept {
-    if (misses <= missed) *this = {other, misses};
+  void improve(const WarmStart<N>& other, double misses, bool same_branch = false) noexcept {
+    if (same_branch || misses <= missed) *this = {other, std::min(misses, missed)};
   }
 };
 
@@ -30,8 +30,8 @@ struct NearestEquilibrium {
 ///
 /// A vector of parameters x holds values of SystemParameters<N, Fx>; those of a turn from the nominal frame are one
 /// rotation vector [rad]. Rows stand in the order in which they were recorded. Where a robot may rest in several
-/// equilibria, the reading tells which one it was in: each row starts from that of its solutions which was nearest to its
-/// reading. Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
+/// equilibria, the reading tells which one it was in: each row stays on the branch of that of its solutions which was
+/// nearest to its reading. Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
 /// @tparam Fx  the effects of the system
 template <int N, class Fx = Standard>
 class Recording {
@@ -96,7 +96,8 @@ public:
           residual.segment<6>(at) = ctcr::residual(measured_[i], w.prediction.reading);
           predicted_[i] = w.prediction.reading;
           const auto misses = residual.segment<6>(at).array().square();
-          equilibria_[i].improve(w.workspace.guess, misses.isFinite().select(misses, 0).sum());
+          equilibria_[i].improve(w.workspace, misses.isFinite().select(misses, 0).sum(),
+                                 w.prediction.solution.kept_branch);
         } else {
           residual.segment<6>(at).setConstant(std::numeric_limits<double>::quiet_NaN());
           if (jacobian) jacobian->middleRows<6>(at).setZero();
@@ -149,7 +150,7 @@ public:
   /// Takes over those of a recording of the same table, perhaps with other effects, where they are nearer.
   void begin_in(const std::vector<NearestEquilibrium<N>>& others) {
     if (others.size() != equilibria_.size()) return;
-    for (std::size_t i = 0; i < others.size(); ++i) equilibria_[i].improve(others[i].guess, others[i].missed);
+    for (std::size_t i = 0; i < others.size(); ++i) equilibria_[i].improve(others[i].start, others[i].missed);
   }
 
   /// T_tracker_sensor as predicted at the last call; meaningless in rows that were not solved.
@@ -170,7 +171,7 @@ private:
   bool solve_row(const System<N, Fx>& system, const HistoryOfRow& history, std::size_t i, Worker& w) noexcept {
     Workspace<N>& ws = w.workspace;
     if (std::isfinite(equilibria_[i].missed))
-      ws.begin_at(equilibria_[i].guess);
+      ws.begin_at(equilibria_[i].start);
     else if (ws.warm &&
              !detail::nearby(ws, Configuration<N>{joints(system.transmission, rows_[i].theta), rows_[i].load}))
       ws.reset();
