@@ -94,7 +94,8 @@ def built(folder: Path, headers: dict[str, str], program: str) -> str:
         ["cmake", "-G", "Ninja", "-S", ROOT, "-B", folder / "library", *off],
         ["cmake", "--install", folder / "library", "--prefix", installed],
         ["cmake", "-G", "Ninja", "-S", project, "-B", project / "build", f"-DCMAKE_PREFIX_PATH={installed}"]
-        + ["-DCMAKE_BUILD_TYPE=Unoptimised"],  # no flags of any type: half the time to compile
+        # Without the flags of any build type: a fraction of the time to compile.
+        + ["-DCMAKE_BUILD_TYPE=Unoptimised", "-DCMAKE_CXX_FLAGS=-DCTCR_FAST_COMPILE"],
         ["cmake", "--build", project / "build"],
         [project / "build" / "controller"],
     ]
