@@ -23,7 +23,7 @@ void agrees_with_eigenvalues(Random& random) {
     for (double& x : T.reshaped()) x = spread * uniform(random, -1, 1);
     T += Matrix::Identity();
     bool close_call = false, has_negative = false;
-    const Eigen::VectorXcd eigenvalues = Eigen::MatrixXd(T).eigenvalues();  // of one size: compiles fast
+    const Eigen::VectorXcd eigenvalues = Eigen::MatrixXd(T).eigenvalues();  // of any size: compiles once
     for (const std::complex<double>& x : eigenvalues) {
       close_call = close_call || (x.real() < 0.1 && std::abs(x.imag()) < 0.1 && x.imag() != 0) || std::abs(x) < 0.01;
       has_negative = has_negative || (x.imag() == 0 && x.real() < 0);

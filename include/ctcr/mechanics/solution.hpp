@@ -35,8 +35,8 @@ struct Solution {
   [[nodiscard]] Pose pose() const noexcept { return {rotation, position}; }
 };
 
-/// Where a solve may begin: a guess, and what is known of the equilibrium there. A solve nearby does not check that again,
-/// be it of other joints, loads or parameters of the robot.
+/// Where a solve may begin: a guess, and what is known of the equilibrium there. A solve nearby does not check that again.
+/// Joints, load and parameters of the robot may all have changed.
 template <int N>
 struct WarmStart {
   TipGuess<N> guess;
@@ -59,16 +59,16 @@ struct Workspace : WarmStart<N> {
   Eigen::Matrix<double, N + 2, 2 * N + 6> sensitivity = Eigen::Matrix<double, N + 2, 2 * N + 6>::Zero();
 
   void reset() noexcept {
-    warm = knows_joints = knows_load = false;
-    static_cast<WarmStart<N>&>(*this) = {};
+    begin_at(WarmStart<N>{});
+    warm = false;
   }
   /// Lets the next solve begin there, whatever was solved before.
   void begin_at(const WarmStart<N>& start) noexcept {
-    reset();
     static_cast<WarmStart<N>&>(*this) = start;
     warm = true;
+    knows_joints = knows_load = false;
   }
-  /// The same of a guess of which nothing is known.
+  /// The same for a guess of which nothing else is known.
   void begin_at(const TipGuess<N>& other) noexcept {
     WarmStart<N> start;
     start.guess = other;

@@ -15,11 +15,12 @@
 
 namespace ctcr {
 
-/// The equilibrium of a row that was nearest to its reading, of those on its branch the last one.
+/// The branch of a row's equilibria that came nearest to its reading.
 template <int N>
 struct NearestEquilibrium {
-  WarmStart<N> start;
-  double missed = std::numeric_limits<double>::infinity();  ///< |residual|^2 [m^2, rad^2]; infinite: none is known
+  WarmStart<N> start;  ///< the last solution on it
+  /// Smallest |residual|^2 on it [m^2, rad^2]; infinite: none is known.
+  double missed = std::numeric_limits<double>::infinity();
 
   void improve(const WarmStart<N>& other, double misses, bool same_branch = false) noexcept {
     if (same_branch || misses <= missed) *this = {other, std::min(misses, missed)};
@@ -30,8 +31,8 @@ struct NearestEquilibrium {
 ///
 /// A vector of parameters x holds values of SystemParameters<N, Fx>; those of a turn from the nominal frame are one
 /// rotation vector [rad]. Rows stand in the order in which they were recorded. Where a robot may rest in several
-/// equilibria, the reading tells which one it was in: each row stays on the branch of that of its solutions which was
-/// nearest to its reading. Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
+/// equilibria, the reading tells which one it was in: each row stays on the branch of the solution that was nearest to its
+/// reading. Answers do not depend on the number of threads. Not for several callers at once. Real time: no.
 /// @tparam Fx  the effects of the system
 template <int N, class Fx = Standard>
 class Recording {
@@ -145,7 +146,7 @@ public:
     solved_at_ = other.solved_at_;
   }
 
-  /// Of each row the solution that was nearest to its reading.
+  /// Of each row the branch that came nearest to its reading.
   [[nodiscard]] const std::vector<NearestEquilibrium<N>>& equilibria() const { return equilibria_; }
   /// Takes over those of a recording of the same table, perhaps with other effects, where they are nearer.
   void begin_in(const std::vector<NearestEquilibrium<N>>& others) {
