@@ -75,27 +75,27 @@ inline constexpr EffectInfo info{
         "with the tubes, with a load or without.",
     .measure = "Turn one tube against the others; load with different weights: a kink stays, a compliance grows.",
     .look_alikes = "entry_clearance softening sensor_offset",
-    .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709; law 2: beams in a bore",
+    .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709; law 1: beams in a bore",
     .form_error = 0.3,
-    .starts = {{{"law", 1.0}}, {{"law", 2.0}}},
+    .starts = {{{"law", 1.0}}},
 };
 inline constexpr std::array parameters{
-    EffectParameter{.name = "tilt",
-                    .unit = "rad",
-                    .neutral = 0,
-                    .sigma = 0.0087,
-                    .soft = {-0.03, 0.03},
-                    .hard = {-0.2, 0.2},
-                    .per_tube = true,
-                    .meaning =
-                        "tilt of the inner tubes at the tip of a tube (none at the innermost); with laws 0 and 1 "
-                        "at most"},
-    detail::saturation_moment.named("moment", "at which 76 % of the tilt is reached; with law 2 all of it"),
+    EffectParameter{
+        .name = "tilt",
+        .unit = "rad",
+        .neutral = 0,
+        .sigma = 0.0087,
+        .soft = {-0.03, 0.03},
+        .hard = {-0.2, 0.2},
+        .per_tube = true,
+        .meaning = "tilt of the inner tubes at the tip of a tube (none at the innermost); with law 0 at most"},
+    detail::saturation_moment.named("moment", "at which 76 % of the tilt is reached; with law 1 all of it"),
     detail::contact_compliance,
-    choice_of_law(3,
-                  "the moment along which the tubes lean, and how far: 0 the one that the inner tubes carry out of the "
-                  "outer tube, up to the tilt; 1 the one that the outer tube carries just before its end and hands "
-                  "over there, up to the tilt; 2 the latter, and the tilt grows with its square root"),
+    choice_of_law(
+        2,
+        "the moment along which the tubes lean, and how far: 0 the one that the inner tubes carry out of the "
+        "outer tube, up to the tilt; 1 the one that the outer tube carries just before its end and hands over "
+        "there, and the tilt grows with its square root"),
 };
 }  // namespace clearance
 
@@ -147,27 +147,59 @@ inline constexpr std::array parameters{
 };
 }  // namespace entry_clearance
 
-/// Where a tube ends, the tubes inside it tilt within its clearance: along the moment that they carry on, or along the one
-/// that the ending tube hands over to them. Without a load and beyond all curved parts the first one is zero; the second one
-/// is how hard the tubes bend each other.
+/// Where a tube ends, the tubes inside it tilt within its clearance: along the moment that they carry on (law 0), or along
+/// the one that the ending tube hands over to them (law 1). Without a load and beyond all curved parts the first one is
+/// zero; the second one is how hard the tubes bend each other.
 ///
-/// Law 2 is that of beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones
+/// Law 1 is that of beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones
 /// (EI = k together) there with the force F, and holds them l behind it, across the gap, with F l = |M|. Between, their
 /// curvatures part by c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the
-/// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)). `tools/oracle/bore.py`
-/// finds the same without these assumptions.
+/// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)).
+///
+/// Tubes that lean relieve their energy, E(M) with dE/dM = -(turn of the inner against the outer ones). So each tube
+/// feels the torque -dE/d(angle), which draws them to where they bend each other harder. Where within the lean a tube
+/// starts to curve or ends, M is that behind it by the weight exp(-4 distance / l). `tools/oracle/bore.py` finds the same
+/// without these assumptions.
 template <int N, class P = double>
 struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
 
   void breakpoint(Breakpoint<P, N>& b) const noexcept {
     if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
-    const double law = value(this->template get<3>());
-    const P& size = this->template get<1>();
-    const std::array<P, 2>& moment = law > 0.5 ? b.near_moment[std::size_t(b.tube)] : b.moment;
-    detail::kink(
-        b, detail::tilt_under(moment, this->template get<0>(b.tube),
-                              law > 1.5 ? rooted(moment, size) : saturated(moment, size), this->template get<2>()));
+    const P &tilt = this->template get<0>(b.tube), &size = this->template get<1>(),
+            &compliance = this->template get<2>();
+    if (value(this->template get<3>()) < 0.5) {
+      detail::kink(b, detail::tilt_under(b.moment, tilt, saturated(b.moment, size), compliance));
+      return;
+    }
+    const auto outer = std::size_t(b.tube);
+    P inner_stiffness = 0.0;
+    for (std::size_t i = 0; i < outer; ++i) inner_stiffness = inner_stiffness + b.stiffness[i];
+    const P farther = weight_beyond(b, inner_stiffness * tilt, size);
+    const auto mean = [&](const std::array<P, 2>& near, const std::array<P, 2>& beyond) -> std::array<P, 2> {
+      return {near[0] + farther * (beyond[0] - near[0]), near[1] + farther * (beyond[1] - near[1])};
+    };
+    const std::array<P, 2> moment = mean(b.near.moment[outer], b.beyond.moment[outer]),
+                           turn = detail::tilt_under(moment, tilt, rooted(moment, size), compliance),
+                           u = mean(b.near.curvature, b.beyond.curvature);
+    detail::kink(b, turn);
+    for (std::size_t i = 0; i <= outer; ++i) {
+      const std::array<P, 2> m = mean(b.near.moment[i], b.beyond.moment[i]);
+      const P &k = b.stiffness[i], torque = turn[1] * (k * u[0] - m[0]) - turn[0] * (k * u[1] - m[1]);
+      b.torque[i] = b.torque[i] + (i < outer ? torque : -(inner_stiffness * inverse(k) * torque));
+    }
+  }
+
+private:
+  /// exp(-4 distance / l) of the next breakpoint towards the base, l = 2 k tilt / sqrt(M size).
+  static P weight_beyond(const Breakpoint<P, N>& b, const P& bending, const P& size) noexcept {
+    constexpr double tiny = 1e-20;  // (N m)^2: the root has a slope at 0
+    constexpr double most = 50;     // beyond that nothing is left
+    P square = tiny;
+    for (const auto* side : {&b.near, &b.beyond})
+      for (const P& m : side->moment[std::size_t(b.tube)]) square = square + m * m;
+    const P over = 2.0 * b.reach * square_root(square_root(square) * size), under = magnitude(bending);
+    return value(over) < most * value(under) ? exponential_of(P(-(over * inverse(under)))) : P(0.0);
   }
 };
 

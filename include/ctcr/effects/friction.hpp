@@ -85,17 +85,17 @@ struct Friction : EffectValues<friction::parameters, N, P, 2 * (Contacts<N>::cou
 
   void breakpoint(Breakpoint<P, N>& s) const noexcept {
     P dx = 0.0, dy = 0.0;
-    for (int j = 0; j < s.near; ++j) {
+    for (int j = 0; j < s.near.present; ++j) {
       const auto i = std::size_t(j);
-      dx = dx + (s.far_moment[i][0] - s.near_moment[i][0]);
-      dy = dy + (s.far_moment[i][1] - s.near_moment[i][1]);
+      dx = dx + (s.far.moment[i][0] - s.near.moment[i][0]);
+      dy = dy + (s.far.moment[i][1] - s.near.moment[i][1]);
       // Both tubes must be there; the outermost touches the front plate alone.
-      if (j + 1 < N ? j + 1 >= s.near : s.kind != Breakpoint<P, N>::Kind::plate) continue;
+      if (j + 1 < N ? j + 1 >= s.near.present : s.kind != Breakpoint<P, N>::Kind::plate) continue;
       constexpr double smooth = 1e-12;  // (N m)^2: the jump of a tube that does not jump has a slope
       const P& h = this->history.state[j + 1 < N ? Contacts<N>::index(j, s.number()) : in_plate];
       const P torque = this->template get<0>(j) * h * square_root(dx * dx + dy * dy + smooth);
       s.torque[i] = s.torque[i] - torque;
-      if (j + 1 < s.near) s.torque[i + 1] = s.torque[i + 1] + torque;
+      if (j + 1 < s.near.present) s.torque[i + 1] = s.torque[i + 1] + torque;
     }
   }
 

@@ -57,11 +57,20 @@ struct Material {
 template <class P, int N>
 struct Breakpoint {
   enum class Kind { tube_tip, curve_start, plate } kind;
-  int tube;                 ///< whose tip or curve start; -1 at the plate
-  int far, near;            ///< tubes present on the side of the robot tip, and on that of the base
-  std::array<P, 2> moment;  ///< bending moment of all tubes on the far side [N m]
-  std::array<P, 2> force;   ///< shear force there, Bishop frame [N]
-  std::array<std::array<P, 2>, N> far_moment, near_moment;  ///< bending moment of each tube on both sides [N m]
+  int tube;                      ///< whose tip or curve start; -1 at the plate
+  std::array<P, 2> moment;       ///< bending moment of all tubes on the far side [N m]
+  std::array<P, 2> force;        ///< shear force there, Bishop frame [N]
+  std::array<P, N> stiffness{};  ///< bending stiffness of each tube [N m^2]
+  /// The tubes on one side.
+  struct Side {
+    int present;                             ///< tubes 1..present
+    std::array<P, 2> curvature{};            ///< of the centreline [1/m]
+    std::array<std::array<P, 2>, N> moment;  ///< bending moment of each tube [N m]
+  };
+  Side far, near;             ///< towards the robot tip and towards the base
+  Side beyond{};              ///< at the tip of a tube the near side of the next breakpoint towards the base, if that
+                              ///< were here; else as `near`
+  P reach;                    ///< distance to that one [m]
   std::array<P, N> torque{};  ///< out: added to the torque of each tube towards the base [N m]
   std::array<P, 2> kink{};    ///< out: rotation of the far side against the near one, along `moment` [rad]
   std::array<P, 2> shift{};   ///< out: displacement of the far side against the near one [m]; at the plate alone

@@ -19,6 +19,7 @@ public:
   using Inputs = RodInputs<N, S, Fx>;
   using Section = CrossSection<N, S>;
   using Sharing = MomentSharing<N, S>;
+  using Side = typename Breakpoint<S, N>::Side;
 
   explicit EffectRod(const Inputs& inputs) noexcept
     : in_(inputs),
@@ -39,24 +40,14 @@ public:
     S here = event_position(events.id[0]);
     for (std::size_t e = 0; e < 2 * N && (events.s[e] > 0 || section.present < N); ++e) {
       const int id = events.id[e];
-      Section near = section;
-      if (id < N) {
-        near.present = id + 1;
-        near.curved[std::size_t(id)] = has_curve(id);
-        near.along[std::size_t(id)] = in_.tubes[std::size_t(id)].length;
-      } else {
-        near.curved[std::size_t(id - N)] = false;
-      }
-      locate(near);
-      if (section.present > 0) {
-        using Kind = typename Breakpoint<S, N>::Kind;
-        apply_breakpoint(id < N ? Kind::tube_tip : Kind::curve_start, id < N ? id : id - N, section, near, y, frame);
-      }
+      const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
+      const S next = last ? S(0.0) : event_position(events.id[e + 1]);
+      const Section near = behind(id, section);
+      if (section.present > 0)
+        apply_breakpoint(id, section, near, last ? Contacts<N>::plate : events.id[e + 1], here - next, y, frame);
       if (id > 0) met(id, frame, y, [&] { return std::pair(moments(section, y), moments(near, y)); });
       section = near;
       section.knows_u = false;
-      const bool last = e + 1 == 2 * N || !(events.s[e + 1] > 0);
-      const S next = last ? S(0.0) : event_position(events.id[e + 1]);
       set_friction_between(id, last ? Contacts<N>::plate : events.id[e + 1], next - here, section);
       const int count = steps.after(id);
       const S h = (1.0 / count) * (next - here);
@@ -68,7 +59,7 @@ public:
       here = next;
     }
     met(Contacts<N>::plate, frame, y, [&] { return std::pair(moments(section, y), moments_behind_plate(section, y)); });
-    apply_breakpoint(Breakpoint<S, N>::Kind::plate, -1, section, section, y, frame);
+    apply_breakpoint(Contacts<N>::plate, section, section, Contacts<N>::plate, S(0.0), y, frame);
   }
 
   struct NoNode {};
@@ -188,21 +179,49 @@ private:
     return d;
   }
 
-  /// Lets the effects act where tubes end or start to curve.
-  void apply_breakpoint(typename Breakpoint<S, N>::Kind kind, int tube, const Section& far, const Section& near,
-                        State& y, Frame<S>& frame) const noexcept {
+  /// The cross-section behind the event `id` of the one in front of it.
+  Section behind(int id, const Section& section) const noexcept {
+    Section near = section;
+    if (id < N) {
+      near.present = id + 1;
+      near.curved[std::size_t(id)] = has_curve(id);
+      near.along[std::size_t(id)] = in_.tubes[std::size_t(id)].length;
+    } else {
+      near.curved[std::size_t(id - N)] = false;
+    }
+    locate(near);
+    return near;
+  }
+
+  /// Lets the effects act at a breakpoint of Contacts<N>.
+  /// @param next   the next one towards the base
+  /// @param reach  distance to it [m]
+  void apply_breakpoint(int id, const Section& far, const Section& near, int next, const S& reach, State& y,
+                        Frame<S>& frame) const noexcept {
     if constexpr (Fx::template On<N, S>::has_breakpoint) {
       if (!in_.effects.acts_at_breakpoints()) return;
+      using Kind = typename Breakpoint<S, N>::Kind;
+      const bool at_plate = id == Contacts<N>::plate;
       Breakpoint<S, N> s{
-          .kind = kind,
-          .tube = tube,
-          .far = far.present,
-          .near = near.present,
+          .kind = at_plate ? Kind::plate
+                  : id < N ? Kind::tube_tip
+                           : Kind::curve_start,
+          .tube = at_plate ? -1 : id % N,
           .moment = {y.m(0), y.m(1)},
           .force = {y.n(0), y.n(1)},
-          .far_moment = moments(far, y),
-          .near_moment = kind == Breakpoint<S, N>::Kind::plate ? moments_behind_plate(near, y) : moments(near, y)};
-      for (std::size_t i = 0; i < N; ++i) s.torque[i] = 0.0;
+          .far = side(far, y),
+          .near = at_plate ? Side{.present = near.present, .moment = moments_behind_plate(near, y)} : side(near, y),
+          .reach = reach};
+      s.beyond = s.near;
+      if (s.kind == Kind::tube_tip && next != Contacts<N>::plate) {
+        Section there = near;
+        for (std::size_t i = 0; i < std::size_t(near.present); ++i) there.along[i] = there.along[i] - reach;
+        s.beyond = side(behind(next, there), y);
+      }
+      for (std::size_t i = 0; i < N; ++i) {
+        s.stiffness[i] = in_.tubes[i].k;
+        s.torque[i] = 0.0;
+      }
       s.kink = s.shift = {0.0, 0.0};
       in_.effects.breakpoint(s);
       for (int i = 0; i < near.present; ++i) y.torque(i) = y.torque(i) + s.torque[std::size_t(i)];
@@ -215,18 +234,21 @@ private:
   }
 
   std::array<std::array<S, 2>, N> moments(const Section& section, const State& y) const noexcept {
+    return side(section, y).moment;
+  }
+  Side side(const Section& section, const State& y) const noexcept {
     const Sharing b = shared_moment(section, y);
-    std::array<std::array<S, 2>, N> m;
+    Side r{.present = section.present, .curvature = b.u, .moment = {}};
     for (int j = 0; j < N; ++j) {
       const auto i = std::size_t(j);
       if (j < section.present) {
-        m[i] = {b.cosine[i] * b.moment[i][0] - b.sine[i] * b.moment[i][1],
-                b.sine[i] * b.moment[i][0] + b.cosine[i] * b.moment[i][1]};
+        r.moment[i] = {b.cosine[i] * b.moment[i][0] - b.sine[i] * b.moment[i][1],
+                       b.sine[i] * b.moment[i][0] + b.cosine[i] * b.moment[i][1]};
       } else {
-        m[i] = {0.0, 0.0};
+        r.moment[i] = {0.0, 0.0};
       }
     }
-    return m;
+    return r;
   }
 
   /// The guide behind the plate keeps the tubes straight: each carries what straightens it, Bishop frame.
