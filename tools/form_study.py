@@ -2,7 +2,8 @@
 
 Each cause of the oracle (tools/oracle/hidden*.py) acts with physics of its own: tubes with centre lines of their own
 in each other's bores, yielding fibres, minimised dissipation. An effect of the catalogue is fitted to noise-free
-readings on the very robot, once by each of its constitutive laws; the best one counts. Of friction, the limit of the
+readings on the very robot, alone and together with the calibration, once by each of its constitutive laws; the best one
+counts. Of friction, the limit of the
 torque between two tubes is compared as well with what their contact forces allow. Writes docs/effect_forms.md with
 --keep.
 """
@@ -50,10 +51,12 @@ ABOUT = f"""# How well the forms of the effects follow fuller models
 {len(SEEDS)} sessions a form: random joints of four robots with two to four tubes, loads of 0, 10 and 20 g. The robot
 file is exact and the readings are free of noise, so all that is left is the error of the form. Explained: the part of
 the variance of the signal at the tip that the fitted effect takes away; 99 % leave a tenth of the amplitude, 90 % a
-third. Written by `tools/form_study.py --keep`.
+third. A calibration takes a large part of the signal for itself, and less of what the form misses: of what it leaves
+the effect may explain less. Written by `tools/form_study.py --keep`.
 
-| effect | the fuller model | signal [mm RMS] | explained [%], median | least [%] | laws chosen |
-|---|---|---|---|---|---|"""
+| effect | the fuller model | signal [mm RMS] | explained [%], median | least [%] \
+| after calibration [mm RMS] | explained [%], median | least [%] | laws chosen |
+|---|---|---|---|---|---|---|---|---|"""
 OF_FRICTION = f"""
 ## The limit of friction
 
@@ -69,11 +72,14 @@ a sixth of Coulomb's. {CONFIGURATIONS} random configurations each:
 
 @dataclass(frozen=True)
 class Explained:
-    """Of one robot and session: the signal at the tip, and the part of its variance that the form explains."""
+    """Of one robot and session: the signal at the tip, and the part of its variance that the form explains; the same of
+    what a calibration leaves of it."""
 
     form: str
     signal_mm: float
     share: float
+    calibrated_mm: float
+    share_calibrated: float
     law: float | None  # where the effect has several
 
 
@@ -116,17 +122,27 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
     nominal, table = robot_file.load(folder / "robot.yaml"), measurements.load(folder / "measurements.csv", n)
 
     effect, left = catalogue.get(identity, n), {}
-    free = [*effect.amplitudes, *effect.shapes]
+    own = [*effect.amplitudes, *effect.shapes]
+    options = {"noise": noise_of(nominal, field=False), "weights": np.ones((len(table), 2)), "scales": {}}
+
+    def left_by(of, free: list[str]) -> float:
+        return float(np.sum(joint.fit(of, table, free, **options).residual[:, :3] ** 2))
+
     for start in ({}, *effect.starts):
         values = {f"effects.{identity}.{name}": x for name, x in start.items()}
         with_effect = catalogue.with_values(nominal, [identity], values)
-        fit = joint.fit(
-            with_effect, table, free, noise=noise_of(nominal, field=False), weights=np.ones((len(table), 2)), scales={}
-        )
         law = start.get("law", 0.0) if effect.laws else None
-        left[float(np.sum(fit.residual[:, :3] ** 2))] = law
-    total, least = float(np.sum(signal**2)), min(left)
-    return Explained(form[0], float(1e3 * np.sqrt(total / len(signal))), 1 - least / total, left[least])
+        left[left_by(with_effect, own), law] = left_by(with_effect, ["standard", *own])
+    total, calibrated = float(np.sum(signal**2)), left_by(nominal, ["standard"])
+    (alone, law), beside = min(left, key=lambda one: one[0]), min(left.values())
+    return Explained(
+        form[0],
+        float(1e3 * np.sqrt(total / len(signal))),
+        1 - alone / total,
+        float(1e3 * np.sqrt(calibrated / len(signal))),
+        1 - beside / calibrated,
+        law,
+    )
 
 
 def friction_limits(robot: str, scale: float) -> Iterator[tuple[int, float, float]]:
@@ -174,11 +190,13 @@ def page(found: list[Explained], limits: list[tuple[str, float, int, float, floa
         if not mine:
             continue
         laws = ", ".join(f"{law:.0f}" for law in sorted({one.law for one in mine if one.law is not None}))
-        shares = [one.share for one in mine]
-        lines.append(
-            f"| {identity} | {physics} | {median(one.signal_mm for one in mine):.2f} | {100 * median(shares):.1f} "
-            f"| {100 * min(shares):.1f} | {laws} |"
-        )
+        cells = [identity, physics]
+        for signals, shares in (
+            ([one.signal_mm for one in mine], [one.share for one in mine]),
+            ([one.calibrated_mm for one in mine], [one.share_calibrated for one in mine]),
+        ):
+            cells += [f"{median(signals):.2f}", f"{100 * median(shares):.1f}", f"{100 * min(shares):.1f}"]
+        lines.append(f"| {' | '.join([*cells, laws])} |")
     lines.append(OF_FRICTION)
     for robot, scale, pair, coefficient, share in limits:
         lines.append(f"| {robot} | x {scale:g} | {pair + 1} in {pair + 2} | {coefficient:.3f} | {100 * share:.0f} |")
