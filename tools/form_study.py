@@ -3,9 +3,8 @@
 Each cause of the oracle (tools/oracle/hidden*.py) acts with physics of its own: tubes with centre lines of their own
 in each other's bores, yielding fibres, minimised dissipation. An effect of the catalogue is fitted to noise-free
 readings on the very robot, alone and together with the calibration, once by each of its constitutive laws; the best one
-counts. Of friction, the limit of the
-torque between two tubes is compared as well with what their contact forces allow. Writes docs/effect_forms.md with
---keep.
+counts. Of friction, the limit of the torque between two tubes is compared as well with what their contact forces allow.
+Writes docs/effect_forms.md with --keep.
 """
 
 import argparse
@@ -51,8 +50,8 @@ ABOUT = f"""# How well the forms of the effects follow fuller models
 {len(SEEDS)} sessions a form: random joints of four robots with two to four tubes, loads of 0, 10 and 20 g. The robot
 file is exact and the readings are free of noise, so all that is left is the error of the form. Explained: the part of
 the variance of the signal at the tip that the fitted effect takes away; 99 % leave a tenth of the amplitude, 90 % a
-third. A calibration takes a large part of the signal for itself, and less of what the form misses: of what it leaves
-the effect may explain less. Written by `tools/form_study.py --keep`.
+third. A calibration absorbs a large part of the signal, but less of the error of the form: of what it leaves, the
+effect may explain less. Written by `tools/form_study.py --keep`.
 
 | effect | the fuller model | signal [mm RMS] | explained [%], median | least [%] \
 | after calibration [mm RMS] | explained [%], median | least [%] | laws chosen |
@@ -90,6 +89,7 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
     from ctcr.fit import joint
     from ctcr.model.noise import noise_of
     from ctcr.robot import robot_file
+    from ctcr.robot.description import Robot
     from ctcr.table import measurements
     from hidden import hide
     from mechanics import Mechanics
@@ -121,20 +121,21 @@ def explained(form: tuple[str, str, str], seed: int) -> Explained:
     write_table(folder / "measurements.csv", rows, n, ("force",), ("t_s", "run"))
     nominal, table = robot_file.load(folder / "robot.yaml"), measurements.load(folder / "measurements.csv", n)
 
-    effect, left = catalogue.get(identity, n), {}
+    effect, fits = catalogue.get(identity, n), []
     own = [*effect.amplitudes, *effect.shapes]
     options = {"noise": noise_of(nominal, field=False), "weights": np.ones((len(table), 2)), "scales": {}}
 
-    def left_by(of, free: list[str]) -> float:
+    def left(of: Robot, *free: str) -> float:
         return float(np.sum(joint.fit(of, table, free, **options).residual[:, :3] ** 2))
 
     for start in ({}, *effect.starts):
         values = {f"effects.{identity}.{name}": x for name, x in start.items()}
         with_effect = catalogue.with_values(nominal, [identity], values)
         law = start.get("law", 0.0) if effect.laws else None
-        left[left_by(with_effect, own), law] = left_by(with_effect, ["standard", *own])
-    total, calibrated = float(np.sum(signal**2)), left_by(nominal, ["standard"])
-    (alone, law), beside = min(left, key=lambda one: one[0]), min(left.values())
+        fits.append((left(with_effect, *own), left(with_effect, "standard", *own), law))
+    total, calibrated = float(np.sum(signal**2)), left(nominal, "standard")
+    alone, _, law = min(fits, key=lambda one: one[0])
+    beside = min(one[1] for one in fits)
     return Explained(
         form[0],
         float(1e3 * np.sqrt(total / len(signal))),

@@ -156,13 +156,14 @@ inline constexpr std::array parameters{
 /// curvatures part by c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the
 /// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)).
 ///
-/// Tubes that lean relieve their energy, E(M) with dE/dM = -(turn of the inner against the outer ones). So each tube
-/// feels the torque -dE/d(angle), which draws them to where they bend each other harder. Where within the lean a tube
-/// starts to curve or ends, M is that behind it by the weight exp(-4 distance / l). `tools/oracle/bore.py` finds the same
-/// without these assumptions.
+/// The lean lowers the elastic energy, by E(M) with dE/dM = -(angle by which the inner tubes turn against the outer one).
+/// So a torque of -dE/d(angle of the tube) acts on each tube and turns it to where the tubes bend each other harder. Where
+/// a tube starts to curve or ends within l, moments and curvatures are means of those on its two sides, the side towards
+/// the base with the weight exp(-4 distance / l). `tools/oracle/bore.py` confirms the law without these assumptions.
 template <int N, class P = double>
 struct Clearance : EffectValues<clearance::parameters, N, P> {
   static constexpr const EffectInfo& info = clearance::info;
+  static constexpr bool looks_beyond = true;
 
   void breakpoint(Breakpoint<P, N>& b) const noexcept {
     if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
@@ -191,7 +192,9 @@ struct Clearance : EffectValues<clearance::parameters, N, P> {
   }
 
 private:
-  /// exp(-4 distance / l) of the next breakpoint towards the base, l = 2 k tilt / sqrt(M size).
+  /// exp(-4 distance / l) of the next breakpoint towards the base; l = 2 k tilt / sqrt(M size), with the root of the sum
+  /// of squares of the outer tube's moments on its two sides for M.
+  /// @param bending  k tilt [N m^2 rad]
   static P weight_beyond(const Breakpoint<P, N>& b, const P& bending, const P& size) noexcept {
     constexpr double tiny = 1e-20;  // (N m)^2: the root has a slope at 0
     constexpr double most = 50;     // beyond that nothing is left

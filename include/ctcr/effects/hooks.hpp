@@ -128,6 +128,10 @@ concept HasMaterial =
 template <class Effect>
 concept DependsOnTorsion = requires { Effect::depends_on_torsion; };
 
+/// An effect that acts at the tip of a tube by what is behind the next breakpoint.
+template <class Effect>
+concept LooksBeyond = requires { Effect::looks_beyond; };
+
 /// An effect on the angles at the grasped ends.
 template <class Effect, class P, int N>
 concept HasBaseCompliance = requires(const Effect& effect, const std::array<P, N>& torque, std::array<P, N>& angle) {
@@ -309,6 +313,10 @@ struct EffectList {
     /// Whether an active effect acts at breakpoints.
     [[nodiscard]] bool acts_at_breakpoints() const noexcept {
       return any([](const auto& e) { return HasBreakpoint<std::remove_cvref_t<decltype(e)>, P, N> && e.active; });
+    }
+    /// Whether an active effect needs Breakpoint::beyond.
+    [[nodiscard]] bool look_beyond() const noexcept {
+      return any([](const auto& e) { return LooksBeyond<std::remove_cvref_t<decltype(e)>> && e.active; });
     }
     /// Whether an active effect lets friction act along the tubes.
     [[nodiscard]] bool acts_by_distributed_friction() const noexcept {

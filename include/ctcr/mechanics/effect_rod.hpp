@@ -213,7 +213,7 @@ private:
           .near = at_plate ? Side{.present = near.present, .moment = moments_behind_plate(near, y)} : side(near, y),
           .reach = reach};
       s.beyond = s.near;
-      if (s.kind == Kind::tube_tip && next != Contacts<N>::plate) {
+      if (s.kind == Kind::tube_tip && next != Contacts<N>::plate && in_.effects.look_beyond()) {
         Section there = near;
         for (std::size_t i = 0; i < std::size_t(near.present); ++i) there.along[i] = there.along[i] - reach;
         s.beyond = side(behind(next, there), y);
