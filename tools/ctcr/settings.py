@@ -198,7 +198,6 @@ CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least
 
 # ---- Diagnosis: probabilities of explanations
 
-FORM_MENDED = 0.1  # mean share of what is left that an effect explains which mends the form of another
 OUTSIDE_CATALOGUE = 0.1  # prior odds of a cause outside the catalogue
 SECOND_CAUSE = 0.5  # prior odds of a second cause beside the first
 IMPLAUSIBLE = 0.02  # probability that the values of a cause lie beyond their soft bounds by two standard deviations

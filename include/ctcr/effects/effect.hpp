@@ -97,8 +97,8 @@ struct EffectInfo {
   std::string_view look_alikes{};  ///< ids, separated by spaces
   std::string_view reference{};
   Needs needs{};
-  /// Part of the amplitude of its signal by which its lumped form errs, as a prior standard deviation. The default
-  /// covers most forms; docs/effect_forms.md measures them against fuller models.
+  /// Part of the amplitude of its signal, as a calibration leaves it, by which its lumped form errs: a prior standard
+  /// deviation. The default covers most forms; docs/effect_forms.md measures them against fuller models.
   double form_error = 0.15;
   /// Ways to act that differ in physics or in the number of parameters, for model selection; a fit tries each of them,
   /// and the evidence pays for the parameters. None: all amplitudes at once. Unused ones are empty.

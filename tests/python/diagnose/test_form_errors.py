@@ -8,6 +8,7 @@ from ctcr.diagnose.form_errors import (
     form_error,
     left_by,
     log_density_of_errors,
+    log_density_of_mend,
     log_odds_of_cause,
     log_odds_of_imitation,
     log_odds_of_mend,
@@ -39,9 +40,11 @@ def test_form_error():
     assert form_error([Found("clearance", 0.0)]) == loose
 
 
-def test_density():
-    """What errors of a form leave is a distribution."""
-    assert quad(lambda left: np.exp(log_density_of_errors(left, 0.15)), 0, 5)[0] == pytest.approx(1, abs=1e-9)
+@pytest.mark.parametrize("error", [0.05, 0.15, 0.5, 2.0])
+def test_densities(error):
+    """What errors of a form leave, and the share of it that another effect explains, are distributions."""
+    assert quad(lambda left: np.exp(log_density_of_errors(left, error)), 0, 20)[0] == pytest.approx(1, abs=1e-6)
+    assert quad(lambda share: np.exp(log_density_of_mend(share, error)), 0, 1)[0] == pytest.approx(1, abs=1e-6)
 
 
 def test_odds():

@@ -8,8 +8,8 @@ effects. Four likelihoods weigh them:
 - the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
   the form error of the effects if nothing else acts, uniform if something does;
 - the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
-  for an imitation (2 (1 - s)), and exponential with mean FORM_MENDED for one that only mends the forms of the others,
-  which leave no more than they may err by;
+  for an imitation (2 (1 - s)), and exponential for one that only mends the forms of the others, with their form error
+  as its mean: the less exact they are, the more of what they leave has a form that another effect can follow;
 - the test of the residual against the noise as stated.
 """
 
@@ -101,8 +101,8 @@ def weighed(
         gain = further.score - cost
         if accepted:  # then the forms of all of them together have to account for what is left
             leaves = log_density_of_errors(left * left_by([further]), form_error([*accepted, further]))
-            share = log_density_of_cause(further.explained) - log_density_of_mend(further.explained)
-            gain = min(gain, leaves - complete + share)
+            mend = log_density_of_mend(further.explained, form_error(accepted))
+            gain = min(gain, leaves - complete + log_density_of_cause(further.explained) - mend)
         weigh(found | {further.id}, weights[found, False] + rejects + gain + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects

@@ -43,17 +43,18 @@ def log_density_of_cause(share: float) -> float:
     return math.log(2 * min(max(share, 1e-3), 1 - 1e-3))
 
 
-def log_density_of_mend(share: float) -> float:
-    """Log density of the share that an effect which only mends the forms of others explains of what they left: likely
-    small."""
-    return -math.log(settings.FORM_MENDED) - min(max(share, 0.0), 1.0) / settings.FORM_MENDED
+def log_density_of_mend(share: float, error: float) -> float:
+    """Log density of the share that an effect which only mends the forms of others explains of what they left:
+    exponential, with the error of these forms as its mean."""
+    return -math.log(error) - min(max(share, 0.0), 1.0) / error - math.log1p(-math.exp(-1 / error))
 
 
 def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
     """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the share that it
     explains of what these left: their errors leave little."""
-    by_errors = log_density_of_errors(left_by(before), form_error(before))
-    return by_errors + log_density_of_mend(share) - log_density_of_cause(share)
+    error = form_error(before)
+    mends = log_density_of_errors(left_by(before), error) + log_density_of_mend(share, error)
+    return mends - log_density_of_cause(share)
 
 
 def log_odds_of_imitation(shares: Sequence[float]) -> float:

@@ -52,7 +52,7 @@ class Effect:
     measure: str
     look_alikes: tuple[str, ...]  # effects that look alike in the data
     reference: str
-    form_error: float  # part of the amplitude of its signal by which its form errs, as a standard deviation
+    form_error: float  # part of the amplitude of its signal after calibration by which its form errs, as an sd
     needs: frozenset[str]  # some of NEEDS
     acts_on: frozenset[str]  # some of joints, rod, tip, reading
     parameters: tuple[EffectParameter, ...]

@@ -31,8 +31,8 @@ amplitudes an effect must change nothing. Hooks, any of them; M rows in the orde
     reading(position, rotation, rows, values) -> position, rotation
         pose that the tracker reads for the sensor's pose (M, 3) [m], (M, 3, 3), tracker frame; row by row
 
-No form is exact: `form_error` is the part of the amplitude of an effect's signal by which its form errs, as a standard
-deviation; 0.15 where the class does not say.
+No form is exact: `form_error` is the part of the amplitude of an effect's signal, as a calibration leaves it, by which
+its form errs, as a standard deviation; 0.15 where the class does not say.
 
 Standard output carries the results of a command: neither the file nor a hook prints there. One call may take a minute.
 """
