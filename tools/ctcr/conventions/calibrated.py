@@ -147,7 +147,8 @@ def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Arra
     names = [name for name, *_ in found]
     mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
-    least = np.where(low < 0, mean - far, mean**2 / (mean + far))  # what is positive is off by a factor, either way
+    # What is positive is off by a factor, either way.
+    least = np.divide(mean**2, mean + far, out=mean - far, where=low >= 0)
     return names, mean, settings.CONVENTION_WIDER * sd, np.maximum(low, least), np.minimum(high, mean + far)
 
 
