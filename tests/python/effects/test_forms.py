@@ -21,6 +21,9 @@ def test_form_errors():
 
 
 def test_usual_form_error():
-    """Users' effects begin with what most effects of the library have."""
+    """Users' effects begin with what most effects of the library have, and the tutorial tells this and the others."""
     usual = Counter(effect.form_error for effect in catalogue.catalogue(1).values()).most_common(1)[0][0]
     assert user_effects.Effect.form_error == usual
+    others = [f"that of {e.id} by {e.form_error:.0%}" for e in catalogue.catalogue(1).values() if e.form_error != usual]
+    told = " ".join(PAGE.with_name("effects.md").read_text("utf-8").replace(" %", "%").split())
+    assert f"taken to err by {usual:.0%} of its signal, {', '.join(others)} (" in told

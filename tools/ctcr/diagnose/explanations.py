@@ -8,8 +8,8 @@ effects. Four likelihoods weigh them:
 - the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
   the form error of the effects if nothing else acts, uniform if something does;
 - the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
-  for an imitation (2 (1 - s)), and exponential for one that only mends the forms of the others, with their form error
-  as its mean: the less exact they are, the more of what they leave has a form that another effect can follow;
+  for an imitation (2 (1 - s)), and exponential for one that only mends the forms of the others. Their form error is
+  its scale: the less exact they are, the more of what they leave may follow the form of another effect;
 - the test of the residual against the noise as stated.
 """
 

@@ -45,8 +45,8 @@ def log_density_of_cause(share: float) -> float:
 
 def log_density_of_mend(share: float, error: float) -> float:
     """Log density of the share that an effect which only mends the forms of others explains of what they left:
-    exponential, with the error of these forms as its mean."""
-    return -math.log(error) - min(max(share, 0.0), 1.0) / error - math.log1p(-math.exp(-1 / error))
+    exponential between 0 and 1, with the error of these forms as its scale."""
+    return -min(max(share, 0.0), 1.0) / error - math.log(-error * math.expm1(-1 / error))
 
 
 def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
