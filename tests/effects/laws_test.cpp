@@ -152,8 +152,8 @@ TEST(Clearance, LeansAlongTheMomentThatTheOuterTubeHandsOver) {
   const double inner = robot.tubes[0].EI(), outer = robot.tubes[1].EI(),
                u = outer * robot.tubes[1].curvature / (inner + outer);
   Catalogue::On<2> effects;
-  const auto leans_by = [&](double size) {
-    effect<Clearance, 2>(effects).values = {0.5, 0.015, size, 0, 1};
+  const auto leans_by = [&](double size, double law = 1) {
+    effect<Clearance, 2>(effects).values = {0.5, 0.015, size, 0, law};
     const Vec3 turn = rotation_vector(solved(robot, effects, q, {}).rotation * rotation_matrix(Vec3(0, 0, -0.7)));
     EXPECT_LE(turn.tail<2>().norm(), 1e-9);
     return (0.04 * u - turn.x()) / 0.015;
@@ -163,6 +163,7 @@ TEST(Clearance, LeansAlongTheMomentThatTheOuterTubeHandsOver) {
   EXPECT_NEAR(leans_by(1e3 * moment) / 1e-3, std::pow(2, 0.25), 1e-4);
   for (const double size : {1e-4, 1e-3})
     EXPECT_NEAR(leans_by(size * moment), std::pow(2, 0.25) / std::sqrt(size), size * size / std::sqrt(size)) << size;
+  for (const double size : {0.1, 1.0, 10.0}) EXPECT_NEAR(leans_by(size * moment, 2), std::tanh(1 / size), 1e-7) << size;
 }
 
 TEST(TipWeight, IsATipLoad) {

@@ -77,7 +77,7 @@ inline constexpr EffectInfo info{
     .look_alikes = "entry_clearance softening sensor_offset",
     .reference = "Ha, Fagogenis & Dupont 2019; Sensors 2023, 23, 3709; law 1: beams in a bore",
     .form_error = 0.5,
-    .starts = {{{"law", 1.0}}},
+    .starts = {{{"law", 1.0}}, {{"law", 2.0}}},
 };
 inline constexpr std::array parameters{
     EffectParameter{
@@ -88,14 +88,14 @@ inline constexpr std::array parameters{
         .soft = {-0.03, 0.03},
         .hard = {-0.2, 0.2},
         .per_tube = true,
-        .meaning = "tilt of the inner tubes at the tip of a tube (none at the innermost); with law 0 at most"},
+        .meaning = "tilt of the inner tubes at the tip of a tube (none at the innermost); with laws 0 and 2 at most"},
     detail::saturation_moment.named("moment", "at which 76 % of the tilt is reached; with law 1 all of it"),
     detail::contact_compliance,
     choice_of_law(
-        2,
+        3,
         "the moment along which the tubes lean, and how far: 0 the one that the inner tubes carry out of the "
         "outer tube, up to the tilt; 1 the one that the outer tube carries just before its end and hands over "
-        "there, and the tilt grows with its square root"),
+        "there, and the tilt grows with its square root; 2 the same moment, up to the tilt"),
 };
 }  // namespace clearance
 
@@ -148,15 +148,16 @@ inline constexpr std::array parameters{
 }  // namespace entry_clearance
 
 /// Where a tube ends, the tubes inside it tilt within its clearance: along the moment that they carry on (law 0), or along
-/// the one that the ending tube hands over to them (law 1). Without a load and beyond all curved parts the first one is
-/// zero; the second one is how hard the tubes bend each other.
+/// the one that the ending tube hands over to them (laws 1 and 2). Without a load and beyond all curved parts the first one
+/// is zero; the second one is how hard the tubes bend each other.
 ///
-/// Law 1 is that of beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones
-/// (EI = k together) there with the force F, and holds them l behind it, across the gap, with F l = |M|. Between, their
-/// curvatures part by c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the
-/// inner ones turn by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)).
+/// With laws 0 and 2 they tilt as stiff tubes do in a short bore: up to an angle that the gap allows. Law 1 is that of
+/// beams in a bore. An outer tube (EI = K) that carries the moment M up to its end leaves the inner ones (EI = k together)
+/// there with the force F, and holds them l behind it, across the gap, with F l = |M|. Between, their curvatures part by
+/// c F (distance from there), c = 1/k + 1/K, which makes the centre lines part by c F l^3/6 = 2 gap: the inner ones turn
+/// by sqrt(3 gap M / c) / k against tubes that fit, within l = sqrt(12 gap / (c M)).
 ///
-/// The lean lowers the elastic energy, by E(M) with dE/dM = -(angle by which the inner tubes turn against the outer one).
+/// That lean lowers the elastic energy, by E(M) with dE/dM = -(angle by which the inner tubes turn against the outer one).
 /// So a torque of -dE/d(angle of the tube) acts on each tube and turns it to where the tubes bend each other harder. Where
 /// a tube starts to curve or ends within l, moments and curvatures are means of those on its two sides, the side towards
 /// the base with the weight exp(-4 distance / l). `tools/oracle/bore.py` confirms the law without these assumptions.
@@ -169,11 +170,13 @@ struct Clearance : EffectValues<clearance::parameters, N, P> {
     if (b.kind != Breakpoint<P, N>::Kind::tube_tip) return;
     const P &tilt = this->template get<0>(b.tube), &size = this->template get<1>(),
             &compliance = this->template get<2>();
-    if (value(this->template get<3>()) < 0.5) {
-      detail::kink(b, detail::tilt_under(b.moment, tilt, saturated(b.moment, size), compliance));
+    const double law = value(this->template get<3>());
+    const auto outer = std::size_t(b.tube);
+    if (law < 0.5 || law > 1.5) {
+      const std::array<P, 2>& moment = law < 0.5 ? b.moment : b.near.moment[outer];
+      detail::kink(b, detail::tilt_under(moment, tilt, saturated(moment, size), compliance));
       return;
     }
-    const auto outer = std::size_t(b.tube);
     P inner_stiffness = 0.0;
     for (std::size_t i = 0; i < outer; ++i) inner_stiffness = inner_stiffness + b.stiffness[i];
     const P farther = weight_beyond(b, inner_stiffness * tilt, size);
