@@ -126,7 +126,13 @@ class Engine:
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
         if noise is full.noise:
             return full
-        return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, near=True)
+        return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, first_weights=full.weights, near=True)
+
+    def converged(self, fit: joint.Fit, fixed: dict[str, float] | None = None) -> joint.Fit:
+        """A fit of this engine's rows, continued from its outliers under its noise."""
+        self._scales = fit.priors.scales
+        options = {"fixed": fixed, "noise": fit.noise, "first_weights": fit.weights, "like": fit.model, "near": True}
+        return self.fit(effects_in(fit), start=values_of(fit), **options)
 
     def revise_initial_history(
         self, fit: joint.Fit, added: Iterable[str], fixed: dict[str, float] | None = None

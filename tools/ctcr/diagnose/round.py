@@ -171,7 +171,7 @@ def run_round(
         own = thin.derivatives(at, known.candidate.names, fixed | dict(known.candidate.shape))
         known = replace(known, gain=segment_delays.linearised(thin, at).gain(at.whiten(own)))
     chosen = refits.in_reach(contenders(known, screened) if known else worth_a_refit(screened))
-    tried = refits.of_all([*chosen, known] if known else chosen)
+    tried = refits.of_all(chosen, known)
     if accepted:
         before, tried = _without_candidate(engine, before, tried, names, fixed)
     fitted = [one.candidate for one in tried]
@@ -256,10 +256,11 @@ class Refits:
         reach = min(best, settings.IN_REACH * best)  # the best itself always is
         return [replace(one, fit=there.fit) for one, there in zip(chosen, tried, strict=True) if there.score >= reach]
 
-    def of_all(self, chosen: list[CandidateFit]) -> list[CandidateFit]:
-        """Each after its fit. Those that contend are fitted to convergence: a candidate that is slow to fit must not
-        lose to one that is quick."""
+    def of_all(self, chosen: list[CandidateFit], known: CandidateFit | None = None) -> list[CandidateFit]:
+        """Each after its fit, one that is `known` by the fit that it has. Those that contend are fitted to convergence:
+        a candidate that is slow to fit must not lose to one that is quick."""
         tried = [self._in_each_shape(self._of(one, settings.FIRST_ITERATIONS)) for one in chosen]
+        tried += [[self._by(known, known.fit)]] if known else []
         near = settings.CONTENDS * max((one.score for forms in tried for one in forms), default=0.0)
         return [self._converged(forms, near) for forms in tried]
 
@@ -298,6 +299,11 @@ class Refits:
                 continue
         else:
             return replace(one, fit=None)
+        return self._by(one, fit)
+
+    def _by(self, one: CandidateFit, fit: joint.Fit) -> CandidateFit:
+        """What the candidate explains by a fit at the weights and noise of the fit before."""
+        engine, before, candidate = self.engine, self.before, one.candidate
         refit = segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty
         explained = fraction_explained(before, fit, len(candidate.names))
         # A chi-square removed has a standard deviation of twice its root.

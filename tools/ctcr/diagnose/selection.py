@@ -76,21 +76,26 @@ class Selection:
         more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
         left to them. surely: as for decide()
         """
-        while not self.finished:
-            taken = {identity for a in self.accepted for identity in a.ids}
-            round_ = self._round([c for c in pool if c.id not in taken], surely)
-            best = round_.accepted
-            if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
-                beside = "together with effects before it, " if self.accepted else ""
-                round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
-            if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
-                return
-            if round_.accepted is None:
-                self.last = round_
-            else:
-                self._accept(round_)
+        while not self.finished and self.take_one(pool, more, surely):
+            pass
         for a in self.accepted[:-1]:  # what the others hid of their forms shows now
             self.refine_form(a)
+
+    def take_one(self, pool: list[Candidate], more: float = 1.0, surely: bool = False) -> bool:
+        """Accepts the next effect; whether there is one. Arguments as for grow()."""
+        taken = {identity for a in self.accepted for identity in a.ids}
+        round_ = self._round([c for c in pool if c.id not in taken], surely)
+        best = round_.accepted
+        if best and log_odds_of_imitation([one.explained for one in (*self.fits, best)]) > 0:
+            beside = "together with effects before it, " if self.accepted else ""
+            round_.reject(f"{beside}{best.id} more probably imitates a cause outside the catalogue")
+        if more > 1 and not (round_.is_clear or round_.is_hopeless(more)):
+            return False
+        if round_.accepted is None:
+            self.last = round_
+            return False
+        self._accept(round_)
+        return True
 
     def revise(self, pool: list[Candidate], more: float = 1.0) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
@@ -241,7 +246,10 @@ class Selection:
             names, fixed = parameters_of(self._with(one, best))
             neutral = dict(zip(form.names, self.engine.priors(form.names)[0], strict=True))
             start = neutral | one.round.rejected_variants | dict(form.shape) | values_of(fit)
-            found.append((best, self.engine.fit_like(fit, names, start, fixed=fixed)))
+            there = self.engine.fit_like(fit, names, start, fixed=fixed, max_iterations=settings.FIRST_ITERATIONS)
+            if not there.converged and there.log_evidence > _least(fit):
+                there = self.engine.fit_like(fit, names, values_of(there), fixed=fixed)
+            found.append((best, there))
         return found
 
 
@@ -270,10 +278,11 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         chosen.grow(pool)
     if few is None:
         chosen.revise(pool)
+    engine.progress("calibration")
     engine.measurements, chosen.engine = coarse.measurements, engine
-    chosen.calibrated, start = chosen.calibrate([], values_of(chosen.calibrated)), values_of(chosen.fit)
+    chosen.calibrated = plain = engine.converged(chosen.calibrated)
     engine.robust = coarse.robust
-    chosen.fit = chosen.calibrate(chosen.fits, start) if chosen.accepted else chosen.calibrated
+    chosen.fit = engine.converged(chosen.fit, parameters_of(chosen.fits)[1]) if chosen.accepted else plain
     return chosen
 
 
@@ -285,10 +294,14 @@ def _best_of_each_law(
     tried = sorted(tried, key=lambda pair: -pair[1].log_evidence)
     if np.max(fit.inflation) <= settings.INFLATION_WRONG:
         return tried[:1]
-    least = fit.log_evidence - settings.HOPELESS * fit.observations
     laws: dict[tuple, tuple[CandidateFit, joint.Fit]] = {}
     for best, freed in tried:
-        if freed.log_evidence > least:
+        if freed.log_evidence > _least(fit):
             held = tuple(pair for pair in best.candidate.shape if pair[0] not in best.candidate.names)
             laws.setdefault(held, (best, freed))
     return list(laws.values())
+
+
+def _least(fit: joint.Fit) -> float:
+    """Log evidence below which another form of its effects is hopeless."""
+    return fit.log_evidence - settings.HOPELESS * fit.observations

@@ -94,19 +94,29 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.SESSION_EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
-    options = {"rows": engine.rows, "sd": wide, "noise": one.noise, **one.frozen}
+    options = {"rows": engine.rows, "sd": wide, "noise": one.noise, "tolerance": engine.tolerance, **one.frozen}
     elsewhere = joint.fit(engine.robot, engine.measurements, one.names, **options)
     if evidence < elsewhere.log_evidence + settings.DECISIVE:
         return False
+    own = framed.fit_with_field([], values_of(own))
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
     chosen = Selection(replace(engine), fit=one)
-    chosen.grow(pool)
-    effects, own = chosen.fit, framed.fit_with_field([], values_of(own))
-    # What a model misses it takes for noise and outliers. Here a reading is one only where neither explains it.
-    names, fixed = parameters_of(chosen.fits)
-    weights, inflation = np.maximum(own.weights, effects.weights), np.minimum(own.inflation, effects.inflation)
-    by_effects = engine.fit_like(own, names, values_of(effects), fixed=fixed, weights=weights, inflation=inflation)
-    by_frames = framed.fit_like(own, start=values_of(own), weights=weights, inflation=inflation)
+    while _is_likelier(framed, own, chosen):
+        if chosen.finished or not chosen.take_one(pool):
+            return True
+    return False
+
+
+def _is_likelier(framed: Engine, own: Fit, chosen: Selection) -> bool:
+    """Whether a frame for each run is likelier than one frame and effects. What a model misses it takes for noise and
+    outliers: here a reading is one only where neither explains it."""
+    effects, (names, fixed) = chosen.fit, parameters_of(chosen.fits)
+    alike = {
+        "weights": np.maximum(own.weights, effects.weights),
+        "inflation": np.minimum(own.inflation, effects.inflation),
+    }
+    by_effects = chosen.engine.fit_like(own, names, values_of(effects), fixed=fixed, **alike)
+    by_frames = framed.fit_like(own, start=values_of(own), **alike)
     return by_frames.log_evidence + _cost(by_frames) > by_effects.log_evidence + settings.DECISIVE
 
 

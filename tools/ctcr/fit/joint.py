@@ -65,6 +65,7 @@ def fit(
     inflation: ArrayLike | None = None,
     scales: Scales | None = None,
     starts: int = settings.STARTS,
+    tolerance: float = settings.TOLERANCE,
 ) -> Fit:
     """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
 
@@ -82,7 +83,7 @@ def fit(
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
     given = {"weights": weights, "inflation": inflation, "scales": scales}
-    named = {"row": measurements.row}
+    named = {"row": measurements.row, "tolerance": tolerance}
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)

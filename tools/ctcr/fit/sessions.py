@@ -22,7 +22,7 @@ def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) ->
     part, rows = part_of_runs(robot, some_runs(readings))
     # At the robot file's values first: within a fit, what is left of the frames acts linearly.
     sessions = _aligned(robot, part, Sessions.alike(robot, part, homes), settings.SESSION_ALIGNMENTS)
-    fit = joint.fit(robot, sessions.taken_out(part), uncertain(robot), rows=rows)
+    fit = joint.fit(robot, sessions.taken_out(part), uncertain(robot), rows=rows, tolerance=settings.COARSE)
     return sessions_at(fit.apply(robot), readings, homes=homes)
 
 
