@@ -59,7 +59,9 @@ TEST_F(SmallProblem, DerivativesAreExact) {
       problem(down.data(), low.data(), nullptr);
       EXPECT_LT((J.col(j) - (high - low) / (2 * h)).norm(), 1e-8 * (1 + J.col(j).norm()));
     }
-    if (loss == 0) EXPECT_LT((problem.jacobian() - J).norm(), 1e-14 * (1 + J.norm()));
+    if (loss == 0) {
+      EXPECT_LT((problem.jacobian() - J).norm(), 1e-14 * (1 + J.norm()));
+    }
   }
 }
 

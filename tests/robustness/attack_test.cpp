@@ -48,7 +48,7 @@ auto without_effects(const Robot<N>& robot, test::Random&) {
 
 TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
   constexpr int N = TypeParam::N;
-  const test::Tally tally = attack<N>("sane", 4000, test::sane_case<N>, without_effects<N>);
+  const test::Tally tally = attack<N>("sane", 1500, test::sane_case<N>, without_effects<N>);
   EXPECT_GT(tally.judged, 0);
   std::cout << test::evaluations_table(tally, "N = " + std::to_string(N));
   for (const auto& [start, evaluations] : tally.evaluations) EXPECT_LE(std::ranges::max(evaluations), 300) << start;
@@ -56,12 +56,12 @@ TYPED_TEST(RandomRobots, SuchAsPeopleBuild) {
 
 TYPED_TEST(RandomRobots, Harder) {
   constexpr int N = TypeParam::N;
-  attack<N>("wide", 1000, test::wide_case<N>, without_effects<N>);
+  attack<N>("wide", 500, test::wide_case<N>, without_effects<N>);
 }
 
 TYPED_TEST(RandomRobots, ThatCannotExist) {
   constexpr int N = TypeParam::N;
-  const test::Tally tally = attack<N>("garbage", 5000, test::garbage_case<N>, without_effects<N>);
+  const test::Tally tally = attack<N>("garbage", 2000, test::garbage_case<N>, without_effects<N>);
   EXPECT_GT(tally.statuses.size(), 5u);
 }
 

@@ -121,7 +121,7 @@ def _runs_x86_64_v3() -> bool:
     """Whether the processor runs what the second module of a package that travels is compiled for."""
     try:
         with open("/proc/cpuinfo") as info:
-            flags = next((line.split() for line in info if line.startswith("flags")), [])
+            flags = next((line for line in info if line.startswith("flags")), "").split()
     except OSError:  # not Linux
         return False
     return {"avx2", "fma", "bmi2", "f16c", "abm", "movbe"} <= set(flags)
