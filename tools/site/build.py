@@ -16,8 +16,8 @@ import gallery
 
 ROOT = Path(__file__).parents[2]
 COPIED = (
-    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "bench/README.md", "tools/ctcr/README.md"),
-    *("tools/oracle/README.md", "docs", "examples", "include"),
+    *("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE", "THIRD_PARTY.md", "bench/README.md"),
+    *("tools/ctcr/README.md", "tools/oracle/README.md", "docs", "examples", "include"),
 )
 DOXYGEN = """
 PROJECT_NAME = ctcr
