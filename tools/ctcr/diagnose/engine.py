@@ -128,8 +128,8 @@ class Engine:
             return full
         return self.fit(added, start=values_of(full), fixed=fixed, noise=noise, first_weights=full.weights, near=True)
 
-    def converged(self, fit: joint.Fit, fixed: dict[str, float] | None = None) -> joint.Fit:
-        """A fit of this engine's rows, continued from its outliers under its noise."""
+    def continued(self, fit: joint.Fit, fixed: dict[str, float] | None = None) -> joint.Fit:
+        """A fit of the same rows taken on to this engine's tolerance, from its values and outliers, under its noise."""
         self._scales = fit.priors.scales
         options = {"fixed": fixed, "noise": fit.noise, "first_weights": fit.weights, "like": fit.model, "near": True}
         return self.fit(effects_in(fit), start=values_of(fit), **options)

@@ -76,13 +76,16 @@ class Selection:
         more: how many times as many readings there are in all. Where these could change the outcome of a round, it is
         left to them. surely: as for decide()
         """
-        while not self.finished and self.take_one(pool, more, surely):
+        while self.take_one(pool, more, surely):
             pass
-        for a in self.accepted[:-1]:  # what the others hid of their forms shows now
-            self.refine_form(a)
+        if self.finished:
+            for a in self.accepted[:-1]:  # what the others hid of their forms shows now
+                self.refine_form(a)
 
     def take_one(self, pool: list[Candidate], more: float = 1.0, surely: bool = False) -> bool:
         """Accepts the next effect; whether there is one. Arguments as for grow()."""
+        if self.finished:
+            return False
         taken = {identity for a in self.accepted for identity in a.ids}
         round_ = self._round([c for c in pool if c.id not in taken], surely)
         best = round_.accepted
@@ -280,9 +283,9 @@ def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
         chosen.revise(pool)
     engine.progress("calibration")
     engine.measurements, chosen.engine = coarse.measurements, engine
-    chosen.calibrated = plain = engine.converged(chosen.calibrated)
+    chosen.calibrated = plain = engine.continued(chosen.calibrated)
     engine.robust = coarse.robust
-    chosen.fit = engine.converged(chosen.fit, parameters_of(chosen.fits)[1]) if chosen.accepted else plain
+    chosen.fit = engine.continued(chosen.fit, parameters_of(chosen.fits)[1]) if chosen.accepted else plain
     return chosen
 
 

@@ -102,7 +102,7 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id not in engine.robot.effects]
     chosen = Selection(replace(engine), fit=one)
     while _is_likelier(framed, own, chosen):
-        if chosen.finished or not chosen.take_one(pool):
+        if not chosen.take_one(pool):
             return True
     return False
 

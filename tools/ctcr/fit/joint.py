@@ -83,7 +83,7 @@ def fit(
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
     given = {"weights": weights, "inflation": inflation, "scales": scales}
-    named = {"row": measurements.row, "tolerance": tolerance}
+    how = {"row": measurements.row, "tolerance": tolerance}
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)
@@ -92,9 +92,9 @@ def fit(
         kept, table = like.frozen if like else given, model()
         if like:
             table.begin_at(like.model)
-        return fit_joint(table, priors, noise, positions, rows, start=start, starts=starts, **kept, **named)
+        return fit_joint(table, priors, noise, positions, rows, start=start, starts=starts, **kept, **how)
 
-    start, priors = _with_frame(model(), priors, noise, positions, rows, **given, **named)
+    start, priors = _with_frame(model(), priors, noise, positions, rows, **given, **how)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
