@@ -235,6 +235,44 @@ TEST(SolveFriction, Segments) {
   }
 }
 
+/// The friction of a dense recording is solved at some samples; at the others the torsion is that of a walk through all.
+TEST(SolveFriction, DenseRecordings) {
+  for (const double insertion : {0.0, 0.7}) {
+    Random random(8);
+    Walk<2> walk(two_tubes(), with_friction(0.03, insertion, elastic));
+    Joints<2> q = at(0, 0);
+    for (int corner = 0; corner < 6; ++corner) {
+      const Joints<2> from = q,
+                      to = at(test::uniform(random, -1, 1), test::uniform(random, -1, 1), -0.35 + 1e-3 * corner);
+      const int steps = int((to.alpha - from.alpha).cwiseAbs().maxCoeff() / 0.003);
+      for (int k = 1; k <= steps; ++k) {
+        q.alpha = from.alpha + double(k) / steps * (to.alpha - from.alpha);
+        q.beta = from.beta + double(k) / steps * (to.beta - from.beta);
+        walk.to(q);
+      }
+    }
+    set_frictionless_torsion<2>(System<2>{walk.system.transmission, Model<2>(two_tubes()), {}, walk.system.settings},
+                                walk.rows);
+    const std::vector<RecordedRow<2>> plain = walk.rows;
+    LinearisedTorsion<2> linear{.variables = {ParameterVector<2>::count}};
+    solve_friction(walk.system, std::span(walk.rows), pool, &linear);
+    const auto solved = std::ranges::count_if(linear.equilibria, [](const auto& found) { return found.has_value(); });
+    EXPECT_LT(solved, std::ssize(walk.rows) / 3) << "not fewer";
+
+    const RecordedPath<2> path = recorded_path<2, Catalogue>(walk.system, plain);
+    detail::PathSolver<2, Catalogue> solver(walk.system.model.effects());
+    double differ = 0, added = 0;
+    for (std::size_t k = 0; k < path.q.size(); ++k) {
+      solver.solve(walk.system, path.sample(plain, k), plain[k].torsion[0], path, k, {});
+      for (std::size_t c = 0; c < std::size_t(Contacts<2>::count); ++c) {
+        differ += std::pow(solver.state().torsion[c] - walk.rows[k].torsion[0][c], 2);
+        added += std::pow(solver.state().torsion[c] - plain[k].torsion[0][c], 2);
+      }
+    }
+    EXPECT_LT(std::sqrt(differ / added), 0.03) << "insertion " << insertion;
+  }
+}
+
 TEST(SolveFriction, WithoutFriction) {
   Walk<2> walk(two_tubes(), with_friction(0));
   walk.to(at(0, 0)).to(at(1, 0));

@@ -27,7 +27,8 @@ TorsionDerivatives<N> torsion_derivatives(const System<N, Fx>& system, const Rec
       });
 }
 
-/// Solves friction and equilibrium at the samples of a path, one after the other. A copy goes on from the same sample.
+/// Solves friction and equilibrium at samples of a path, one after the other; between them the joints move straight on. A copy
+/// goes on from the same sample.
 template <int N, class Fx>
 class PathSolver {
   using Effects = typename Fx::template On<N>;
@@ -110,8 +111,9 @@ private:
     before_.for_each([&](auto& effect, int) {
       if constexpr (!DependsOnTorsion<std::remove_cvref_t<decltype(effect)>> &&
                     requires { effect.update_history(path, k); })
-        effect.update_history(path, k);
+        for (std::size_t passed = next_; passed <= k; ++passed) effect.update_history(path, passed);
     });
+    next_ = k + 1;
   }
 
   /// The effects after the motion to the current sample, if this is the torsion there.
@@ -155,6 +157,7 @@ private:
   Sample from_{}, here_{};      ///< the sample before, the current one
   ContactRadii<N> radius_;
   bool is_first_ = true;
+  std::size_t next_ = 0;          ///< the sample after the current one
   Vec difference_ = Vec::Zero();  ///< of the solved torsion from the given one
   TorsionSolver<N, Fx> torsion_solver_;
   Workspace<N> ws_;

@@ -1,14 +1,15 @@
 #pragma once
 // Friction along a recording. Tubes that rub twist each other, and the angle by which they turn against each other at their
-// contacts, the relative torsion, decides what friction does next. Solved here: history, torsion and equilibrium at every
-// sample of the recording, and how the torsion changes with the parameters. In parts:
+// contacts, the relative torsion, decides what friction does next. Solved here: history, torsion and equilibrium along the
+// recording, and how the torsion changes with the parameters. In parts:
 //
 //   frictionless_torsion.hpp    samples, and the torsion to start from
 //   relative_torsion.hpp        torsion in one equilibrium, and its derivatives
 //   torsion_solver.hpp          friction and torsion at one sample: Newton's method
-//   path_solver.hpp             from sample to sample
+//   path_nodes.hpp              the samples at which friction is solved
+//   path_solver.hpp             from node to node
 //   solved_samples.hpp          segments of the path by several threads
-//   torsion_sensitivities.hpp   derivatives from sample to sample
+//   torsion_sensitivities.hpp   derivatives from node to node
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -55,17 +56,29 @@ double solve_friction(const System<N, Fx>& system, std::span<RecordedRow<N>> row
   for (Window window; window.first < variables; window.first += window.size)
     sensitivities.emplace_back(system, rows, path, alone, window);
 
-  // Friction, torsion and equilibrium at each sample, then the derivatives from sample to sample.
-  Samples samples(system, rows, path, linear.equilibria, after_contacts, pool);
+  // Friction, torsion and equilibrium at each node, then the derivatives from node to node.
+  const detail::PathNodes<N> nodes(rows, path);
+  Samples samples(system, rows, path, nodes, linear.equilibria, after_contacts, pool);
   detail::PathSolver<N, Fx> solver(system.model.effects());
-  for (std::size_t first = 0; first < count; first += Samples::most) {
-    const std::size_t end = std::min(first + Samples::most, count);
+  for (std::size_t first = 0; first < nodes.size(); first += Samples::most) {
+    const std::size_t end = std::min(first + Samples::most, nodes.size());
     samples.solve(first, end, solver);
-    pool.parallel_for(int(sensitivities.size()), [&](int i, int) noexcept {
-      for (std::size_t k = first; k < end; ++k)
-        sensitivities[std::size_t(i)].advance(k, samples.derivatives(k), linear);
+    pool.parallel_for(int(sensitivities.size()), [&](int j, int) noexcept {
+      for (std::size_t i = first; i < end; ++i)
+        sensitivities[std::size_t(j)].advance(nodes[i], samples.derivatives(i), linear);
     });
   }
+
+  // Between the nodes, what friction adds to the torsion, and the derivatives.
+  using Vec = VecN<Contacts<N>::count>;
+  const auto given = [&](std::size_t k) {
+    return Vec::Map(rows[path.index[k].row].torsion[path.index[k].of_row].data());
+  };
+  const auto found = [&](std::size_t k) { return Vec::Map(path.q[k].torsion.data()); };
+  nodes.for_each_between([&](std::size_t k, std::size_t a, std::size_t b, double part) {
+    found(k) = given(k) + (1 - part) * (found(a) - given(a)) + part * (found(b) - given(b));
+    linear.at(k) = (1 - part) * linear.at(a) + part * linear.at(b);
+  });
 
   // The torsion back into the rows.
   double largest = 0;

@@ -6,7 +6,7 @@
 
 namespace ctcr::detail {
 
-/// Propagates the derivatives of torsion and friction from sample to sample, for a window of variables.
+/// Propagates the derivatives of torsion and friction from node to node, for a window of variables.
 template <int N, class Fx>
 class TorsionSensitivities {
   static constexpr int contacts = Contacts<N>::count;
@@ -18,7 +18,7 @@ public:
                        const Variables<N, Fx>& variables, const Window& window) noexcept
     : variables_(&variables), window_(window), history_(system, rows, path, variables, window) {}
 
-  /// To sample k, the one after that of the call before.
+  /// To sample k, straight on from that of the call before.
   /// @param there  derivatives of the torsion there, as PathSolver::linearise() gives them; nothing without an equilibrium:
   ///               then it keeps those of the sample before
   void advance(std::size_t k, const std::optional<TorsionDerivatives<N>>& there, LinearisedTorsion<N>& out) noexcept {

@@ -19,6 +19,7 @@ from ctcr.model.protocol import ResidualModel
 from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
+from ctcr.table.path import with_path
 
 Progress = Callable[[str], None]
 
@@ -120,7 +121,7 @@ class Engine:
                 return self.fit(added, start=from_there, fixed=fixed, near=True)
             return self.fit_like(like, added, from_there, fixed=fixed, tolerance=settings.COARSE)
 
-        full = self.fit(added, start=start, fixed=fixed, near=bool(start))
+        full = self.fit(added, start=start, fixed=fixed)
         full = one_sided.restarted(full, again)
         noise = joint.likeliest_field(full)
         # Fitted anew, not linearised: far from the full model's values effects are not linear.
@@ -161,6 +162,12 @@ class Engine:
     def linear_fit(self, at: joint.Fit, **options: Any) -> joint.Fit:
         """joint.linear_fit() of the rows of this engine."""
         return joint.linear_fit(at, rows=self.rows, **options)
+
+    def part(self, rows: Mask) -> "Engine":
+        """An engine for some of its rows (M,), on a table of these and of the path to them."""
+        kept = with_path(self.measurements, rows)
+        table = replace(self.measurements.rows(kept), about=self.measurements.centre)
+        return replace(self, measurements=table, rows=rows[kept])
 
     def thinned(self, fit: joint.Fit, least: int = settings.LINEARISATION_ROWS) -> tuple["Engine", joint.Fit]:
         """Itself and a fit, or both with at least so many of many rows, each of which counts for its neighbours."""

@@ -316,13 +316,14 @@ def _diagnose(
         notices=outliers.messages(robot, engine.measurements, with_effects, isolated),
     )
     if verdict.word == "not_in_catalogue" and accepted:
-        _, _, residual = structure(chosen.calibrated)
+        plain = engine.continued(chosen.calibrated)
+        _, _, residual = structure(plain)
         result.without_effects = replace(
             result,
             accepted=[],
             residual=residual,
             with_effects=one_sided.widened(calibrated),
-            final=segment_delays.widened(engine, one_sided.widened(chosen.calibrated)),
+            final=segment_delays.widened(engine, one_sided.widened(plain)),
             floors=floors(robot, measurements),
         )
     return result

@@ -114,7 +114,7 @@ class Selection:
                 surely, self.last = True, None
                 self.grow(pool, more, surely)
         if len(seen) > 1:
-            self._follow()
+            self.follow()
 
     def _without_weakest(self) -> bool:
         """Drops the effect that is least probably a cause beside the others, if it is more probably none."""
@@ -170,7 +170,7 @@ class Selection:
         options = {"fixed": fixed, "tolerance": settings.COARSE, "near": False, "max_iterations": max_iterations}
         return self.engine.fit_like(self.fit, names, values_of(self.fit), **options)
 
-    def _follow(self) -> None:
+    def follow(self) -> None:
         """The residual with one effect after the other, in the order in which they stand now."""
         fits = [self._fit_with(self.accepted[:k]) for k in range(1, len(self.accepted))]
         for a, fit in zip(self.accepted, [*fits, self.fit], strict=True):
@@ -258,34 +258,37 @@ class Selection:
 
 def select_effects(engine: Engine, pool: list[Candidate]) -> Selection:
     """The effects that explain the fitted readings. Of many readings a part decides rounds whose outcome is sure; fits
-    that decide need not be converged, only those that are returned."""
+    that decide need not be converged, only the one whose values are quoted."""
     coarse = replace(engine, tolerance=settings.COARSE)
     chosen = Selection(coarse)
     few = folds.few_of(engine.fitted)
     start_plain, start = {}, {}
     if few is not None:
         engine.progress("a part of the readings first")
-        chosen.engine = replace(coarse, rows=few)
+        chosen.engine = coarse.part(few)
         chosen.fit = chosen.calibrate([], {})
         start_plain = values_of(chosen.fit)
         more = float(np.sum(engine.fitted) / np.sum(few))
         chosen.grow(pool, more)
         chosen.revise(pool, more)
         start = values_of(chosen.fit)
-        coarse.measurements, chosen.engine = chosen.engine.measurements, coarse
+        from_home = chosen.engine.measurements.from_home
+        coarse.measurements, chosen.engine = replace(coarse.measurements, from_home=from_home), coarse
     chosen.calibrated = chosen.fit = chosen.calibrate([], start_plain)
     if chosen.accepted:
         coarse.robust = True
         chosen.fit = chosen.calibrate(chosen.fits, start)
+        chosen.follow()
     if not chosen.finished:
         chosen.grow(pool)
     if few is None:
         chosen.revise(pool)
     engine.progress("calibration")
     engine.measurements, chosen.engine = coarse.measurements, engine
-    chosen.calibrated = plain = engine.continued(chosen.calibrated)
     engine.robust = coarse.robust
-    chosen.fit = engine.continued(chosen.fit, parameters_of(chosen.fits)[1]) if chosen.accepted else plain
+    chosen.fit = engine.continued(chosen.fit, parameters_of(chosen.fits)[1])
+    if not chosen.accepted:
+        chosen.calibrated = chosen.fit
     return chosen
 
 

@@ -147,7 +147,7 @@ def _fit_widened(model: ResidualModel, priors: Priors, noise: Noise, positions: 
         scales = likelihood.likeliest()
         if likelihood.posterior(scales) - likelihood.posterior(fit.priors.scales) < settings.COARSE:
             break
-        again = replace(how, start=fit.values, starts=1)
+        again = replace(how, start=fit.values, starts=1, first_weights=fit.weights)
         refitted = _fit_active(model, replace(priors, scales=scales), noise, positions, again)
         if refitted.log_evidence < fit.log_evidence:
             break

@@ -28,7 +28,7 @@ def values(robot: Robot) -> Array:
 
 def session_part(measurements: Measurements) -> Array:
     """When each row was measured, from 0 (first in time) to 1 (last); by its number where times are missing."""
-    t = measurements.t if np.isfinite(measurements.t).all() else np.arange(len(measurements), dtype=float)
+    t = measurements.clock
     return (t - t.min()) / max(np.ptp(t), np.finfo(float).tiny)
 
 
@@ -70,8 +70,6 @@ def recording_of(
     known = names_of(robot.n_tubes)
     own = dict(zip(catalogue.names_of(robot.n_tubes), catalogue.values(robot), strict=True)) | dict(fixed or {})
     beta, alpha = robot.joints_of_table(measurements.beta, measurements.alpha)
-    position = measurements.positions
-    measured = position[np.isfinite(position).all(axis=1)]
     return _core.Recording(
         parameters=parameters.values(robot),
         effects=np.array(list(own.values())),
@@ -79,12 +77,12 @@ def recording_of(
         beta=beta,
         alpha=alpha,
         force=measurements.force,
-        position=position,
+        position=measurements.positions,
         quaternion=measurements.quaternions,
         time=measurements.t,
         part=session_part(measurements),
         run=measurements.run.astype(np.int32),
-        centre=measured.mean(axis=0) if len(measured) else np.zeros(3),
+        centre=measurements.centre,
         free=[known.index(name) for name in names],
         steps=steps,
         threads=threads,

@@ -62,6 +62,7 @@ class Measurements(Shown):
     from_home: bool = True  # whether the robot came to the first row straight from home; else it was at rest there
     file: str = ""  # that it was read from; empty: a DataFrame, or made by a program
     refusal: InputError | None = None  # why it cannot be used as it is: only another convention makes it possible
+    about: Array | None = None  # (3,) `centre` [m] of the table of which these are some rows; None: they are all
 
     COLUMNS: ClassVar = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")  # one value a row
 
@@ -92,6 +93,18 @@ class Measurements(Shown):
     def measured(self) -> Mask:
         """Whether a position or an orientation was measured (M,)."""
         return np.isfinite(self.positions).all(axis=1) | self.oriented
+
+    @property
+    def centre(self) -> Array:
+        """Mean of the positions (3,) [m]; 0 without any."""
+        measured = self.positions[np.isfinite(self.positions).all(axis=1)]
+        mean = measured.mean(axis=0) if len(measured) else np.zeros(3)
+        return mean if self.about is None else self.about
+
+    @property
+    def clock(self) -> Array:
+        """Times (M,) [s], or the numbers of the rows where times are missing."""
+        return self.t if np.isfinite(self.t).all() else self.row.astype(float)
 
     def without_poses(self, rows: Mask) -> "Measurements":
         """A copy whose rows (M,) have no pose: what the tracker gave there is no reading."""

@@ -92,11 +92,12 @@ public:
   void descend_reweighted() {
     constexpr int rounds = 8;
     const double coarse = std::max(0.5, options_.tolerance);
-    for (int round = 0; (finds_weights_ || finds_inflation_) && round < rounds; ++round) {
+    bool settled = false;
+    for (int round = 0; (finds_weights_ || finds_inflation_) && round < rounds && !settled; ++round) {
       descend(coarse);
-      if (!objective_.at(z_) || !reweight()) break;
+      settled = !objective_.at(z_) || !reweight();
     }
-    descend(options_.tolerance);
+    if (!settled || options_.tolerance < coarse) descend(options_.tolerance);
     linearise();
   }
 
