@@ -133,6 +133,39 @@ def test_groups(truth, tmp_path, imported, same):
     assert "camera.image (24 x 8 x 9)" in said
 
 
+@pytest.mark.parametrize("how", ["groups", "matlab", "structures"])
+def test_runs(truth, tmp_path, imported, same, how):
+    """A group, or a structure, for each run, of different lengths: one run after the other, in the order of their
+    numbers. What one run lacks is missing there."""
+    parts = {2: slice(0, 7), 10: slice(7, 24)}
+    logs = {
+        run: {"time": truth.t[part], "beta": truth.beta[part], "alpha": truth.alpha[part], "pos": truth.position[part]}
+        for run, part in parts.items()
+    }
+    if how == "groups":
+        items = {f"data/run_{run}/{name}": value for run, log in logs.items() for name, value in log.items()}
+        table, said = imported(hdf5(tmp_path / "log.h5", items | {"limits": np.arange(7.0)}))
+        assert "left out: limits" in said
+    elif how == "matlab":
+        table, said = imported(matlab(tmp_path / "log.mat", {f"trial{run}": log for run, log in logs.items()}))
+    else:
+        table, said = imported(matlab(tmp_path / "log.mat", {"trials": list(logs.values())}))
+    same(table, orientation=False)
+    assert np.bincount(table.run).tolist()[-1] == 17 and np.sum(table.run == table.run[0]) == 7
+    del logs[2]["pos"]
+    items = {f"run_{run}/{name}": value for run, log in logs.items() for name, value in log.items()}
+    table, said = imported(hdf5(tmp_path / "log.h5", items))
+    assert np.isnan(table.positions).all(axis=1).tolist() == [True] * 7 + [False] * 17
+    assert "run 2, missing: pos_x" in said
+
+
+def test_tubes_are_no_runs(truth, tmp_path, imported, same):
+    """Groups of tubes have numbers too: their arrays stand side by side."""
+    items = {"t": truth.t, "pos": truth.position}
+    items |= {f"tube{i + 1}/{name}": getattr(truth, name)[:, i] for i in range(2) for name in ("beta", "alpha")}
+    same(imported(hdf5(tmp_path / "log.h5", items))[0], orientation=False)
+
+
 def test_compound_table(truth, tmp_path, imported, same):
     """A table of h5py: fields with names, vectors among them, and texts."""
     fields = [("t", float), ("beta", float, 2), ("alpha", float, 2), ("pos", float, 3), ("state", "S4")]

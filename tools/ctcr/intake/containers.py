@@ -4,6 +4,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import dataclass
 from os.path import commonprefix
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem
 from ctcr.intake import hdf5
 from ctcr.intake.log import Log
+from ctcr.intake.names import RUN
 from ctcr.show.wording import listed
 
 MAT5 = b"MATLAB 5.0"
@@ -39,23 +41,82 @@ def read_hdf5(path: Path, content: bytes) -> Log:
     return _log(path, "MATLAB .mat" if matlab else "HDF5", *hdf5.arrays(path, content), _TABLE if matlab else "")
 
 
-def _log(path: Path, kind: str, variables: dict[str, Any], left_out: list[str], hint: str) -> Log:
-    """Variables, fields of structures and columns of matrices that share the length that most of them have.
+@dataclass(frozen=True)
+class _Table:
+    """The columns of one length of some arrays, and the names of the arrays that are left out."""
 
-    A structure or group that holds all of them is left out of their names: run_3 would say what none of them is.
-    """
+    columns: dict[str, list[str] | Array]
+    length: int
+    left_out: list[str]
+
+    def column(self, name: str) -> list[str] | Array:
+        """A column; NaN where it is missing."""
+        return self.columns.get(name, np.full(self.length, np.nan))
+
+
+def _log(path: Path, kind: str, variables: dict[str, Any], left_out: list[str], hint: str) -> Log:
+    """Variables, fields of structures and columns of matrices that share the length that most of them have; where
+    structures or groups hold a run each, one run after the other."""
     arrays = dict(_arrays("", variables))
-    lengths = Counter(size for array in arrays.values() for size in set(array.shape) if size > 4)
-    if not lengths:
+    runs, others = _runs(arrays)
+    tables = {f"run {run}, ": _table(inside) for run, inside in runs.items()} or {"": _table(arrays)}
+    names = list(dict.fromkeys(name for one in tables.values() for name in one.columns))
+    if not names:
         held = "; ".join([listed(list(variables))] * bool(variables) + left_out) or "nothing"
         raise InputError(Problem(f"holds no arrays of a common length, but {held}{hint}", str(path)))
+    columns = {name: _one_after_another([one.column(name) for one in tables.values()]) for name in names}
+    notes = [*left_out]
+    if runs:
+        columns = {"run": np.repeat([*runs], [one.length for one in tables.values()])} | columns
+        notes.append(f"a group is a run each: {listed([str(run) for run in runs])}")
+        notes += [f"not in a group of a run, left out: {listed(others)}"] * bool(others)
+    for run, one in tables.items():
+        missing = [name for name in names if name not in one.columns]
+        notes += [f"{run}not {one.length} values long, left out: {listed(one.left_out)}"] * bool(one.left_out)
+        notes += [f"{run}missing: {listed(missing)}"] * bool(missing)
+    count = sum(one.length for one in tables.values())
+    return Log(path, kind, tuple(columns), tuple(columns.values()), np.arange(1, count + 1), notes=notes)
+
+
+def _runs(arrays: dict[str, Any]) -> tuple[dict[int, dict[str, Any]], list[str]]:
+    """The arrays of each run, without what names it, and the names of all others. Structures or groups such as run_1
+    and run_2, or 1 and 2, are runs."""
+    runs: dict[int, dict[str, Any]] = {}
+    others = []
+    for name, array in arrays.items():
+        parts = name.split(".")
+        numbers = [_number_of_run(group) for group in parts[:-1]]
+        place = next((k for k, number in enumerate(numbers) if number is not None), None)
+        if place is None:
+            others.append(name)
+        else:
+            runs.setdefault(numbers[place], {})[".".join(parts[:place] + parts[place + 1 :])] = array
+    return (dict(sorted(runs.items())), others) if len(runs) > 1 else ({}, [])
+
+
+def _number_of_run(group: str) -> int | None:
+    found = re.fullmatch(r"(.*?)[ _-]*(\d+)", group)
+    if found and (not found[1] or RUN & set(re.findall("[a-z]+", found[1].lower()))):
+        return int(found[2])
+    return None
+
+
+def _table(arrays: dict[str, Any]) -> _Table:
+    """A structure or group that holds all columns is left out of their names: log_3 would say what none of them is."""
+    lengths = Counter(size for array in arrays.values() for size in set(array.shape) if size > 4)
+    if not lengths:
+        return _Table({}, 0, list(arrays))
     length = max(lengths, key=lambda size: (lengths[size], size))
     used = [name for name, array in arrays.items() if length in array.shape]
     shared = sum(len(part) + 1 for part in commonprefix([name.split(".")[:-1] for name in used]))
     columns = dict(column for name in used for column in _columns(name[shared:], arrays[name], length))
-    other = [name for name in arrays if name not in used]
-    notes = left_out + ([f"not {length} values long, left out: {listed(other)}"] if other else [])
-    return Log(path, kind, tuple(columns), tuple(columns.values()), np.arange(1, length + 1), notes=notes)
+    return _Table(columns, length, [name for name in arrays if name not in used])
+
+
+def _one_after_another(parts: list[list[str] | Array]) -> list[str] | Array:
+    if all(isinstance(part, np.ndarray) for part in parts):
+        return np.concatenate(parts)
+    return [str(value) for part in parts for value in part]
 
 
 def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -68,8 +129,12 @@ def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "OU":
         if all(isinstance(item, str) for item in value):
             yield prefix, value
-        elif value.size and all(isinstance(item, dict) for item in value):  # an array of structures: a row each
-            for name in value[0]:
+        elif value.size and all(isinstance(item, dict) for item in value):  # an array of structures
+            if any(max(np.shape(part), default=0) > 4 for part in value[0].values()):
+                for i, item in enumerate(value, start=1):  # a run each
+                    yield from _arrays(f"{prefix}.{i}", item)
+                return
+            for name in value[0]:  # a row each
                 parts = [np.atleast_1d(item.get(name, np.nan)) for item in value]
                 if len({part.shape for part in parts}) == 1 and parts[0].dtype.kind in "fiub":
                     yield from _arrays(f"{prefix}.{name}", np.squeeze(np.stack(parts)))

@@ -47,7 +47,11 @@ def arrays(path: Path, content: bytes) -> tuple[dict[str, Any], list[str]]:
                 elif not _fits(item.shape):
                     shape = item.shape[::-1] if "MATLAB_class" in item.attrs else item.shape
                     left_out.append(f"{name} ({' x '.join(map(str, shape))}) is no column, vector or matrix a row")
-                elif (value := _value(h5py, item)) is not None:
+                elif isinstance(value := _value(h5py, item), list):
+                    group, _, field = name.rpartition(".")
+                    for run, part in enumerate(value, start=1):
+                        found[f"{group}.{run}.{field}".lstrip(".")] = part
+                elif value is not None:
                     found[name + _unit(item)] = value
     except InputError:
         raise
@@ -86,12 +90,15 @@ def _value(h5py: Any, item: Any) -> Any:
     return np.squeeze(value.T) if kind else _by_field(np.asarray(value))
 
 
-def _joined(parts: list[Any]) -> Array | None:
-    """The parts of a cell, or of a field of structures, as rows: texts, numbers of one shape, structures; else None."""
+def _joined(parts: list[Any]) -> Array | list[Array] | None:
+    """The parts of a cell, or of a field of structures, as rows: texts, numbers of one shape, structures; columns of
+    runs as they are; else None."""
     if all(isinstance(part, dict) for part in parts):
         return np.array(parts, dtype=object)
     if any(not isinstance(part, np.ndarray) for part in parts):
         return None
+    if all(part.dtype.kind in "fiub" and max(part.shape, default=0) > 4 for part in parts):
+        return parts
     if len({(part.shape, part.dtype.kind == "U") for part in parts}) > 1:
         return None
     return np.squeeze(np.stack(parts))

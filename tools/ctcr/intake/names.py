@@ -11,7 +11,7 @@ INNER, MIDDLE, OUTER = -3, -2, -1  # numbers of tubes that a name gives as a wor
 
 _GREEK = {"α": "alpha", "β": "beta", "θ": "theta", "φ": "phi", "ψ": "psi", "ρ": "rho"}
 _TIME = {"t", "time", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "secs", "clock", "times"}
-_RUN = {"run", "trial", "path", "experiment", "trajectory", "traj", "sequence", "runs", "trials"}
+RUN = {"run", "trial", "path", "experiment", "trajectory", "traj", "sequence", "runs", "trials"}
 _BETA = {"beta", "b", "d", "trans", "translation", "translations", "translational", "linear", "lin", "ins", "insertion"}
 _BETA |= {"tr", "ext", "extension", "slide", "rho", "l", "s", "advance", "displacement", "disp", "stroke", "betas"}
 _ALPHA = {"alpha", "a", "theta", "rot", "rotation", "rotations", "rotational", "roll", "psi", "phi", "angle", "ang"}
@@ -194,7 +194,7 @@ def _joint(words: list[str]) -> Found:
 
 
 def _other(words: list[str]) -> Found:
-    for role, known in (("t", _TIME), ("run", _RUN), ("seen", _SEEN), ("weight", _WEIGHT)):
+    for role, known in (("t", _TIME), ("run", RUN), ("seen", _SEEN), ("weight", _WEIGHT)):
         if set(words) & known:
             return role, 0, [word for word in words if word not in known and not word.isdigit()]
     return None
