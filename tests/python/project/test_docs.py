@@ -196,6 +196,19 @@ def test_scores_told_are_those_kept():
     assert f"{named} of {causes} causes where two to five act together" in " ".join(told.split())
 
 
+def test_conventions_told_are_those_kept():
+    """How often a wrong convention was named, of both halves together."""
+    page = (ROOT / "docs" / "convention_study.md").read_text()
+    told = " ".join((ROOT / "README.md").read_text().split())
+
+    def of(wrong):
+        counts = re.findall(rf"^\| {wrong} \| (\d+)/(\d+) =", page, re.MULTILINE)
+        return [sum(int(count) for count in column) for column in zip(*counts, strict=True)]
+
+    (named, sessions), (silent, right) = of("one"), of("nothing")
+    assert f"in {named} of {sessions}, and none in {silent} of {right} that had none" in told
+
+
 @pytest.mark.parametrize("document", ["README.md", "docs/calibration.md"])
 def test_coverage_told(document):
     """The share of true values within two standard deviations, as the page of the study keeps it."""
