@@ -159,10 +159,12 @@ def test_runs(truth, tmp_path, imported, same, how):
     assert "run 2, missing: pos_x" in said
 
 
-def test_tubes_are_no_runs(truth, tmp_path, imported, same):
+@pytest.mark.parametrize("group", ["tube{}", "tubes/{}", "robot/tube_{}", "motor/{}"])
+def test_tubes_are_no_runs(truth, tmp_path, imported, same, group):
     """Groups of tubes have numbers too: their arrays stand side by side."""
     items = {"t": truth.t, "pos": truth.position}
-    items |= {f"tube{i + 1}/{name}": getattr(truth, name)[:, i] for i in range(2) for name in ("beta", "alpha")}
+    for i in range(2):
+        items |= {f"{group.format(i + 1)}/{name}": getattr(truth, name)[:, i] for name in ("beta", "alpha")}
     same(imported(hdf5(tmp_path / "log.h5", items))[0], orientation=False)
 
 

@@ -22,6 +22,21 @@ from ctcr.show.wording import listed
 MAT5 = b"MATLAB 5.0"
 _VECTORS = {"pos", "position", "positions", "p", "xyz", "tip", "sensor", "force", "f", "translation", "x"}
 _TURNS = {"rpy", "euler", "angles", "angle", "rot", "rotation", "orientation", "joint", "joints", "tube", "tubes"}
+_SEVERAL = {
+    "tube",
+    "joint",
+    "motor",
+    "drive",
+    "axis",
+    "actuator",
+    "stage",
+    "marker",
+    "sensor",
+    "coil",
+    "tracker",
+    "body",
+}
+_SEVERAL |= {f"{part}s" for part in _SEVERAL} | {"axes", "bodies"}  # of which a machine has several
 _TABLE = "; a table of MATLAB is saved as s = table2struct(T, 'ToScalar', true); save(name, '-struct', 's')"
 
 
@@ -85,7 +100,7 @@ def _runs(arrays: dict[str, Any]) -> tuple[dict[int, dict[str, Any]], list[str]]
     others = []
     for name, array in arrays.items():
         parts = name.split(".")
-        numbers = [_number_of_run(group) for group in parts[:-1]]
+        numbers = [_number_of_run(group, parts[:k]) for k, group in enumerate(parts[:-1])]
         place = next((k for k, number in enumerate(numbers) if number is not None), None)
         if place is None:
             others.append(name)
@@ -94,11 +109,13 @@ def _runs(arrays: dict[str, Any]) -> tuple[dict[int, dict[str, Any]], list[str]]
     return (dict(sorted(runs.items())), others) if len(runs) > 1 else ({}, [])
 
 
-def _number_of_run(group: str) -> int | None:
-    found = re.fullmatch(r"(.*?)[ _-]*(\d+)", group)
-    if found and (not found[1] or RUN & set(re.findall("[a-z]+", found[1].lower()))):
-        return int(found[2])
-    return None
+def _number_of_run(group: str, inside: list[str]) -> int | None:
+    """The number of the run that the name of a group gives; a number alone counts parts of a robot or a tracker where
+    the groups that hold it say so."""
+    name, number = re.fullmatch(r"(.*?)[ _-]*(\d*)", group).groups()
+    words = set(re.findall("[a-z]+", (name or " ".join(inside)).lower()))
+    is_run = words & RUN if name else not words & _SEVERAL
+    return int(number) if number and is_run else None
 
 
 def _table(arrays: dict[str, Any]) -> _Table:
