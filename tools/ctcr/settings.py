@@ -89,10 +89,10 @@ FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are t
 
 # ---- Joint fit
 
+# A table of a part of the readings leaves rows out where the joints move straight on.
+PATH_STRAIGHT = {"alpha": 1.5e-3, "beta": 2e-6}  # [rad], [m] by which they may miss that motion: friction slips at 5e-3
+PATH_STEP = {"alpha": 0.035, "beta": 1e-3}  # [rad], [m] over which the torsion of rubbing tubes changes linearly
 FEW_ROWS = 300  # rows of a first fit where there are twice as many: enough to find the basin of every parameter
-PATH_STRAIGHT = {"alpha": 1.5e-3, "beta": 2e-6}  # [rad], [m] by which rows that are left out miss a straight motion:
-# far less than resolves friction, which a slide changes as a turn of slide / radius does
-PATH_STEP = {"alpha": 0.035, "beta": 1e-3}  # [rad], [m] farthest that friction is followed at once
 FEW_PART = 0.1  # of very many rows, fitted before all of them: its steps cost a tenth
 TOLERANCE = 0.02  # [log evidence] of a converged fit: far below what decides anything
 COARSE = 0.5  # [log evidence] tolerance of fits that only find a start, or tell models apart

@@ -7,19 +7,23 @@
 
 namespace ctcr::detail {
 
-/// The samples of a path at which friction is solved, its nodes: of a dense recording some, else all. Between two nodes the
-/// joints move straight on under the same load, the torsion that the path brings is linear, and so is what friction adds to
-/// it. Friction changes fast where the motion turns: there the nodes follow each other as the samples do, and on the way from
-/// there their distance doubles, up to a largest one.
+/// The samples of a path at which friction is solved, its nodes. Of a dense recording they are some of the samples, else all.
+/// Between two nodes the joints move straight on under the same load, and the torsion that the path brings is linear; what
+/// friction adds to it is taken to be linear, too. Where the motion turns, friction changes fast: there every sample is a node.
+/// From there on the distance between nodes doubles, up to a largest one.
 template <int N>
 class PathNodes {
-  using Place = Eigen::Vector<double, 2 * N>;                       // alpha [rad], then beta [m]
-  static constexpr double rotation = 0.0175, translation = 3.5e-4;  // largest distance between nodes [rad], [m]
-  static constexpr double bent = 1.5e-3,
-                          slid = 2e-6;     // by which a motion is still straight [rad], [m]; a slide of a radius
-                                           // changes friction as much as a turn of 1 rad
-  static constexpr double twisted = 5e-3;  // by which a torsion is still linear [rad]
-  static constexpr std::size_t most = 64;  // samples from node to node: bounded work
+  using Place = Eigen::Vector<double, 2 * N>;  // alpha [rad], then beta [m]
+
+  // Largest distance between nodes [rad], [m].
+  static constexpr double rotation = 0.0175, translation = 3.5e-4;
+  // By which a motion may bend and still be straight [rad], [m]: a slide by the radius of a tube changes friction as much as
+  // a turn of 1 rad.
+  static constexpr double bent = 1.5e-3, slid = 2e-6;
+  // By which a torsion may bend and still be linear [rad].
+  static constexpr double twisted = 5e-3;
+  // Samples from node to node, at most: it bounds the work.
+  static constexpr std::size_t most = 64;
 
 public:
   PathNodes(std::span<const RecordedRow<N>> rows, const RecordedPath<N>& path) : rows_(rows), path_(path) {

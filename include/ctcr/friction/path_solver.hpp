@@ -99,6 +99,7 @@ public:
   }
 
 private:
+  [[nodiscard]] bool is_at_first() const noexcept { return next_ <= 1; }
   static auto& of_torsion(auto& effects) noexcept { return std::get<TorsionEffect<Fx, N>>(effects.list); }
 
   /// Moves to sample k, its torsion still that of the path, and updates the history of all effects but that of torsion.
@@ -106,7 +107,6 @@ private:
     from_ = here_;
     here_ = path.q[k];
     radius_ = path.radius;
-    is_first_ = k == 0;
     before_ = effects_;
     before_.for_each([&](auto& effect, int) {
       if constexpr (!DependsOnTorsion<std::remove_cvref_t<decltype(effect)>> &&
@@ -119,7 +119,7 @@ private:
   /// The effects after the motion to the current sample, if this is the torsion there.
   Effects effects_at(const RelativeTorsion<N>& torsion) const noexcept {
     Effects now = before_;
-    if (is_first_) return now;
+    if (is_at_first()) return now;
     std::array way{from_, here_};
     way[1].torsion = torsion;
     of_torsion(now).update_history({way, {}, {}, radius_}, 1);
@@ -130,7 +130,7 @@ private:
   Vec friction_by_torsion() const noexcept {
     using S = Dual<1>;
     Vec derivative = Vec::Zero();
-    if (is_first_) return derivative;
+    if (is_at_first()) return derivative;
     const auto dual = [](const Sample& plain) {
       typename Path<N, S>::Row row;
       std::ranges::copy(plain.beta, row.beta.begin());
@@ -156,8 +156,7 @@ private:
   Effects effects_, before_{};  ///< after the motion to the current sample; those of torsion before it
   Sample from_{}, here_{};      ///< the sample before, the current one
   ContactRadii<N> radius_;
-  bool is_first_ = true;
-  std::size_t next_ = 0;          ///< the sample after the current one
+  std::size_t next_ = 0;          ///< the sample after the current one; 0: before the first
   Vec difference_ = Vec::Zero();  ///< of the solved torsion from the given one
   TorsionSolver<N, Fx> torsion_solver_;
   Workspace<N> ws_;

@@ -69,7 +69,7 @@ double solve_friction(const System<N, Fx>& system, std::span<RecordedRow<N>> row
     });
   }
 
-  // Between the nodes, what friction adds to the torsion, and the derivatives.
+  // Between the nodes, interpolate what friction adds to the torsion, and the derivatives.
   using Vec = VecN<Contacts<N>::count>;
   const auto given = [&](std::size_t k) {
     return Vec::Map(rows[path.index[k].row].torsion[path.index[k].of_row].data());

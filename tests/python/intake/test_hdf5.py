@@ -104,6 +104,17 @@ def test_matlab_structures_and_cells(truth, tmp_path, imported, same, as_cell):
     same(table, orientation=False)
 
 
+def test_matlab_rows_of_long_vectors(truth, tmp_path, imported, same):
+    """Structures with vectors of a pose, and a text, are a row each, not a run of seven rows each."""
+    pose = np.column_stack([truth.position, truth.rotation.as_quat()])
+    rows = zip(truth.t, truth.beta, truth.alpha, pose, strict=True)
+    log = [{"t": t, "beta": beta, "alpha": alpha, "tip": tip, "state": "ok"} for t, beta, alpha, tip in rows]
+    columns = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    options = [word for i, role in enumerate(columns, 1) for word in ("--column", f"{role}=tip_{i}")]
+    table, _ = imported(matlab(tmp_path / "log.mat", {"log": log}), *options)
+    same(table)
+
+
 def test_matlab_table(truth, tmp_path, refused, imported):
     """What only MATLAB reads is named, with what to do: alone it is a fault, beside arrays a note."""
     path = matlab(tmp_path / "log.mat", {"gain": 3.0, "T": np.arange(6, dtype=np.uint16)})

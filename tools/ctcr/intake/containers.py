@@ -22,21 +22,8 @@ from ctcr.show.wording import listed
 MAT5 = b"MATLAB 5.0"
 _VECTORS = {"pos", "position", "positions", "p", "xyz", "tip", "sensor", "force", "f", "translation", "x"}
 _TURNS = {"rpy", "euler", "angles", "angle", "rot", "rotation", "orientation", "joint", "joints", "tube", "tubes"}
-_SEVERAL = {
-    "tube",
-    "joint",
-    "motor",
-    "drive",
-    "axis",
-    "actuator",
-    "stage",
-    "marker",
-    "sensor",
-    "coil",
-    "tracker",
-    "body",
-}
-_SEVERAL |= {f"{part}s" for part in _SEVERAL} | {"axes", "bodies"}  # of which a machine has several
+_SEVERAL = {"tube", "joint", "motor", "drive", "axis", "actuator", "stage", "marker", "sensor", "coil", "tracker"}
+_SEVERAL |= {f"{part}s" for part in _SEVERAL} | {"axes", "body", "bodies"}  # of which a machine has several
 _TABLE = "; a table of MATLAB is saved as s = table2struct(T, 'ToScalar', true); save(name, '-struct', 's')"
 
 
@@ -147,14 +134,28 @@ def _arrays(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
         if all(isinstance(item, str) for item in value):
             yield prefix, value
         elif value.size and all(isinstance(item, dict) for item in value):  # an array of structures
-            if any(max(np.shape(part), default=0) > 4 for part in value[0].values()):
-                for i, item in enumerate(value, start=1):  # a run each
-                    yield from _arrays(f"{prefix}.{i}", item)
+            if _holds_columns(value[0]):  # a run each
+                yield from _arrays(prefix, {str(number): item for number, item in enumerate(value, start=1)})
                 return
             for name in value[0]:  # a row each
                 parts = [np.atleast_1d(item.get(name, np.nan)) for item in value]
-                if len({part.shape for part in parts}) == 1 and parts[0].dtype.kind in "fiub":
+                if len({part.shape for part in parts}) == 1 and parts[0].dtype.kind in "fiubU":
                     yield from _arrays(f"{prefix}.{name}", np.squeeze(np.stack(parts)))
+
+
+def _holds_columns(structure: dict[str, Any]) -> bool:
+    """Whether most fields of a structure have one length, longer than the vectors of a reading: else it is a row."""
+    sizes = Counter(_sizes(structure))
+    return any(size > 4 and 2 * often > sizes.total() for size, often in sizes.items())
+
+
+def _sizes(value: Any) -> Iterator[int]:
+    """The longest side of each field; 0 of numbers and texts."""
+    if isinstance(value, dict):
+        for inner in value.values():
+            yield from _sizes(inner)
+    else:
+        yield max(np.shape(value), default=0)
 
 
 def _columns(name: str, array: Any, length: int) -> Iterator[tuple[str, list[str] | Array]]:

@@ -28,17 +28,20 @@ def arrays(path: Path, content: bytes) -> tuple[dict[str, Any], list[str]]:
     found: dict[str, Any] = {}
     left_out: list[str] = []
     items: list[tuple[str, Any]] = []
-    name = None
+    name, inner = None, _INNER
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             file.visititems(lambda *item: items.append(item))
             for place, item in items:
-                if place.startswith(_INNER):
+                if place.startswith(inner):
                     continue
                 name = place.replace("/", ".")
                 if "pandas_type" in item.attrs:
                     text = "is what pandas' to_hdf writes: read it with pandas.read_hdf, and save it with to_csv"
                     raise InputError(Problem(text, str(path), field=name))
+                if _is_array_of_structures(h5py, item):
+                    found[name], inner = _structures(h5py, item), (*inner, f"{place}/")
+                    continue
                 if not isinstance(item, h5py.Dataset) or item.shape is None:
                     continue
                 if "MATLAB_object_decode" in item.attrs:
@@ -47,11 +50,7 @@ def arrays(path: Path, content: bytes) -> tuple[dict[str, Any], list[str]]:
                 elif not _fits(item.shape):
                     shape = item.shape[::-1] if "MATLAB_class" in item.attrs else item.shape
                     left_out.append(f"{name} ({' x '.join(map(str, shape))}) is no column, vector or matrix a row")
-                elif isinstance(value := _value(h5py, item), list):
-                    group, _, field = name.rpartition(".")
-                    for run, part in enumerate(value, start=1):
-                        found[f"{group}.{run}.{field}".lstrip(".")] = part
-                elif value is not None:
+                elif (value := _value(h5py, item)) is not None:
                     found[name + _unit(item)] = value
     except InputError:
         raise
@@ -80,7 +79,7 @@ def _value(h5py: Any, item: Any) -> Any:
         return {name: _value(h5py, part) for name, part in item.items()}
     if "MATLAB_empty" in item.attrs:
         return np.array("") if kind == "char" else None
-    if h5py.check_ref_dtype(item.dtype) is h5py.Reference:
+    if _refers(h5py, item):
         return _joined([_value(h5py, item.file[part]) for part in item[()].ravel()])
     if h5py.check_string_dtype(item.dtype):
         return item.asstr(errors="replace")[()]
@@ -90,15 +89,32 @@ def _value(h5py: Any, item: Any) -> Any:
     return np.squeeze(value.T) if kind else _by_field(np.asarray(value))
 
 
-def _joined(parts: list[Any]) -> Array | list[Array] | None:
-    """The parts of a cell, or of a field of structures, as rows: texts, numbers of one shape, structures; columns of
-    runs as they are; else None."""
+def _is_array_of_structures(h5py: Any, item: Any) -> bool:
+    """Whether a group is an array of structures of MATLAB: each field refers to its values, one a structure."""
+    return (
+        isinstance(item, h5py.Group)
+        and item.attrs.get("MATLAB_class") == b"struct"
+        and len(item) > 0
+        and all(_refers(h5py, field) and "MATLAB_class" not in field.attrs for field in item.values())
+    )
+
+
+def _structures(h5py: Any, group: Any) -> Array:
+    """The structures of such an array, each a dict of its fields."""
+    columns = [[_value(h5py, group.file[part]) for part in field[()].ravel()] for field in group.values()]
+    return np.array([dict(zip(group, row, strict=True)) for row in zip(*columns, strict=True)], dtype=object)
+
+
+def _refers(h5py: Any, item: Any) -> bool:
+    return isinstance(item, h5py.Dataset) and h5py.check_ref_dtype(item.dtype) is h5py.Reference
+
+
+def _joined(parts: list[Any]) -> Array | None:
+    """The parts of a cell as rows: texts, numbers of one shape, structures; else None."""
     if all(isinstance(part, dict) for part in parts):
         return np.array(parts, dtype=object)
     if any(not isinstance(part, np.ndarray) for part in parts):
         return None
-    if all(part.dtype.kind in "fiub" and max(part.shape, default=0) > 4 for part in parts):
-        return parts
     if len({(part.shape, part.dtype.kind == "U") for part in parts}) > 1:
         return None
     return np.squeeze(np.stack(parts))

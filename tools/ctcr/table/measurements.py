@@ -62,7 +62,7 @@ class Measurements(Shown):
     from_home: bool = True  # whether the robot came to the first row straight from home; else it was at rest there
     file: str = ""  # that it was read from; empty: a DataFrame, or made by a program
     refusal: InputError | None = None  # why it cannot be used as it is: only another convention makes it possible
-    about: Array | None = None  # (3,) `centre` [m] of the table of which these are some rows; None: they are all
+    about: Array | None = None  # (3,) `centre` [m] of the whole table, where these are some of its rows
 
     COLUMNS: ClassVar = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")  # one value a row
 
@@ -96,10 +96,11 @@ class Measurements(Shown):
 
     @property
     def centre(self) -> Array:
-        """Mean of the positions (3,) [m]; 0 without any."""
+        """Mean position (3,) [m] of the whole table; 0 without any."""
+        if self.about is not None:
+            return self.about
         measured = self.positions[np.isfinite(self.positions).all(axis=1)]
-        mean = measured.mean(axis=0) if len(measured) else np.zeros(3)
-        return mean if self.about is None else self.about
+        return measured.mean(axis=0) if len(measured) else np.zeros(3)
 
     @property
     def clock(self) -> Array:

@@ -8,9 +8,9 @@ from ctcr.table.measurements import Measurements
 
 
 def with_path(measurements: Measurements, rows: Mask) -> Mask:
-    """Some rows (M,), and those without which the path would be another: where the joints turn, and where runs, loads
-    and the session begin or end. Between these all joints move evenly in time, but for settings.PATH_STRAIGHT, and no
-    farther than settings.PATH_STEP."""
+    """Some rows (M,) and those that keep the path: where the joints turn, and where runs, loads and the session begin
+    or end. From each of them to the next all joints move at constant speed, within settings.PATH_STRAIGHT. Of a dense
+    recording one row in each settings.PATH_STEP is kept, too."""
     time, kept = measurements.clock, rows.copy()
     kept[[0, -1, np.argmin(time), np.argmax(time)]] = True
     changes = (np.diff(measurements.run) != 0) | np.any(np.diff(measurements.force, axis=0) != 0, axis=1)
