@@ -180,6 +180,7 @@ SEGMENT_ROWS = 12  # in each of more segments, at least
 MOST_SEGMENTS = 96  # of more runs several share one, as each is a column of all readings
 SEGMENTS_AT_ONCE = 16  # columns that are made at a time: memory
 LAG_SPREAD = 0.2  # prior standard deviation of the lag of a segment, over the delay
+LAG_SCATTER = (0.0, 1 / 8, 1 / 4, 1 / 2, 1.0)  # of that sd, which the lags of single readings may have
 LAG_CORRELATION = (0.0, 1 / 16, 1 / 4)  # correlation times of lags over the session that are tried
 LAGS_LEAVE = 0.5  # fraction of the unexplained chi-square that lags may leave, if they are to be its cause
 ONE_FRAME = 0.3  # by how much lags may differ from one frame of the tracker, over it, and still be called so

@@ -18,7 +18,7 @@ from ctcr.model.noise import noise_of_readings
 
 MASS = "effects.tip_load.mass"
 SPREAD = "effects.delay.spread"
-NO_GAIN = Gain(0.0, *4 * [np.zeros(1)])
+NO_GAIN = Gain(0.0, *4 * [np.zeros(1)], removed=0.0)
 
 
 def engine_for(robot, plan, hidden, seed=4):
@@ -97,7 +97,7 @@ def test_one_odd_run():
 
 def candidate_fit(identity, score, *, shape=(), explained=0.9, columns=None, **changes):
     columns = np.zeros((1, 1)) if columns is None else columns
-    gain = Gain(score, np.zeros(1), np.zeros(1), columns[:, 0], columns)
+    gain = Gain(score, np.zeros(1), np.zeros(1), columns[:, 0], columns, removed=2 * score)
     candidate = Candidate(identity, (f"effects.{identity}.any",), shape)
     return CandidateFit(candidate, gain, refit=score, explained=explained, fit=object(), **changes)
 

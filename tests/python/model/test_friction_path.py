@@ -125,7 +125,7 @@ def test_other_variant(robot, plan):
     }
     for given, fitted in names.items():
         fit = engine.fit(fitted)
-        gain = Gain(0.0, *4 * [np.zeros(1)])
+        gain = Gain(0.0, *4 * [np.zeros(1)], removed=0.0)
         entered = CandidateFit(Candidate("friction", fitted), gain, fit=fit)
         round_ = Round(fit, [entered], accepted=entered, ids=["friction"])
         one = Accepted(entered, round_, log_evidence=100.0, beside=0.9)

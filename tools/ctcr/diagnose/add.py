@@ -13,7 +13,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import prepared
 from ctcr.calibrate.joint_fit import Stage
-from ctcr.diagnose import outliers, segment_delays, smooth_field
+from ctcr.diagnose import lags, outliers, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.held_out import fit_to_predict
@@ -178,11 +178,11 @@ def add(
         if held_out.any():
             fit = stage(fitted, fitted, everything, [now | values_of(fit)])
         progress.advance(1)
-    corrected, nuisances = segment_delays.corrected(stage.engine, fit)
+    corrected, nuisances = lags.corrected(stage.engine, fit)
     explained = stage.explained or (bool(nuisances) and not joint.rejects(corrected))
     if (smooth := smooth_field.likeliest_noise(stage.engine, fit)) is not None:
         nuisances.append(smooth_field.message(smooth))
-    fit = segment_delays.widened(stage.engine, one_sided.widened(fit))
+    fit = lags.widened(stage.engine, one_sided.widened(fit))
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), folds.named(readings, held_out)

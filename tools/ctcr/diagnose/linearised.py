@@ -20,6 +20,7 @@ class Gain:
     calibration: Array  # (n,) change of the fitted parameters that goes with them
     signal: Array  # (K,) change of the residual that calibration cannot imitate
     columns: Array  # (K, k) derivatives that calibration cannot imitate
+    removed: float  # chi-square of residual and prior
 
 
 def laplace(information: Array, gradient: Array) -> tuple[Array, Array]:
@@ -56,5 +57,6 @@ class Linear:
         """Of parameters with derivatives `columns` (K, k): exact where the model is linear in them."""
         imitation = self.imitation(columns)
         left = columns - self.jacobian @ imitation
-        log_evidence, eta = laplace(columns.T @ left, columns.T @ self.residual)
-        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left)
+        gradient = columns.T @ self.residual
+        log_evidence, eta = laplace(columns.T @ left, gradient)
+        return Gain(float(log_evidence), eta, -imitation @ eta, left @ eta, left, -float(gradient @ eta))

@@ -11,7 +11,7 @@ from ctcr import settings
 from ctcr.arrays import Mask
 from ctcr.audit import prepared
 from ctcr.conventions import Finding
-from ctcr.diagnose import outliers, segment_delays, smooth_field
+from ctcr.diagnose import lags, outliers, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, Progress, values_of
 from ctcr.diagnose.explanations import probability
@@ -263,8 +263,8 @@ def _diagnose(
     progress("structure of the residual")
 
     def structure(fit: joint.Fit) -> tuple[joint.Fit, list[str], Residual]:
-        corrected, corrections = segment_delays.corrected(engine, fit)
-        corrections += [segment_delays.CORRECTED] if corrections else []
+        corrected, corrections = lags.corrected(engine, fit)
+        corrections += [lags.CORRECTED] if corrections else []
         return corrected, corrections, residual_of(engine, chosen.calibrated, corrected, corrections)
 
     corrected, corrections, residual = structure(fit)
@@ -275,7 +275,7 @@ def _diagnose(
     if accepted:
         with_effects = fit_to_predict(engine, fit, fixed)
         if corrections:
-            with_effects, _ = segment_delays.corrected(engine, with_effects)
+            with_effects, _ = lags.corrected(engine, with_effects)
     explained = explained_by_run(engine, calibrated, with_effects) if accepted else {}
     isolated = outliers.isolated(engine.measurements, with_effects, held_out)
 
@@ -286,7 +286,7 @@ def _diagnose(
     smooth = smooth_field.likeliest_noise(engine, fit) if verdict.word == "identified" else None
     if smooth is not None:
         fit = engine.fit(names, start=values_of(fit), fixed=fixed, noise=smooth, near=True)
-        corrected = segment_delays.corrected(engine, fit)[0] if corrections else fit
+        corrected = lags.corrected(engine, fit)[0] if corrections else fit
         with_effects = smooth_field.corrected(engine, corrected, smooth)
         corrections = [*corrections, smooth_field.message(smooth), smooth_field.CORRECTED]
         residual = residual_of(engine, chosen.calibrated, corrected, corrections)
@@ -305,7 +305,7 @@ def _diagnose(
         not_testable=not_testable,
         calibrated=calibrated,
         with_effects=one_sided.widened(with_effects),
-        final=segment_delays.widened(engine, one_sided.widened(fit)),
+        final=lags.widened(engine, one_sided.widened(fit)),
         floors=floors(_with_effects(robot, fit, accepted, fixed), measurements),
         noise_floor_mm=joint.tracker_error(with_effects, floor_noise)[0],
         rounds=chosen.rounds,
@@ -323,7 +323,7 @@ def _diagnose(
             accepted=[],
             residual=residual,
             with_effects=one_sided.widened(calibrated),
-            final=segment_delays.widened(engine, one_sided.widened(plain)),
+            final=lags.widened(engine, one_sided.widened(plain)),
             floors=floors(robot, measurements),
         )
     return result

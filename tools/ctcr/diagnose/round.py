@@ -8,7 +8,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
-from ctcr.diagnose import segment_delays, starts
+from ctcr.diagnose import lags, starts
 from ctcr.diagnose.candidates import Candidate
 from ctcr.diagnose.engine import Engine, effects_in, values_of
 from ctcr.diagnose.form_errors import log_odds_of_cause
@@ -114,22 +114,30 @@ class Round:
         return len(self.ids) == 1 and self.margin >= settings.DECISIVE
 
 
-def unexplained(fit: joint.Fit) -> float:
-    """Chi-square beyond what the noise as stated explains, at least its usual scatter; in units of inflated noise."""
-    used = (fit.weights > 0).sum(axis=0)
-    by_noise = float(3 * np.sum(used / fit.inflation**2))
-    return max(_chi_square(fit) - by_noise, np.sqrt(2 * fit.observations))
+@dataclass(frozen=True)
+class Judged:
+    """A fit as the selection judges it: beside a delay, lags that the data ask for are noise."""
 
+    fit: joint.Fit
+    log_evidence: float
+    chi_square: float  # of residual and prior, in units of the fit's inflated noise
 
-def fraction_explained(before: joint.Fit, after: joint.Fit, added: int) -> float:
-    """Fraction of the unexplained chi-square that `added` parameters explain, at the same weights and noise."""
-    removed = _chi_square(before) - _chi_square(after) - added
-    return float(removed / max(unexplained(before), removed, 1.0))
+    @staticmethod
+    def of(engine: Engine, fit: joint.Fit) -> "Judged":
+        more, removed = lags.explained(engine, fit)
+        return Judged(fit, fit.log_evidence + more, fit.admitted_chi_square + fit.shift_square - removed)
 
+    @property
+    def unexplained(self) -> float:
+        """Chi-square beyond what the noise as stated explains, at least its usual scatter."""
+        used = (self.fit.weights > 0).sum(axis=0)
+        by_noise = float(3 * np.sum(used / self.fit.inflation**2))
+        return max(self.chi_square - by_noise, np.sqrt(2 * self.fit.observations))
 
-def _chi_square(fit: joint.Fit) -> float:
-    """Of residual and prior, in units of the fit's inflated noise."""
-    return fit.admitted_chi_square + fit.shift_square
+    def fraction_explained(self, after: "Judged", added: int) -> float:
+        """Fraction of the unexplained chi-square that `added` parameters explain, at the same weights and noise."""
+        removed = self.chi_square - after.chi_square - added
+        return float(removed / max(self.unexplained, removed, 1.0))
 
 
 def outlier_fraction(fit: joint.Fit) -> float:
@@ -169,7 +177,7 @@ def run_round(
     refits = Refits(engine, before, fixed)
     if known:
         own = thin.derivatives(at, known.candidate.names, fixed | dict(known.candidate.shape))
-        known = replace(known, gain=segment_delays.linearised(thin, at).gain(at.whiten(own)))
+        known = replace(known, gain=lags.linearised(thin, at).gain(at.whiten(own)))
     chosen = refits.in_reach(contenders(known, screened) if known else worth_a_refit(screened))
     tried = refits.of_all(chosen, known)
     if accepted:
@@ -188,7 +196,7 @@ def screen(
     engine: Engine, before: joint.Fit, candidates: list[Candidate], fixed: dict[str, float]
 ) -> list[CandidateFit]:
     """All candidates with their linearised gain, best first."""
-    n_tubes, linear = engine.robot.n_tubes, segment_delays.linearised(engine, before)
+    n_tubes, linear = engine.robot.n_tubes, lags.linearised(engine, before)
     candidates = [c for c in candidates if not set(c.names) & set(before.names)]
     forces = catalogue.names_with("tip_force", n_tubes)
     everywhere = dict.fromkeys(catalogue.names_with("moment", n_tubes), starts.EVERYWHERE)
@@ -242,7 +250,7 @@ class Refits:
     fixed: dict[str, float]
 
     def __post_init__(self) -> None:
-        self._log_evidence = segment_delays.log_evidence(self.engine, self.before)
+        self._judged = Judged.of(self.engine, self.before)
 
     def in_reach(self, chosen: list[CandidateFit]) -> list[CandidateFit]:
         """Those that a refit to a few of many rows does not leave far behind the best, with that fit as a start."""
@@ -303,12 +311,12 @@ class Refits:
 
     def _by(self, one: CandidateFit, fit: joint.Fit) -> CandidateFit:
         """What the candidate explains by a fit at the weights and noise of the fit before."""
-        engine, before, candidate = self.engine, self.before, one.candidate
-        refit = segment_delays.log_evidence(engine, fit) - self._log_evidence - candidate.penalty
-        explained = fraction_explained(before, fit, len(candidate.names))
+        candidate, before, after = one.candidate, self._judged, Judged.of(self.engine, fit)
+        refit = after.log_evidence - before.log_evidence - candidate.penalty
+        explained = before.fraction_explained(after, len(candidate.names))
         # A chi-square removed has a standard deviation of twice its root.
-        sd = 2 * np.sqrt(max(explained, 0.0) / max(unexplained(before), 1.0))
-        implausible = tuple(_implausible(engine, fit, candidate))
+        sd = 2 * np.sqrt(max(explained, 0.0) / max(before.unexplained, 1.0))
+        implausible = tuple(_implausible(self.engine, fit, candidate))
         return replace(one, refit=refit, explained=explained, explained_sd=sd, fit=fit, implausible=implausible)
 
 
@@ -344,8 +352,10 @@ def _without_candidate(
     if found <= 0:
         return before, tried
 
+    judged = Judged.of(engine, there)
+
     def over_there(one: CandidateFit) -> CandidateFit:
-        explained = fraction_explained(there, one.fit, len(one.candidate.names))
+        explained = judged.fraction_explained(Judged.of(engine, one.fit), len(one.candidate.names))
         return replace(one, refit=one.refit - found, explained=explained)
 
     return there, [one if one.fit is None else over_there(one) for one in tried]

@@ -10,7 +10,7 @@ from ctcr.arrays import Array
 from ctcr.diagnose.candidates import Candidate, forms, other_amplitudes
 from ctcr.diagnose.engine import Engine, values_of
 from ctcr.diagnose.form_errors import log_odds_of_cause, log_odds_of_imitation
-from ctcr.diagnose.round import CandidateFit, Round, fraction_explained, parameters_of, run_round
+from ctcr.diagnose.round import CandidateFit, Judged, Round, parameters_of, run_round
 from ctcr.effects import catalogue
 from ctcr.fit import folds, joint
 
@@ -231,7 +231,8 @@ class Selection:
                 break
         self.fit, best, freed = max(ended, key=lambda end: end[0].log_evidence)
         if self.fit is not fit:
-            more = fraction_explained(fit, freed, len(freed.names) - len(fit.names))
+            judged = [Judged.of(self.engine, one) for one in (fit, freed)]
+            more = judged[0].fraction_explained(judged[1], len(freed.names) - len(fit.names))
             explained = best.explained + (1 - best.explained) * more
             one.best = replace(best, fit=freed.without_readings(), explained=explained)
             one.beside += (1 - one.beside) * more

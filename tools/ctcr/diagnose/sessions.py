@@ -13,7 +13,7 @@ from ctcr import settings
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.round import fraction_explained, parameters_of, unexplained
+from ctcr.diagnose.round import Judged, parameters_of
 from ctcr.diagnose.selection import Selection
 from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
@@ -79,7 +79,7 @@ def _may_win(engine: Engine, one: Fit) -> bool:
     linear, columns = engine.linear(one), one.whiten(columns)
     free = np.hstack([linear.jacobian, columns])  # without priors: tables that contradict the robot end here
     most = free @ np.linalg.lstsq(free, linear.residual, rcond=None)[0]
-    if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * unexplained(one):
+    if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * Judged.of(engine, one).unexplained:
         return False
     gains = (linear.gain(part * columns).log_evidence for part in settings.SESSION_PARTS)
     return max(gains) > settings.DECISIVE
@@ -91,7 +91,8 @@ def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
     frame = [name for name in one.names if name not in own.names]
     evidence, numbers = own.log_evidence + _cost(own), len(frame) * len(framed.measurements.sessions.run)
     beyond = evidence - one.log_evidence
-    if beyond < settings.DECISIVE or fraction_explained(one, own, numbers) < settings.SESSION_EXPLAINED:
+    explained = Judged.of(engine, one).fraction_explained(Judged.of(framed, own), numbers)
+    if beyond < settings.DECISIVE or explained < settings.SESSION_EXPLAINED:
         return False
     wide = {name: settings.SESSION_PRIOR_WIDER * sd for name, sd in zip(frame, engine.priors(frame)[1], strict=True)}
     options = {"rows": engine.rows, "sd": wide, "noise": one.noise, "tolerance": engine.tolerance, **one.frozen}
@@ -157,7 +158,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     of_tubes = [name for name in fit.names if name.startswith("tubes.")]
     groups = [home_names(engine.robot.n_tubes), *([name] for name in of_tubes)]
     groups += [[name for name in of_tubes if f"tubes.{i + 1}." in name] for i in range(engine.robot.n_tubes)]
-    found = {}
+    found, unexplained = {}, Judged.of(engine, fit).unexplained
     for names in groups:
         if not set(names) <= set(fit.names):  # known exactly
             continue
@@ -165,8 +166,8 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
         gain = linear.gain((own[:, :, None] * of_run[:, None, :]).reshape(len(run), -1))
         removed = np.sum(residual**2) - np.sum((residual + gain.signal) ** 2)
         sure = gain.log_evidence > settings.DECISIVE + np.log(len(groups))
-        if sure and removed > settings.SESSION_EXPLAINED * unexplained(fit):
-            found[tuple(names)] = float(min(removed / unexplained(fit), 1.0))
+        if sure and removed > settings.SESSION_EXPLAINED * unexplained:
+            found[tuple(names)] = float(min(removed / unexplained, 1.0))
     return found
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ctcr import settings
-from ctcr.diagnose import diagnose, figures, segment_delays
+from ctcr.diagnose import diagnose, figures, lags
 from ctcr.diagnose import round as rounds
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine
@@ -64,7 +64,7 @@ def test_segments(recorded, readings, parts):
     runs = np.repeat(np.arange(12), readings)
     there = np.arange(len(runs)) % len(recorded)
     columns = {name: value[there] for name, value in vars(recorded).items() if isinstance(value, np.ndarray)}
-    segment = segment_delays.segments(replace(recorded, **columns | {"run": runs}))
+    segment = lags.segments(replace(recorded, **columns | {"run": runs}))
     assert segment.max() + 1 == 12 * parts == len(np.unique(segment))
     assert all(len(np.unique(segment[runs == run])) == parts for run in range(12))
 
@@ -79,19 +79,34 @@ def test_no_hysteresis(by_chance):
     engine, fit = by_chance
     pool = [c for c in candidates(engine.robot, engine.measurements)[0] if c.id in ("friction", "backlash_rotation")]
     assert max(one.linear for one in rounds.screen(engine, fit, pool, {})) < settings.DECISIVE
-    assert segment_delays.log_evidence(engine, fit) > fit.log_evidence + settings.DECISIVE
+    assert lags.explained(engine, fit)[0] > settings.DECISIVE
+
+
+def test_single_readings(robot, recorded):
+    """Lags of single readings are noise, as a parameter for each reading would be; nothing else explains them."""
+    readings = late(robot, recorded, np.random.default_rng(7).random(len(recorded)) < 0.5)
+    engine = Engine(robot, readings, noise_of_readings(robot, readings, field=False), groups(readings) % 4 != 2)
+    fit = engine.fit([DELAY])
+    late_by_sd = settings.LAG_SPREAD * delay_of(fit)[0] * fit.derivative_where_used(DELAY)
+    each = fit.whiten(late_by_sd[:, :, None] * np.eye(len(readings))[:, None, engine.fitted])
+    by_parameters = engine.linear(fit).gain(each)
+    _, as_noise = lags.Scatter(fit, late_by_sd).beside(engine.linear(fit))
+    assert as_noise == pytest.approx((by_parameters.log_evidence, by_parameters.removed))
+    assert lags.explained(engine, fit)[0] > settings.DECISIVE
+    pool = [c for c in candidates(robot, readings)[0] if c.id != "delay"]
+    assert max(one.linear for one in rounds.screen(engine, fit, pool, {})) < settings.DECISIVE
 
 
 def test_message(by_chance):
     """The message says by how much the delay varies."""
-    _, (message,) = segment_delays.corrected(*by_chance)
+    _, (message,) = lags.corrected(*by_chance)
     spread = float(message.split(" varies by ")[1].split(" ms")[0])
     assert spread == pytest.approx(1e3 * (DELAYS[1] - DELAYS[0]) / 2, rel=0.4)
 
 
 def test_uncertainty(by_chance, steady):
     """The delay is no surer than its lags; where there are none it is."""
-    (value, sd), (one, sure) = delay_of(segment_delays.widened(*by_chance)), delay_of(steady.final)
+    (value, sd), (one, sure) = delay_of(lags.widened(*by_chance)), delay_of(steady.final)
     assert DELAYS[0] - 2 * sd < value < DELAYS[1] + 2 * sd and sd > 0.01
     assert abs(one - DELAYS[0]) < 4 * sure and sure < 0.2 * sd
 
@@ -125,7 +140,7 @@ def test_held_out_runs(slipped):
     rms, one_delay = slipped.rms_mm, slipped.final.rms_mm(slipped.held_out)
     noise = rms["noise_floor"] ** 2
     assert one_delay**2 - noise > 4 * (rms["with_effects"] ** 2 - noise)
-    assert segment_delays.CORRECTED in slipped.residual.messages
+    assert lags.CORRECTED in slipped.residual.messages
 
 
 def test_frame_of_tracker(robot, slipped):
@@ -134,5 +149,5 @@ def test_frame_of_tracker(robot, slipped):
     slow.tracker.rate_Hz = 1 / (DELAYS[1] - DELAYS[0])
     noise = noise_of_readings(slow, slipped.measurements)
     engine = Engine(slow, slipped.measurements, noise, ~slipped.held_out)
-    assert "about one frame of the tracker (250 ms)" in segment_delays.corrected(engine, slipped.final)[1][0]
-    assert "frame" not in segment_delays.corrected(replace(engine, robot=robot), slipped.final)[1][0]
+    assert "about one frame of the tracker (250 ms)" in lags.corrected(engine, slipped.final)[1][0]
+    assert "frame" not in lags.corrected(replace(engine, robot=robot), slipped.final)[1][0]
