@@ -99,6 +99,20 @@ def test_wrong_data_sheet():
     assert found.findings == []
 
 
+@pytest.mark.parametrize(("field", "size"), [("curvature_per_m", 1e-3), ("length_mm", 1e-3)])
+def test_unit_of_file(field, size, files, run):
+    """Values of the robot file in another unit are named as that, and what looks wrong in the file is said first."""
+    robot, readings = bench(37)
+    fields = (field, "curved_length_mm") if field == "length_mm" else (field,)
+    tubes = [tube.model_copy(update={name: size * getattr(tube, name) for name in fields}) for tube in robot.tubes]
+    paths = files(robot.model_copy(update={"tubes": tubes}), readings)
+    code, out, error = run("compare", *paths, "--json", "-")
+    [one] = json.loads(out)["conventions"]
+    assert (code, one["kind"], one["columns"]) == (0, "file_unit", [])
+    assert f"tubes[0].{field}: {getattr(robot.tubes[0], field):g}" in one["fix"]
+    assert error.index("is this ") < error.index("Wrong conventions")
+
+
 def test_frame():
     """An inverse frame and a frame that is somewhere else are told apart, both with the right six numbers."""
     robot, readings = bench(7)

@@ -1,13 +1,17 @@
 """How wrong a model is: `ctcr.compare`, and the command of that name."""
 
+import numpy as np
+
 from ctcr.api.reviewed import reviewed, without_false_poses
 from ctcr.audit import missing_motion, sensor_pose
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
 from ctcr.conventions import Review
 from ctcr.diagnose import sessions
+from ctcr.errors import InputError
 from ctcr.fit.floors import floors
 from ctcr.model.table_poses import predict
+from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements, check_of
@@ -17,17 +21,18 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     """Compares predicted poses with measured ones: the size of the error beside the noise, and what it depends on.
 
     steps    integration steps per segment: more are slower and more accurate
-    First tests whether the table or the robot file follows another convention; where the table cannot be compared as it
-    is, the corrected one is. Raises InputError where no row can be compared.
+    First tests whether the table or the robot file follows another convention; where they cannot be compared as they
+    are, corrected ones are. Raises InputError where no row can be compared.
     """
     check_of(robot, table)
     files = [*robot.files, *table.files]
     found = reviewed(robot, table)
     readings, corrected = table, []
-    if table.refusal:
+    prediction = None if table.refusal else predict(robot.standard, readings, steps=steps)
+    if prediction is None or (found.wrong and not np.isfinite(prediction.position).any()):
         robot, readings = found.robot, found.readings
-        corrected = ["the table as it is cannot be compared: all that follows is of the corrected one"]
-    prediction = predict(robot.standard, readings, steps=steps)
+        corrected = ["as they are, table and robot file cannot be compared: all that follows is of corrected ones"]
+        prediction = predict(robot.standard, readings, steps=steps)
     readings, excluded = without_false_poses(robot, readings, found, prediction.position)
     robot, placed = sensor_pose.placed(robot, readings)
     own, floor = _fitted(robot, readings, found)
@@ -36,7 +41,10 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
     notices = [*map(sentence, (*corrected, *placed)), *excluded, *map(sentence, added)]
-    return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
+    try:
+        return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
+    except InputError as error:  # nothing is left to compare: the robot file may say why
+        raise InputError([*error.problems, *robot_file.warnings(robot)]) from None
 
 
 def _fitted(robot: Robot, readings: Measurements, found: Review) -> tuple[list[str], dict[str, float]]:

@@ -10,6 +10,7 @@ from ctcr.audit import spikes
 from ctcr.conventions import Finding, Review, review
 from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
+from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed, sentence
 from ctcr.table.measurements import Measurements, check_of
@@ -18,9 +19,11 @@ from ctcr.table.measurements import Measurements, check_of
 class WrongConventions(InputError):
     """A table or a robot file that follows other conventions than the format says; `review` holds them."""
 
-    def __init__(self, found: Review, wrong: list[Finding], table: Measurements):
+    def __init__(self, robot: Robot, found: Review, wrong: list[Finding], table: Measurements):
+        doubts, said = robot_file.warnings(robot), [Problem(one.sentence, table.source) for one in wrong]
+        first = [*doubts, Problem("look at the robot file first: what follows may come of it")] if doubts else []
         advice = "a fit would take that for physics: correct it first, or go on with --anyway (anyway=True)"
-        super().__init__([*(Problem(one.sentence, table.source) for one in wrong), Problem(advice)])
+        super().__init__([*first, *said, Problem(advice)])
         self.review = found
 
 
@@ -73,7 +76,7 @@ def to_fit(
     found = reviewed(robot, table)
     wrong = [one for one in found.wrong if one.kind not in finds]
     if wrong and not anyway:
-        raise WrongConventions(found, wrong, table)
+        raise WrongConventions(robot, found, wrong, table)
     if table.refusal:
         raise table.refusal
     readings, said = without_false_poses(robot, table, found)

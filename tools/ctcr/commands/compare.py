@@ -30,6 +30,6 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     result = compare(loaded, readings, steps=steps)
     out.write_page(result)
     out.write_json(result.as_dict())
+    out.say(*options.doubtful(loaded, robot, in_full=bool(result.conventions)))
     terminal.show(out.console, result)
     out.say(*readings.warnings)
-    out.say(*options.doubtful(loaded, robot))

@@ -38,10 +38,12 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
         found = wrong.review
         out.write_report("conventions.report", found)
         out.write_json(report.as_diagnosis(found))
+        out.say(*options.doubtful(loaded, robot, in_full=True))
         report.show(out.console, found)
         return
     out.write_page(result)
     out.write_json(result.as_dict())
+    out.say(*options.doubtful(loaded, robot))
     terminal.show(out.console, result)
     out.say(*readings.warnings)
     if result.accepted and not result.verdict.names_no_cause:

@@ -170,14 +170,17 @@ def load_any(robot: str, table: str):
     return loaded, measurements.read(table, loaded.n_tubes)
 
 
-def doubtful(loaded, path: str) -> list[str]:
-    """A line on the values of a robot file that look wrong; none where none do."""
+def doubtful(loaded, path: str, in_full: bool = False) -> list[str]:
+    """A line on the values of a robot file that look wrong; none where none do. In full: a line for each."""
     from ctcr.robot import robot_file
     from ctcr.show.wording import counted
 
-    count = len(robot_file.warnings(loaded))
-    look = "looks" if count == 1 else "look"
-    return [f"{counted(count, 'value')} {look} wrong in the robot file: ctcr info {path}"] if count else []
+    doubts = robot_file.warnings(loaded)
+    look = "looks" if len(doubts) == 1 else "look"
+    lines = [f"{counted(len(doubts), 'value')} {look} wrong in the robot file: ctcr info {path}"] if doubts else []
+    if doubts and in_full:
+        lines = ["Look at the robot file first: what follows may come of it.", *(f"Doubt: {d}" for d in doubts)]
+    return lines
 
 
 def with_effects(robot, given):

@@ -166,12 +166,11 @@ def compare(
     """
     sample = take_sample(robot, measurements, prediction)
     if len(sample.row) == 0:
-        raise InputError(
-            Problem(
-                f"no row can be compared: {len(sample.not_measured)} rows without a measured position, "
-                f"{len(sample.not_solved)} rows that the model does not solve"
-            )
+        text = (
+            f"no row can be compared: {len(sample.not_measured)} rows without a measured position, "
+            f"{len(sample.not_solved)} rows that the model does not solve"
         )
+        raise InputError(Problem(text))
     tracker = robot.tracker
     headline = sample
     if sessions:

@@ -11,8 +11,10 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
 from ctcr.model import parameters
+from ctcr.model.parameters import value_at
+from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
-from ctcr.show.wording import join
+from ctcr.show.wording import join, listed
 from ctcr.table.measurements import Measurements, group_columns
 
 Change = Callable[[Measurements], Measurements]
@@ -35,6 +37,7 @@ class Hypothesis:
     fix: str
     change: Change = lambda m: m
     frame: tuple[Array, Array] | None = None  # R_tracker_base and origin [m] instead of the file's
+    file: Robot | None = None  # the robot file as it should be
     registers: bool = False  # the tracker frame is taken from the readings
     sensor: Array | None = None  # (3,) [m] of the sensor in the frame of the tip instead of the file's
     offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
@@ -63,6 +66,8 @@ class Hypothesis:
         return ()
 
     def robot(self, robot: Robot) -> Robot:
+        if self.file is not None:
+            return self.file
         if self.sensor is not None:
             tracker = robot.tracker.model_copy(update={"sensor_position_mm": (1e3 * self.sensor).tolist()})
             return robot.model_copy(update={"tracker": tracker})
@@ -71,7 +76,7 @@ class Hypothesis:
 
 def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
     """All that the table and the robot have room for."""
-    parts = (_signs, _zeros, _offsets, _units, _orders, _forces, _positions, _frames, _sensor)
+    parts = (_signs, _zeros, _offsets, _units, _file_units, _orders, _forces, _positions, _frames, _sensor)
     return [one for part in parts for one in part(robot, readings)]
 
 
@@ -170,6 +175,25 @@ def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
                 text = f"{named(kind, tubes, n)} {verb} in {unit}, not in {given}"
                 fix = "ctcr import " + " ".join(f"--unit {name}={unit}" for name in names)
                 yield Hypothesis("joint_unit", text, names, fix, changed(kind, lambda q, s=scale: q * s))
+
+
+def _file_units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """The values of the robot file that would be usual ones in another unit, all of them in that."""
+    mended, fields, units = robot.model_copy(deep=True), [], []
+    for path, quantity, value in robot.unusual():
+        if (meant := quantity.meant(value)) is None:
+            continue
+        unit, size = meant
+        section, last = value_at(mended, path[:-1]), path[-1]
+        if isinstance(last, int):
+            section[last] = size * value
+        else:
+            setattr(section, last, size * value)
+        fields.append(f"{path_text(path)}: {size * value:g}")
+        units.append(unit)
+    if fields:
+        text = f"values of the robot file are in {join([*dict.fromkeys(units)])}, not in the unit of their field"
+        yield Hypothesis("file_unit", text, (), f"write {listed(fields, 12)}", file=mended)
 
 
 def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

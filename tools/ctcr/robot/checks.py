@@ -44,7 +44,7 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
 
 def doubts(robot: Robot) -> Iterator[Fault]:
     """Values that are possible but look wrong, and unknown ones that the model could use."""
-    yield from robot.unusual()
+    yield from ((path, quantity.doubt(value)) for path, quantity, value in robot.unusual())
     if robot._source:
         yield from (((name,), defaults.SAID[name]) for name in defaults.absent(robot._source.data))
     for i, tube in enumerate(robot.tubes):

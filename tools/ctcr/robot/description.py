@@ -83,8 +83,8 @@ class Section(BaseModel):
             section, field = (inner, step) if isinstance(step, str) else (section, field)
         return section, field
 
-    def unusual(self, path: FieldPath = ()) -> Iterator[tuple[FieldPath, str]]:
-        """Possible values that look wrong, here and in the sections below: the path of each, and a doubt in words."""
+    def unusual(self, path: FieldPath = ()) -> Iterator[tuple[FieldPath, Quantity, float]]:
+        """Possible values that look wrong, here and in the sections below: path, quantity and value of each."""
         for field in type(self).model_fields:
             quantity, value = self.quantity(field), getattr(self, field)
             for index, part in enumerate(value if isinstance(value, list) else [value]):
@@ -92,7 +92,7 @@ class Section(BaseModel):
                 if isinstance(part, Section):
                     yield from part.unusual(where)
                 elif quantity and isinstance(part, int | float) and not quantity.is_usual(part):
-                    yield where, quantity.doubt(part)
+                    yield where, quantity, part
 
     @field_validator("*")
     @classmethod

@@ -57,11 +57,17 @@ class Quantity:
     def is_usual(self, value: float) -> bool:
         return self.usual is None or value == 0 or self.usual[0] <= abs(value) <= self.usual[1]
 
+    def meant(self, value: float) -> tuple[str, float] | None:
+        """The unit in which an unusual value would be a usual one, and its size in our unit."""
+        if self.is_usual(value):
+            return None
+        others = _OTHER_UNITS.get(self.unit, ())
+        return next((one for one in others if self.is_usual(value * one[1]) and self.is_possible(value * one[1])), None)
+
     def doubt(self, value: float) -> str:
         """Message on an unusual value, with the unit that was probably meant."""
         text = f"{value:g} {self.unit}".rstrip()
-        for unit, factor in _OTHER_UNITS.get(self.unit, ()):
-            if self.is_usual(value * factor) and self.is_possible(value * factor):
-                return f"{text}: is this {unit}?"
+        if meant := self.meant(value):
+            return f"{text}: is this {meant[0]}?"
         low, high = self.usual or (0, 0)
         return f"{text} is unusual (usual: {low:g} to {high:g} {self.unit})".replace(" )", ")")

@@ -229,6 +229,6 @@ def _relations(s: Scenario, n: int):
 def _unusual(s: Scenario):
     """Values that look like another unit: in a file that moves a robot they are faults."""
     first: dict[tuple, str] = {}  # of each field
-    for path, doubt in s.unusual():
-        first.setdefault(tuple(step for step in path if isinstance(step, str)), doubt)
+    for path, quantity, value in s.unusual():
+        first.setdefault(tuple(step for step in path if isinstance(step, str)), quantity.doubt(value))
     yield from first.items()
