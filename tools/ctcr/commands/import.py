@@ -75,13 +75,18 @@ def _list_option(name: str, field: str, metavar: str, text: str):
 @click.option("--home-mm", callback=_numbers, metavar="B1,B2,..", help="beta at home or at flush tips; else of ROBOT.")
 @click.option("--order", metavar="ORDER", help="Numbers of the tubes: innermost-first (default) or outermost-first.")
 @_list_option("--flip", "flip", "NAME", "Change the sign of alpha2, alpha, beta or force.")
+@_list_option("--unwrap", "unwrap", "NAME", "Take jumps of a whole turn out of alpha2 or alpha.")
 @_pair_option("--offset", "offsets", "JOINT=VALUE", "Add to a joint or to t: alpha2=90deg; alpha2@7: in run 7.")
 @_pair_option("--constant", "constants", "JOINT=VALUE", "A joint that never moves and is not logged: beta3=0mm.")
 @click.option("--sensor", metavar="MARKER", help="Which of several markers is at the tip (a part of its name).")
 @click.option("--relative-to", metavar="MARKER", help="Give the sensor's pose in the frame of this marker.")
 @click.option("--quaternion", metavar="ORDER", help="Order of the four columns: wxyz (default) or xyzw.")
-@click.option("--invert-quaternion", is_flag=True, help="The log holds the inverse rotation.")
-@click.option("--euler", metavar="AXES", help="Sequence of Euler angles: ZYX is R = Rz Ry Rx; zyx, fixed axes.")
+@click.option(
+    "--invert-quaternion", is_flag=True, help="The log holds the inverse rotation; of 4 x 4 matrices, the inverse pose."
+)
+@click.option(
+    "--euler", metavar="AXES", help="Euler angles: ZYX is R = Rz Ry Rx; zyx, fixed axes; vector: a rotation vector."
+)
 @click.option("--mirror", metavar="AXIS", help="The tracker frame is left-handed: turn this axis round.")
 @options.json
 def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, **said) -> None:

@@ -41,6 +41,8 @@ def _matrix_roles(roles: Roles) -> dict[str, str] | None:
     for first in (1, 0):
         if all(f"m{i}" in roles for i in range(first, first + 16)):
             return {f"m{i + first - 1}": f"m{i}" for i in range(1, 17)}
+        if all((f"m{i}" in roles) == (i < first + 12) for i in range(first, first + 13)):  # three rows
+            return {f"m{i + first - 1}": f"m{i}" for i in range(1, 13)}
         place = {f"m{i + first}{j + first}": f"m{i + 1}{j + 1}" for i in range(3) for j in range(4)}
         if all(name in roles for name in place):
             return place
@@ -58,7 +60,8 @@ def settled(roles: Roles) -> Roles:
     if "qw" not in made and "q0" in roles and "qx" in made:  # as NDI names them
         made["qw"] = roles["q0"]
     for first in (0, 1):
-        if not set(QUATERNION) & set(made) and all(f"q{i}" in roles for i in range(first, first + 4)):
+        four = all((f"q{i}" in roles) == (i < first + 4) for i in range(first, first + 5))  # more are joints
+        if not set(QUATERNION) & set(made) and four:
             made |= {role: roles[f"q{i}"] for i, role in enumerate(QUATERNION, start=first)}
             made["numbered"] = roles[f"q{first}"]
     if matrix := _matrix_roles(roles):

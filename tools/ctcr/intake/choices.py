@@ -29,9 +29,11 @@ class Choices:
     units       role or group (GROUPS) -> unit
     translation what the translations hold: beta (<= 0), or travel from home or from flush tips, outwards positive
     home_mm     beta of each tube at home, or at flush tips
-    euler       sequence of rotation axes as in scipy: ZYX turns about moving axes (R = Rz Ry Rx), zyx about fixed ones
+    euler       sequence of rotation axes as in scipy: ZYX turns about moving axes (R = Rz Ry Rx), zyx about fixed ones;
+                vector: the angles are a rotation vector, axis times angle
     flip        joints, force or groups whose sign changes
     offsets     joints, joints of one run (alpha2@7) or t -> what is added to it, with its unit
+    unwrap      joints or alpha, whose jumps of a whole turn are taken out
     constants   joints that the log lacks -> their value, with its unit
     mirror      an axis of a left-handed tracker frame
     """
@@ -44,6 +46,7 @@ class Choices:
     home_mm: list[float] | None = None
     order: str | None = None
     flip: list[str] = field(default_factory=list)
+    unwrap: list[str] = field(default_factory=list)
     offsets: dict[str, str] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     sensor: str | None = None
@@ -59,7 +62,7 @@ class Choices:
         for one in fields(self):
             mine, theirs = getattr(self, one.name), getattr(other, one.name)
             if isinstance(mine, dict):
-                wider = {name for name in theirs if one.name == "units" and _group(name) in mine}
+                wider = {name for name in theirs if one.name == "units" and group_of(name) in mine}
                 value = {name: said for name, said in theirs.items() if name not in wider} | mine
             elif isinstance(mine, list) and isinstance(theirs, list):
                 value = [*theirs, *(item for item in mine if item not in theirs)] if one.name != "home_mm" else mine
@@ -95,6 +98,7 @@ class Choices:
                 re.compile(rf"{joints.pattern}(@\d+)?|t"),
                 "alpha2, alpha2@7 in run 7 alone, or t",
             ),
+            ("unwrap", self.unwrap, re.compile(r"alpha[1-9]?"), "alpha or a joint such as alpha2"),
             ("constant", self.constants, re.compile(r"(?:beta|alpha)[1-9]"), "a joint such as beta3"),
         ):
             for name in names:
@@ -112,11 +116,12 @@ class Choices:
                 yield option, f"{value} is not known: {', '.join(known)}"
         if self.home_mm is not None and self.translation in (None, "beta"):
             yield "home-mm", "needs --translation from-home or from-flush: what does the log measure from there?"
-        if self.euler is not None and not re.fullmatch(r"(?!.*(.)\1)([XYZ]{3}|[xyz]{3})", self.euler):
-            yield "euler", f"{self.euler} is no sequence of axes: such as ZYX (moving axes) or zyx (fixed axes)"
+        if self.euler is not None and not re.fullmatch(r"(?!.*(.)\1)([XYZ]{3}|[xyz]{3})|vector", self.euler):
+            text = "is no sequence of axes: such as ZYX (moving axes), zyx (fixed axes), or vector (axis times angle)"
+            yield "euler", f"{self.euler} {text}"
 
 
-def _group(role: str) -> str:
+def group_of(role: str) -> str:
     """The group of a role, as units name it."""
     kinds = {"length": "position", "angle": "euler"}
     kind = role.rstrip("0123456789")
@@ -127,9 +132,9 @@ def grouped(units: dict[str, str]) -> dict[str, str]:
     """Units of roles, as one of their group where it has only one."""
     kinds: dict[str, set[str]] = {}
     for role, unit in units.items():
-        kinds.setdefault(_group(role), set()).add(unit)
+        kinds.setdefault(group_of(role), set()).add(unit)
     single = {group: next(iter(found)) for group, found in kinds.items() if len(found) == 1}
-    return single | {role: unit for role, unit in units.items() if _group(role) not in single}
+    return single | {role: unit for role, unit in units.items() if group_of(role) not in single}
 
 
 def load(path: str | Path) -> Choices:

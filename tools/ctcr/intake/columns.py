@@ -3,6 +3,7 @@
 import numpy as np
 
 from ctcr.arrays import Array
+from ctcr.errors import Problem
 from ctcr.intake import fields, units
 from ctcr.intake.choices import Choices
 from ctcr.intake.log import Log
@@ -12,6 +13,7 @@ from ctcr.intake.units import Unit, named
 from ctcr.table.csv_table import Faults
 
 LONGEST_M = 3.0  # of a joint or a position: larger numbers are millimetres
+STRONGEST_N = 10.0  # at the tip of a robot of this kind: larger numbers are in another unit
 RAD_UP_TO, DEG_FROM = 1.01 * 2 * np.pi, 4 * np.pi  # between them, angles without a unit may be either
 
 
@@ -22,6 +24,7 @@ class Columns:
         self.log, self.mapping, self.choices = log, mapping, choices
         self.beside = beside  # whether another log has a part: a choice of units may concern that one
         self.faults, self.notes = Faults(str(log.path)), [*log.notes, *mapping.notes]
+        self.doubts: list[Problem] = []
         self.units: dict[str, tuple[Unit, str]] = {}  # of each role, and how it is known
 
     def values(self, role: str) -> Array:

@@ -75,7 +75,7 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
         None if position is None else position[kept],
         None if quaternion is None else quaternion[kept],
         moved.rows,
-        warnings=list(_doubts(columns, moved)),
+        warnings=[*_doubts(columns, moved), *moving.doubts],
     )
     columns.notes += [
         f"{option} has no effect here: there is no {what}" for option, what in _idle(columns, moving, pose)
@@ -144,6 +144,8 @@ def _check_values(columns: Columns, moving: Columns, moved: Motion, position, qu
 
 def _hint(beta: Array, choices: Choices) -> str:
     """What joints that cannot be are probably."""
+    if (np.abs(beta) > measurements.QUANTITIES["beta"].usual[1]).any():
+        return "if these are counts of an encoder, say how long one is, such as --unit beta=0.0025mm"
     if (beta >= 0).all() and choices.translation is None:
         return (
             "beta is where a tube is grasped: 0 at the front plate, negative behind it. Positive columns are often"

@@ -1,9 +1,10 @@
 """Which column of a log holds what: by the user's choices, by the format, by the names of the columns."""
 
+import re
 from dataclasses import dataclass, field
 
 from ctcr.errors import InputError, Problem
-from ctcr.intake import names
+from ctcr.intake import names, units
 from ctcr.intake.bodies import (
     EULER,
     GRID,
@@ -17,14 +18,13 @@ from ctcr.intake.bodies import (
     merged,
     settled,
 )
-from ctcr.intake.choices import Choices
+from ctcr.intake.choices import GROUPS, Choices, group_of
 from ctcr.intake.log import Log
-from ctcr.intake.names import INNER, MIDDLE, OUTER
+from ctcr.intake.names import INNER, MIDDLE, OUTER, TIP_WORDS
 from ctcr.intake.units import Unit
 from ctcr.show.wording import join, listed
 
-TIP_WORDS = {"tip", "sensor", "probe", "ee", "effector", "end", "tool", "distal"}
-MOVING = ("beta", "alpha", "run", "fx", "fy", "fz", "weight")  # what a log of poses alone lacks
+MOVING = ("beta", "alpha", "run", "fx", "fy", "fz", "weight", "force")  # what a log of poses alone lacks
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
     ignored = {i for name in choices.ignore if (i := _index(log, name, "ignore", faults)) is not None}
     taken = {used.column for used in explicit.values()} | ignored
     candidates = []
-    for i, name in enumerate(log.names):
-        found = log.meanings[name] if name in log.meanings else names.meaning(name)
+    for i, (name, spelled) in enumerate(zip(log.names, names.with_middle(log.names), strict=True)):
+        found = log.meanings[name] if name in log.meanings else names.meaning(spelled)
         if i not in taken and found and not (n_tubes == 0 and found.role in MOVING):
             candidates.append(Candidate(i, name, found))
     how = "format" if log.meanings else "name"
@@ -66,12 +66,14 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
     joints, n = _joints(candidates, explicit, choices, n_tubes, picker)
     made = Mapping(joints | explicit, n)
     for role in ("t", "nsec", "run", "fx", "fy", "fz", "weight"):
-        same = [one for one in candidates if one.meaning.role == role]
+        axes = role != "weight" or {"fx", "fy", "fz"} & set(made.used)  # else a force without an axis is a weight
+        same = [one for one in candidates if one.meaning.role in ((role,) if axes else (role, "force"))]
         if role not in made.used and same:
             made.used[role] = picker.best(role, same)
     if poses:
         _poses(made, candidates, choices, picker)
     _check(log, made, n_tubes, faults)
+    _check_units(log, made, choices, faults)
     if faults:
         raise InputError(faults)
     return made
@@ -108,9 +110,10 @@ def _explicit(log: Log, choices: Choices, faults: list[Problem]) -> dict[str, Us
     for role, name in choices.columns.items():
         i = _index(log, name, f"column {role}", faults)
         if i is not None:
-            found = log.meanings[log.names[i]] if log.names[i] in log.meanings else names.meaning(log.names[i])
-            unit = found.unit if found and found.unit and found.unit.quantity == names.quantity(_plain(role)) else None
-            made[role] = Used(i, log.names[i], unit, "option")
+            found = log.meanings.get(log.names[i])
+            unit = found.unit if found else names.unit(log.names[i])
+            fits = unit and unit.quantity in ("", names.quantity(_plain(role)))
+            made[role] = Used(i, log.names[i], unit if fits else None, "option")
     return made
 
 
@@ -144,14 +147,17 @@ def _joints(candidates, explicit, choices: Choices, n_tubes: int | None, picker)
 
 def _poses(made: Mapping, candidates: list[Candidate], choices: Choices, picker: _Picker) -> None:
     """Columns of the sensor and, where it is asked for, of the reference marker."""
-    bodies: dict[str, Roles] = {}
-    for one in candidates:
-        role = one.meaning.role
-        if role in POSITION + QUATERNION + EULER or role[0] in "omq" or role == "seen":
-            bodies.setdefault(one.meaning.marker, {}).setdefault(role, []).append(one)
-    bodies = merged(bodies)
-    placed = {name: settled(roles) for name, roles in bodies.items() if has_position(roles)}
+    bodies = _bodies([one for one in candidates if not one.meaning.is_given])
     given = {role for role in made.used if role in (*POSITION, *SEQUENCE, *TRANSLATION)}
+    if not given and not any(map(has_position, bodies.values())):
+        commanded = _bodies([one for one in candidates if one.meaning.is_given])
+        if any(map(has_position, commanded.values())):
+            bodies = commanded
+            made.notes.append("by their names, the positions are commanded or computed, not measured")
+    placed = {name: settled(roles) for name, roles in bodies.items() if has_position(roles)}
+    if len(placed) > 1 and "" in placed:  # a body without a name goes by its first column
+        roles = placed.pop("")
+        placed[next(iter(roles.values()))[0].name] = roles
     if given and choices.sensor is None:  # the user named its position: a single orientation may still be guessed
         complete = [settled(roles) for roles in bodies.values()]
         turned = [roles for roles in complete if any(set(roles) >= set(kind) for kind in (QUATERNION, EULER, GRID))]
@@ -161,8 +167,10 @@ def _poses(made: Mapping, candidates: list[Candidate], choices: Choices, picker:
     sensor = None if given and choices.sensor is None else _sensor(placed, choices.sensor, picker)
     if sensor is not None:
         _take(made, "", placed[sensor], choices, picker)
-        if "seen" not in made.used and "seen" in bodies.get("", {}):
-            made.used["seen"] = picker.best("seen", bodies[""]["seen"])
+        unnamed = bodies.get("", {})
+        turned = any(role[0] in "qrm" for role in placed[sensor]) or has_position(unnamed)
+        kept = {role: found for role, found in unnamed.items() if not turned or role == "seen"}
+        _take(made, "", settled(kept), choices, picker)  # what has no name is the sensor's
     reference = None
     if choices.relative_to is not None:
         reference = _named(placed, choices.relative_to, "--relative-to", picker)
@@ -172,7 +180,16 @@ def _poses(made: Mapping, candidates: list[Candidate], choices: Choices, picker:
         others = [name for name in placed if name not in (sensor, reference)]
         if others:
             hint = "" if reference else "; --relative-to NAME gives the sensor in the frame of one of them"
-            made.notes.append(f"other markers: {listed([name or '(no name)' for name in others])}{hint}")
+            made.notes.append(f"other markers: {listed(others)}{hint}")
+
+
+def _bodies(candidates: list[Candidate]) -> dict[str, Roles]:
+    bodies: dict[str, Roles] = {}
+    for one in candidates:
+        role = one.meaning.role
+        if role in POSITION + QUATERNION + EULER or role[0] in "omq" or role == "seen":
+            bodies.setdefault(one.meaning.marker, {}).setdefault(role, []).append(one)
+    return merged(bodies)
 
 
 def _sensor(placed, asked: str | None, picker: _Picker) -> str | None:
@@ -180,21 +197,18 @@ def _sensor(placed, asked: str | None, picker: _Picker) -> str | None:
         return _named(placed, asked, "--sensor", picker)
     if not placed:
         return None
-    rank = {
-        name: min(one.meaning.rank // 100 for one in roles.get("x") or roles.get("m14") or roles["m1"])
-        for name, roles in placed.items()
-    }
-    best = [name for name in placed if rank[name] == min(rank.values())]
-    tips = [name for name in best if set(name.lower().replace("_", " ").split()) & TIP_WORDS]
-    if len(best) == 1 or len(tips) == 1:
-        return best[0] if len(best) == 1 else tips[0]
-    picker.say(f"it holds several markers, {join(best)}: choose the one at the tip with --sensor NAME")
+    tips = [name for name in placed if set(name.lower().replace("_", " ").split()) & TIP_WORDS]
+    for names_of_one in (list(placed), tips):
+        if len(names_of_one) == 1:
+            return names_of_one[0]
+    picker.say(f"it holds several markers, {join(list(placed))}: choose the one at the tip with --sensor NAME")
     return None
 
 
 def _named(placed, asked: str, option: str, picker: _Picker) -> str | None:
-    exact = [name for name in placed if name.lower() == asked.lower()]
-    found = exact or [name for name in placed if asked.lower() in name.lower()]
+    plain = {name: re.sub(r"[\W_]+", "", name.lower()) for name in (*placed, asked)}
+    exact = [name for name in placed if plain[name] == plain[asked]]
+    found = exact or [name for name in placed if plain[asked] in plain[name]]
     if len(found) == 1:
         return found[0]
     which = f"fits {join(found)}" if found else f"fits none of {join(list(placed))}" if placed else "needs a position"
@@ -216,7 +230,7 @@ def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _P
             made.used[prefix + role] = picker.best(prefix + role, roles[role])
     if quaternion and "numbered" in roles and choices.quaternion is None:
         name = picker.best(prefix + "qw", roles["numbered"]).name
-        if any(character == "0" for character in name[-2:]):
+        if roles["numbered"][0].meaning.role == "q0":
             made.guessed_order = True
         else:
             text = "four columns are numbered from 1. A quaternion: say its order with --quaternion wxyz or xyzw. "
@@ -245,3 +259,18 @@ def _check(log: Log, made: Mapping, n_tubes: int | None, faults: list[Problem]) 
                 absent = [prefix + role for role in roles if role not in there]
                 lack = f"{join(absent)} of the {group} {'is' if len(absent) == 1 else 'are'} missing"
                 say(f"{lack}: give --column {absent[0]}=NAME")
+
+
+def _check_units(log: Log, made: Mapping, choices: Choices, faults: list[Problem]) -> None:
+    """Faults where a name states a unit of no known size, and where a weight has none: it may be in g, kg or N."""
+    silent: dict[tuple[str, str], list[str]] = {}
+    for role, used in made.used.items():
+        group, unit = group_of(_plain(role)), used.unit
+        if {role, group} & set(choices.units) or (unit.quantity if unit else role != "weight"):
+            continue
+        silent.setdefault((group, unit.text if unit else ""), []).append(used.name)
+    for (group, text), columns in silent.items():
+        quantity, one = GROUPS[group], {"length": "0.0025mm", "angle": "0.09deg", "time": "0.1s", "force": "0.01N"}
+        said = f"{text} is no unit of {quantity} that is known" if text else "has no unit"
+        todo = f"say what one is, such as --unit {group}={one[quantity] if text else 'g'} ({units.of(quantity)})"
+        faults.append(Problem(f"{said}: {todo}, or --ignore it", str(log.path), field=join(columns)))

@@ -1,5 +1,6 @@
 """How the robot moved by a log: times, runs, joints and known forces."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
 
@@ -9,12 +10,15 @@ from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem
 from ctcr.intake import fields, units
 from ctcr.intake.choices import Choices
-from ctcr.intake.columns import DEG_FROM, RAD_UP_TO, Columns, angle_unit, length_unit
+from ctcr.intake.columns import DEG_FROM, RAD_UP_TO, STRONGEST_N, Columns, angle_unit, length_unit
 from ctcr.intake.units import Unit, named
 from ctcr.robot.description import Robot
-from ctcr.show.wording import listed
+from ctcr.show.wording import join, listed
+from ctcr.table import measurements
+from ctcr.table.csv_table import Faults
 
 FORCE = ("fx", "fy", "fz")
+JUMP_RAD = 1.5 * np.pi  # nearer to a whole turn than to half of one
 
 
 @dataclass
@@ -40,8 +44,41 @@ def of(columns: Columns, robot: Robot | None) -> Motion:
     beta = _from_home(columns, _joints(columns, "beta", length_unit), robot)
     alpha = _joints(columns, "alpha", lambda size: _sure_angle_unit(columns, size))
     run = _runs(columns)
+    columns.doubts += _jumps(columns, run, alpha)
+    columns.doubts += _impossible(columns, robot, beta) if robot else []
     _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
     return Motion(t, zero, run, beta, alpha, _force(columns, robot), columns.log.rows)
+
+
+def _jumps(columns: Columns, run: Array, alpha: Array) -> Iterator[Problem]:
+    """The doubt where angles jump by nearly a whole turn, as wrapped ones do."""
+    span = np.nanmax(alpha, axis=0, initial=-np.inf) - np.nanmin(alpha, axis=0, initial=np.inf)
+    jumps = (np.abs(np.diff(alpha, axis=0)) > JUMP_RAD) & (np.diff(run) == 0)[:, None] & (span <= RAD_UP_TO)
+    if jumps.any():
+        tubes = join([f"alpha{i}" for i in 1 + np.flatnonzero(jumps.any(axis=0))])
+        text = f"{tubes}: jumps of nearly a whole turn ({jumps.sum()}): if the log wraps angles, --unwrap alpha"
+        yield Problem(text, str(columns.log.path))
+
+
+def _impossible(columns: Columns, robot: Robot, beta: Array) -> Iterator[Problem]:
+    """The doubt where tubes end where the model allows no tip, or hardly move; a fault where that is so in all rows."""
+    file, length = str(columns.log.path), np.array([tube.length for tube in robot.tubes])
+    faulty = Faults(file)  # of the joints themselves: the table says them
+    measurements.check("beta", beta, columns.log.rows, ["beta"] * len(length), faulty)
+    if faulty.total:
+        return
+    largest = np.nanmax(np.abs(beta), initial=0.0)
+    if 0 < largest < 1e-3 * length.min():
+        text = f"beta is at most {1e3 * largest:.2g} mm, of tubes {1e3 * length.min():g} mm long and more"
+        yield Problem(f"{text}: is its unit right, or is it --unit beta=m?", file)
+    front, slack = length + beta, measurements.JOINT_ORDER_SLACK_M
+    wrong = (front < -slack).any(axis=1) | (np.diff(front, axis=1) > slack).any(axis=1)
+    text = "a tube of the robot ends behind the plate or inside an outer tube: are the unit (--unit beta=mm), --order, "
+    text += "--translation and the lengths in ROBOT right?"
+    if wrong.all():
+        columns.faults.add(1, None, f"in every row {text}")
+    elif wrong.any():
+        yield Problem(f"in {row_ranges(columns.log.rows[wrong])} {text}", file)
 
 
 def times(columns: Columns) -> tuple[Array, float]:
@@ -49,7 +86,7 @@ def times(columns: Columns) -> tuple[Array, float]:
     if not columns.has("t"):
         return np.full(len(columns.log), np.nan), 0.0
     used, asked = columns.mapping.used["t"], columns.choices.units.get("t")
-    asked = None if columns.beside and used.unit else asked
+    asked = None if columns.beside and used.unit and used.unit.quantity else asked
     unit = units.parsed(asked, "time", "--unit t") if asked else used.unit
     read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
     if columns.has("nsec"):
@@ -105,6 +142,9 @@ def _joints(columns: Columns, kind: str, guess) -> Array:
         for key in (role, kind):
             if key in choices.offsets:
                 values[role] = values[role] + units.value(choices.offsets[key], quantity, f"--offset {key}")
+        if {role, kind} & set(choices.unwrap):
+            known = np.isfinite(values[role])
+            values[role][known] = np.unwrap(values[role][known])
     return np.column_stack([values[role] for role in roles]) + 0.0  # no negative zeros
 
 
@@ -171,7 +211,15 @@ def _weight(columns: Columns, robot: Robot | None) -> Array:
         name = columns.mapping.used["weight"].name
         text = "a weight needs the direction of gravity: give --robot ROBOT, whose gravity is known"
         raise InputError(Problem(f"{text}, or --ignore {name}", str(columns.log.path), field=name))
-    return columns.si("force", ["weight"], lambda _: named("N")) * down / np.linalg.norm(down)
+    columns.notes.append(f"{columns.mapping.used['weight'].name} is taken as a weight at the tip, along gravity")
+    return columns.si("force", ["weight"], lambda size: _force_unit(columns, size)) * down / np.linalg.norm(down)
+
+
+def _force_unit(columns: Columns, size: float) -> Unit:
+    if size > STRONGEST_N:
+        text = f"forces up to {size:.4g} without a unit are no N at a tip: say it with --unit force=mN (g, N, ...)"
+        columns.faults.add(1, None, text)
+    return named("N")
 
 
 def _force(columns: Columns, robot: Robot | None) -> Array:
@@ -181,6 +229,8 @@ def _force(columns: Columns, robot: Robot | None) -> Array:
     if columns.has("weight"):
         force += _weight(columns, robot)
     if roles:
-        force[:, [FORCE.index(role) for role in roles]] += columns.si("force", roles, lambda _: named("N"))
+        force[:, [FORCE.index(role) for role in roles]] += columns.si(
+            "force", roles, lambda size: _force_unit(columns, size)
+        )
     signs = [-1.0 if (role in flip) != ("force" in flip) else 1.0 for role in FORCE]
     return force * signs + 0.0

@@ -2,77 +2,57 @@
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from ctcr.intake import units
 from ctcr.intake.units import Unit, named
 
 LARGEST = 9  # number of a tube: a larger one counts something else
 INNER, MIDDLE, OUTER = -3, -2, -1  # numbers of tubes that a name gives as a word
 
 _GREEK = {"α": "alpha", "β": "beta", "θ": "theta", "φ": "phi", "ψ": "psi", "ρ": "rho"}
-_TIME = {"t", "time", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "secs", "clock", "times"}
-RUN = {"run", "trial", "path", "experiment", "trajectory", "traj", "sequence", "runs", "trials"}
-_BETA = {"beta", "b", "d", "trans", "translation", "translations", "translational", "linear", "lin", "ins", "insertion"}
-_BETA |= {"tr", "ext", "extension", "slide", "rho", "l", "s", "advance", "displacement", "disp", "stroke", "betas"}
-_ALPHA = {"alpha", "a", "theta", "rot", "rotation", "rotations", "rotational", "roll", "psi", "phi", "angle", "ang"}
-_ALPHA |= {"alphas", "thetas", "angles"}
-_STRONG = {"beta", "alpha", "insertion", "translation", "extension", "betas", "alphas"}  # without a number: of one tube
-_WORDS = {
-    "one": 1,
-    "two": 2,
-    "three": 3,
-    "four": 4,
-    "i": INNER,
-    "in": INNER,
-    "o": OUTER,
-    "out": OUTER,
-    "inner": INNER,
-    "innermost": INNER,
-    "middle": MIDDLE,
-    "mid": MIDDLE,
-    "outer": OUTER,
-    "outermost": OUTER,
-}
-_SEEN = {"valid", "visible", "tracked", "seen", "state", "status", "visibility", "isvalid", "validity"}
-_COMMANDED = {
-    "cmd",
-    "command",
-    "commanded",
-    "des",
-    "desired",
-    "target",
-    "goal",
-    "setpoint",
-    "set",
-    "demand",
-    "demanded",
-}
-_COMMANDED |= {"sp", "nominal", "planned", "pred", "predicted", "model", "sim"}
-_MEASURED = {"meas", "measured", "actual", "act", "fb", "feedback", "enc", "encoder", "real"}
-_ROTATION = {"rot", "rotation", "orientation", "ori", "orient", "quat", "quaternion", "q", "euler", "attitude"}
-_FORCE = {"f", "force", "load"}
-_WEIGHT = {"weight", "mass", "load", "payload"}  # hung at the tip
-_PARTS = {"nsec", "nsecs", "nanosec", "nanosecs"}  # of the second that another column counts, as ROS writes stamps
-_EULER = {"roll": "rx", "pitch": "ry", "yaw": "rz"}
-_MATRIX = {"r", "rot", "m", "t", "h", "tf", "mat", "matrix", "g", "rotation", "transform", "pose"}
-_NOISE = {"field", "pose", "pos", "position", "positions", "data", "log", "msg", "joint", "joints", "tube", "tubes"}
-_NOISE |= {"motor", "axis", "value", "values", "tracker", "coordinate", "coord", "p", "translation", "header", "of"}
-_NOISE |= {"vector", "xyz"} | _ROTATION
-_ELSE = {
-    "vel",
-    "velocity",
-    "speed",
-    "rate",
-    "acc",
-    "acceleration",
-    "current",
-    "voltage",
-    "torque",
-    "temperature",
-    "temp",
-}
-_ELSE |= {"error", "err", "std", "sd", "var", "variance", "cov", "covariance", "rms", "residual", "quality", "counts"}
-_SHORT = {"a", "b", "d", "l", "s"}  # joints where the name says nothing else
+
+
+def _set(words: str) -> set[str]:
+    return set(words.split())
+
+
+TIP_WORDS = _set("tip sensor probe ee effector end tool distal")
+RUN = _set("run runs trial trials path experiment trajectory traj sequence messung versuch lauf bahn")
+_TIME = _set("t time times timestamp timestamps stamp datetime elapsed secs clock zeit")
+_BETA = _set("beta betas b d trans translation translations translational linear lin ins insertion tr ext extension")
+_BETA |= _set("slide rho l s advance displacement disp stroke vorschub")
+_ALPHA = _set("alpha alphas a theta thetas rot rotation rotations rotational roll psi phi angle angles ang winkel")
+_STRONG = _set("beta betas alpha alphas insertion translation extension")  # without a number: of one tube
+_SHORT = _set("a b d l s")  # joints where the name says nothing else
+_WORDS = {"one": 1, "two": 2, "three": 3, "four": 4}
+_WORDS |= dict.fromkeys(_set("i in inner innermost innen"), INNER) | dict.fromkeys(_set("middle mid mitte"), MIDDLE)
+_WORDS |= dict.fromkeys(_set("o out outer outermost aussen"), OUTER)
+_SEEN = _set("ok valid visible tracked seen state status visibility isvalid validity")
+_COMMANDED = _set("cmd command commanded des desired target goal setpoint set demand demanded sp nominal planned ideal")
+_COMMANDED |= _set(
+    "pred predicted prediction model sim simulated simulation calc calculated computed theory theoretical"
+)
+_COMMANDED |= _set("fk soll")
+_GIVEN = 100  # rank of a column that a command, a target or a model gives
+_MEASURED = _set("meas measured actual act fb feedback enc encoder real exp true gt ist")
+_ROTATION = _set("rot rotation orientation ori orient quat quaternion q euler attitude angle rpy rotvec rvec rodrigues")
+_ROTATION |= {"axang"}
+_FORCE = _set("force load kraft")
+_WEIGHT = _set("weight mass load payload gewicht masse")  # hung at the tip
+_UNSIZED = _set("count counts cnt cnts step steps tick ticks pulse pulses inc increments")
+_UNSIZED |= {"grad"}  # degrees in German, gon in English
+_PARTS = _set("nsec nsecs nanosec nanosecs")  # of the second that another column counts, as ROS writes stamps
+_EULER = {"roll": "rx", "pitch": "ry", "yaw": "rz", "elevation": "ry", "azimuth": "rz"}
+_MATRIX = _set("r rot m t h tf mat matrix g rotation transform pose")
+_NOISE = _set("field pose pos position positions data log msg joint joints tube tubes motor axis value values tracker")
+_NOISE |= _set("coordinate coord p translation header of vector xyz is tracking mean avg") | _ROTATION
+_ELSE = _set("vel velocity speed rate acc acceleration current voltage torque temperature temp error err std sd var")
+_ELSE |= _set("variance cov covariance rms residual quality")
+_REMARKS = _set("base reference left right x y z w") | TIP_WORDS | _TIME | RUN | _BETA | _ALPHA | _SEEN | _COMMANDED
+_REMARKS |= _MEASURED | _FORCE | _WEIGHT | _NOISE | {*_WORDS, *_EULER}  # in brackets they are no units
+_RATE = re.compile(r"([^\W\d_]+)\s*/\s*(?:s|sec|min|h)[\W\d]*$")  # such as mm/s: neither a joint nor a pose
+_AXIS = re.compile(r"[tp]?[xyz]|q[xyzw]|[rfw][xyz]")
 
 
 @dataclass(frozen=True)
@@ -88,29 +68,57 @@ class Meaning:
     rank: int = 0
     tube: int = 0  # of a joint, as the name numbers it; INNER, MIDDLE, OUTER
 
+    @property
+    def is_given(self) -> bool:
+        """Whether a command, a target or a model gives the column."""
+        return self.rank >= _GIVEN
+
+
+def with_middle(names: tuple[str, ...]) -> list[str]:
+    """The names, in which a lone m is spelled out that stands where others have i and o: the middle tube, no metre."""
+    made = []
+    for name in names:
+        places = [found.start() for found in re.finditer(r"(?<![^\W_])m(?![^\W_])", name)]
+        places = [k for k in places if all(name[:k] + tube + name[k + 1 :] in names for tube in "io")]
+        made.append(f"{name[: places[0]]}middle{name[places[0] + 1 :]}" if places else name)
+    return made
+
 
 def meaning(name: str) -> Meaning | None:
     """What a name suggests, None for nothing. Some roles wait for their neighbours.
 
     ox, oy, oz, ow: orientation, a quaternion where there is an ow, else angles. m1 to m16, or m11 to m44: a matrix.
     """
-    unit, text = _unit(unicodedata.normalize("NFKC", name))  # subscripts become digits
-    words = _words(text)
-    rank = 100 * bool(_COMMANDED & set(words))
-    words = [word for word in words if word not in _COMMANDED | _MEASURED]
-    last = re.findall(r"[a-z]+", name.lower())[-1:]
-    if last and last[0] in _PARTS:
-        return Meaning("nsec", named("ns"), rank=rank)
-    if set(words) & _ELSE:
+    name = unicodedata.normalize("NFKC", name)  # subscripts become digits
+    unit, text = _unit(name)
+    words = _words(name)
+    rate = _RATE.search(name)
+    if set(words) & _ELSE or (rate and named(rate[1])):
         return None
+    if words and words[-1] in _PARTS:
+        return Meaning("nsec", named("ns"))
+    made = _meaning(text, unit)
+    wanted = made and quantity(made.role)
+    if not made or not unit or unit.quantity == wanted:
+        return made
+    if not wanted or (wanted == "time" and unit.text.lower() not in _UNSIZED):  # a time has its zone in brackets
+        return replace(made, unit=None)
+    if len(unit.text) == 1 and name.rstrip()[-1].isalpha():  # stands for a word, such as measured
+        return _meaning(name, None)
+    return replace(made, unit=units.unknown(unit.text), rank=made.rank + 1)
+
+
+def _meaning(text: str, unit: Unit | None) -> Meaning | None:
+    """What a name without its unit suggests."""
+    words = _words(text)
+    rank = _GIVEN * bool(_COMMANDED & set(words))
+    words = [word for word in words if word not in _COMMANDED | _MEASURED]
     if not words:  # a name such as [s] is all unit
         return Meaning("t", unit, rank=rank) if unit and unit.quantity == "time" else None
     found = _matrix(words) or _pose(words) or _joint(words) or _other(words)
     if found is None:
         return None
     role, tube, rest = found
-    if unit and unit.quantity != quantity(role):
-        unit = None
     marker = " ".join(word for word in rest if word not in _NOISE) if not tube else ""
     return Meaning(role, unit, marker, rank + len(rest), tube)
 
@@ -118,22 +126,37 @@ def meaning(name: str) -> Meaning | None:
 def quantity(role: str) -> str | None:
     """The quantity of a role: time, length, angle, force; None for numbers without a unit."""
     kinds = {"t": "time", "nsec": "time", "beta": "length", "alpha": "angle", "weight": "force"}
-    kinds |= {"f": "force", "r": "angle", "o": "angle"}
+    kinds |= {"f": "force", "force": "force", "r": "angle", "o": "angle"}
     if role in ("x", "y", "z"):
         return "length"
     return kinds.get(role.rstrip("0123456789")) or (kinds.get(role[0]) if role[1:] in ("x", "y", "z") else None)
 
 
+def unit(name: str) -> Unit | None:
+    """The unit that a name states."""
+    return _unit(unicodedata.normalize("NFKC", name))[0]
+
+
 def _unit(name: str) -> tuple[Unit | None, str]:
-    """The unit at the end of a name, and the name without it."""
+    """The unit that a name states, and the name without it."""
     bracketed = re.search(r"[\[(<{]\s*([^\])>}]+?)\s*[\])>}]\s*$", name)
-    if bracketed and (unit := named(bracketed[1])):
-        return unit, name[: bracketed.start()]
-    last = re.search(r"(?<=[\w)])[\s_/.,\-]+([^\W_]+)\s*$", name)
-    if last and (unit := named(last[1])):
-        return unit, name[: last.start()]
+    if bracketed and (found := units.multiple(bracketed[1]) or _unknown(bracketed[1])):
+        return found, name[: bracketed.start()]
+    last = re.search(r"(?:(?<=[\w)])[\s_/.,\-]+|(?<=\d)(?=\D\D))(\d*\.\d+[^\W\d_]+|[^\W\d_]+)\s*$", name)
+    inner = last and last[1].lower() == "in" and not re.search(r"(\d|(?<![a-z])[xyz])$", name[: last.start()].lower())
+    if last and not inner and (found := units.multiple(last[1])):
+        return found, name[: last.start()]
     camel = re.search(r"(?<=[a-z0-9])(Deg|Rad|Mm|Sec|Ms)$", name)
-    return (named(camel[1]), name[: camel.start()]) if camel else (None, name)
+    if camel:
+        return named(camel[1]), name[: camel.start()]
+    unsized = re.search(rf"(?<![a-z])({'|'.join(_UNSIZED)})(?![a-z])", name.lower())
+    return (units.unknown(unsized[1]), name[: unsized.start()] + name[unsized.end() :]) if unsized else (None, name)
+
+
+def _unknown(text: str) -> Unit | None:
+    """What stands in brackets, where it is one word that says nothing else."""
+    is_word = re.fullmatch(r"[\d.]*\s*[^\W\d_][\w./^]*", text) and not set(_words(text)) & _REMARKS
+    return units.unknown(text) if is_word else None
 
 
 def _words(text: str) -> list[str]:
@@ -159,42 +182,48 @@ def _matrix(words: list[str]) -> Found:
 
 
 def _pose(words: list[str]) -> Found:
-    *rest, last = words
-    if last.isdigit() and rest and re.fullmatch(r"[tp]?[xyz]|q[xyzw]", rest[-1]):  # x1 is the first marker's
-        *rest, last = *rest[:-1], last, rest[-1]
-    if last in _EULER:
-        return _EULER[last], 0, rest
-    if re.fullmatch(r"[tp][xyz]|[fqr][xyz]|qw", last):
-        role = last[1] if last[0] in "tp" else last
-        return role, 0, rest
-    if last in ("x", "y", "z", "w"):
-        if rest and rest[-1] in _FORCE:
-            return f"f{last}", 0, rest[:-1]
-        if set(rest) & _ROTATION:
-            return f"o{last}", 0, rest
-        return (last, 0, rest) if last != "w" else ("ow", 0, rest)
-    if len(words) > 1 and words[-2] in ("q", "quat", "quaternion") and last in ("0", "1", "2", "3", "4"):
-        return f"q{last}", 0, words[:-2]
+    """The one word of an axis may stand anywhere, the others name the marker; a numbered tube is one of a joint."""
+    at = [i for i, word in enumerate(words) if _AXIS.fullmatch(word)]
+    if not at and (words[-1] in _EULER or not _numbers(words)):
+        at = [i for i, word in enumerate(words) if word in _EULER or word == "w"]
+    if len(at) == 1 and (at[0] >= len(words) - 1 - words[-1].isdigit() or not _joint(words)):
+        axis, rest = words[at[0]], words[: at[0]] + words[at[0] + 1 :]
+        if axis in _EULER:
+            return _EULER[axis], 0, rest
+        if len(axis) == 2:  # w turns
+            return axis[1] if axis[0] in "tp" else "r" + axis[1] if axis[0] == "w" else axis, 0, rest
+        if set(rest) & _FORCE or words[max(at[0] - 1, 0)] == "f":
+            return f"f{axis}", 0, [word for word in rest if word not in {"f"} | _FORCE]
+        return f"o{axis}" if axis == "w" or set(rest) & _ROTATION else axis, 0, rest
+    if len(words) > 1 and words[-2] in ("q", "quat", "quaternion") and re.fullmatch(r"\d", words[-1]):
+        return f"q{words[-1]}", 0, words[:-2]
     return None
 
 
+def _numbers(words: list[str]) -> list[int]:
+    """Numbers of tubes."""
+    return [int(word) if word.isdigit() else _WORDS[word] for word in words if word.isdigit() or word in _WORDS]
+
+
 def _joint(words: list[str]) -> Found:
-    numbers = [int(word) for word in words if word.isdigit()] + [_WORDS[word] for word in words if word in _WORDS]
+    numbers = _numbers(words)
     rest = [word for word in words if not word.isdigit() and word not in _WORDS]
     kinds = {"beta": [w for w in rest if w in _BETA], "alpha": [w for w in rest if w in _ALPHA]}
     if bool(kinds["beta"]) == bool(kinds["alpha"]) or len(numbers) > 1 or max(numbers, default=0) > LARGEST:
         return None
     kind = "beta" if kinds["beta"] else "alpha"
-    if not numbers and not set(kinds[kind]) & _STRONG:
+    if not numbers and (not set(kinds[kind]) & _STRONG or any(map(_AXIS.fullmatch, rest))):
         return None
     others = [word for word in rest if word not in kinds[kind] and word not in _NOISE]
-    if others and set(kinds[kind]) <= _SHORT:
+    if set(others) & _FORCE or others and set(kinds[kind]) <= _SHORT:
         return None
     return kind, numbers[0] if numbers else 1, others  # tube 0 is settled with all names
 
 
 def _other(words: list[str]) -> Found:
-    for role, known in (("t", _TIME), ("run", RUN), ("seen", _SEEN), ("weight", _WEIGHT)):
+    known_words = ("t", _TIME), ("run", RUN), ("seen", _SEEN), ("weight", _WEIGHT), ("force", _FORCE)
+    for role, known in known_words:
         if set(words) & known:
-            return role, 0, [word for word in words if word not in known and not word.isdigit()]
+            rest = [word for word in words if word not in known and not word.isdigit()]
+            return None if role == "force" and set(rest) - TIP_WORDS - _NOISE else (role, 0, rest)
     return None

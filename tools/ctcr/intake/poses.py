@@ -27,9 +27,11 @@ class Pose:
 
 
 def from_quaternions(columns: Array, rows: Integers, name: str, faults: Faults) -> Array:
-    """Unit quaternions (M, 4), w first, of rounded ones; all zeros count as missing."""
+    """Unit quaternions (M, 4), w first, of rounded ones; one number four times, such as 0, counts as missing."""
     norm = np.linalg.norm(columns, axis=1)
-    off = np.isfinite(norm) & (norm > 0) & (np.abs(norm - 1) > QUATERNION_SLACK)
+    off = np.isfinite(norm) & (np.abs(norm - 1) > QUATERNION_SLACK)
+    norm = np.where(off & (columns == columns[:, :1]).all(axis=1), 0.0, norm)
+    off &= norm > 0
     faults.where(
         off, rows, name, "norm", lambda i: f"quaternion of norm {norm[i]:.4g}: must be 1. Are these its columns?"
     )
@@ -38,12 +40,17 @@ def from_quaternions(columns: Array, rows: Integers, name: str, faults: Faults) 
 
 
 def from_euler(angles: Array, sequence: str) -> Array:
-    """Quaternions (M, 4) of angles (M, 3) [rad] about x, y, z, in the sequence of scipy: ZYX moving, zyx fixed axes."""
-    ordered = angles[:, ["xyz".index(axis) for axis in sequence.lower()]]
-    known = np.isfinite(ordered).all(axis=1)
+    """Quaternions (M, 4) of angles (M, 3) [rad] about x, y, z, in the sequence of scipy: ZYX moving, zyx fixed axes;
+    of rotation vectors where that is "vector"."""
+    known = np.isfinite(angles).all(axis=1)
     made = np.full((len(angles), 4), np.nan)
-    if known.any():
-        made[known] = np.roll(Rotation.from_euler(sequence, ordered[known]).as_quat(), 1, axis=1)
+    if not known.any():
+        return made
+    if sequence == "vector":
+        turned = Rotation.from_rotvec(angles[known])
+    else:
+        turned = Rotation.from_euler(sequence, angles[known][:, ["xyz".index(axis) for axis in sequence.lower()]])
+    made[known] = np.roll(turned.as_quat(), 1, axis=1)
     return made
 
 
@@ -51,7 +58,7 @@ def from_matrices(matrices: Array, rows: Integers, name: str, faults: Faults) ->
     """Quaternions (M, 4) of rotation matrices (M, 3, 3), rounded ones too; all zeros count as missing."""
     known = np.isfinite(matrices).all(axis=(1, 2)) & (np.abs(matrices).max(axis=(1, 2)) > 0)
     tested = np.where(known[:, None, None], matrices, np.eye(3))
-    error = np.abs(tested @ np.swapaxes(tested, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    error = off_rotation(tested)
     mirrored = np.linalg.det(tested) < 0
     faults.where(
         error > ORTHOGONAL_SLACK,
@@ -70,20 +77,32 @@ def from_matrices(matrices: Array, rows: Integers, name: str, faults: Faults) ->
     return made
 
 
+def off_rotation(matrices: Array) -> Array:
+    """How far matrices (M, 3, 3) are from rotations or reflections (M,): the largest entry of R R^T - 1."""
+    return np.abs(matrices @ np.swapaxes(matrices, 1, 2) - np.eye(3)).max(axis=(1, 2))
+
+
 def unseen(pose: Pose) -> Mask:
-    """Rows (M,) in which the tracker saw nothing: a missing position, or one of exact zeros with no rotation."""
+    """Rows (M,) in which the tracker saw nothing: a missing position, or one number thrice with no rotation: 0 or -1
+    stand for missing there."""
     missing = ~np.isfinite(pose.position).all(axis=1)
-    origin = (pose.position == 0).all(axis=1)
+    word = (pose.position == pose.position[:, :1]).all(axis=1)
     if pose.quaternion is None:
-        return missing | origin
+        return missing | word
     turned = np.isfinite(pose.quaternion).all(axis=1) & (np.abs(pose.quaternion[:, 0]) < 1)
-    return missing | (origin & ~turned)
+    return missing | (word & ~turned)
 
 
 def is_constant(quaternion: Array) -> bool:
     """Whether a rotation never changes: the sensor has none, or the program wrote a constant."""
     known = quaternion[np.isfinite(quaternion).all(axis=1)]
     return len(known) > 2 and bool((known == known[0]).all())
+
+
+def inverse(pose: Pose) -> Pose:
+    """The tracker in the frame of the marker."""
+    count = len(pose.position)
+    return seen_from(pose, Pose(np.zeros((count, 3)), np.tile([1.0, 0, 0, 0], (count, 1))))
 
 
 def seen_from(reference: Pose, pose: Pose) -> Pose:

@@ -4,7 +4,6 @@ import numpy as np
 
 from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem
-from ctcr.frames import conjugate
 from ctcr.intake import fields, poses, units
 from ctcr.intake.bodies import EULER, GRID, POSITION, QUATERNION, SEQUENCE, TRANSLATION
 from ctcr.intake.columns import Columns, angle_unit, length_unit
@@ -30,8 +29,6 @@ def of(columns: Columns) -> Pose | None:
     if pose.quaternion is not None and poses.is_constant(pose.quaternion):
         columns.notes.append("the rotation of the sensor never changes: it is left out")
         pose.quaternion = None
-    if pose.quaternion is not None and choices.invert_quaternion:
-        pose.quaternion = conjugate(pose.quaternion)
     if choices.mirror:
         pose = poses.mirrored(pose, choices.mirror)
     if not np.isfinite(pose.position).any():
@@ -42,6 +39,7 @@ def of(columns: Columns) -> Pose | None:
 def _marker(columns: Columns, prefix: str) -> Pose | None:
     """The pose of one marker, NaN where it was not seen."""
     position, rotation = _matrix(columns, prefix)
+    is_whole = position is not None
     if position is None:
         if not columns.has(prefix + "x"):
             return None
@@ -58,13 +56,18 @@ def _marker(columns: Columns, prefix: str) -> Pose | None:
         who = "the reference" if prefix else "the sensor"
         columns.notes.append(f"{who} was not seen in {row_ranges(columns.log.rows[hidden])}: the pose is left empty")
     pose.hide(hidden)
+    if pose.quaternion is not None and columns.choices.invert_quaternion:
+        turned = poses.inverse(pose)
+        return turned if is_whole else Pose(position=pose.position, quaternion=turned.quaternion)
     return pose
 
 
 def _matrix(columns: Columns, prefix: str) -> tuple[Array | None, Array | None]:
     """Positions (M, 3) [m] and rotation matrices (M, 3, 3) of matrices; None for what they lack."""
     count = len(columns.log)
-    if columns.has(f"{prefix}m1") and columns.has(f"{prefix}m16"):
+    if columns.has(f"{prefix}m1") and not columns.has(f"{prefix}m16"):
+        return _matrix_of_three_rows(columns, prefix)
+    if columns.has(f"{prefix}m1"):
         values = np.column_stack([columns.values(prefix + role) for role in SEQUENCE]).reshape(count, 4, 4)
         last_row, last_column = (np.nanmax(np.abs(part), initial=0.0) for part in (values[:, 3, :3], values[:, :3, 3]))
         by_columns = last_row > 0 and last_column == 0
@@ -77,6 +80,16 @@ def _matrix(columns: Columns, prefix: str) -> tuple[Array | None, Array | None]:
     if columns.has(prefix + "x") or not columns.has(prefix + "m14"):
         return None, rotation
     return _scaled(columns, np.column_stack([columns.values(prefix + role) for role in TRANSLATION])), rotation
+
+
+def _matrix_of_three_rows(columns: Columns, prefix: str) -> tuple[Array, Array]:
+    """Of 3 x 4 matrices, by rows or by columns: as their rotations say."""
+    values = np.column_stack([columns.values(prefix + role) for role in SEQUENCE[:12]])
+    by_rows, by_columns = values.reshape(-1, 3, 4), np.swapaxes(values.reshape(-1, 4, 3), 1, 2)
+    error = [np.nan_to_num(poses.off_rotation(one[:, :, :3])).sum() for one in (by_rows, by_columns)]
+    columns.notes.append(f"matrices are read by {'rows' if error[0] <= error[1] else 'columns'}, as rotations are")
+    matrices = by_rows if error[0] <= error[1] else by_columns
+    return _scaled(columns, matrices[:, :, 3]), matrices[:, :, :3]
 
 
 def _scaled(columns: Columns, position: Array) -> Array:
@@ -108,9 +121,11 @@ def _quaternion(columns: Columns, prefix: str, rotation: Array | None) -> Array 
         names = ",".join(columns.mapping.used[prefix + role].name for role in EULER)
         text = (
             "Euler angles need their sequence: --euler ZYX for R = Rz Ry Rx (roll, pitch, yaw of robotics), --euler XYZ"
+            " for R = Rx Ry Rz; a rotation vector (axis times angle) is --euler vector"
         )
-        columns.faults.add(1, columns.name(prefix + "rx"), f"{text} for R = Rx Ry Rz, or --ignore {names}")
+        columns.faults.add(1, columns.name(prefix + "rx"), f"{text}; or --ignore {names}")
         return None
     axes = sequence if sequence.isupper() else sequence[::-1]
-    columns.notes.append(f"Euler angles: R = {' '.join('R' + axis.lower() for axis in axes)}")
+    if sequence != "vector":
+        columns.notes.append(f"Euler angles: R = {' '.join('R' + axis.lower() for axis in axes)}")
     return poses.from_euler(angles, sequence)

@@ -162,7 +162,7 @@ def _names(rows: Rows, start: int, count: int) -> tuple[list[str], list[str] | N
     if len(names) < count:
         last_empty = all(not fields[-1].strip() for _, fields in rows[start:] if len(fields) == count)
         names = [*names, ""] if last_empty else ["", *names]
-    names = [f"{name} [{unit}]" if unit and named(unit) else name for name, unit in _padded(names, units)]
+    names = [f"{name} [{unit}]" if unit else name for name, unit in _padded(names, units)]
     return names[: max(count, len([n for n in names if n]))], header
 
 

@@ -16,17 +16,33 @@ _SIZES = {  # unit -> (quantity, size in SI units)
     "us": ("time", 1e-6),
     "ns": ("time", 1e-9),
     "min": ("time", 60.0),
+    "h": ("time", 3600.0),
+    "day": ("time", 86400.0),
     "m": ("length", 1.0),
+    "dm": ("length", 1e-1),
     "cm": ("length", 1e-2),
     "mm": ("length", 1e-3),
     "um": ("length", 1e-6),
+    "inch": ("length", 25.4e-3),
     "rad": ("angle", 1.0),
     "mrad": ("angle", 1e-3),
     "deg": ("angle", pi / 180),
+    "cdeg": ("angle", pi / 18000),
+    "mdeg": ("angle", pi / 180000),
+    "arcmin": ("angle", pi / 10800),
+    "arcsec": ("angle", pi / 648000),
+    "gon": ("angle", pi / 200),
+    "pi": ("angle", pi),
     "rev": ("angle", 2 * pi),
     "N": ("force", 1.0),
+    "kN": ("force", 1e3),
+    "cN": ("force", 1e-2),
     "mN": ("force", 1e-3),
+    "kgf": ("force", 1e3 * _GRAM_FORCE),
     "gf": ("force", _GRAM_FORCE),
+    "mgf": ("force", 1e-3 * _GRAM_FORCE),
+    "lbf": ("force", 453.59237 * _GRAM_FORCE),
+    "ozf": ("force", 453.59237 / 16 * _GRAM_FORCE),
     CLOCK: ("time", 1.0),
 }
 _ALSO = {
@@ -34,17 +50,28 @@ _ALSO = {
     "ms": "msec msecs millisecond milliseconds millis",
     "us": "usec microsecond microseconds µs μs",
     "ns": "nsec nsecs nanosec nanosecond nanoseconds",
-    "min": "minutes",
+    "min": "minute minutes mins",
+    "h": "hr hrs hour hours",
+    "day": "days",
     "m": "meter meters metre metres",
     "cm": "centimeter centimeters centimetre centimetres",
     "mm": "millimeter millimeters millimetre millimetres",
     "um": "micrometer micrometers micron microns µm μm",
+    "dm": "decimeter decimeters decimetre decimetres",
+    "inch": "in inches",
     "rad": "radian radians rads",
     "deg": "degree degrees degs °",
     "rev": "revs revolution revolutions turn turns",
+    "pi": "π",
     "N": "n newton newtons",
+    "kN": "kn kilonewton kilonewtons",
+    "cN": "cn centinewton centinewtons",
     "mN": "mn millinewton millinewtons",
-    "gf": "g gram grams",
+    "kgf": "kg kilogram kilograms",
+    "gf": "g gram grams gramm",
+    "mgf": "mg milligram milligrams",
+    "lbf": "lb lbs pound pounds",
+    "ozf": "oz ounce ounces",
     CLOCK: "iso datetime",
 }
 _NAMED = {unit: unit for unit in _SIZES} | {other: unit for unit, others in _ALSO.items() for other in others.split()}
@@ -55,7 +82,7 @@ class Unit:
     """`text` as a user writes it, such as mm or 0.0025mm; `size` in the SI unit of the quantity."""
 
     text: str
-    quantity: str  # time, length, angle, force
+    quantity: str  # time, length, angle, force; "" of a unit that is not known, such as counts
     size: float
 
     @property
@@ -70,6 +97,23 @@ def named(text: str) -> Unit | None:
     return Unit(unit, *_SIZES[unit]) if unit else None
 
 
+def multiple(text: str) -> Unit | None:
+    """The unit of a text such as 0.1 mm or mm; None where it is none."""
+    found = re.fullmatch(r"\s*(\d*\.?\d+)?\s*(\D+?)\s*", text)
+    unit = named(found[2]) if found else None
+    return Unit(text.strip(), unit.quantity, float(found[1]) * unit.size) if unit and found[1] else unit
+
+
+def unknown(text: str) -> Unit:
+    """A unit that a name states without a size, such as counts: an option must give it."""
+    return Unit(text.strip(), "", float("nan"))
+
+
+def of(quantity: str) -> str:
+    """The units of a quantity, as texts name them."""
+    return ", ".join(name for name, (kind, _) in _SIZES.items() if kind == quantity)
+
+
 def parsed(text: str, quantity: str, where: str) -> Unit:
     """The unit of an option, which may begin with a number: 0.0025mm is one count of an encoder.
 
@@ -82,8 +126,7 @@ def parsed(text: str, quantity: str, where: str) -> Unit:
     except ValueError:
         factor = 0.0
     if unit is None or unit.quantity != quantity or factor == 0:
-        units = ", ".join(name for name, (kind, _) in _SIZES.items() if kind == quantity)
-        raise InputError(Problem(f"{text} is no unit of {quantity}: give one of {units}", field=where))
+        raise InputError(Problem(f"{text} is no unit of {quantity}: give one of {of(quantity)}", field=where))
     return Unit(unit.text if found[1] is None else text.strip(), quantity, factor * unit.size)
 
 
