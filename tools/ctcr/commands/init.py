@@ -57,6 +57,9 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     robot.sensor_on_tube = sensor_on_tube or 1
     robot.gravity = _vector(gravity or "unknown")
     robot.home_mm = _numbers(home_mm)
+    if any(home > 0 for home in robot.home_mm):
+        text = f"{home_mm}: beta is 0 at the front plate and negative behind it: write --home-mm=-400,-300"
+        raise InputError(Problem(text, field="--home-mm"))
     text = new_file.text(robot)
     loaded = robot_file.parse(text.encode(), target)
     write_text(text, target)
@@ -78,7 +81,7 @@ def _asked(new_file, gravity):
         outer = _ask("  outer diameter [mm]")
         inner = _ask("  inner diameter [mm]")
         radius = click.prompt("  radius of the precurved part [mm], 0 for a straight tube", type=float)
-        curved = _ask("  length of the precurved part [mm]") if radius else 0.0
+        curved = _ask("  length of the precurved part [mm]") if new_file.curvature(radius) else 0.0
         modulus = click.prompt("  Young's modulus [GPa]", type=float, default=new_file.NITINOL_GPA)
         tube = new_file.NewTube(length, outer, inner, curved, new_file.curvature(radius), modulus)
         robot.tubes.append(tube)

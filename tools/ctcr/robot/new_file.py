@@ -1,7 +1,7 @@
 """A new robot file: what must be known of a robot, defaults for the rest, and comments that say which is which."""
 
 from dataclasses import dataclass, field
-from math import isfinite
+from math import isinf, isnan
 from typing import Any
 
 from ctcr.errors import InputError, Problem, suggestion
@@ -75,7 +75,7 @@ def tube_of(given: str, where: str) -> NewTube:
             value = float("nan")
         if name not in known:
             faults.append(f"{name} is no field of a tube: {suggestion(name, known, ', '.join(known))}")
-        elif not isfinite(value):
+        elif isnan(value) or (isinf(value) and name != "radius_mm"):  # an infinite radius is straight
             faults.append(f"{name}: {text or 'nothing'} is not a number")
         values[name] = value
     radius = values.pop("radius_mm", None)
@@ -92,7 +92,7 @@ def tube_of(given: str, where: str) -> NewTube:
 
 
 def curvature(radius_mm: float) -> float:
-    """Curvature [1/m] of a radius [mm]; 0 for a straight tube, whose radius is written as 0."""
+    """Curvature [1/m] of a radius [mm]; 0 for a straight tube, whose radius is written as 0 or inf."""
     return 1e3 / radius_mm if radius_mm else 0.0
 
 
