@@ -127,6 +127,42 @@ def test_weights(truth, log, imported, refused, run, tmp_path):
     np.testing.assert_allclose(table.force, np.outer(grams, [0, -9.80665e-3, 0]), atol=1e-12)
 
 
+def test_units_of_loads(truth, log, imported, refused):
+    """Every unit of force or mass becomes newtons; forces of no such robot are asked for."""
+    names = ["t", "beta1", "beta2", "alpha1", "alpha2", "fx{}", "fy{}", "fz{}", "x", "y", "z"]
+    for unit, size in {"_kN": 1e3, " [cN]": 1e-2, "_kg": 9.80665, "_g": 9.80665e-3, " (lbf)": 4.4482216152605}.items():
+        columns = [truth.t, truth.beta, truth.alpha, truth.force / size, truth.position]
+        table, _ = imported(log(text([name.format(unit) for name in names], columns)))
+        np.testing.assert_allclose(table.force, truth.force, atol=1e-9)
+    columns[3] = 1e3 * truth.force
+    assert "--unit force=mN" in refused(log(text([name.format("") for name in names], columns)))
+
+
+def test_rotations(truth, log, imported, refused, same):
+    """Rotation vectors; 3 x 4 matrices in one row, by rows or by columns; matrices of the inverse pose."""
+    names, joints = ["t", "beta1", "beta2", "alpha1", "alpha2"], [truth.t, truth.beta, truth.alpha]
+    for turns in (["rx", "ry", "rz"], ["wx", "wy", "wz"], ["rotvec_x", "rotvec_y", "rotvec_z"]):
+        path = log(text([*names, "x", "y", "z", *turns], [*joints, truth.position, truth.rotation.as_rotvec()]))
+        assert "--euler vector" in refused(path)
+        same(imported(path, "--euler", "vector")[0])
+    matrix = np.concatenate([truth.rotation.as_matrix(), truth.position[:, :, None]], axis=2)
+    for layout in (matrix, np.swapaxes(matrix, 1, 2)):
+        same(imported(log(text([*names, *(f"m{i}" for i in range(1, 13))], [*joints, layout.reshape(24, 12)])))[0])
+    back = truth.rotation.inv()
+    inverse = np.concatenate([back.as_matrix(), -back.apply(truth.position)[:, :, None]], axis=2).reshape(24, 12)
+    grid = [f"T{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)]
+    same(imported(log(text([*names, *grid], [*joints, inverse])), "--invert-quaternion")[0])
+
+
+def test_middle_tube(truth, log, imported):
+    """Beside i and o, m is the middle tube, no metre."""
+    columns = np.column_stack([truth.beta[:, 0], truth.beta.mean(axis=1), truth.beta[:, 1]])
+    names = ["t", "b_i", "b_m", "b_o", "a_i", "a_m", "a_o", "x", "y", "z"]
+    path = log(text(names, [truth.t, 1e3 * columns, columns, truth.position]))
+    table, _ = imported(path, "--unit", "alpha=rad", tubes=3)
+    np.testing.assert_allclose(table.beta, columns, atol=1e-9)
+
+
 def test_seconds_and_nanoseconds(truth, log, imported):
     """Stamps of ROS in two columns."""
     names = ["stamp.secs", "stamp.nsecs", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]

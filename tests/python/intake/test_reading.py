@@ -1,6 +1,7 @@
 """What is tolerated, what is said, what is refused."""
 
 import json
+from dataclasses import replace
 
 import lab_logs
 import numpy as np
@@ -92,6 +93,115 @@ def test_two_columns_for_one_thing(truth, log, refused, imported, same):
     assert "--column beta1=" in refused(path)
     table, _ = imported(path, "--column", "beta1=left_beta1")
     same(table, orientation=False)
+
+
+@pytest.mark.parametrize("given", ["sim", "cmd", "target", "pred", "model", "nominal", "fk", "theory"])
+@pytest.mark.parametrize("measured", ["exp", "ndi", "gt", "tracker", "meas", "true", ""])
+def test_given_poses_are_not_measured(truth, log, imported, same, given, measured):
+    """What a model or a command gives is no measurement beside one, in any order and under any name of that."""
+    for names in (["{}_x", "{}_y", "{}_z"], ["x_{}", "y_{}", "z_{}"]):
+        both = [[name.format(word).strip("_") for name in names] for word in (given, measured)]
+        content = text(
+            [*NAMES[:5], *both[0], *both[1]], [truth.t, truth.beta, truth.alpha, truth.position + 1, truth.position]
+        )
+        table, said = imported(log(content))
+        same(table, orientation=False)
+        assert f"Not used: {', '.join(both[0])}" in said
+
+
+def test_given_poses_alone(truth, log, imported, refused):
+    """Without a measured one, a given pose is taken and said; two measured ones are a question that names both."""
+    columns = [truth.t, truth.beta, truth.alpha, truth.position]
+    assert "not measured" in imported(log(text([*NAMES[:5], "x_sim", "y_sim", "z_sim"], columns)))[1]
+    both = [f"{axis}_{word}" for word in ("raw", "filt") for axis in "xyz"]
+    error = refused(log(text([*NAMES[:5], *both], [*columns, truth.position])))
+    assert "raw and filt" in error and "--sensor" in error
+
+
+def test_markers_by_any_spelling(truth, log, imported, same):
+    """A marker is found without the signs in its name; one without a name goes by its first column; a rotation without
+    a name is the sensor's."""
+    names = [f"EM{i}_{axis}" for i in (1, 2) for axis in "xyz"]
+    poses = log(text([*NAMES[:5], *names], [truth.t, truth.beta, truth.alpha, truth.position + 1, truth.position]))
+    same(imported(poses, "--sensor", "EM2")[0], orientation=False)
+    names = [*NAMES, "x_raw", "y_raw", "z_raw", "qw", "qx", "qy", "qz"]
+    columns = [truth.t, truth.beta, truth.alpha, truth.position, truth.position + 1, truth.quaternion]
+    same(imported(log(text(names, columns)), "--sensor", "x")[0])
+    names = [*NAMES[:5], "x_base", "y_base", "z_base", "x_tip", "y_tip", "z_tip", "qw", "qx", "qy", "qz"]
+    columns[3:5] = [truth.position + 1, truth.position]
+    same(imported(log(text(names, columns)))[0])
+
+
+@pytest.mark.parametrize(
+    ("column", "words", "option"),
+    [
+        ("beta1 [furlong]", "furlong is no unit of length", "--unit beta="),
+        ("beta1_counts", "counts is no unit of length", "--unit beta="),
+        ("beta1 [deg]", "deg is no unit of length", "--unit beta="),
+        ("alpha1_steps", "steps is no unit of angle", "--unit alpha="),
+        ("alpha1 (Grad)", "Grad is no unit of angle", "--unit alpha="),
+        ("t_ticks", "ticks is no unit of time", "--unit t="),
+        ("x [px]", "px is no unit of length", "--unit position="),
+        ("mass", "has no unit", "--unit force="),
+    ],
+)
+def test_units_are_asked_for(truth, log, lines, refused, column, words, option):
+    """A stated unit that is not known, or none of a weight, is never guessed; the option that says it is named."""
+    columns = [truth.t, truth.beta, truth.alpha, truth.position]
+    names = [column if column.startswith(name) else name for name in NAMES] + ["mass"] * (column == "mass")
+    error = refused(log(text(names, [*columns, np.full(24, 20.0)][: len(columns) + (column == "mass")])))
+    assert words in error and column in error and option in error
+
+
+def test_counts(truth, log, imported, refused, same):
+    """Numbers that can only be counts are asked for with the option that says how long one is."""
+    path = log(text(NAMES, [truth.t, truth.beta / 2.5e-6, truth.alpha, truth.position]))
+    assert "--unit beta=0.0025mm" in refused(path)
+    same(imported(path, "--unit", "beta=0.0025mm")[0], orientation=False)
+
+
+def test_words_for_missing_as_numbers(truth, log, imported):
+    """One number in all three coordinates stands for a pose that was not seen."""
+    for word in (-1.0, 999.0, -9999.0):
+        position = truth.position.copy()
+        position[5] = word
+        table, said = imported(log(text(NAMES, [truth.t, truth.beta, truth.alpha, position])), "--unit", "position=m")
+        assert np.flatnonzero(np.isnan(table.position[:, 0])).tolist() == [5] and "1 row (7): the pose" in said
+
+
+def test_wrapped_angles(truth, log, imported, same):
+    """Jumps of a whole turn are a doubt, and taken out where that is asked for."""
+    slow = replace(truth, alpha=np.linspace([0.1, 0], [12, -9], 24))
+    path = log(text(NAMES, [truth.t, truth.beta, slow.alpha % (2 * np.pi), truth.position]))
+    assert "alpha1 and alpha2: jumps of nearly a whole turn (3)" in imported(path)[1]
+    table, said = imported(path, "--unwrap", "alpha")
+    np.testing.assert_allclose(table.alpha, slow.alpha, atol=1e-9)
+    assert "whole turn" not in said
+
+
+@pytest.fixture
+def robot(run, tmp_path):
+    """Of two tubes, 420 and 300 mm long."""
+    path = tmp_path / "robot.yaml"
+    assert run("init", "-o", path, "--example", 2)[0] == 0
+    return path
+
+
+def test_joints_that_the_robot_cannot_have(truth, log, imported, refused, robot):
+    """Tubes that end behind the plate or inside an outer one, or hardly move, are said with what may be wrong."""
+
+    def path(beta):
+        return log(
+            text([*NAMES[:1], "beta1 [m]", "beta2 [m]", *NAMES[3:]], [truth.t, beta, truth.alpha, truth.position])
+        )
+
+    assert "Doubt" not in imported(path(truth.beta), "--robot", robot)[1]
+    assert "behind the plate" in refused(path(truth.beta * [2, 2]), "--robot", robot)
+    retracted = np.where(np.arange(24)[:, None] == 3, [-0.43, -0.2], truth.beta)
+    assert "in 1 row (5) a tube" in imported(path(retracted), "--robot", robot)[1]
+    assert "--unit beta=m" in imported(path(1e-3 * truth.beta * 0.5), "--robot", robot)[1]
+    order = ["--robot", robot, "--translation", "from-flush"]
+    assert "--order" in refused(path(truth.travel[:, ::-1] + [0, 0.01]), *order)
 
 
 def test_travel_is_asked_for(truth, log, refused):
@@ -254,6 +364,19 @@ def test_json(log, lines, run, tmp_path):
         ("rot_i", "alpha", -3, None),
         ("nsecs", "nsec", 0, "ns"),
         ("TubeOneRotDeg", "alpha", 1, "deg"),
+        ("beta1mm", "beta", 1, "mm"),
+        ("x_in", "x", 0, "inch"),
+        ("rot_in", "alpha", -3, None),
+        ("y_0.1mm", "y", 0, "0.1mm"),
+        ("load_kg", "weight", 0, "kgf"),
+        ("fz [lb]", "fz", 0, "lbf"),
+        ("alpha1 [gon]", "alpha", 1, "gon"),
+        ("rot2_steps", "alpha", 2, "steps"),
+        ("x [furlong]", "x", 0, "furlong"),
+        ("x (tip)", "x", 0, None),
+        ("Time (UTC)", "t", 0, None),
+        ("azimuth", "rz", 0, None),
+        ("Vorschub 1 [mm]", "beta", 1, "mm"),
     ],
 )
 def test_names(name, role, tube, unit):
@@ -261,7 +384,9 @@ def test_names(name, role, tube, unit):
     assert (found.role, found.tube, found.unit and found.unit.text) == (role, tube, unit)
 
 
-@pytest.mark.parametrize("name", ["index", "Unnamed: 0", "current_1_A", "alpha1_vel", "", "#3", "rot_360"])
+@pytest.mark.parametrize(
+    "name", ["index", "Unnamed: 0", "current_1_A", "alpha1_vel", "", "#3", "rot_360", "wx [rad/s]"]
+)
 def test_names_of_nothing(name):
     assert meaning(name) is None
 

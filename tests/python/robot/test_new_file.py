@@ -20,7 +20,7 @@ def test_examples(run, tmp_path, tubes):
 def test_options(run, tmp_path):
     """A radius is a curvature; everything else may be said too; names may hold anything."""
     path, name = tmp_path / "robot.yaml", 'he said "[red]" \\ \n: # é'
-    second = "length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,youngs_modulus_GPa=75"
+    second = "length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,youngs_modulus_GPa=75,radius_mm=inf"
     arguments = ["--name", name, "--gravity", "-y", "--sensor-on-tube", 2, "--home-mm=-400,-290"]
     code, out, err = run("init", "-o", path, "--tube", CURVED, "--tube", second, *arguments)
     assert code == 0, err
@@ -52,6 +52,8 @@ def test_questions(tmp_path):
         (["--tube", CURVED.replace("420", "long")], ["long is not a number"]),
         (["--tube", CURVED, "--tube", CURVED], ["too narrow"]),
         (["--example", 2, "--home-mm=-3"], ["needs 2, one a tube"]),
+        (["--example", 2, "--home-mm=400,300"], ["negative behind it"]),
+        (["--tube", CURVED.replace("420", "inf")], ["inf is not a number"]),
         (["--example", 2, "--tube", CURVED], ["exclude each other"]),
         (["--example", 1, "--sensor-on-tube", 3], ["3 is not a tube"]),
     ],

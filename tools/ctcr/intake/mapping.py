@@ -147,9 +147,11 @@ def _joints(candidates, explicit, choices: Choices, n_tubes: int | None, picker)
 
 def _poses(made: Mapping, candidates: list[Candidate], choices: Choices, picker: _Picker) -> None:
     """Columns of the sensor and, where it is asked for, of the reference marker."""
-    bodies = _bodies([one for one in candidates if not one.meaning.is_given])
-    given = {role for role in made.used if role in (*POSITION, *SEQUENCE, *TRANSLATION)}
-    if not given and not any(map(has_position, bodies.values())):
+    measured = [one for one in candidates if not one.meaning.is_given]
+    bodies = _bodies(measured)
+    places = {*POSITION, *TRANSLATION, *SEQUENCE}
+    given = places & set(made.used)
+    if not given and not any(one.meaning.role in places for one in measured):
         commanded = _bodies([one for one in candidates if one.meaning.is_given])
         if any(map(has_position, commanded.values())):
             bodies = commanded
