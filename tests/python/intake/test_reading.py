@@ -173,7 +173,7 @@ def test_wrapped_angles(truth, log, imported, same):
     """Jumps of a whole turn are a doubt, and taken out where that is asked for."""
     slow = replace(truth, alpha=np.linspace([0.1, 0], [12, -9], 24))
     path = log(text(NAMES, [truth.t, truth.beta, slow.alpha % (2 * np.pi), truth.position]))
-    assert "alpha1 and alpha2: jumps of nearly a whole turn (3)" in imported(path)[1]
+    assert "alpha1 and alpha2: jumps by nearly a whole turn, 3 times" in imported(path)[1]
     table, said = imported(path, "--unwrap", "alpha")
     np.testing.assert_allclose(table.alpha, slow.alpha, atol=1e-9)
     assert "whole turn" not in said
@@ -375,6 +375,7 @@ def test_json(log, lines, run, tmp_path):
         ("x [furlong]", "x", 0, "furlong"),
         ("x (tip)", "x", 0, None),
         ("Time (UTC)", "t", 0, None),
+        ("T [degC]", "t", 0, "degC"),
         ("azimuth", "rz", 0, None),
         ("Vorschub 1 [mm]", "beta", 1, "mm"),
     ],

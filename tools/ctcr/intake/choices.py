@@ -84,27 +84,17 @@ class Choices:
         for name in self.units:
             if name not in GROUPS and quantity(name) is None:
                 yield f"unit {name}", f"is not known: {', '.join(GROUPS)}, or one joint such as alpha1"
-        joints = re.compile(r"(?:beta|alpha)[1-9]?")
+        joint = r"(?:beta|alpha)[1-9]"
         for option, names, pattern, hint in (
-            (
-                "flip",
-                self.flip,
-                re.compile(rf"{joints.pattern}|force|f[xyz]"),
-                "a joint such as alpha2, alpha or force",
-            ),
-            (
-                "offset",
-                self.offsets,
-                re.compile(rf"{joints.pattern}(@\d+)?|t"),
-                "alpha2, alpha2@7 in run 7 alone, or t",
-            ),
-            ("unwrap", self.unwrap, re.compile(r"alpha[1-9]?"), "alpha or a joint such as alpha2"),
-            ("constant", self.constants, re.compile(r"(?:beta|alpha)[1-9]"), "a joint such as beta3"),
+            ("flip", self.flip, rf"{joint}?|force|f[xyz]", "a joint such as alpha2, alpha or force"),
+            ("offset", self.offsets, rf"{joint}?(@\d+)?|t", "alpha2, alpha2@7 in run 7 alone, or t"),
+            ("unwrap", self.unwrap, r"alpha[1-9]?", "alpha or a joint such as alpha2"),
+            ("constant", self.constants, joint, "a joint such as beta3"),
         ):
             for name in names:
                 if name in ("x", "y", "z") and option == "flip":
                     yield option, f"{name}: an axis of the tracker changes its sign with the rotations: --mirror {name}"
-                elif not pattern.fullmatch(name):
+                elif not re.fullmatch(pattern, name):
                     yield option, f"{name} is not known: give {hint}"
         for option, value, known in (
             ("translation", self.translation, TRANSLATIONS),
@@ -182,9 +172,8 @@ def _expected(kind: Any) -> str:
         "list[float]": "a list of numbers",
         "list": "a list of names",
     }
-    return next(
-        (said for start, said in words.items() if text.startswith(start)), "true or false" if kind is bool else "text"
-    )
+    plain = "true or false" if kind is bool else "text"
+    return next((said for start, said in words.items() if text.startswith(start)), plain)
 
 
 def save(choices: Choices, path: str | Path) -> None:
@@ -211,17 +200,8 @@ def _scalar(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, int | float):
         return repr(value)
-    if re.fullmatch(r"[A-Za-z][\w-]*", value) and value.lower() not in (
-        "y",
-        "n",
-        "yes",
-        "no",
-        "on",
-        "off",
-        "true",
-        "false",
-        "null",
-    ):
+    other = "y n yes no on off true false null".split()
+    if re.fullmatch(r"[A-Za-z][\w-]*", value) and value.lower() not in other:
         return value
     escaped = "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in value)
     return f'"{escaped}"'

@@ -19,6 +19,7 @@ from ctcr.intake.bodies import (
     settled,
 )
 from ctcr.intake.choices import GROUPS, Choices, group_of
+from ctcr.intake.fields import is_text
 from ctcr.intake.log import Log
 from ctcr.intake.names import INNER, MIDDLE, OUTER, TIP_WORDS
 from ctcr.intake.units import Unit
@@ -268,7 +269,8 @@ def _check_units(log: Log, made: Mapping, choices: Choices, faults: list[Problem
     silent: dict[tuple[str, str], list[str]] = {}
     for role, used in made.used.items():
         group, unit = group_of(_plain(role)), used.unit
-        if {role, group} & set(choices.units) or (unit.quantity if unit else role != "weight"):
+        is_clock = role == "t" and is_text(log, used.column)
+        if {role, group} & set(choices.units) or is_clock or (unit.quantity if unit else role != "weight"):
             continue
         silent.setdefault((group, unit.text if unit else ""), []).append(used.name)
     for (group, text), columns in silent.items():

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from ctcr.table import measurements
 from ctcr.table.csv_table import Faults
 
 FORCE = ("fx", "fy", "fz")
-JUMP_RAD = 1.5 * np.pi  # nearer to a whole turn than to half of one
 
 
 @dataclass
@@ -42,32 +42,36 @@ def of(columns: Columns, robot: Robot | None) -> Motion:
     """The motion that a log holds."""
     t, zero = times(columns)
     beta = _from_home(columns, _joints(columns, "beta", length_unit), robot)
-    alpha = _joints(columns, "alpha", lambda size: _sure_angle_unit(columns, size))
+    alpha = _joints(columns, "alpha", partial(_sure_angle_unit, columns))
     run = _runs(columns)
+    _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
     columns.doubts += _jumps(columns, run, alpha)
     columns.doubts += _impossible(columns, robot, beta) if robot else []
-    _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
     return Motion(t, zero, run, beta, alpha, _force(columns, robot), columns.log.rows)
 
 
 def _jumps(columns: Columns, run: Array, alpha: Array) -> Iterator[Problem]:
-    """The doubt where angles jump by nearly a whole turn, as wrapped ones do."""
+    """The doubt where angles that stay within a turn jump by one, up to a step as the tube often makes."""
+    steps = np.abs(np.diff(alpha, axis=0)[np.diff(run) == 0])
+    small = np.where((steps > 0) & (steps < np.pi), steps, np.nan)
+    often = np.array([np.nanmedian(one) if np.isfinite(one).any() else 0.0 for one in small.T])
     span = np.nanmax(alpha, axis=0, initial=-np.inf) - np.nanmin(alpha, axis=0, initial=np.inf)
-    jumps = (np.abs(np.diff(alpha, axis=0)) > JUMP_RAD) & (np.diff(run) == 0)[:, None] & (span <= RAD_UP_TO)
+    jumps = (np.abs(steps - 2 * np.pi) <= often) & (span <= RAD_UP_TO)
     if jumps.any():
         tubes = join([f"alpha{i}" for i in 1 + np.flatnonzero(jumps.any(axis=0))])
-        text = f"{tubes}: jumps of nearly a whole turn ({jumps.sum()}): if the log wraps angles, --unwrap alpha"
-        yield Problem(text, str(columns.log.path))
+        text = f"jumps by nearly a whole turn, {jumps.sum()} times: if the log wraps angles, --unwrap alpha"
+        yield Problem(text, str(columns.log.path), field=tubes)
 
 
 def _impossible(columns: Columns, robot: Robot, beta: Array) -> Iterator[Problem]:
     """The doubt where tubes end where the model allows no tip, or hardly move; a fault where that is so in all rows."""
     file, length = str(columns.log.path), np.array([tube.length for tube in robot.tubes])
-    faulty = Faults(file)  # of the joints themselves: the table says them
-    measurements.check("beta", beta, columns.log.rows, ["beta"] * len(length), faulty)
-    if faulty.total:
+    known = np.isfinite(beta).all(axis=1)
+    beta, rows, faulty = beta[known], columns.log.rows[known], Faults(file)
+    measurements.check("beta", beta, rows, ["beta"] * len(length), faulty)
+    if faulty.total or not len(rows):  # the table says what is wrong with the joints themselves
         return
-    largest = np.nanmax(np.abs(beta), initial=0.0)
+    largest = np.abs(beta).max()
     if 0 < largest < 1e-3 * length.min():
         text = f"beta is at most {1e3 * largest:.2g} mm, of tubes {1e3 * length.min():g} mm long and more"
         yield Problem(f"{text}: is its unit right, or is it --unit beta=m?", file)
@@ -78,7 +82,7 @@ def _impossible(columns: Columns, robot: Robot, beta: Array) -> Iterator[Problem
     if wrong.all():
         columns.faults.add(1, None, f"in every row {text}")
     elif wrong.any():
-        yield Problem(f"in {row_ranges(columns.log.rows[wrong])} {text}", file)
+        yield Problem(f"in {row_ranges(rows[wrong])} {text}", file)
 
 
 def times(columns: Columns) -> tuple[Array, float]:
@@ -86,8 +90,9 @@ def times(columns: Columns) -> tuple[Array, float]:
     if not columns.has("t"):
         return np.full(len(columns.log), np.nan), 0.0
     used, asked = columns.mapping.used["t"], columns.choices.units.get("t")
-    asked = None if columns.beside and used.unit and used.unit.quantity else asked
-    unit = units.parsed(asked, "time", "--unit t") if asked else used.unit
+    stated = used.unit if used.unit and used.unit.quantity else None
+    asked = None if columns.beside and stated else asked
+    unit = units.parsed(asked, "time", "--unit t") if asked else stated
     read = fields.times(columns.log, used.column, unit, columns.choices.missing, columns.faults)
     if columns.has("nsec"):
         read = _with_parts(columns, read)
@@ -212,7 +217,7 @@ def _weight(columns: Columns, robot: Robot | None) -> Array:
         text = "a weight needs the direction of gravity: give --robot ROBOT, whose gravity is known"
         raise InputError(Problem(f"{text}, or --ignore {name}", str(columns.log.path), field=name))
     columns.notes.append(f"{columns.mapping.used['weight'].name} is taken as a weight at the tip, along gravity")
-    return columns.si("force", ["weight"], lambda size: _force_unit(columns, size)) * down / np.linalg.norm(down)
+    return columns.si("force", ["weight"], partial(_force_unit, columns)) * down / np.linalg.norm(down)
 
 
 def _force_unit(columns: Columns, size: float) -> Unit:
@@ -229,8 +234,6 @@ def _force(columns: Columns, robot: Robot | None) -> Array:
     if columns.has("weight"):
         force += _weight(columns, robot)
     if roles:
-        force[:, [FORCE.index(role) for role in roles]] += columns.si(
-            "force", roles, lambda size: _force_unit(columns, size)
-        )
+        force[:, [FORCE.index(role) for role in roles]] += columns.si("force", roles, partial(_force_unit, columns))
     signs = [-1.0 if (role in flip) != ("force" in flip) else 1.0 for role in FORCE]
     return force * signs + 0.0

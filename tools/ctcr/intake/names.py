@@ -49,7 +49,16 @@ _NOISE = _set("field pose pos position positions data log msg joint joints tube 
 _NOISE |= _set("coordinate coord p translation header of vector xyz is tracking mean avg") | _ROTATION
 _ELSE = _set("vel velocity speed rate acc acceleration current voltage torque temperature temp error err std sd var")
 _ELSE |= _set("variance cov covariance rms residual quality")
-_REMARKS = _set("base reference left right x y z w") | TIP_WORDS | _TIME | RUN | _BETA | _ALPHA | _SEEN | _COMMANDED
+_REMARKS = (
+    _set("base reference left right x y z w utc gmt local unix epoch")
+    | TIP_WORDS
+    | _TIME
+    | RUN
+    | _BETA
+    | _ALPHA
+    | _SEEN
+    | _COMMANDED
+)
 _REMARKS |= _MEASURED | _FORCE | _WEIGHT | _NOISE | {*_WORDS, *_EULER}  # in brackets they are no units
 _RATE = re.compile(r"([^\W\d_]+)\s*/\s*(?:s|sec|min|h)[\W\d]*$")  # such as mm/s: neither a joint nor a pose
 _AXIS = re.compile(r"[tp]?[xyz]|q[xyzw]|[rfw][xyz]")
@@ -101,7 +110,7 @@ def meaning(name: str) -> Meaning | None:
     wanted = made and quantity(made.role)
     if not made or not unit or unit.quantity == wanted:
         return made
-    if not wanted or (wanted == "time" and unit.text.lower() not in _UNSIZED):  # a time has its zone in brackets
+    if not wanted:
         return replace(made, unit=None)
     if len(unit.text) == 1 and name.rstrip()[-1].isalpha():  # stands for a word, such as measured
         return _meaning(name, None)

@@ -44,13 +44,11 @@ def from_euler(angles: Array, sequence: str) -> Array:
     of rotation vectors where that is "vector"."""
     known = np.isfinite(angles).all(axis=1)
     made = np.full((len(angles), 4), np.nan)
-    if not known.any():
-        return made
-    if sequence == "vector":
-        turned = Rotation.from_rotvec(angles[known])
-    else:
-        turned = Rotation.from_euler(sequence, angles[known][:, ["xyz".index(axis) for axis in sequence.lower()]])
-    made[known] = np.roll(turned.as_quat(), 1, axis=1)
+    if known.any() and sequence == "vector":
+        made[known] = np.roll(Rotation.from_rotvec(angles[known]).as_quat(), 1, axis=1)
+    elif known.any():
+        ordered = angles[:, ["xyz".index(axis) for axis in sequence.lower()]]
+        made[known] = np.roll(Rotation.from_euler(sequence, ordered[known]).as_quat(), 1, axis=1)
     return made
 
 

@@ -65,9 +65,9 @@ def _marker(columns: Columns, prefix: str) -> Pose | None:
 def _matrix(columns: Columns, prefix: str) -> tuple[Array | None, Array | None]:
     """Positions (M, 3) [m] and rotation matrices (M, 3, 3) of matrices; None for what they lack."""
     count = len(columns.log)
-    if columns.has(f"{prefix}m1") and not columns.has(f"{prefix}m16"):
+    if all(columns.has(prefix + role) for role in SEQUENCE[:12]) and not columns.has(f"{prefix}m16"):
         return _matrix_of_three_rows(columns, prefix)
-    if columns.has(f"{prefix}m1"):
+    if columns.has(f"{prefix}m1") and columns.has(f"{prefix}m16"):
         values = np.column_stack([columns.values(prefix + role) for role in SEQUENCE]).reshape(count, 4, 4)
         last_row, last_column = (np.nanmax(np.abs(part), initial=0.0) for part in (values[:, 3, :3], values[:, :3, 3]))
         by_columns = last_row > 0 and last_column == 0

@@ -8,43 +8,14 @@ from ctcr.errors import InputError, Problem
 
 SI = {"time": "s", "length": "m", "angle": "rad", "force": "N"}
 CLOCK = "clock"  # the unit of times such as 2026-05-04T10:15:30.25 and 10:15:30.25
-_GRAM_FORCE = 9.80665e-3
-
-_SIZES = {  # unit -> (quantity, size in SI units)
-    "s": ("time", 1.0),
-    "ms": ("time", 1e-3),
-    "us": ("time", 1e-6),
-    "ns": ("time", 1e-9),
-    "min": ("time", 60.0),
-    "h": ("time", 3600.0),
-    "day": ("time", 86400.0),
-    "m": ("length", 1.0),
-    "dm": ("length", 1e-1),
-    "cm": ("length", 1e-2),
-    "mm": ("length", 1e-3),
-    "um": ("length", 1e-6),
-    "inch": ("length", 25.4e-3),
-    "rad": ("angle", 1.0),
-    "mrad": ("angle", 1e-3),
-    "deg": ("angle", pi / 180),
-    "cdeg": ("angle", pi / 18000),
-    "mdeg": ("angle", pi / 180000),
-    "arcmin": ("angle", pi / 10800),
-    "arcsec": ("angle", pi / 648000),
-    "gon": ("angle", pi / 200),
-    "pi": ("angle", pi),
-    "rev": ("angle", 2 * pi),
-    "N": ("force", 1.0),
-    "kN": ("force", 1e3),
-    "cN": ("force", 1e-2),
-    "mN": ("force", 1e-3),
-    "kgf": ("force", 1e3 * _GRAM_FORCE),
-    "gf": ("force", _GRAM_FORCE),
-    "mgf": ("force", 1e-3 * _GRAM_FORCE),
-    "lbf": ("force", 453.59237 * _GRAM_FORCE),
-    "ozf": ("force", 453.59237 / 16 * _GRAM_FORCE),
-    CLOCK: ("time", 1.0),
-}
+_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0, CLOCK: 1.0}
+_LENGTHS = {"m": 1.0, "dm": 1e-1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 25.4e-3}
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "cdeg": pi / 18000, "rev": 2 * pi, "pi": pi, "gon": pi / 200}
+_ANGLES |= {"arcmin": pi / 10800, "arcsec": pi / 648000}
+_FORCES = {"N": 1.0, "kN": 1e3, "cN": 1e-2, "mN": 1e-3}
+_FORCES |= {"kgf": 9.80665, "gf": 9.80665e-3, "mgf": 9.80665e-6, "lbf": 4.4482216152605, "ozf": 0.27801385095378125}
+_QUANTITIES = {"time": _TIMES, "length": _LENGTHS, "angle": _ANGLES, "force": _FORCES}
+_SIZES = {unit: (quantity, size) for quantity, sizes in _QUANTITIES.items() for unit, size in sizes.items()}
 _ALSO = {
     "s": "sec secs second seconds",
     "ms": "msec msecs millisecond milliseconds millis",
@@ -111,7 +82,7 @@ def unknown(text: str) -> Unit:
 
 def of(quantity: str) -> str:
     """The units of a quantity, as texts name them."""
-    return ", ".join(name for name, (kind, _) in _SIZES.items() if kind == quantity)
+    return ", ".join(_QUANTITIES[quantity])
 
 
 def parsed(text: str, quantity: str, where: str) -> Unit:
