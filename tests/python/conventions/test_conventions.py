@@ -9,7 +9,7 @@ from conventions_bench import RUNS, design, session
 from ctcr.conventions import review
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
-from ctcr.frames import conjugate
+from ctcr.frames import conjugate, product
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table import measurements
@@ -182,6 +182,39 @@ def test_frozen_at_stops():
     position[rows], quaternion[rows] = position[79], quaternion[79]
     [one] = review(robot, replace(twice, position=position, quaternion=quaternion)).findings
     assert (one.kind, list(one.rows)) == ("frozen", twice.row[rows].tolist())
+
+
+def test_frozen_across_runs():
+    """A tracker that repeats its pose from one run into the next stood still in both."""
+    robot, readings = bench(17)
+    start = int(np.flatnonzero(readings.run == 3)[0])
+    rows = np.arange(start - 3, start + 3)
+    position, quaternion = readings.position.copy(), readings.quaternion.copy()
+    position[rows], quaternion[rows] = position[start - 4], quaternion[start - 4]
+    [one] = review(robot, replace(readings, position=position, quaternion=quaternion)).findings
+    assert (one.kind, list(one.rows)) == ("frozen", readings.row[rows].tolist())
+
+
+@pytest.mark.parametrize("late", [[2, 5], list(range(RUNS))])
+def test_stale(late):
+    """Runs whose poses are those of the row before are named; in a stream that is a delay, and no convention."""
+    robot, readings = bench(23)
+    rows = np.arange(len(readings))
+    before = np.where(np.isin(readings.run, late) & (readings.run == readings.run[rows - 1]), rows - 1, rows)
+    old = replace(readings, position=readings.position[before], quaternion=readings.quaternion[before])
+    [one] = review(robot, old).findings
+    assert (one.kind, list(one.runs)) == ("stale", late)
+    assert "stale" not in [one.kind for one in review(robot, replace(old, t=old.t / 60)).findings]
+
+
+def test_uncertain_sensor(files):
+    """A sensor whose rotation the file says to be anywhere is not said to be turned."""
+    robot, readings = bench(23)
+    turned = product(readings.quaternion, Rotation.from_rotvec([1.0, 1.5, 0.5]).as_quat(scalar_first=True))
+    wide = robot.uncertainty.model_copy(update={"sensor_rotation_deg": 104.0})
+    table = replace(readings, quaternion=turned)
+    assert [one.kind for one in review(robot, table).findings] == ["sensor_rotation"]
+    assert review(robot.model_copy(update={"uncertainty": wide}), table).findings == []
 
 
 def test_at_rest():

@@ -276,8 +276,8 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anywa
     """Fit named parameters of ROBOT to the poses in MEASUREMENTS, all together (maximum a posteriori).
 
     The `uncertainty` of the robot file gives the priors. Shows which parameters the data determine and which they do
-    not, the error on held-out runs, and the expected error of a perfect model (jitter, tracker field, parameter
-    uncertainty), which no fit can beat. Stops where a convention is wrong, as `ctcr compare` says.
+    not, the error on held-out runs, and the expected error of a right model (jitter, tracker field up to its stated
+    accuracy, parameter uncertainty). Stops where a convention is wrong, as `ctcr compare` says.
 
     Example: ctcr calibrate fit robot.yaml measurements.csv --free standard -o calibrated.yaml --report fit.html
     """

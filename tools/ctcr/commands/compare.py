@@ -15,7 +15,8 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     """Compare predicted poses with measured ones.
 
     First tests whether the table or the robot file follows another convention: signs, units, order and zeros of the
-    joints, the tracker frame, quaternions, the sign of the force, time, runs homed elsewhere, poses that repeat.
+    joints, the tracker frame, quaternions, the sign of the force, time, runs homed elsewhere, poses that repeat or
+    are those of the row before, units of the robot file.
 
     Then the model of ROBOT predicts the poses of MEASUREMENTS. Shows the size of the error beside the noise, the
     hysteresis (difference between visits of the same joints from opposite directions), and which of joints, load

@@ -51,7 +51,8 @@ class Calibrated:
 
     def left_of(self, before: "Calibrated") -> Array:
         """The share that is left of the error beyond jitter: typical, and of 90 % of the readings."""
-        return self._beyond_jitter / np.maximum(before._beyond_jitter, 1e-150)
+        with np.errstate(invalid="ignore"):  # neither is solved
+            return self._beyond_jitter / np.maximum(before._beyond_jitter, 1e-150)
 
     def beats(self, before: "Calibrated") -> bool:
         """Whether the typical error fell far towards that of jitter and not by chance, and that of 90 % fell too."""

@@ -13,16 +13,16 @@ from ctcr.table.measurements import Measurements
 
 
 def repeated(readings: Measurements) -> Mask:
-    """Rows (M,) with exactly the pose of a row before, and of all between, in the same run, at other joints."""
+    """Rows (M,) with exactly the pose of a row before, and of all between, at other joints."""
     q = readings.load_space
     return (q != q[_since(readings)]).any(axis=1)
 
 
 def _since(readings: Measurements) -> Integers:
-    """The row (M,) of the same run since which exactly this pose was read; the row itself where it is a new one."""
+    """The row (M,) since which exactly this pose was read; the row itself where it is a new one."""
     pose = np.column_stack([readings.positions, np.nan_to_num(readings.quaternions)])
     held, first = np.zeros(len(readings), bool), np.arange(len(readings))
-    held[1:] = (pose[1:] == pose[:-1]).all(axis=1) & (readings.run[1:] == readings.run[:-1])
+    held[1:] = (pose[1:] == pose[:-1]).all(axis=1)
     first[held] = 0
     return np.maximum.accumulate(first)
 

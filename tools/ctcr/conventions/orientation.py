@@ -29,7 +29,7 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None)
     if not use.any():
         return [], lambda m: m
     predicted = _predicted(fit.robot, readings.rows(use))
-    known = fit.robot.tracker.sensor_rotation_known
+    known = _is_known(fit.robot)
     measured = {form: _in_form(given[use], *form, axis) for form in np.ndindex(2, 2)}
     errors = {form: _error_deg(predicted, measured[form], known) for form in measured}
     last, inverse = best = min(errors, key=lambda form: errors[form])
@@ -57,7 +57,7 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     if not use.any():
         return False
     predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
-    known = fit.robot.tracker.sensor_rotation_known
+    known = _is_known(fit.robot)
     options = [
         min(_error_deg(predicted, _in_form(given, *form, along), known) for form in np.ndindex(2, 2))
         for along in (None, axis)
@@ -68,7 +68,7 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
 def error_deg(robot: Robot, readings: Measurements) -> float:
     """RMS error of the orientations; NaN where none was measured."""
     some = readings.rows(readings.oriented)
-    known = robot.tracker.sensor_rotation_known
+    known = _is_known(robot)
     return _error_deg(_predicted(robot, some), some.quaternions, known) if len(some) else np.nan
 
 
@@ -84,6 +84,12 @@ def _in_form(quaternion: Array, last: int, inverse: int, axis: int | None) -> Ar
     moved = np.roll(quaternion, 1, axis=-1) if last else quaternion
     turned = conjugate(moved) if inverse else moved
     return turned if axis is None else mirror(turned, axis)
+
+
+def _is_known(robot: Robot) -> bool:
+    """Whether the robot file knows how the sensor is turned, but for an error of mounting."""
+    stated = robot.uncertainty.sensor_rotation_deg
+    return robot.tracker.sensor_rotation_known and np.max(stated or 0.0) <= np.rad2deg(settings.SENSOR_JUMP[1])
 
 
 def _predicted(robot: Robot, readings: Measurements) -> Array:

@@ -1,4 +1,5 @@
-"""All conventions of a table, one after another: joints, loads and frames, orientations, runs, frozen rows, time."""
+"""All conventions of a table, one after another: joints, loads and frames, orientations, runs, stale and frozen poses,
+time."""
 
 from dataclasses import dataclass, replace
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers, Mask, evenly
-from ctcr.conventions import clock, frozen, orientation, runs, search, tips
+from ctcr.conventions import clock, frozen, orientation, runs, search, stale, tips
 from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
 from ctcr.robot.description import Robot
@@ -67,6 +68,10 @@ def review(robot: Robot, readings: Measurements) -> Review:
         of_runs, right, before = change(of_runs), change(right), fit
         fit = calibrated(case.robot, of_runs)
         found.append(finding.with_errors(before.rms_mm, fit.rms_mm))
+
+    if late := stale.late_by_a_row(fit, right):
+        finding, change = late
+        found, right = [*found, finding], change(right)
 
     if still := frozen.stood_still(fit.robot, right):
         finding, rows = still

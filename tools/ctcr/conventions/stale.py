@@ -1,0 +1,59 @@
+"""Runs whose poses are those of the row before: the program logged the reading that it took last."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ctcr.arrays import Array, Mask
+from ctcr.conventions import tips
+from ctcr.conventions.calibrated import Calibrated
+from ctcr.conventions.finding import Finding
+from ctcr.conventions.hypotheses import POSE, QUATERNION, Change
+from ctcr.effects import catalogue
+from ctcr.frames import points_to_tracker
+from ctcr.show.wording import counted, listed
+from ctcr.table.measurements import Measurements
+
+
+def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
+    """Runs whose poses fit the joints of the row before far better than their own. Rows that follow one another faster
+    than a tracker may lag are none: there the delay is an effect."""
+    lags = catalogue.names_with("lag", readings.n_tubes)
+    longest = max(catalogue.parameter_of(readings.n_tubes)[name].hard[1] for name in lags)
+    same = np.diff(readings.run) == 0
+    steps = np.diff(readings.t)[same]
+    if not (len(steps) and np.nanmedian(steps) > longest):
+        return None
+    after = 1 + np.flatnonzero(same & np.isfinite(readings.positions[1:]).all(axis=1))
+    positions = points_to_tracker(fit.robot.tracker, tips.predicted(fit.robot, readings))
+    own, before = (
+        replace(fit, error=np.linalg.norm(readings.positions[after] - positions[rows], axis=1))
+        for rows in (after, after - 1)
+    )
+    runs = readings.run[after]
+    late = [run for run in np.unique(runs) if before.at(runs == run).beats(own.at(runs == run))]
+    if not late:
+        return None
+    rows = np.isin(runs, late)
+    text = f"poses of {counted(len(late), 'run')} ({listed(late)}) are those of the row before"
+    fix = "move the pose fields of these runs up by a row, or log the reading that follows each motion"
+    columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
+    rms = own.at(rows).rms_mm, before.at(rows).rms_mm
+    return Finding("stale", text, columns, fix, runs=[int(run) for run in late], rms_mm=rms), _moved_up(late)
+
+
+def _moved_up(late: list[int]) -> Change:
+    """Poses of some runs moved up by a row, the last one of each run missing."""
+
+    def change(m: Measurements) -> Measurements:
+        rows = np.isin(m.run, late)
+        follows = np.append(np.diff(m.run) == 0, False)
+        there = np.where(rows & follows, np.arange(len(m)) + 1, np.arange(len(m)))
+        moved = {name: _taken(getattr(m, name), there, rows & ~follows) for name in ("position", "quaternion")}
+        return replace(m, **moved)
+
+    return change
+
+
+def _taken(poses: Array | None, there: Array, missing: Mask) -> Array | None:
+    return None if poses is None else np.where(missing[:, None], np.nan, poses[there])
