@@ -85,6 +85,7 @@ BEYOND_MOTION = 2.0  # ... and is, where it differs from errors at near joints b
 # ---- Noise of the tracker
 
 CORRELATION_LENGTH = 0.1  # [m] over which the smooth field error changes: about the size of a workspace
+JITTER_KNOWN = 0.1  # standard deviation of the logarithm of the stated jitter: data sheets give two digits at best
 FIELD_PARTS = (1.0, 0.3, 0.1, 0.0)  # parts of the stated field error that are tried, halves of a decade apart
 
 # ---- Joint fit

@@ -12,7 +12,7 @@ from ctcr.fit.result import Priors
 from ctcr.frames import base_to_tracker, product, quaternion_from_rotation_vector
 from ctcr.model import parameters
 from ctcr.model.model import Model
-from ctcr.model.noise import Noise, noise_of
+from ctcr.model.noise import Noise, changed, noise_of
 from ctcr.model.protocol import LinearModel
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -178,6 +178,21 @@ def test_truth_recovered():
     # The fitted robot predicts what the fit says it does.
     again = joint.fit(fit.apply(bench), readings, "tracker.position.x", noise=NOISE)
     np.testing.assert_allclose(again.nominal_residual, fit.residual, atol=1e-7)
+
+
+def test_jitter_nearly_as_stated():
+    """Readings that scatter by a tenth more than stated agree with the noise, by a half more they do not, and more
+    scatter never agrees better."""
+    bench = robot()
+    noises = [
+        changed(NOISE, position_jitter=k * NOISE.position_jitter, rotation_jitter=k * NOISE.rotation_jitter)
+        for k in (1.0, 1.1, 1.25, 1.5)
+    ]
+    stated = noises[0]
+    fits = [joint.fit(bench, table(bench, 400, 1, one), ["tracker.position.x"], noise=stated) for one in noises]
+    p_values = [joint.linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value for fit in fits]
+    assert p_values == sorted(p_values, reverse=True)
+    assert p_values[1] > 0.1 and p_values[-1] < 1e-4
 
 
 def test_whitening():

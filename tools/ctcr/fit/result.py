@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import chi2
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.fit import widening
 from ctcr.fit.widening import Scales
@@ -211,8 +211,11 @@ class Fit:
 
     @cached_property
     def p_value(self) -> float:
-        """Probability of so large a chi-square where model, priors and noise are right."""
-        return float(chi2.sf(self.chi_square + self.shift_square, self.bulk_observations))
+        """Probability of so large a chi-square where model and priors are right, and the stated jitter nearly is."""
+        node, weight = np.polynomial.hermite_e.hermegauss(21)
+        scale = np.exp(2 * settings.JITTER_KNOWN * node)
+        tail = chi2.sf((self.chi_square + self.shift_square) / scale, self.bulk_observations)
+        return float(weight @ tail / weight.sum())
 
     def rms_mm(self, rows: Mask | None = None) -> float:
         """RMS length of the position residual of some rows (M,), all by default."""
