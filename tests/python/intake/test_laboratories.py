@@ -4,6 +4,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 
 import numpy as np
+import pytest
 from ctcr.frames import conjugate
 from lab_logs import text
 from scipy.spatial.transform import Rotation
@@ -62,6 +63,41 @@ def test_ros(truth, log, imported, same):
     assert "--relative-to" in said
 
 
+def in_rows(truth, base, tools, step=0.0):
+    """A log with a row for each of two tools, the second `step` later."""
+    names = ["time_s", "run", "beta1", "beta2", "alpha1", "alpha2", "Tool ID", "x", "y", "z", "qx", "qy", "qz", "qw"]
+    other = [np.tile([1.0, 2.0, 0.5], (24, 1)), np.tile(base.as_quat(), (24, 1))]
+    tip = [base.apply(truth.position) + [1.0, 2.0, 0.5], (base * truth.rotation).as_quat()]
+    tables = [
+        text(names, [truth.t + k * step, truth.run, truth.beta, truth.alpha, [tools[k]] * 24, *pose]).split("\n")[:-1]
+        for k, pose in enumerate((other, tip))
+    ]
+    return "\n".join(
+        [tables[0][0], *(line for pair in zip(*(table[1:] for table in tables), strict=True) for line in pair)]
+    )
+
+
+@pytest.mark.parametrize("tools", [("base", "tip"), ("0A", "0B"), ("1", "2")])
+def test_a_row_a_tool(truth, log, imported, refused, same, tools):
+    """Rows of one time are one reading, in which --sensor and --relative-to choose as in any other log."""
+    path = log(in_rows(truth, Rotation.from_euler("xyz", [0.3, -0.2, 0.9]), tools))
+    same(imported(path, "--sensor", tools[1], "--relative-to", tools[0])[0], run=True)
+    if tools[1] != "tip":
+        assert "--sensor NAME" in refused(path)
+
+
+def test_tools_with_times_of_their_own(truth, log, imported, refused, same):
+    """No two tools are one reading: --sensor takes the rows of one, and without it the error names them."""
+    path = log(in_rows(truth, Rotation.identity(), ("base", "tip"), 0.001))
+    error = refused(path)
+    assert "base and tip" in error and "--sensor NAME" in error and "--ignore Tool ID" in error
+    assert "times of its own" in refused(path, "--sensor", "tip", "--relative-to", "base")
+    table, said = imported(path, "--sensor", "tip")
+    np.testing.assert_allclose(table.positions - [1.0, 2.0, 0.5], truth.position, atol=1e-9)
+    assert len(table) == 24 and "only the rows of tip" in said
+    assert len(imported(path, "--ignore", "Tool ID")[0]) == 48
+
+
 def test_matrices(truth, log, imported, same):
     """Spaces, no header, 4 x 4 matrices by rows or by columns, roles by their order."""
     matrices = np.zeros((24, 4, 4))
@@ -96,16 +132,20 @@ def test_euler_angles(truth, log, imported, refused, same):
     assert table.quaternion is None
 
 
-def test_clocks(truth, log, imported, same):
-    """ISO times, dates of MATLAB, and a clock that passes midnight."""
-    start = datetime(2026, 11, 27, 23, 59, 59, 900_000)
+def test_clocks(truth, log, imported, refused, same):
+    """Times of many programs pass midnight; of day and month, the one that makes the log short comes first."""
+    start = datetime(2026, 6, 5, 23, 59, 59, 900_000)
     moments = [start + timedelta(seconds=float(t)) for t in truth.t]
-    forms = [moment.isoformat() for moment in moments], [m.strftime("%d-%b-%Y %H:%M:%S.%f") for m in moments]
-    for times in (*forms, [moment.strftime("%H:%M:%S.%f") for moment in moments]):
-        names = ["Timestamp", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
-        table, said = imported(log(text(names, [list(times), truth.beta, truth.alpha, truth.position])))
+    forms = ["%Y-%m-%dT%H:%M:%S.%f", "%d-%b-%Y %H:%M:%S.%f", "%H:%M:%S.%f", "%H:%M:%S:%f", "%M:%S.%f"]
+    forms += ["%Y-%m-%d %H-%M-%S.%f", "%d/%m/%y %H:%M:%S.%f", "%m/%d/%y %I:%M:%S.%f %p", "%d.%m.%Y %H:%M:%S,%f"]
+    names = ["Timestamp", "beta1", "beta2", "alpha1", "alpha2", "x", "y", "z"]
+    for form in forms:
+        times = [moment.strftime(form) for moment in moments]
+        table, said = imported(log(text(names, [times, truth.beta, truth.alpha, truth.position], ";")))
         same(table, orientation=False)
         assert f"t_s = 0 is {times[0]}" in said
+    error = refused(log(text(names, [["noon"] * 24, truth.beta, truth.alpha, truth.position])))
+    assert "'noon' is no time that is understood: 2026-05-04 10:15:30.25" in error
 
 
 def test_forces(truth, log, imported, same):

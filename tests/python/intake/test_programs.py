@@ -101,6 +101,21 @@ def test_joints_between_their_rows(truth, log, imported, refused):
     assert "--offset t=" in refused(late, "--joints", joint_log)
 
 
+def test_one_log_without_times(truth, log, joints, imported, refused):
+    """The error names the log that lacks times, and what to do; a frame number with its unit is a time."""
+    t = np.round(truth.t / 0.005) * 0.005
+    names = ["Frame", "x", "y", "z"]
+    poses = log(text(names, [np.round(t / 0.005).astype(int), truth.position]))
+    error = refused(poses, "--joints", joints)
+    assert "log.csv: has no times, joints.csv has" in error and "--column t=NAME" in error and "Frame" in error
+    table, _ = imported(poses, "--joints", joints, "--column", "t=Frame", "--unit", "t=5ms")
+    np.testing.assert_allclose(np.diff(table.t), np.diff(t), atol=1e-9)
+    one_by_one = log("\n".join(joints.read_text().split("\n")[:25]), "short.csv")
+    assert "row by row, --ignore t" in refused(poses, "--joints", one_by_one)
+    table, _ = imported(poses, "--joints", one_by_one, "--ignore", "t")
+    np.testing.assert_allclose(table.positions, truth.position, atol=1e-9)
+
+
 def test_mat(truth, tmp_path, imported, same, refused):
     """A structure of matrices, of other variables too; 4 x 4 matrices along the third axis."""
     path = tmp_path / "log.mat"
@@ -118,6 +133,35 @@ def test_mat(truth, tmp_path, imported, same, refused):
     assert "--quaternion" in refused(path)
     path.write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     assert "damaged" in refused(path) or "no arrays" in refused(path)
+
+
+def test_numpy(truth, tmp_path, imported, refused, same):
+    """Named arrays of a .npz, times as numpy's dates among them; a matrix alone needs the names of its columns."""
+    stamps = np.datetime64("2026-05-04T10:00:00", "ns") + np.round(1e9 * truth.t).astype("timedelta64[ns]")
+    path = tmp_path / "log.npz"
+    np.savez(path, time=stamps, beta=truth.beta, alpha=truth.alpha, position=truth.position, gain=3.0)
+    same(imported(path)[0], orientation=False)
+    path = tmp_path / "log.npy"
+    np.save(path, np.column_stack([truth.t, truth.beta, truth.alpha, truth.position]))
+    assert "--columns" in refused(path)
+    same(imported(path, "--columns", "t,beta1..beta2,alpha1..alpha2,x,y,z")[0], orientation=False)
+
+
+@pytest.mark.parametrize("written", [1, 2])
+def test_labview_measurement(truth, log, imported, same, written):
+    """A .lvm file: headers with numbers, units and decimal commas, one of them each time it was written to."""
+    names = ["X_Value", "Trans 1", "Trans 2", "Rot 1", "Rot 2", "x", "y", "z"]
+    end = "***End_of_Header***"
+    head = ["LabVIEW Measurement\t", "Separator\tTab", "Decimal_Separator\t,", "Time\t14:03:22,887", end + "\t", "\t"]
+    units = "\t".join(["Y_Unit_Label", "mm", "mm", "deg", "deg", "mm", "mm", "mm"])
+    part = ["Channels\t7", "Samples" + "\t24" * 7, units, "X0" + "\t0,0E+0" * 7, "Delta_X" + "\t2,0" * 7, end]
+    values = [truth.t, 1e3 * truth.beta, np.rad2deg(truth.alpha), 1e3 * truth.position]
+    body = text(names, values, "\t", ",").split("\n")
+    first = [f"{body[0]}\tComment", f"{body[1]}\tbegun", *body[2:13]]
+    again = ["", *part, f"{body[0]}\tComment"] if written == 2 else []
+    table, said = imported(log("\n".join([*head, *part, *first, *again, *body[13:]]), "log.lvm"))
+    same(table, orientation=False)
+    assert "Comment" in said and "guessed: unit" not in said
 
 
 def test_mcap(truth, tmp_path, imported, same):

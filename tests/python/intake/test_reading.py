@@ -28,6 +28,51 @@ def test_tolerated(log, lines, imported, same):
         assert words in said
 
 
+@pytest.mark.parametrize("note", ["# homing done", "% 1, 2, 3, 4, 5, 6, 7, 8", "homing done"])
+def test_lines_below_the_header(log, lines, imported, same, note):
+    """Comments and short lines, below the header, below its units and below the first row, hide none of them."""
+    units = "[s],[m],[m],[rad],[rad],[m],[m],[m]"
+    after = note if note[0] in "#%" else ""
+    table, said = imported(log("\n".join([lines[0], note, units, note, lines[1], after, *lines[2:]])))
+    same(table, orientation=False)
+    assert "guessed: unit" not in said
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        ["time,beta,beta,alpha,alpha,position,position,position", ",1,2,1,2,x,y,z"],
+        ["time,beta,,alpha,,position,,", ",1,2,1,2,x,y,z"],
+        [",inner,outer,inner,outer,tip,tip,tip", "t,trans,trans,rot,rot,x,y,z"],
+        ["time,beta,,alpha,,tip,,", ",1,2,1,2,x,y,z", "s,m,m,rad,rad,m,m,m"],
+    ],
+)
+def test_header_of_two_rows(log, lines, imported, same, header):
+    """Names above numbers or axes, merged or not, are a name each column, and no reading where they come again."""
+    same(imported(log("\n".join([*header, *lines[1:9], *header, *lines[9:]])))[0], orientation=False)
+
+
+def test_lines_of_runs(log, lines, imported, same, refused):
+    """A line that names a run begins it, where no column does; any other short line is a fault with what to do."""
+    blocks = ["Run 3", *lines[:13], "", "# run_7", lines[0], *lines[13:]]
+    table, said = imported(log("\n".join(blocks)))
+    same(table, orientation=False)
+    assert np.bincount(table.run).tolist()[3:] == [12, 0, 0, 0, 12] and "row 16: names a run" in said
+    named = [f"{line},{'run' if i == 0 else 5}" for i, line in enumerate(lines)]
+    table, _ = imported(log("\n".join([*named[:13], "Run 2", *named[13:]])))
+    assert set(table.run) == {5}
+    assert "one such as Run 2 begins a run" in refused(log("\n".join([*lines[:13], "Block B", *lines[13:]])))
+
+
+def test_names_in_columns(truth, log, imported, same):
+    """Joints that ROS writes as names and positions are named by those; velocities are none."""
+    joints = ["tube1_trans", "tube2_trans", "tube1_rot", "tube2_rot"]
+    names = ["t", *(f"field.{word}{i}" for word in ("name", "position", "velocity") for i in range(4)), "x", "y", "z"]
+    words = [[joint] * 24 for joint in joints]
+    values = [truth.beta, truth.alpha, 0 * truth.beta, 0 * truth.alpha, truth.position]
+    same(imported(log(text(names, [truth.t, *words, *values])))[0], orientation=False)
+
+
 def test_faults_at_once(log, lines, refused):
     """Rows that do not fit are faults with their numbers, all of a kind at once."""
     short = [*lines]
@@ -43,13 +88,23 @@ def test_faults_at_once(log, lines, refused):
 
 def test_missing(truth, log, lines, imported):
     """Words and numbers for missing: the pose is left empty; without joints the row is dropped; both are said."""
-    for word in ("MISSING", "NaN", "", "-3.697314E28", "0", "none", "1e30", "gone"):
+    words = ("MISSING", "NaN", "", "-3.697314E28", "0", "none", "1e30", "gone", "?", ".", "<NA>", "-1.#IND", "nan(ind)")
+    for word in words:
         changed = [*lines]
         changed[5] = ",".join([*lines[5].split(",")[:5], word, word, word])
         changed[9] = ",".join([lines[9].split(",")[0], "NaN", *lines[9].split(",")[2:]])
         table, said = imported(log("\n".join(changed)), "--missing", "gone")
         assert np.isnan(table.position[4]).all() and np.isfinite(table.position).all(axis=1).sum() == 22
         assert len(table) == 23 and "1 row (10): dropped" in said and "1 row (6): the pose is left empty" in said
+
+
+def test_fields_that_are_no_words(log, lines, refused, imported, same):
+    """Numbers of Fortran are read; units, vectors and thousands in a field are never taken for missing."""
+    same(imported(log("\n".join([lines[0], lines[1].replace(",", "D+00,"), *lines[2:]])))[0], orientation=False)
+    for field, words in (("12.5 mm", "holds its unit"), ("[1 2]", "several numbers"), ('"1,100.5"', "thousands")):
+        changed = [*lines[:4], ",".join([lines[4].split(",")[0], field, *lines[4].split(",")[2:]]), *lines[5:]]
+        error = refused(log("\n".join(changed)))
+        assert words in error and "--missing" not in error
 
 
 def test_identity_and_states(truth, log, imported):
@@ -307,6 +362,10 @@ def test_faulty_options(log, lines, refused, options, words):
     [
         (b"", "is empty"),
         (b"PK\3\4", "spreadsheet"),
+        (b"\xd0\xcf\x11\xe0" + bytes(9), "spreadsheet"),
+        (b"\x80\4\x95", "frame.to_csv"),
+        (b'[{"t": 1}]', "frame.to_csv"),
+        (b"\x93NUMPY", "numpy.savez"),
         (b"\x00\x01\x02" * 50, "neither text"),
         (b"hello\nworld\n", "no rows of numbers"),
         (b"a,b,c\n1,2,3\n4,5,6\n", "looks like a joint"),
@@ -316,11 +375,43 @@ def test_no_log(log, refused, content, words):
     assert words in refused(log(content))
 
 
-def test_time_in_doubt(truth, log, imported):
-    """Times without a unit that would make a log very slow are a question; with a unit they are none."""
-    path = log(text(NAMES, [25.0 * np.arange(24), truth.beta, truth.alpha, truth.position]))
-    assert "if these are ms, say --unit t=ms" in imported(path)[1]
-    assert "Doubt" not in imported(path, "--unit", "t=ms")[1]
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "utf-32-le", "utf-32-be", "utf-16", "utf-32"])
+def test_wide_characters(log, lines, imported, same, encoding):
+    """Text of two or four bytes a character, with or without a mark in front."""
+    same(imported(log("\n".join(lines), encoding=encoding))[0], orientation=False)
+
+
+@pytest.mark.parametrize("epoch", [719529, 25569])
+def test_days(truth, log, imported, refused, same, epoch):
+    """Days since an epoch may be seconds too: the error asks, and either unit answers it."""
+    days = [f"{epoch + 20000 + t / 86400:.12f}" for t in truth.t]
+    path = log(text(NAMES, [days, truth.beta, truth.alpha, truth.position]))
+    assert "--unit t=day or --unit t=s" in refused(path)
+    table, _ = imported(path, "--unit", "t=day")
+    np.testing.assert_allclose(table.t, truth.t - truth.t[0], atol=2e-5)
+    assert np.ptp(imported(path, "--unit", "t=s")[0].t) < 1e-4
+    same(
+        imported(log(text(["time_h", *NAMES[1:]], [truth.t / 3600, truth.beta, truth.alpha, truth.position])))[0],
+        orientation=False,
+    )
+
+
+def test_windows_stamps(truth, log, imported, same):
+    """Times in steps of 100 ns are too few for nanoseconds since 1970."""
+    stamps = [str(133_900_000_090_000_000 + round(1e7 * t)) for t in truth.t]
+    same(imported(log(text(NAMES, [stamps, truth.beta, truth.alpha, truth.position])))[0], orientation=False)
+
+
+def test_times_that_start_again(truth, log, imported):
+    """Runs without a column: the clock starts again, and goes on from there. A row that is out of order begins none."""
+    t = np.concatenate([np.arange(10), 0.5 + np.arange(8), np.arange(6)])
+    table, said = imported(log(text(NAMES, [t, truth.beta, truth.alpha, truth.position])))
+    np.testing.assert_array_equal(table.run, np.repeat([0, 1, 2], [10, 8, 6]))
+    assert "times start again: 3 runs" in said and "Doubt" not in said
+    t = np.arange(24.0)
+    t[[6, 7, 15]] = 7, 6, 2
+    table, said = imported(log(text(NAMES, [t, truth.beta, truth.alpha, truth.position])))
+    assert not table.run.any() and "2 rows do not come after" in said and "--ignore t" in said
 
 
 def test_options_without_effect(log, lines, imported):

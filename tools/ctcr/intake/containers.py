@@ -1,4 +1,4 @@
-"""Logs in files of named arrays: MATLAB's .mat, and HDF5."""
+"""Logs in files of named arrays: MATLAB's .mat, HDF5, and .npz and .npy of numpy."""
 
 import io
 import re
@@ -19,7 +19,7 @@ from ctcr.intake.log import Log
 from ctcr.intake.names import RUN
 from ctcr.show.wording import listed
 
-MAT5 = b"MATLAB 5.0"
+MAT5, NPY = b"MATLAB 5.0", b"\x93NUMPY"
 _VECTORS = {"pos", "position", "positions", "p", "xyz", "tip", "sensor", "force", "f", "translation", "x"}
 _TURNS = {"rpy", "euler", "angles", "angle", "rot", "rotation", "orientation", "joint", "joints", "tube", "tubes"}
 _SEVERAL = {"tube", "joint", "motor", "drive", "axis", "actuator", "stage", "marker", "sensor", "coil", "tracker"}
@@ -41,6 +41,19 @@ def read_hdf5(path: Path, content: bytes) -> Log:
     """A plain HDF5 file, or a .mat file of version 7.3."""
     matlab = content.startswith(hdf5.MATLAB)
     return _log(path, "MATLAB .mat" if matlab else "HDF5", *hdf5.arrays(path, content), _TABLE if matlab else "")
+
+
+def read_numpy(path: Path, content: bytes) -> Log:
+    """A .npz or .npy file. The columns of a single matrix have no names."""
+    try:
+        loaded = np.load(io.BytesIO(content))
+        arrays = {path.stem: loaded} if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded}
+    except Exception as error:  # the reader leaks all kinds of exceptions on damaged files
+        text = f"is damaged, or holds objects of Python: save its arrays with numpy.savez ({error})"
+        raise InputError(Problem(text, str(path))) from None
+    if isinstance(loaded, np.ndarray) and loaded.ndim == 2:
+        arrays = {f"#{i}": column for i, column in enumerate(loaded.T, start=1)}
+    return _log(path, "numpy", {name: hdf5.by_field(array) for name, array in arrays.items()}, [], "")
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,12 @@ from ctcr.intake.columns import Columns
 from ctcr.intake.log import Log
 from ctcr.intake.motion import Motion
 from ctcr.intake.poses import Pose
+from ctcr.intake.stacked import unstacked
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join, listed
 from ctcr.table import measurements
 from ctcr.table.csv_table import Faults
 from ctcr.table.measurements import Measurements
-
-SLOW_S = 1.0  # between readings, where no unit of time is stated: perhaps milliseconds
 
 
 @dataclass
@@ -42,12 +41,12 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     Raises InputError with all faults of one kind: of the columns, then of single fields, then of values.
     """
     n_tubes = robot.n_tubes if robot else None
-    of_poses = choices if joints is None else together.of_poses(choices, log)
+    log, choices = unstacked(log, choices)
+    of_poses, of_joints = (choices, choices) if joints is None else together.divided(choices, log, joints)
     beside = joints is not None
     columns = Columns(log, mapping.of(log, of_poses, 0 if beside else n_tubes), of_poses, beside)
     moving = columns
     if joints is not None:
-        of_joints = together.of_joints(choices, joints)
         moving = Columns(joints, mapping.of(joints, of_joints, n_tubes, poses=False), of_joints, beside)
     _check_joints(moving)
     moved = motion.of(moving, robot)
@@ -113,7 +112,7 @@ def _check_joints(columns: Columns) -> None:
     unused = listed(columns.unused, 30)
     if len(missing) == len(wanted):
         text = "no column looks like a joint: name them with --column beta1=NAME, --column alpha1=NAME, ..."
-        if log.meanings:
+        if log.is_stated:
             text = f"an export of {log.kind} holds no joints: give their log with --joints FILE"
         elif all(name.startswith("#") for name in log.names):
             text = "it has no header: name its columns in their order, such as --columns t,beta1..beta2,alpha1..alpha2"
@@ -165,7 +164,5 @@ def _doubts(columns: Columns, moved: Motion) -> Iterator[Problem]:
         return
     name, file = columns.name("t"), str(columns.log.path)
     if back := int((steps <= 0).sum()):
-        yield Problem(f"{back} rows do not come after the row before them", file, field=name)
-    unit, how = columns.units["t"]
-    if how == "values" and not unit.is_clock and (step := float(np.median(steps))) >= SLOW_S:
-        yield Problem(f"{step:g} s pass between rows: if these are ms, say --unit t=ms", file, field=name)
+        todo = f"put them in order, or do without times: --ignore {columns.mapping.used['t'].name}"
+        yield Problem(f"{back} rows do not come after the row before them: {todo}", file, field=name)

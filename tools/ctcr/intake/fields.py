@@ -10,18 +10,25 @@ import numpy as np
 from ctcr.arrays import Array, Mask
 from ctcr.errors import shown
 from ctcr.intake.log import Log
-from ctcr.intake.units import CLOCK, Unit, named
+from ctcr.intake.units import CLOCK, Unit, named, parsed
 from ctcr.table.csv_table import Faults
 
 MISSING = {"", "nan", "na", "n/a", "#n/a", "#nv", "none", "null", "nil", "-", "--", "---", "missing", "miss", "invalid"}
+MISSING |= {"?", ".", "*", "n.a.", "n.d.", "nd", "<na>", "<none>"}
 MISSING |= {"disabled", "lost", "out of volume", "not visible", "nat", "inf", "-inf", "+inf", "<null>", "undefined"}
+_NOT_A_NUMBER = re.compile(r"[-+]?(nan(\(\w*\))?|1\.#[a-z]+\d*)")  # as C and Windows write it: nan(ind), -1.#IND
+_FORTRAN = re.compile(r"([-+]?[\d.]+)[dD]([-+]?\d+)")  # 1.0D+02
 SEEN_WORDS = {"ok", "1", "1.0", "true", "yes", "valid", "visible", "tracked", "seen", "enabled", "good"}
 BEYOND = 1e20  # trackers write numbers beyond it, such as -3.697314e28, where they see nothing
 STAMP_S = 1e6  # times beyond it are stamps: the table's clock begins with its first row
-_STAMPS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))  # numbers beyond these are stamps since 1970 in this unit
+# numbers beyond these are stamps in this unit since 1970; in 100 ns, since 1601 or 1, as Windows and .NET count
+_STAMPS = ((1e18, "ns"), (1e17, "100ns"), (1e14, "us"), (1e11, "ms"))
+_DATES = ((25569, 73050), (719529, 767010))  # 1970 to 2100 in days, as spreadsheets and MATLAB count them
 _CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
-_DAYS = ("%d-%b-%Y", "%Y/%m/%d", "%Y_%m_%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y")
-_FORMATS = (*(f"{day} {clock}" for day in _DAYS for clock in _CLOCKS), *_CLOCKS)
+_DAYS = ("%d-%b-%Y", "%Y/%m/%d", "%Y_%m_%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d.%m.%y", "%m/%d/%y", "%d/%m/%y")
+_ISO, _MINUTES = "ISO", "%M:%S.%f"
+_FORMATS = (_ISO, *(f"{day} {clock}" for day in _DAYS for clock in _CLOCKS), *_CLOCKS, _MINUTES)
+_UNDERSTOOD = "2026-05-04 10:15:30.25, 04.05.2026 10:15:30, 5/4/26 10:15:30 AM, 10:15:30.25 or, with minutes, 15:30.25"
 
 
 def numbers(log: Log, column: int, words: Iterable[str], faults: Faults) -> Array:
@@ -40,20 +47,35 @@ def _floats(log: Log, column: int, raw: list[str], words: Iterable[str], faults:
         return np.fromiter(map(float, fields), float, count=len(fields))
     except ValueError:
         pass
-    missing = MISSING | {word.strip().lower() for word in words}
     values, wrong = np.full(len(fields), np.nan), np.zeros(len(fields), dtype=bool)
     for i, text in enumerate(fields):
         try:
-            values[i] = float(text)
+            values[i] = float(_FORTRAN.sub(r"\1e\2", text))
         except ValueError:
-            wrong[i] = _word(text) not in missing
-    hint = ": is it a word for missing? --missing WORD"
-    faults.where(wrong, log.rows, log.names[column], "number", lambda i: f"{shown(raw[i])} is not a number{hint}")
+            wrong[i] = not _is_missing(text, words)
+    faults.where(wrong, log.rows, log.names[column], "number", lambda i: f"{shown(raw[i])} {_no_number(raw[i])}")
     return values
+
+
+def _no_number(text: str) -> str:
+    """Why a text is no number."""
+    digits, unit = re.fullmatch(r"\s*([-+\d.,]*)\s*(.*?)\s*", text).groups()
+    if text.strip()[:1] in ("[", "("):
+        return "holds several numbers: give each a column of its own"
+    if digits and named(unit):
+        return "holds its unit: write it into the name of the column, such as beta1 [mm], and the number alone here"
+    if digits and not unit:
+        return "is not a number: it has separators of thousands, or another decimal sign than other columns"
+    return "is not a number: is it a word for missing? --missing WORD"
 
 
 def _word(text: str) -> str:
     return text.strip().strip("\"'").strip().lower()
+
+
+def _is_missing(text: str, words: Iterable[str] = ()) -> bool:
+    word = _word(text)
+    return word in MISSING or bool(_NOT_A_NUMBER.fullmatch(word)) or word in (one.strip().lower() for one in words)
 
 
 def is_text(log: Log, column: int) -> bool:
@@ -61,13 +83,13 @@ def is_text(log: Log, column: int) -> bool:
     raw = log.values[column]
     if isinstance(raw, np.ndarray):
         return False
-    filled = [text for text in raw[:50] if _word(text) not in MISSING]
+    filled = [text for text in raw[:50] if not _is_missing(text)]
     return bool(filled) and not any(_is_number(text, log.decimal_comma) for text in filled)
 
 
 def _is_number(text: str, decimal_comma: bool) -> bool:
     try:
-        float(text.replace(",", ".") if decimal_comma else text)
+        float(_FORTRAN.sub(r"\1e\2", text.replace(",", ".") if decimal_comma else text))
     except ValueError:
         return False
     return True
@@ -117,7 +139,10 @@ def times(log: Log, column: int, unit: Unit | None, words: Iterable[str], faults
     values = numbers(log, column, words, faults) if exact is None else exact.astype(float)
     finite = values[np.isfinite(values)]
     size = np.median(np.abs(finite)) if len(finite) else 0.0
-    known = unit or named(next((name for least, name in _STAMPS if size > least), "s"))
+    known = unit or parsed(next((name for least, name in _STAMPS if size > least), "s"), "time", "")
+    if unit is None and any(first <= size <= last for first, last in _DATES) and np.ptp(finite) < 1:
+        text = f"{finite[0]:.15g} may be days since an epoch, or seconds: say it with --unit t=day or --unit t=s"
+        faults.add(int(log.rows[0]), log.names[column], text)
     if not len(finite) or abs(finite[0] * known.size) <= STAMP_S:
         return Times(values * known.size, 0.0, known, unit is None, "")
     since = values - finite[0] if exact is None else (exact - exact[0]).astype(float)
@@ -141,40 +166,53 @@ def _whole(log: Log, column: int):
 def _clock(log: Log, column: int, words: Iterable[str], faults: Faults) -> tuple[Array, str, float]:
     """Times since the first one [s], that one as it stands there, and it in seconds since 1970."""
     raw = [text.strip().strip("\"'") for text in log.values[column]]
-    missing = MISSING | {word.strip().lower() for word in words}
-    first = next((text for text in raw if _word(text) not in missing), "")
-    read = next((reader for reader in _readers() if _try(reader, first)), None)
-    start = _try(read, first) if read else None
+    filled = [text for text in raw if not _is_missing(text, words)] or [""]
+    first = filled[0]
+    forms = [form for form in _FORMATS if _moment(first, form)]
+    form = min(forms, key=lambda form: _length(form, first, filled[-1]), default=_ISO)
+    start, turn = _moment(first, form), timedelta(hours=1 if form == _MINUTES else 24)
     wrong, seconds, days, last = np.zeros(len(raw), dtype=bool), np.full(len(raw), np.nan), timedelta(), None
     for i, text in enumerate(raw):
-        moment = _try(read, text) if read else None
-        if moment is None or (moment.tzinfo is None) != (start.tzinfo is None):
-            wrong[i] = _word(text) not in missing
+        moment = _moment(text, form)
+        if start is None or moment is None or (moment.tzinfo is None) != (start.tzinfo is None):
+            wrong[i] = not _is_missing(text, words)
             continue
-        if moment.year == 1900 and last is not None and moment + days < last - timedelta(hours=12):
-            days += timedelta(days=1)  # a clock without days at midnight
+        if moment.year == 1900 and last is not None and moment + days < last - turn / 2:
+            days += turn  # a clock without days at midnight, one without hours at the full hour
         last = moment + days
         seconds[i] = (last - start).total_seconds()
-    faults.where(wrong, log.rows, log.names[column], "time", lambda i: f"{shown(raw[i])} is no time such as {first}")
+    like = f"such as {first}" if start else f"that is understood: {_UNDERSTOOD}, or a number with --unit t=s"
+    faults.where(wrong, log.rows, log.names[column], "time", lambda i: f"{shown(raw[i])} is no time {like}")
     zero = (
         (start.replace(tzinfo=start.tzinfo or UTC) - datetime.fromtimestamp(0, UTC)).total_seconds() if start else 0.0
     )
     return seconds, first, zero
 
 
-def _readers():
-    yield datetime.fromisoformat
-    for form in _FORMATS:
-        yield lambda text, form=form: datetime.strptime(_six_digits(text), form)
+def _length(form: str, first: str, last: str) -> timedelta:
+    """How long a log would last, if its times had a format; of two orders of day and month the right one is shorter."""
+    start, end = (_moment(text, form) for text in (first, last))
+    return abs(end.replace(tzinfo=None) - start.replace(tzinfo=None)) if end else timedelta.max
 
 
-def _six_digits(text: str) -> str:
-    """A fraction of a second as datetime reads it: a point, at most six digits."""
-    return re.sub(r"(:\d\d)[.,](\d{1,6})\d*", r"\1.\2", text)
-
-
-def _try(reader, text: str) -> datetime | None:
+def _moment(text: str, form: str) -> datetime | None:
+    """The time of a text; None where it has another format."""
+    text = re.sub(r"(?<=[ T_]\d\d)-(\d\d)-(\d\d)", r":\1:\2", text)  # 14-03-31 after a date
+    text = re.sub(r"(:\d\d)(?:[.,]|(?<=:\d\d:\d\d):)(\d{1,6})\d*", r"\1.\2", text)  # a fraction as datetime reads it
     try:
-        return reader(text)
+        return datetime.fromisoformat(text) if form == _ISO else datetime.strptime(text, form)
     except ValueError:
         return None
+
+
+def runs(seconds: Array, notes: list[str]) -> Array:
+    """Runs (M,) by times alone. A run begins where the clock starts again: nearer to the first time of the run than to
+    its last one, and goes on from there; a row that is out of order does not."""
+    first, made = 0, np.zeros(len(seconds))
+    for i in np.flatnonzero(seconds[1:] < seconds[:-1]) + 1:
+        last = seconds[i - 1]
+        if 2 * seconds[i] < seconds[first] + last and (seconds[i + 1 : i + 2] < last).any():
+            first, made[i:] = i, made[i] + 1
+    if first:
+        notes.append(f"times start again: {int(made[-1]) + 1} runs")
+    return made

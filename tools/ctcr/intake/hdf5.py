@@ -86,7 +86,7 @@ def _value(h5py: Any, item: Any) -> Any:
     value = item[()]
     if kind == "char":
         value = np.array([row.astype("<u2").tobytes().decode("utf-16-le", "replace") for row in value.T])
-    return np.squeeze(value.T) if kind else _by_field(np.asarray(value))
+    return np.squeeze(value.T) if kind else by_field(np.asarray(value))
 
 
 def _is_array_of_structures(h5py: Any, item: Any) -> bool:
@@ -120,10 +120,12 @@ def _joined(parts: list[Any]) -> Array | None:
     return np.squeeze(np.stack(parts))
 
 
-def _by_field(value: Any) -> Any:
+def by_field(value: Any) -> Any:
     """A compound array by its fields; matrices along the first axis, as Python has them, go along the last one."""
     if value.dtype.names:
-        return {name: _by_field(value[name]) for name in value.dtype.names}
+        return {name: by_field(value[name]) for name in value.dtype.names}
+    if value.dtype.kind == "M":
+        return value.astype(str)  # times as ISO texts
     if value.dtype.kind in "SO":
         return np.frompyfunc(lambda one: one.decode(errors="replace") if isinstance(one, bytes) else one, 1, 1)(value)
     return np.moveaxis(value, 0, 2) if value.ndim == 3 and set(value.shape[1:]) <= {3, 4} else value

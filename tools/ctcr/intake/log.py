@@ -25,6 +25,11 @@ class Log:
     def __len__(self) -> int:
         return len(self.rows)
 
+    @property
+    def is_stated(self) -> bool:
+        """Whether the format says what each column holds."""
+        return self.names == tuple(self.meanings)
+
     def index(self, name: str, where: str) -> int:
         """The position of a column, by its name or as #3. Raises InputError that names the option `where`."""
         if name in self.names:

@@ -1,10 +1,11 @@
-"""Text that programs of tracker makers export, told by its first lines: NDI ToolBox and OptiTrack Motive.
+"""Text that programs of makers export, told by its first lines: NDI ToolBox, OptiTrack Motive and LabVIEW.
 
-Both say themselves what each column holds. Neither holds joints.
+The first two say themselves what each column holds, and hold no joints.
 """
 
 import re
 from collections.abc import Callable
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from ctcr.intake.names import Meaning
 from ctcr.intake.units import Unit, named
 
 _MM, _S, _DEG = named("mm"), named("s"), named("deg")
+X_VALUE = Meaning("t", _S)  # LabVIEW's column of times
 # roll about z, pitch about y, yaw about x of NDI: R = Rz Ry Rx
 _NDI = {"q0": "qw", "qx": "qx", "qy": "qy", "qz": "qz", "tx": "x", "ty": "y", "tz": "z", "rx": "rx", "ry": "ry"}
 _NDI |= {"rz": "rz", "state": "seen"}
@@ -29,6 +31,24 @@ def reader_of(rows: Rows) -> Callable[[Path, Rows], Log] | None:
         return _motive
     is_ndi = len(first) > 3 and first[0].strip() == "Tools" and re.match(r"Port\b", first[1].strip())
     return _ndi if is_ndi else None
+
+
+def without_labview_headers(lines: list[str]) -> list[str]:
+    """The lines of a file of LabVIEW with empty ones for its headers: one of the file, and one of each time it was
+    written to. The units of the columns, which they state, are added to the names below them."""
+    if not lines[0].startswith("LabVIEW Measurement"):
+        return lines
+    made, units, inside, tab = [], [], True, "\t" if "\t" in "".join(lines[:9]) else ","
+    for line in lines:
+        fields = line.split(tab)
+        inside = inside or fields[0] == "Channels"
+        units = fields if fields[0] == "Y_Unit_Label" else units
+        if fields[0] == "X_Value":
+            pairs = zip_longest(fields, units[: len(fields)], fillvalue="")
+            line = tab.join(f"{name} [{unit}]" if named(unit) else name for name, unit in pairs)
+        made.append("" if inside else line)
+        inside = inside and fields[0] != "***End_of_Header***"
+    return made
 
 
 def _ndi(path: Path, rows: Rows) -> Log:

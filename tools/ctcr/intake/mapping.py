@@ -62,7 +62,7 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
         found = log.meanings[name] if name in log.meanings else names.meaning(spelled)
         if i not in taken and found and not (n_tubes == 0 and found.role in MOVING):
             candidates.append(Candidate(i, name, found))
-    how = "format" if log.meanings else "name"
+    how = "format" if log.is_stated else "name"
     picker = _Picker(log, how, faults)
     joints, n = _joints(candidates, explicit, choices, n_tubes, picker)
     made = Mapping(joints | explicit, n)

@@ -14,19 +14,15 @@ from ctcr.intake.packages import needed
 from ctcr.show.wording import listed
 
 MCAP = b"\x89MCAP0\r\n"
-_BAGS = {b"#ROSBAG V2.0": "a bag of ROS 1", b"SQLite format 3\0": "a database of SQLite, as ROS 2 records bags"}
 _OURS = ("/joints", "/measurements")
 _NO_BAGS = (
     "bags of ROS are not read: play the bag, write each topic to a text file with"
     " `ros2 topic echo --csv TOPIC > topic.csv`, and import these (docs/formats.md)"
 )
-
-
-def refuse_bag(path: Path, content: bytes) -> None:
-    """Raises InputError where the file is a bag of ROS without MCAP."""
-    for start, kind in _BAGS.items():
-        if content.startswith(start):
-            raise InputError(Problem(f"is {kind}: {_NO_BAGS}", str(path)))
+BAGS = {
+    b"#ROSBAG V2.0": f"is a bag of ROS 1: {_NO_BAGS}",
+    b"SQLite format 3\0": f"is a database of SQLite, as ROS 2 records bags: {_NO_BAGS}",
+}
 
 
 def read_mcap(path: Path, content: bytes) -> Log:

@@ -43,7 +43,7 @@ def of(columns: Columns, robot: Robot | None) -> Motion:
     t, zero = times(columns)
     beta = _from_home(columns, _joints(columns, "beta", length_unit), robot)
     alpha = _joints(columns, "alpha", partial(_sure_angle_unit, columns))
-    run = _runs(columns)
+    run = _runs(columns, t)
     _add_to_runs(columns, run, {"beta": beta, "alpha": alpha})
     columns.doubts += _jumps(columns, run, alpha)
     columns.doubts += _impossible(columns, robot, beta) if robot else []
@@ -200,9 +200,9 @@ def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None
         joints[kind][rows, tubes] += units.value(text, "length" if kind == "beta" else "angle", f"--offset {key}")
 
 
-def _runs(columns: Columns) -> Array:
+def _runs(columns: Columns, t: Array) -> Array:
     if not columns.has("run"):
-        return np.zeros(len(columns.log))
+        return fields.runs(t, columns.notes)
     run, texts = fields.labels(columns.log, columns.mapping.used["run"].column, columns.faults)
     if texts:
         columns.notes.append("runs: " + listed([f"{i} = {text or '(empty)'}" for i, text in enumerate(texts)]))

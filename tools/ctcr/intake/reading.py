@@ -12,6 +12,16 @@ _READERS: dict[bytes | tuple[bytes, ...], Callable[[Path, bytes], Log]] = {
     containers.MAT5: containers.read_mat,
     (hdf5.MATLAB, hdf5.SIGNATURE): containers.read_hdf5,
     messages.MCAP: messages.read_mcap,
+    (containers.NPY, b"PK"): containers.read_numpy,
+}
+_SHEET = "is a spreadsheet: save the sheet of the log as CSV"
+_FRAME = 'read it in Python, and save it with frame.to_csv("log.csv", index=False) of pandas, or numpy.savez'
+_REFUSED: dict[bytes | tuple[bytes, ...], str] = messages.BAGS | {
+    b"\xd0\xcf\x11\xe0": _SHEET,
+    (b"\x80\2", b"\x80\3", b"\x80\4", b"\x80\5"): f"is a pickle of Python, which may run code: {_FRAME}",
+    (b"[{", b'{"'): f"is JSON: {_FRAME}",
+    (b"PAR1", b"ARROW1"): f"is a table of Arrow: {_FRAME}",
+    (b"\x1f\x8b", b"BZh"): "is compressed: unpack it",
 }
 
 
@@ -21,9 +31,11 @@ def read(path: str | Path) -> Log:
         if Path(path).stat().st_size > MAX_BYTES:
             raise InputError(Problem("is over 2 GB: split it", str(path)))
         content = Path(path).read_bytes()
-    if content.startswith(b"PK"):
-        raise InputError(Problem("is a spreadsheet: save it as CSV", str(path)))
-    messages.refuse_bag(Path(path), content)
+    if content.startswith(b"PK") and b".npy" not in content:
+        raise InputError(Problem(_SHEET, str(path)))
+    for starts, text in _REFUSED.items():
+        if content.startswith(starts):
+            raise InputError(Problem(text, str(path)))
     for starts, reader in _READERS.items():
         if content.startswith(starts):
             return reader(Path(path), content)

@@ -11,25 +11,25 @@ from ctcr.intake.columns import Columns
 from ctcr.intake.log import Log
 from ctcr.intake.mapping import MOVING
 from ctcr.intake.motion import Motion, complete, row_ranges
+from ctcr.show.wording import listed
 
 
-def of_poses(choices: Choices, log: Log) -> Choices:
-    """The choices that concern the log of the poses."""
-    return replace(choices, columns={r: n for r, n in choices.columns.items() if not _moves(r) and _of(log, r, n)})
+def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices]:
+    """The choices that concern the log of the poses, and those that concern the log of the joints: names of times or of
+    columns to ignore, the log that has them; a unit of time, the log whose times are named where only one's are."""
 
+    def part(log: Log, other: Log, wanted: bool) -> Choices:
+        def mine(name: str) -> bool:
+            return name in log.names or log is poses and name not in other.names
 
-def of_joints(choices: Choices, log: Log) -> Choices:
-    """The choices that concern the log of the joints."""
-    columns = {r: n for r, n in choices.columns.items() if _moves(r) or r in ("t", "nsec") and _of(log, r, n)}
-    return replace(choices, columns=columns, sensor=None, relative_to=None)
+        times = ("t", "nsec")
+        named = choices.columns.items()
+        columns = {r: n for r, n in named if (mine(n) if r in times else (r.rstrip("123456789") in MOVING) == wanted)}
+        unused = {"t"} if "t" in choices.columns and "t" not in columns else ()
+        units = {role: unit for role, unit in choices.units.items() if role not in unused}
+        return replace(choices, columns=columns, units=units, ignore=[name for name in choices.ignore if mine(name)])
 
-
-def _moves(role: str) -> bool:
-    return role.rstrip("123456789") in MOVING
-
-
-def _of(log: Log, role: str, name: str) -> bool:
-    return role not in ("t", "nsec") or name in log.names
+    return part(poses, joints, False), replace(part(joints, poses, True), sensor=None, relative_to=None)
 
 
 def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) -> Motion:
@@ -46,7 +46,13 @@ def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) 
             raise InputError(Problem(text, file))
         return replace(moved, rows=rows)
     if not all(timed):
-        raise InputError(Problem("only one of the two logs has times: give --column t=NAME", file))
+        lacking, other = (moving, columns) if timed[0] else (columns, moving)
+        text = f"has no times, {other.log.path.name} has: name its column with --column t=NAME; a number of the frame"
+        text += ", at 60 a second, takes --unit t=16.667ms too"
+        if len(rows) == len(moved.rows):
+            text += f"; where the logs belong together row by row, --ignore {other.mapping.used['t'].name}"
+        unused = listed(lacking.unused, 30)
+        raise InputError(Problem(f"{text} (not used: {unused})", str(lacking.log.path)))
     known = moved.only(complete(moving, moved) & np.isfinite(moved.t))
     if (np.diff(known.t) < 0).any():
         raise InputError(
