@@ -91,11 +91,14 @@ def test_tools_with_times_of_their_own(truth, log, imported, refused, same):
     path = log(in_rows(truth, Rotation.identity(), ("base", "tip"), 0.001))
     error = refused(path)
     assert "base and tip" in error and "--sensor NAME" in error and "--ignore Tool ID" in error
-    assert "times of its own" in refused(path, "--sensor", "tip", "--relative-to", "base")
+    assert "not of one time" in refused(path, "--sensor", "tip", "--relative-to", "base")
     table, said = imported(path, "--sensor", "tip")
     np.testing.assert_allclose(table.positions - [1.0, 2.0, 0.5], truth.position, atol=1e-9)
     assert len(table) == 24 and "only the rows of tip" in said
     assert len(imported(path, "--ignore", "Tool ID")[0]) == 48
+    roles = "t,run,beta1..beta2,alpha1..alpha2,-,x,y,z,qx,qy,qz,qw"
+    assert "--sensor NAME" in refused(path, "--columns", roles)
+    assert len(imported(path, "--columns", roles, "--sensor", "tip")[0]) == 24
 
 
 def test_matrices(truth, log, imported, same):

@@ -101,15 +101,17 @@ def test_joints_between_their_rows(truth, log, imported, refused):
     assert "--offset t=" in refused(late, "--joints", joint_log)
 
 
-def test_one_log_without_times(truth, log, joints, imported, refused):
+def test_one_log_without_times(truth, log, joints, imported, refused, tmp_path):
     """The error names the log that lacks times, and what to do; a frame number with its unit is a time."""
     t = np.round(truth.t / 0.005) * 0.005
     names = ["Frame", "x", "y", "z"]
     poses = log(text(names, [np.round(t / 0.005).astype(int), truth.position]))
     error = refused(poses, "--joints", joints)
     assert "log.csv: has no times, joints.csv has" in error and "--column t=NAME" in error and "Frame" in error
-    table, _ = imported(poses, "--joints", joints, "--column", "t=Frame", "--unit", "t=5ms")
-    np.testing.assert_allclose(np.diff(table.t), np.diff(t), atol=1e-9)
+    kept = tmp_path / "lab.yaml"
+    for said in (["--column", "t=Frame", "--unit", "t=5ms", "--save-mapping", kept], ["--mapping", kept]):
+        table, _ = imported(poses, "--joints", joints, *said)
+        np.testing.assert_allclose(np.diff(table.t), np.diff(t), atol=1e-9)
     one_by_one = log("\n".join(joints.read_text().split("\n")[:25]), "short.csv")
     assert "row by row, --ignore t" in refused(poses, "--joints", one_by_one)
     table, _ = imported(poses, "--joints", one_by_one, "--ignore", "t")

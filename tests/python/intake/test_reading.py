@@ -403,7 +403,8 @@ def test_windows_stamps(truth, log, imported, same):
 
 
 def test_times_that_start_again(truth, log, imported):
-    """Runs without a column: the clock starts again, and goes on from there. A row that is out of order begins none."""
+    """Runs without a column: the clock starts again, and goes on from there. Rows out of order, or back in time, do
+    not."""
     t = np.concatenate([np.arange(10), 0.5 + np.arange(8), np.arange(6)])
     table, said = imported(log(text(NAMES, [t, truth.beta, truth.alpha, truth.position])))
     np.testing.assert_array_equal(table.run, np.repeat([0, 1, 2], [10, 8, 6]))
@@ -412,6 +413,8 @@ def test_times_that_start_again(truth, log, imported):
     t[[6, 7, 15]] = 7, 6, 2
     table, said = imported(log(text(NAMES, [t, truth.beta, truth.alpha, truth.position])))
     assert not table.run.any() and "2 rows do not come after" in said and "--ignore t" in said
+    table, said = imported(log(text(NAMES, [np.arange(24.0)[::-1], truth.beta, truth.alpha, truth.position])))
+    assert not table.run.any() and "23 rows do not come after" in said
 
 
 def test_options_without_effect(log, lines, imported):

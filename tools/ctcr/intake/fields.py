@@ -206,12 +206,12 @@ def _moment(text: str, form: str) -> datetime | None:
 
 
 def runs(seconds: Array, notes: list[str]) -> Array:
-    """Runs (M,) by times alone. A run begins where the clock starts again: nearer to the first time of the run than to
-    its last one, and goes on from there; a row that is out of order does not."""
+    """Runs (M,) by times alone. One begins where the clock starts again, nearer to the first time of the last run than
+    to its end, and goes on from there. Rows that are out of order, or go back in time, begin none."""
     first, made = 0, np.zeros(len(seconds))
     for i in np.flatnonzero(seconds[1:] < seconds[:-1]) + 1:
-        last = seconds[i - 1]
-        if 2 * seconds[i] < seconds[first] + last and (seconds[i + 1 : i + 2] < last).any():
+        last, after = seconds[i - 1], seconds[i + 1 : i + 2]
+        if 2 * seconds[i] < seconds[first] + last and ((seconds[i] <= after) & (after < last)).any():
             first, made[i:] = i, made[i] + 1
     if first:
         notes.append(f"times start again: {int(made[-1]) + 1} runs")

@@ -20,8 +20,6 @@ _REFUSED: dict[bytes | tuple[bytes, ...], str] = messages.BAGS | {
     b"\xd0\xcf\x11\xe0": _SHEET,
     (b"\x80\2", b"\x80\3", b"\x80\4", b"\x80\5"): f"is a pickle of Python, which may run code: {_FRAME}",
     (b"[{", b'{"'): f"is JSON: {_FRAME}",
-    (b"PAR1", b"ARROW1"): f"is a table of Arrow: {_FRAME}",
-    (b"\x1f\x8b", b"BZh"): "is compressed: unpack it",
 }
 
 

@@ -19,9 +19,10 @@ _SHARED = (*MOVING, "t", "nsec")  # roles of columns that are the same for all t
 
 
 def unstacked(log: Log, choices: Choices) -> tuple[Log, Choices]:
-    """The log with one row a time, and the choices that are left to make. Where tools have times of their own, only the
-    rows of the sensor stay. Raises InputError where none is chosen."""
-    column = next((i for i, name in enumerate(log.names) if _names_tools(log, i) and name not in choices.ignore), None)
+    """The log with one row a time, and the choices that are left to make. Where tools have times of their own, or the
+    user counts columns, only the rows of the sensor stay. Raises InputError where none is chosen."""
+    taken = {*choices.ignore, *choices.columns.values()}
+    column = next((i for i, name in enumerate(log.names) if name not in taken and _names_tools(log, i)), None)
     if column is None:
         return log, choices
     tool, name = _texts(log, column), log.names[column]
@@ -31,8 +32,10 @@ def unstacked(log: Log, choices: Choices) -> tuple[Log, Choices]:
     tools, asked = list(dict.fromkeys(tool.tolist())), (choices.sensor or "").lower()
     found = [one for one in tools if one.lower() == asked] or [one for one in tools if asked and asked in one.lower()]
     if len(found) != 1 or choices.relative_to:
-        text = f"holds {join(tools)}, each in rows and at times of its own: take those of one with --sensor NAME, which"
-        text += f" no --relative-to can refer to; if all are one tool, --ignore {name}"
+        text = (
+            f"holds {join(tools)} in rows of their own, which are not of one time: take those of one with --sensor NAME"
+        )
+        text += f", without --relative-to; if all are one tool, --ignore {name}"
         raise InputError(Problem(text, str(log.path), field=name))
     rows = np.flatnonzero(tool == found[0])
     values = tuple(one[rows] if isinstance(one, np.ndarray) else [one[i] for i in rows] for one in log.values)
@@ -88,7 +91,9 @@ def _wide(log: Log, column: int, tool: np.ndarray, time: Integers) -> Log:
         elif i != column:
             for label in dict.fromkeys(tool.tolist()):
                 mine = tool == label
-                made = np.full(len(first), "" if values.dtype.kind == "U" else np.nan, values.dtype)
+                made = (
+                    np.full(len(first), "", values.dtype) if values.dtype.kind == "U" else np.full(len(first), np.nan)
+                )
                 made[time[mine]] = values[mine]
                 columns[f"{label}: {name}"] = made
                 meanings[f"{label}: {name}"] = one and replace(one, marker=label)

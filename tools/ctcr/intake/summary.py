@@ -56,6 +56,7 @@ def resolved(choices: Choices, sources: Sequence[Columns]) -> Choices:
     The unit of times is kept where all logs have the same.
     """
     columns = {role: used.name for source in sources for role, used in source.mapping.used.items()}
+    columns |= {role: name for role, name in choices.columns.items() if role == "t"}  # of one of two logs
     units = dict(choices.units)
     for source in sources:
         for role, (unit, _) in source.units.items():

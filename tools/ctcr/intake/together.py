@@ -16,7 +16,7 @@ from ctcr.show.wording import listed
 
 def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices]:
     """The choices that concern the log of the poses, and those that concern the log of the joints: names of times or of
-    columns to ignore, the log that has them; a unit of time, the log whose times are named where only one's are."""
+    columns to ignore, the log that has them; the size of a count as a unit of time, the log whose times are named."""
 
     def part(log: Log, other: Log, wanted: bool) -> Choices:
         def mine(name: str) -> bool:
@@ -25,7 +25,8 @@ def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices
         times = ("t", "nsec")
         named = choices.columns.items()
         columns = {r: n for r, n in named if (mine(n) if r in times else (r.rstrip("123456789") in MOVING) == wanted)}
-        unused = {"t"} if "t" in choices.columns and "t" not in columns else ()
+        counts = "t" in choices.columns and choices.units.get("t", "")[:1].isdigit()
+        unused = {"t"} if counts and "t" not in columns else ()
         units = {role: unit for role, unit in choices.units.items() if role not in unused}
         return replace(choices, columns=columns, units=units, ignore=[name for name in choices.ignore if mine(name)])
 
