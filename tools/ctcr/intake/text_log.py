@@ -1,7 +1,8 @@
 """Logs as text: delimiters, decimal commas, headers of any height and rows that are no rows are found out.
 
-What cannot go wrong is tolerated (blank lines, comments, a header repeated where files were joined, an index column, a
-trailing delimiter, a last row cut off) and said; any other row that does not fit is a fault with its number.
+What cannot go wrong is tolerated (blank lines, comments, lines that name a run, a header repeated where files were
+joined, an index column, a trailing delimiter, a last row cut off) and said; any other row that does not fit is a fault
+with its number.
 """
 
 import csv
