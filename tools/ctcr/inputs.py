@@ -15,22 +15,34 @@ _fingerprints: dict[str, str] = {}
 
 @contextmanager
 def open_input(path: object) -> Iterator[BinaryIO]:
-    """An input file to read as bytes. Raises InputError where it cannot be read; a pipe would be waited for in vain."""
+    """An input file to read as bytes. Raises InputError where it cannot be read; a pipe would be waited for in vain.
+
+    What is refused by its beginning or its size is not read to its end: the fingerprint comes last.
+    """
     with (
         file_faults(path, "read"),
         open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file,
     ):
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise InputError(Problem("is a pipe or a device: give a file", file=str(path)))
-        _fingerprints[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
-        file.seek(0)
         yield file
+        file.seek(0)
+        _fingerprints[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def read(path: str | Path, most: int, hint: str) -> bytes:
+    """The content of an input file. Raises InputError, with the hint where it has over `most` bytes."""
+    with open_input(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise InputError(Problem(f"is over {most >> 20} MB: {hint}", str(path)))
+        return file.read()
 
 
 def sha256(path: str | Path) -> str:
     """The fingerprint of a file as it is, in hexadecimal. Raises InputError where it cannot be read."""
     with open_input(path):
-        return _fingerprints[str(path)]
+        pass
+    return _fingerprints[str(path)]
 
 
 def fingerprint(path: str | Path) -> str:

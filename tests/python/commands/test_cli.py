@@ -227,11 +227,30 @@ def test_interrupt(run, monkeypatch):
     assert code == 130 and out == "" and err.endswith("Error: stopped\n")
 
 
-def test_pipe(run, tmp_path):
-    """A pipe as an input is refused and not waited for."""
-    os.mkfifo(tmp_path / "pipe")
-    code, _, err = run("info", tmp_path / "pipe")
-    assert code == 1 and "is a pipe or a device" in err
+@pytest.mark.parametrize(
+    "arguments",
+    [("info", "PIPE"), ("import", "PIPE", "-o", "OUT"), ("add", ROBOT, "--diagnosis", "PIPE", "-o", "OUT")]
+    + [("predict", ROBOT, "TABLE", "-o", "PIPE"), ("sensitivity", ROBOT, "--open-loop", 1, "--resume", "PIPE")],
+)
+def test_pipe(run, tmp_path, table, arguments):
+    """A pipe is refused and not waited for: as an input, and as an output that nothing reads."""
+    files = {"PIPE": tmp_path / "pipe", "OUT": tmp_path / "out", "TABLE": table}
+    os.mkfifo(files["PIPE"])
+    code, _, err = run(*(files.get(word, word) for word in arguments))
+    assert code == 1 and ("is a pipe or a device" in err or "nothing reads this pipe" in err)
+    assert not files["OUT"].exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [("info", "BIG"), ("compare", ROBOT, "BIG"), ("add", ROBOT, "--diagnosis", "BIG", "-o", "OUT")]
+)
+def test_large_file(run, tmp_path, arguments):
+    """A large file that is something else is refused before it is read to its end."""
+    files = {"BIG": tmp_path / "big", "OUT": tmp_path / "out"}
+    files["BIG"].touch()
+    os.truncate(files["BIG"], 1 << 40)
+    code, _, err = run(*(files.get(word, word) for word in arguments))
+    assert code == 1 and re.search("this is not|is not text", err)
 
 
 def test_unexpected_error(run, monkeypatch):

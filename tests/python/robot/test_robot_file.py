@@ -216,10 +216,12 @@ def test_no_warnings():
         (b"a: !!python/object/apply:os.getcwd []", "not valid YAML"),
     ],
 )
-def test_other_files(content, message):
+def test_other_files(content, message, tmp_path):
     """A file that is no robot file is one clear sentence."""
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(content)
     with pytest.raises(InputError) as caught:
-        robot_file.parse(content)
+        robot_file.load(path)
     (problem,) = caught.value.problems
     assert message in problem.message and "\n" not in str(problem)
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ctcr import inputs
 from ctcr.arrays import Array, Integers
 from ctcr.errors import InputError, Problem, did_you_mean, shown
-from ctcr.inputs import open_input
 from ctcr.table.csv_table import Faults, header_names
 
 MAX_BYTES = 16 << 20
@@ -97,11 +97,7 @@ def read(path: str | Path, columns: Sequence[Column]) -> Table:
 
 def _lines(path: str | Path) -> list[list[str]]:
     """The fields of each line, the header first."""
-    with open_input(path) as file:
-        content = file.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        text = f"is over {MAX_BYTES >> 20} MB: this is not a table of a calibration procedure"
-        raise InputError(Problem(text, str(path)))
+    content = inputs.read(path, MAX_BYTES, "this is not a table of a calibration procedure")
     header_names(content.partition(b"\n")[0], str(path))
     try:
         return list(csv.reader(content.decode("utf-8-sig").splitlines()))

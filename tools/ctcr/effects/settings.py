@@ -6,9 +6,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from ctcr import inputs
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.robot.description import Robot
+
+MAX_BYTES = 16 << 20  # an answer is some kB
 
 
 def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dict[str, float]:
@@ -30,10 +33,9 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
 
 def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
     """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
+    content = inputs.read(path, MAX_BYTES, "this is not an answer of ctcr diagnose --json")
     try:
-        return found(json.loads(Path(path).read_text(encoding="utf-8")), robot)
-    except OSError as error:
-        raise InputError(Problem(f"cannot be read: {error.strerror}", path)) from None
+        return found(json.loads(content), robot)
     except (ValueError, LookupError, TypeError):
         raise InputError(Problem("is not an answer of ctcr diagnose --json", path)) from None
 

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr import inputs
+from ctcr.errors import InputError, Problem
 from ctcr.intake import containers, hdf5, messages, text_log
 from ctcr.intake.log import Log
 
@@ -25,10 +26,7 @@ _REFUSED: dict[bytes | tuple[bytes, ...], str] = messages.BAGS | {
 
 def read(path: str | Path) -> Log:
     """The log of a file. Raises InputError where it cannot be read, with all its faulty rows."""
-    with file_faults(path, "read"):
-        if Path(path).stat().st_size > MAX_BYTES:
-            raise InputError(Problem("is over 2 GB: split it", str(path)))
-        content = Path(path).read_bytes()
+    content = inputs.read(path, MAX_BYTES, "split it")
     if content.startswith(b"PK") and b".npy" not in content:
         raise InputError(Problem(_SHEET, str(path)))
     for starts, text in _REFUSED.items():

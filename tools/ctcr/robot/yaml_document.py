@@ -8,8 +8,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, SequenceNode
 
+from ctcr import inputs
 from ctcr.errors import InputError, Problem
-from ctcr.inputs import open_input
 
 FieldPath = tuple[str | int, ...]
 MAX_BYTES = 1 << 20  # a description is a few kB: a larger file is something else, often a table
@@ -37,15 +37,11 @@ class YamlDocument:
 
 def load(path: str | Path) -> YamlDocument:
     """The document of a file. Raises InputError where it cannot be read or is no YAML."""
-    with open_input(path) as file:
-        content = file.read(MAX_BYTES + 1)
-    return parse(content, str(path))
+    return parse(inputs.read(path, MAX_BYTES, "this is not a description"), str(path))
 
 
 def parse(content: str | bytes, file: str) -> YamlDocument:
     """Parses one document; `file` is its name in errors. Raises InputError that names the line."""
-    if len(content) > MAX_BYTES:
-        raise InputError(Problem(f"is over {MAX_BYTES >> 20} MB: this is not a description", file))
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     except UnicodeDecodeError:

@@ -13,8 +13,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ctcr.errors import InputError, Problem, file_faults
+from ctcr import inputs
+from ctcr.errors import InputError, Problem
 from ctcr.show.output import atomic_writer
+
+MAX_BYTES = 64 << 20
 
 
 @contextmanager
@@ -67,10 +70,9 @@ class ProgressFile:
         """The state, or None where there is none yet. Raises InputError where it belongs to another study."""
         if self.path is None or not Path(self.path).exists():
             return None
-        with file_faults(self.path, "read"):
-            text = Path(self.path).read_text(encoding="utf-8")
+        content = inputs.read(self.path, MAX_BYTES, "this is not the progress of a study")
         try:
-            kept = json.loads(text)
+            kept = json.loads(content)
             settings, state = kept["settings"], kept["state"]
         except (ValueError, KeyError, TypeError):
             raise InputError(Problem("is not the progress of a sensitivity study", str(self.path))) from None

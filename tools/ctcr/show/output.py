@@ -1,5 +1,6 @@
 """Output of commands: files that are whole or absent, JSON, tables on a terminal, progress bars."""
 
+import errno
 import json
 import os
 import stat
@@ -39,7 +40,7 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
     try:
         with file_faults(path, "write"):
             if special:
-                with open(target, **mode) as file:
+                with open(target, **mode, opener=_open_at_once) as file:
                     yield file
                 return
             handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
@@ -53,6 +54,18 @@ def atomic_writer(path: str | Path, binary: bool = False) -> Iterator[IO]:
     finally:
         if temporary:
             Path(temporary).unlink(missing_ok=True)
+
+
+def _open_at_once(target: str, flags: int) -> int:
+    """A device, or a pipe that is read: to open another one would wait for its reader."""
+    try:
+        handle = os.open(target, flags | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            error.strerror = "nothing reads this pipe"
+        raise
+    os.set_blocking(handle, True)
+    return handle
 
 
 def write_text(text: str, target: str | Path) -> None:
