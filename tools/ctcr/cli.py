@@ -1,5 +1,6 @@
 """The `ctcr` command. Each subcommand is a module of `ctcr.commands`, loaded when it is called."""
 
+import errno
 import io
 import os
 import pkgutil
@@ -9,8 +10,10 @@ from importlib import import_module
 import click
 
 from ctcr import commands
+from ctcr.effects import watched
 from ctcr.show.wording import visible
 
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 STOPPED = 130  # exit code after Ctrl+C: 128 + SIGINT, as shells have it
 FORMATS = "docs/formats.md draws frames, angles and signs and lists every field and column."
 FILES = {"robot", "measurements", "table", "tables", "log", "example"}  # arguments and options that name such files
@@ -56,9 +59,15 @@ def main(arguments: list[str] | None = None) -> None:
     """
     # Before numpy loads: its matrices are too small for threads, which only wait for each other. The core has its own.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if sys.stdout:
-        sys.stdout.reconfigure(errors="backslashreplace")  # a letter that this terminal lacks must not stop a command
-    sys.exit(run(arguments))
+    sys.stdout, sys.stderr = (stream or open(os.devnull, "w") for stream in (sys.stdout, sys.stderr))  # None: closed
+    sys.stdout.reconfigure(errors="backslashreplace")  # a letter that this terminal lacks must not stop a command
+    given = sys.argv[1:] if arguments is None else arguments
+    if any(word.startswith("--effects") for word in given) and (ended := watched.ended()):
+        code, fault = ended
+        if fault:
+            _say(fault)
+        sys.exit(code)
+    sys.exit(run(given))
 
 
 def run(arguments: list[str] | None = None) -> int:
@@ -78,16 +87,19 @@ def run(arguments: list[str] | None = None) -> int:
         return STOPPED
     except BrokenPipeError:  # the reader, such as `head`, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except Exception as error:
-        _report(error)
-    return 1
+        return _report(error)
 
 
-def _report(error: Exception) -> None:
-    from ctcr.errors import InputError
+def _report(error: Exception) -> int:
+    """Says what was wrong; the exit code."""
+    from ctcr.errors import ArgumentError, InputError
 
     if isinstance(error, InputError):
         _say(*error.lines if len(error.lines) == 1 else ("the input cannot be used:", *error.lines))
+    elif isinstance(error, OSError) and error.errno in FULL:  # standard output: files are InputErrors
+        _say(f"the output cannot be written: {error.strerror.lower()}")
     elif isinstance(error, ModuleNotFoundError) and error.name == "ctcr._core":
         _say("the compiled part of ctcr is missing: install the package with `pip install .` or `tools/dev setup`")
     elif isinstance(error, MemoryError):
@@ -97,6 +109,7 @@ def _report(error: Exception) -> None:
     else:
         reason = " ".join(str(error).split())
         _say(f"{reason} ({type(error).__name__}; this should not happen: CTCR_DEBUG=1 shows where)")
+    return click.UsageError.exit_code if isinstance(error, ArgumentError) else 1
 
 
 def _say(*lines: str) -> None:

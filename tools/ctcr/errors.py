@@ -38,6 +38,10 @@ class InputError(Exception):
         return "\n".join(self.lines)
 
 
+class ArgumentError(InputError):
+    """What was asked for is wrong, whatever the files hold: an option of a command, or an argument of a function."""
+
+
 def did_you_mean(name: str, choices: Iterable[str]) -> str | None:
     """The choice nearest in spelling to `name`, if any is near."""
     near = get_close_matches(name.lower(), [choice.lower() for choice in choices], n=1, cutoff=0.6)

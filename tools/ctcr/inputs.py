@@ -10,6 +10,8 @@ from typing import BinaryIO
 
 from ctcr.errors import InputError, Problem, file_faults
 
+MAX_BYTES = 64 << 20  # of what is parsed as a whole, which takes many times its size of memory
+
 _fingerprints: dict[str, str] = {}
 
 
@@ -30,7 +32,7 @@ def open_input(path: object) -> Iterator[BinaryIO]:
         _fingerprints[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def read(path: str | Path, most: int, hint: str) -> bytes:
+def read(path: str | Path, hint: str, most: int = MAX_BYTES) -> bytes:
     """The content of an input file. Raises InputError, with the hint where it has over `most` bytes."""
     with open_input(path) as file:
         if os.fstat(file.fileno()).st_size > most:

@@ -21,6 +21,7 @@ from ctcr.table import measurements
 
 ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "examples" / "robots" / "table2.yaml"
+TABLE = ROOT / "examples" / "data" / "demo" / "measurements.csv"
 
 
 class Straight:
@@ -183,9 +184,6 @@ def test_faulty_robot(run, tmp_path):
     [
         (["info", "absent.yaml"], "absent.yaml: cannot read it: no such file or directory"),
         (["predict", ROBOT, ROBOT, "-o", "x.csv"], "alpha1_rad"),
-        (["shape", ROBOT, "--beta-mm", "-3e5,-2e5,-1e5", "--alpha-deg", "0,0,0"], "--beta-mm: -300 m: is this mm?"),
-        (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "0,0"], "--alpha-deg: needs 3 finite numbers"),
-        (["shape", ROBOT, "--beta-mm", "-300,-200,nan", "--alpha-deg", "0,0,0"], "--beta-mm: needs 3 finite numbers"),
         (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "178,0,0"], "at these joints: not converged"),
     ],
 )
@@ -202,18 +200,37 @@ def test_errors(run, arguments, message):
         (["nonsense"], "No such command 'nonsense'"),
         (["compare", "r.yaml", "t.csv", "--json", "./r.yaml"], "r.yaml is also that of '--json'"),
         (["shape", ROBOT], "Missing option '--beta-mm'"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,nan", "--alpha-deg", "0,0,0"], "--beta-mm: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "0,0"], "--alpha-deg: needs 3 finite numbers"),
+        (["shape", ROBOT, "--beta-mm", "-3e5,-2e5,-1e5", "--alpha-deg", "0,0,0"], "--beta-mm: -300 m: is this mm?"),
         (["shape", ROBOT, "--beta-mm", "a,b", "--alpha-deg", "0,0,0"], "is not a list of numbers"),
         (["compare", "r.yaml", "t.csv", "--json", "a", "--report", "a"], "a is also that of '--json'"),
         (["predict", "r.yaml", "t.csv", "-o", "t.csv"], "t.csv is also that of"),
         (["devices", "--bench", "b.yaml", "--json", "b.yaml"], "b.yaml is also that of '--bench'"),
         (["sensitivity", "r.yaml", "--closed-loop", "s", "--report", "s"], "s is also that of '--closed-loop'"),
         (["sim", "aurora", ROBOT, "--oracle", "'"], "no closing quotation"),
+        (["add", ROBOT, "friction"], "give -o"),
+        (["add", ROBOT, "friction", "--set", "bla=1", "-o", "x.yaml"], "has no parameter bla"),
+        (["calibrate", "fit", ROBOT, TABLE, "-o", "x.yaml", "--in-place"], "give either -o or --in-place"),
+        (["calibrate", "fit", ROBOT, TABLE, "--free", "nonsense"], "no parameter is named nonsense"),
+        (["calibrate", "fit", ROBOT, TABLE, "--sd", "nonsense=1"], "no parameter is named nonsense"),
+        (["calibrate", "fit", ROBOT, TABLE, "--hold-out", "1000"], "--hold-out 1000 needs more than 1000 runs"),
+        (["next", ROBOT, TABLE, "--masses", "a"], "--masses a"),
     ],
 )
 def test_usage(run, arguments, message):
     """Exit code 2 where the command line is wrong, also where it would write a file that it reads or writes already."""
     code, out, err = run(*arguments)
     assert code == 2 and message in err and out == ""
+
+
+@pytest.mark.parametrize("arguments", [["info", str(ROBOT)], ["info", str(ROBOT), "--json", "-"], ["--help"]])
+@pytest.mark.parametrize("to, says", [(">/dev/full", "cannot be written: no space left"), (">&-", "")])
+def test_output_that_takes_nothing(arguments, to, says):
+    """A full standard output is an error of one sentence; a closed one is none: its reader wants nothing."""
+    main = [sys.executable, "-c", f"from ctcr.cli import main; main({arguments})"]
+    ended = subprocess.run(f"{shlex.join(main)} {to}", shell=True, stderr=subprocess.PIPE, text=True)
+    assert bool(ended.returncode) == bool(says) and says in ended.stderr and ended.stderr.count("\n") == bool(says)
 
 
 def test_interrupt(run, monkeypatch):

@@ -1,6 +1,8 @@
 """ctcr effects, add, remove, simulate, history, and the effects of a robot in predict, compare and shape."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -201,7 +203,7 @@ def test_fit_of_a_diagnosis(run, tmp_path, robot, plan, hidden):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, "cannot be read"),
+        (None, "cannot read it"),
         ("[]", "is not an answer of ctcr diagnose"),
         ("{", "is not an answer"),
         ('{"effects": []}', "nothing was found to add"),
@@ -216,22 +218,22 @@ def test_faults_of_a_diagnosis(text, message, run, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("arguments", "message", "exits"),
     [
-        (["-o", "x.yaml"], "name an effect"),
-        (["softening"], "give -o"),
-        (["soften", "-o", "x.yaml"], "did you mean softening?"),
-        (["softening", "-o", "x.yaml", "--set", "friction=0.1"], "not among the effects to add"),
-        (["softening", "-o", "x.yaml", "--fit", "none.csv"], "no such file"),
-        (["softening", "-o", "x.yaml", "--fit", "PLAN"], "no measured poses"),
-        (["softening", "-o", "x.yaml", "--fit", DEMO, "--free", "tubes.9.length"], "no parameter is named"),
+        (["-o", "x.yaml"], "name an effect", 2),
+        (["softening"], "give -o", 2),
+        (["soften", "-o", "x.yaml"], "did you mean softening?", 1),
+        (["softening", "-o", "x.yaml", "--set", "friction=0.1"], "not among the effects to add", 2),
+        (["softening", "-o", "x.yaml", "--fit", "none.csv"], "no such file", 1),
+        (["softening", "-o", "x.yaml", "--fit", "PLAN"], "no measured poses", 1),
+        (["softening", "-o", "x.yaml", "--fit", DEMO, "--free", "tubes.9.length"], "no parameter is named", 2),
     ],
 )
-def test_faults_of_add(arguments, message, run, table, tmp_path, monkeypatch):
+def test_faults_of_add(arguments, message, exits, run, table, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     before = ROBOT.read_bytes()
     code, _, err = run("add", ROBOT, *(table if word == "PLAN" else word for word in arguments))
-    assert code == 1 and message in err
+    assert code == exits and message in err
     assert ROBOT.read_bytes() == before and not (tmp_path / "x.yaml").exists()
 
 
@@ -331,3 +333,13 @@ def test_history_report(run, tmp_path, robot, plan, hidden):
     assert code == 0 and "sensor offset" in out and "m.csv" in out and "expected error" in out
     text = page.read_text()
     assert "<svg" in text and 'src="http' not in text and 'href="http' not in text
+
+
+@pytest.mark.parametrize("end", ["import os; os._exit(0)", "import ctypes; ctypes.string_at(0)"])
+def test_end_in_own_effect(tmp_path, end):
+    """A user's code that ends the process is an error that names the file, never a success."""
+    file = tmp_path / "mine.py"
+    file.write_text(end)
+    main = f"from ctcr.cli import main; main(['effects', '--effects', {str(file)!r}])"
+    ended = subprocess.run([sys.executable, "-c", main], capture_output=True, text=True)
+    assert ended.returncode > 0 and f"Error: {file}: " in ended.stderr and ended.stdout == ""

@@ -5,6 +5,7 @@ import json
 import os
 import resource
 import stat
+import sys
 import tempfile
 from pathlib import Path
 
@@ -119,6 +120,23 @@ def test_narrow_table():
     assert number in text and sentence not in text  # it had to give way
     for word in ("precurvature_profile", *sentence.split()):
         assert word in text
+
+
+def test_width(monkeypatch):
+    """Lines keep to COLUMNS, also in a file; a table that does not fit stays whole, as all lines do without COLUMNS."""
+    made = output.table("", ["name", "mean x", "95 %"], [["a sentence", "-1234.567", "1234.567"]])
+
+    def printed(columns: str | None) -> list[str]:
+        monkeypatch.setattr(sys, "stdout", io.StringIO())
+        monkeypatch.setenv("COLUMNS", columns) if columns else monkeypatch.delenv("COLUMNS", raising=False)
+        console = output.console()
+        console.print("word " * 50)
+        console.print(made)
+        return sys.stdout.getvalue().splitlines()
+
+    assert max(map(len, printed("50"))) <= 50 < 200 < max(map(len, printed(None)))
+    for word in ("sentence", "-1234.567", "1234.567", "mean x", "95 %"):
+        assert any(word in line for line in printed("10"))
 
 
 def test_progress(monkeypatch):

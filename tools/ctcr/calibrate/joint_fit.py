@@ -14,7 +14,7 @@ from ctcr.arrays import Array, Mask
 from ctcr.audit import sensor_pose
 from ctcr.calibrate import checks
 from ctcr.calibrate.halves import Halves, compare_halves
-from ctcr.errors import InputError, Problem
+from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.fit import folds, joint, widening
 from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
@@ -267,7 +267,10 @@ def _part(robot: Robot, readings: Measurements, few: Mask) -> tuple[Measurements
 def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> tuple[folds.Split | None, list[int]]:
     """How the table is split, and the parts that are held out: each in turn, or `count` runs."""
     if count:
-        return folds.runs_left_out(readings, count), [1]
+        try:
+            return folds.runs_left_out(readings, count), [1]
+        except InputError as error:
+            raise ArgumentError(error.problems) from None
     split = folds.parts_of(readings, lever, settings.FOLDS) if count is None else None
     if split is None:
         return None, []

@@ -6,7 +6,7 @@ from math import degrees, inf, isfinite, nan
 from typing import Any
 
 from ctcr.calibrate.procedure_figures import WIDTH
-from ctcr.errors import InputError, Problem
+from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.model.parameters import name_at, uncertainty_of, value_at
 from ctcr.robot import ledger
 from ctcr.robot.ledger import Change, Entry
@@ -82,11 +82,11 @@ def in_file(robot, path: FieldPath) -> float:
 def check_target(robot, target: str | None, in_place: bool, needed: bool = False) -> str | None:
     """The robot file to write, if any. Raises InputError where that asks for the impossible, before any work."""
     if in_place and target:
-        raise InputError(Problem("give either -o or --in-place"))
+        raise ArgumentError(Problem("give either -o or --in-place"))
     if (in_place or target) and robot is None:
-        raise InputError(Problem("give --robot: the robot file whose values are to be updated"))
+        raise ArgumentError(Problem("give --robot: the robot file whose values are to be updated"))
     if needed and not (in_place or target):
-        raise InputError(Problem("give -o: the robot file to write"))
+        raise ArgumentError(Problem("give -o: the robot file to write"))
     return robot._source.file if in_place else target
 
 

@@ -14,7 +14,7 @@ from ctcr.arrays import Array
 from ctcr.calibrate import procedure_figures as figures_of
 from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
 from ctcr.calibrate.tables import Column, Table
-from ctcr.errors import InputError, Problem
+from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.frames import points_to_base
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
@@ -75,7 +75,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
     if ratio is None and robot is not None:
         ratio = robot.actuation.rotation_rev_per_rev
     if ratio is None:
-        raise InputError(Problem("give --ratio, turns of a tube in one turn of its motor, or --robot"))
+        raise ArgumentError(Problem("give --ratio, turns of a tube in one turn of its motor, or --robot"))
     pose = np.eye(4)
     if robot:
         pose[:3, :3], pose[:3, 3] = robot.tracker.rotation, robot.tracker.position
@@ -192,7 +192,7 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
     tubes = _all_tubes(table, robot)
     pitch = robot.actuation.translation_mm_per_rev if robot and pitch_mm is None else pitch_mm
     if pitch is None:
-        raise InputError(Problem("give --pitch-mm, how far a tube moves in one turn of its motor, or --robot"))
+        raise ArgumentError(Problem("give --pitch-mm, how far a tube moves in one turn of its motor, or --robot"))
 
     def values(tube: int, name: str) -> list[float]:
         mine = table[name][table["tube"] == tube] if name in table else np.empty(0)
@@ -284,7 +284,9 @@ def cantilever(
     inner = inner_mm if inner_mm is not None else getattr(described, "inner_diameter_mm", None)
     outer = outer_mm if outer_mm is not None else getattr(described, "outer_diameter_mm", None)
     if inner is None or outer is None:
-        raise InputError(Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot and --tube"))
+        raise ArgumentError(
+            Problem("needs the diameters: give --inner-mm and --outer-mm, or --robot and --tube")
+        )
     fit = computed(
         _core.fit_cantilever,
         table.file,
@@ -338,9 +340,9 @@ def curvature(
         raise InputError(Problem(f"x is in {unit} but y in {table.unit['y']}: give both in one unit", table.file))
     given = (scale_mm is not None) + (reference is not None)
     if unit == "px" and given != 1:
-        raise InputError(Problem("points in px need their scale: give --mm-per-px, or --reference, not both"))
+        raise ArgumentError(Problem("points in px need their scale: give --mm-per-px, or --reference, not both"))
     if unit != "px" and given:
-        raise InputError(Problem(f"points in {unit} have their scale: leave out --mm-per-px and --reference"))
+        raise ArgumentError(Problem(f"points in {unit} have their scale: leave out --mm-per-px and --reference"))
     if reference is not None:
         scale = {"reference": np.array(reference[:4]).reshape(2, 2), "reference_length": 1e-3 * reference[4]}
     else:
@@ -381,6 +383,6 @@ def _described_tube(robot: Robot | None, tube: int | None):
     if robot is None:
         return None
     if tube is None:
-        raise InputError(Problem(f"give --tube, 1 to {robot.n_tubes} from the innermost: which tube was measured"))
+        raise ArgumentError(Problem(f"give --tube, 1 to {robot.n_tubes} from the innermost: which tube was measured"))
     check_tube(tube, robot, robot._source.file)
     return robot.tubes[tube - 1]

@@ -97,7 +97,7 @@ def read(path: str | Path, columns: Sequence[Column]) -> Table:
 
 def _lines(path: str | Path) -> list[list[str]]:
     """The fields of each line, the header first."""
-    content = inputs.read(path, MAX_BYTES, "this is not a table of a calibration procedure")
+    content = inputs.read(path, "this is not a table of a calibration procedure", MAX_BYTES)
     header_names(content.partition(b"\n")[0], str(path))
     try:
         return list(csv.reader(content.decode("utf-8-sig").splitlines()))

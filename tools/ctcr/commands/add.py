@@ -51,8 +51,9 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
     found, held, start = diagnosed(diagnosis, loaded) if diagnosis else ([], {}, {})
     ids = list(dict.fromkeys(catalogue.get(name, loaded.n_tubes).id for name in [*names, *found]))
     if not ids:
-        text = "nothing was found to add" if diagnosis else "name an effect: see ctcr effects"
-        raise InputError(Problem(text, diagnosis))
+        if diagnosis:
+            raise InputError(Problem("nothing was found to add", diagnosis))
+        raise click.UsageError("name an effect: see ctcr effects")
     fixed = held | settings(given, loaded, ids)
     if not measurements:
         after = catalogue.with_values(loaded, ids, fixed)

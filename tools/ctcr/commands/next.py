@@ -63,14 +63,14 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
 
 def _masses(text: str) -> tuple[float, ...]:
     """Masses [kg] of a text in g."""
-    from ctcr.errors import InputError, Problem
+    from ctcr.errors import ArgumentError, Problem
 
     try:
         grams = [float(part) for part in text.split(",")]
     except ValueError:
         grams = [-1.0]
     if not all(0 <= gram < 1000 for gram in grams):
-        raise InputError(Problem(f"--masses {text}: give grams from 0 to 1000, separated by commas, as 0,10,20"))
+        raise ArgumentError(Problem(f"--masses {text}: give grams from 0 to 1000, separated by commas, as 0,10,20"))
     return tuple(1e-3 * gram for gram in grams)
 
 

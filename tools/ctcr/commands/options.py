@@ -63,10 +63,10 @@ def finite(option: str, values: list[float], count: int):
     """The numbers of an option as an array (count,). Raises InputError where there are others."""
     import numpy as np
 
-    from ctcr.errors import InputError, Problem
+    from ctcr.errors import ArgumentError, Problem
 
     if len(values) != count or not np.isfinite(values).all():
-        raise InputError(Problem(f"needs {count} finite numbers, separated by commas", field=option))
+        raise ArgumentError(Problem(f"needs {count} finite numbers, separated by commas", field=option))
     return np.array(values)
 
 

@@ -32,7 +32,7 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
 
     Example: ctcr sensitivity robot.yaml --open-loop 10000 --accuracy 0.5
     """
-    from ctcr.errors import InputError, Problem
+    from ctcr.errors import ArgumentError, Problem
     from ctcr.robot import robot_file
     from ctcr.sensitivity import closed_loop as closed
     from ctcr.sensitivity import open_loop as opened
@@ -42,7 +42,7 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
     from ctcr.track import scenario as scenario_file
 
     if not open_loop and not closed_loop:
-        raise InputError(Problem("nothing to do: give --open-loop N, --closed-loop SCENARIO, or both"))
+        raise ArgumentError(Problem("nothing to do: give --open-loop N, --closed-loop SCENARIO, or both"))
     loaded = robot_file.load(robot)
     wanted = scenario_file.load(closed_loop, loaded.n_tubes) if closed_loop else None
     both, varied, found = open_loop and wanted, all_varied(loaded), {}

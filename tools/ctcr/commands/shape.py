@@ -3,7 +3,7 @@
 import click
 
 from ctcr.commands import options
-from ctcr.errors import InputError, Problem
+from ctcr.errors import ArgumentError, InputError, Problem
 
 SAMPLES = 400  # along the backbone: a chord then misses the curve by micrometres
 
@@ -117,7 +117,7 @@ def _joints(name: str, option: str, joints):
 
     for value in joints:
         if abs(value) > QUANTITIES[name].usual[1]:
-            raise InputError(Problem(QUANTITIES[name].doubt(value), field=option))
+            raise ArgumentError(Problem(QUANTITIES[name].doubt(value), field=option))
     return joints
 
 

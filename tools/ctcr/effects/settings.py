@@ -8,10 +8,8 @@ from typing import Any
 
 from ctcr import inputs
 from ctcr.effects import catalogue
-from ctcr.errors import InputError, Problem, suggestion
+from ctcr.errors import ArgumentError, InputError, Problem, suggestion
 from ctcr.robot.description import Robot
-
-MAX_BYTES = 16 << 20  # an answer is some kB
 
 
 def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dict[str, float]:
@@ -27,13 +25,13 @@ def settings(given: Iterable[str], robot: Robot, ids: Sequence[str] = ()) -> dic
         except InputError as error:
             problems += error.problems
     if problems:
-        raise InputError(problems)
+        raise ArgumentError(problems)
     return found
 
 
 def diagnosed(path: str | Path, robot: Robot) -> tuple[list[str], dict[str, float], dict[str, float]]:
     """As found(), of the file that `ctcr diagnose --json` wrote. Raises InputError where it is not such an answer."""
-    content = inputs.read(path, MAX_BYTES, "this is not an answer of ctcr diagnose --json")
+    content = inputs.read(path, "this is not an answer of ctcr diagnose --json")
     try:
         return found(json.loads(content), robot)
     except (ValueError, LookupError, TypeError):
@@ -104,5 +102,5 @@ def _number(item: str, text: str, parameter: catalogue.EffectParameter) -> float
     return number
 
 
-def _fault(text: str, message: str) -> InputError:
-    return InputError(Problem(message, field=text))
+def _fault(text: str, message: str) -> ArgumentError:
+    return ArgumentError(Problem(message, field=text))

@@ -55,8 +55,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ctcr import inputs
 from ctcr.arrays import Array, Integers
-from ctcr.effects import catalogue
+from ctcr.effects import catalogue, watched
 from ctcr.errors import InputError, Problem, shown
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
@@ -198,8 +199,7 @@ def used_by(robot: Robot, names: Sequence[str] = ()) -> list[Effect]:
 
 def _module(path: Path) -> ModuleType:
     """The file, run as a module of its own name."""
-    if not path.is_file():
-        raise InputError(Problem("no such file" if not path.exists() else "is not a file", str(path)))
+    inputs.read(path, "this is not a file of effects")
     name = f"ctcr_user_effects_{re.sub(r'[^0-9a-zA-Z_]', '_', str(path.resolve()))}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None:
@@ -249,6 +249,7 @@ def _users_code(file: str, hook: str = "") -> Iterator[None]:
     Raises InputError at the line of the file that was reached.
     """
     printed = io.StringIO()
+    watched.note(f"{file}: {hook}".strip())
     try:
         with _time_limit(), redirect_stdout(printed):
             yield
@@ -256,6 +257,8 @@ def _users_code(file: str, hook: str = "") -> Iterator[None]:
         raise
     except BaseException as error:  # also sys.exit(), which would look like success
         raise InputError(_fault(error, file, hook)) from error
+    finally:
+        watched.note("")
     if said := printed.getvalue():
         text = f"prints {shown(said)} to standard output, which carries the results: print to sys.stderr"
         raise InputError(Problem(f"{hook} {text}".strip(), file))

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from ctcr import _core, settings
 from ctcr.arrays import Array
 from ctcr.effects import catalogue
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import ArgumentError, InputError, Problem, did_you_mean
 from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.yaml_document import FieldPath
 
@@ -147,7 +147,7 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
     if not problems and not chosen:
         problems.append(Problem("nothing is free: name at least one parameter, or standard"))
     if problems:
-        raise InputError(problems)
+        raise ArgumentError(problems)
     return [name for name in known if name in chosen]
 
 

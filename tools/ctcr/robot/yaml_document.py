@@ -37,7 +37,7 @@ class YamlDocument:
 
 def load(path: str | Path) -> YamlDocument:
     """The document of a file. Raises InputError where it cannot be read or is no YAML."""
-    return parse(inputs.read(path, MAX_BYTES, "this is not a description"), str(path))
+    return parse(inputs.read(path, "this is not a description", MAX_BYTES), str(path))
 
 
 def parse(content: str | bytes, file: str) -> YamlDocument:

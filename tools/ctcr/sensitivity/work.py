@@ -17,8 +17,6 @@ from ctcr import inputs
 from ctcr.errors import InputError, Problem
 from ctcr.show.output import atomic_writer
 
-MAX_BYTES = 64 << 20
-
 
 @contextmanager
 def workers(address: str | None, threads: int | None = None) -> Iterator[Callable[[Callable, Iterable], Iterator]]:
@@ -70,7 +68,7 @@ class ProgressFile:
         """The state, or None where there is none yet. Raises InputError where it belongs to another study."""
         if self.path is None or not Path(self.path).exists():
             return None
-        content = inputs.read(self.path, MAX_BYTES, "this is not the progress of a study")
+        content = inputs.read(self.path, "this is not the progress of a study")
         try:
             kept = json.loads(content)
             settings, state = kept["settings"], kept["state"]

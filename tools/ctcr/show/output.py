@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from rich import box
-from rich.console import Console, Group
+from rich.console import Console, ConsoleOptions, Group, RenderResult
+from rich.measure import Measurement
 from rich.progress import Progress as Bar
 from rich.table import Table
 from rich.text import Text
@@ -110,10 +111,24 @@ class Terminal(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         return super().render_str(visible(text), **options)
 
+    def print(self, *objects: Any, **options: Any) -> None:
+        super().print(*objects, crop=False, **options)
+
+
+class _Whole(Table):
+    """A table that is never narrower than its words and numbers: a terminal may break its lines, nothing cuts them."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        least = Measurement.get(console, options.update(width=sys.maxsize), self).minimum
+        return super().__rich_console__(console, options.update(width=max(options.max_width, least)))
+
 
 def console(json_target: str | None = None) -> Terminal:
-    """A terminal for human readers; it leaves standard output alone when that carries JSON."""
-    wraps = (sys.stderr if json_target == "-" else sys.stdout).isatty()  # a file or a pipe gets lines as they are
+    """A terminal for human readers; it leaves standard output alone when that carries JSON.
+
+    A file or a pipe gets lines as they are, unless COLUMNS says how wide they may be.
+    """
+    wraps = (sys.stderr if json_target == "-" else sys.stdout).isatty() or "COLUMNS" in os.environ
     return Terminal(stderr=json_target == "-", soft_wrap=not wraps)
 
 
@@ -128,15 +143,14 @@ def table(
 
     On a narrow terminal text wraps between words, so that numbers and names are not cut.
     """
-    made = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    made = _Whole(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for i, column in enumerate(columns):
         is_text = i in text if text else i < text_columns
         cells = [line.strip() for row in rows for line in ([row[i]] if isinstance(row[i], str) else row[i])]
         folds = is_text and any(" " in cell for cell in cells)
-        longest = max((len(word) for cell in cells for word in cell.split()), default=0)
-        made.add_column(
-            column, justify="left" if is_text else "right", no_wrap=not folds, min_width=longest if folds else None
-        )
+        whole = [word for cell in (*cells, column) for word in (cell.split() if folds else [cell])]
+        longest = max(map(len, whole), default=0)
+        made.add_column(column, justify="left" if is_text else "right", no_wrap=not folds, min_width=longest)
     for row in rows:
         made.add_row(*(cell if isinstance(cell, str) else Group(*cell) for cell in row))
     return made
