@@ -82,7 +82,10 @@ def run(arguments: list[str] | None = None) -> int:
         error.show(usage)
         click.echo("\n".join(map(visible, usage.getvalue().split("\n"))), err=True, nl=False)
         return error.exit_code
-    except click.Abort:
+    except click.Abort as stop:
+        if isinstance(stop.__context__, EOFError):  # of a question: no terminal, or Ctrl+D
+            _say("the input ended before all was answered: give options instead (see --help)")
+            return 1
         _say("stopped")
         return STOPPED
     except BrokenPipeError:  # the reader, such as `head`, has seen enough

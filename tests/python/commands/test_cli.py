@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import click
@@ -141,6 +142,22 @@ def test_bench(run, monkeypatch):
         (load, derivatives) for load in ("none", "tip force") for derivatives in (False, True)
     }
     assert all(90 < result["solved_percent"] < 100 and result["per_second"] > 0 for result in results)
+
+
+def test_bench_of_a_slow_robot(run, monkeypatch):
+    """A robot that is slow to solve is timed on fewer configurations, in bounded time."""
+    from ctcr.commands import bench
+
+    predict, seen = Straight.predict, []
+
+    def slow(self, beta, *others, **options):
+        seen.append(len(beta))
+        time.sleep(1e-4 * len(beta))
+        return predict(self, beta, *others, **options)
+
+    monkeypatch.setattr(Straight, "predict", slow)
+    monkeypatch.setattr(bench, "SECONDS", 0.02)
+    assert run("bench", "--json", "-")[0] == 0 and max(seen) <= 200
 
 
 def test_bench_joints():

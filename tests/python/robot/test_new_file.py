@@ -1,5 +1,7 @@
 """New robot files: valid, commented, with what was said in them."""
 
+import io
+
 import pytest
 from click.testing import CliRunner
 from ctcr.cli import cli
@@ -34,7 +36,7 @@ def test_options(run, tmp_path):
 def test_questions(tmp_path):
     """Without options it asks; the answers are in the file, tips are flush at home."""
     path = tmp_path / "robot.yaml"
-    answers = ["mine", "2", "420", "0.88", "0.65", "80", "60", "", "300", "1.3", "1", "0", "70", "-z", "1"]
+    answers = ["mine", "2", "420", "0.88", "0.65", "flat", "12.5/m", "60", "", "300", "1.3", "1", "0", "70", "-z", "1"]
     done = CliRunner().invoke(cli, ["init", "-o", str(path)], input="\n".join(answers) + "\n")
     assert done.exit_code == 0, done.output
     robot = robot_file.load(path)
@@ -48,6 +50,10 @@ def test_questions(tmp_path):
     [
         (["--tube", "length_mm=300"], ["outer_diameter_mm is missing", "inner_diameter_mm is missing"]),
         (["--tube", "lenght_mm=3"], ["did you mean length_mm"]),
+        (
+            ["--tube", CURVED + ",colour=3", "--tube", "length_mm=long"],
+            ["--tube 1: colour is no field", "--tube 2: length"],
+        ),
         (["--tube", CURVED + ",curvature_per_m=3"], ["say the same"]),
         (["--tube", CURVED.replace("420", "long")], ["long is not a number"]),
         (["--tube", CURVED, "--tube", CURVED], ["too narrow"]),
@@ -64,6 +70,13 @@ def test_faults(run, tmp_path, arguments, words):
     code, _, err = run("init", "-o", path, *arguments)
     assert code in (1, 2) and not path.exists()
     assert all(word in err for word in words), err
+
+
+def test_no_answers(run, tmp_path, monkeypatch):
+    """Without anybody who answers, the questions end in an error that points to the options."""
+    monkeypatch.setattr("sys.stdin", io.StringIO("mine\n"))
+    code, _, err = run("init", "-o", tmp_path / "robot.yaml")
+    assert code == 1 and "give options instead" in err and not (tmp_path / "robot.yaml").exists()
 
 
 def test_existing_files_are_kept(run, tmp_path):

@@ -184,15 +184,30 @@ def test_tubes_in_reverse_order():
         ("curvature_per_m", "150", "strains it by"),
         ("jitter_mm", "9", "accuracy"),
         ("curved_length_mm", "0", "counts as straight"),
+        ("home_translation_mm", "[420, -330.5, -199]", "in front of the plate"),
+        ("home_translation_mm", "[-100, -330.5, -199]", "behind tube 1 inside it"),
     ],
 )
 def test_warnings(key, value, hint):
     """Unusual values are reported with the unit that was probably meant."""
-    text, line = edited(TEXT, key, value, occurrence=0)
+    text, line = edited(drop_list(TEXT, key) if value.startswith("[") else TEXT, key, value, occurrence=0)
     if key == "length_mm" and value == "4":
         text, line = edited(TEXT, key, value, occurrence=2)
         text, _ = edited(text, "curved_length_mm", "3", occurrence=2)
     assert (line, True) in [(p.line, hint in p.message) for p in robot_file.warnings(parse(text))]
+
+
+def test_nothing_uncertain():
+    """Where all is known exactly, a doubt says that nothing can be fitted."""
+    exact = re.sub(r"(\n  \w+): .*", r"\1: 0", TEXT[TEXT.index("uncertainty:") :])
+    doubts = robot_file.warnings(parse(TEXT[: TEXT.index("uncertainty:")] + exact))
+    assert [doubt.field for doubt in doubts] == ["uncertainty"] and "no fit" in doubts[0].message
+
+
+def test_impossible_values():
+    """A negative number is one fault: nothing is compared with it."""
+    problems = faults(edited(TEXT, "length_mm", "-463", 0)[0])
+    assert [problem.field for problem in problems] == ["tubes[0].length_mm"]
 
 
 def test_no_warnings():
@@ -209,6 +224,7 @@ def test_no_warnings():
         (b"t_s,run\n1,2\n", "is this the table"),
         (b"a: [1, 2\n", "not valid YAML"),
         (b"a: 1\na: 2\n", "not valid YAML"),
+        (b"a:\n\tb: 1\n", "indent by spaces"),
         (b"\xff\xfe\x00n", "UTF-8"),
         (b"a: \x00", "not valid YAML"),
         (b"[" * 1200, "nested too deeply"),

@@ -16,13 +16,14 @@ def command(robot: str, out) -> None:
     Example: ctcr info robot.yaml
     """
     from ctcr.robot import robot_file
+    from ctcr.show.wording import counted
 
     loaded = robot_file.load(robot)
     doubts = robot_file.warnings(loaded)
     out.write_json(_as_data(loaded, doubts))
     if out.json_target == "-":
         return
-    out.console.print(f"{loaded.name}: {loaded.n_tubes} tubes, innermost first", style="bold")
+    out.console.print(f"{loaded.name}: {counted(loaded.n_tubes, 'tube')}, innermost first", style="bold")
     out.table("Tubes", *_tube_rows(loaded), 2)
     out.table("Sensor and frame", ["", "value", "unit"], _bench_rows(loaded))
     if doubts:
@@ -68,15 +69,17 @@ def _bench_rows(robot) -> list[list[str]]:
         return ", ".join(f"{v:g}" for v in value) if isinstance(value, list) else f"{value:g}"
 
     tracker, actuation = robot.tracker, robot.actuation
-    sd = {kind: "" for kind in parameters.ANYWHERE}
+    pose = {"position": tracker.sensor_position_mm, "rotation": tracker.sensor_rotation_vector_rad}
+    sd = dict.fromkeys(pose, "")
     for name in parameters.of_sensor(robot)[::-1]:
         field, (_, width, _, _) = parameters.field_of(name), parameters.priors(robot, [name])
-        sd[name.split(".")[1].removeprefix("sensor_")] = f" ± {field.factor * width[0]:.3g} {field.unit}"
+        kind = name.split(".")[1].removeprefix("sensor_")
+        sd[kind] = "" if pose[kind] is None else f" ± {field.factor * width[0]:.3g} {field.unit}"
     return [
         ["gravity in the base frame", text(robot.gravity), "m/s^2"],
         ["sensor on tube", text(tracker.sensor_on_tube), ""],
-        ["its position in the tip's frame", text(tracker.sensor_position_mm) + sd["position"], "mm"],
-        ["its rotation vector there", text(tracker.sensor_rotation_vector_rad) + sd["rotation"], "rad"],
+        ["its position in the tip's frame", text(pose["position"]), "mm" + sd["position"]],
+        ["its rotation vector there", text(pose["rotation"]), "rad" + sd["rotation"]],
         ["base frame in the tracker frame", text(tracker.position_mm), "mm"],
         ["its rotation vector", text(tracker.rotation_vector_rad), "rad"],
         ["readings", text(tracker.rate_Hz), "Hz"],

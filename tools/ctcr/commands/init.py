@@ -47,7 +47,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     if tubes and example:
         raise click.UsageError("--tube and --example exclude each other")
     if tubes:
-        robot = new_file.NewRobot([new_file.tube_of(tube, f"--tube {i}") for i, tube in enumerate(tubes, start=1)])
+        robot = new_file.NewRobot(new_file.tubes_of(tubes))
     elif example:
         robot = new_file.example(example)
     else:
@@ -80,15 +80,24 @@ def _asked(new_file, gravity):
         length = _ask("  length [mm]")
         outer = _ask("  outer diameter [mm]")
         inner = _ask("  inner diameter [mm]")
-        radius = click.prompt("  radius of the precurved part [mm], 0 for a straight tube", type=float)
-        curved = _ask("  length of the precurved part [mm]") if new_file.curvature(radius) else 0.0
+        text = "  radius of the precurved part [mm], or its curvature such as 12.5/m; 0 for a straight tube"
+        bent = click.prompt(text, value_proc=_bent)
+        curved = _ask("  length of the precurved part [mm]") if bent else 0.0
         modulus = click.prompt("  Young's modulus [GPa]", type=float, default=new_file.NITINOL_GPA)
-        tube = new_file.NewTube(length, outer, inner, curved, new_file.curvature(radius), modulus)
-        robot.tubes.append(tube)
+        robot.tubes.append(new_file.NewTube(length, outer, inner, curved, bent, modulus))
     if gravity is None:
         text = "Where weights fall in the base frame (z along the insertion)"
         gravity = click.prompt(text, type=click.Choice(list(DIRECTIONS)), default="unknown")
     return robot, gravity
+
+
+def _bent(answer: str) -> float:
+    from ctcr.robot.new_file import precurvature
+
+    try:
+        return precurvature(answer)
+    except ValueError:
+        raise click.BadParameter(f"{answer!r} is neither a radius nor a curvature") from None
 
 
 def _ask(text: str) -> float:

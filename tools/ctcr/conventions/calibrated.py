@@ -96,10 +96,10 @@ def calibrated(
     for iteration in range(settings.CONVENTION_ITERATIONS):
         if found is None:
             residual, jacobian, _ = table.residual(values, True)
-            residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, -1)[:, :3]
+            residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, len(names))[:, :3]
             error = np.linalg.norm(residual, axis=1)
             solved = np.isfinite(error)
-            if solved.mean() <= settings.CONVENTION_SOLVED:
+            if not names or solved.mean() <= settings.CONVENTION_SOLVED:  # all is known exactly, or nothing fits
                 break
             size = max(float(np.median(error[solved])), floor, settings.CONVENTION_FINEST)
             if iteration >= settings.CONVENTION_PATIENCE and size > to_beat:
@@ -146,7 +146,7 @@ def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Arra
         except InputError:  # known exactly
             continue
     names = [name for name, *_ in found]
-    mean, sd, low, high = np.array([numbers for _, *numbers in found]).T
+    mean, sd, low, high = np.array([numbers for _, *numbers in found]).reshape(-1, 4).T
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
     # What is positive is off by a factor, either way.
     least = np.divide(mean**2, mean + far, out=mean - far, where=low >= 0)

@@ -175,7 +175,7 @@ def priors(
     own = [name for name in names if name.startswith("effects.")]
     known = dict(zip(own, zip(*catalogue.priors(robot, own), strict=True), strict=True))
     known |= {name: _prior(robot, name) for name in names if name not in known}
-    mean, stated, low, high = zip(*(known[name] for name in names), strict=True)
+    mean, stated, low, high = ([known[name][k] for name in names] for k in range(4))
     width = [given.get(name, sd) for name, sd in zip(names, stated, strict=True)]
     problems = [
         Problem(

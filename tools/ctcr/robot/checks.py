@@ -8,8 +8,7 @@ import numpy as np
 
 from ctcr.errors import Problem, did_you_mean, shown
 from ctcr.robot import defaults
-from ctcr.robot.description import Robot, Section, path_of
-from ctcr.robot.units import LARGEST
+from ctcr.robot.description import AT_PLATE, Robot, Section, Tube, path_of
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
 Fault = tuple[FieldPath, str]
@@ -57,6 +56,16 @@ def doubts(robot: Robot) -> Iterator[Fault]:
     for i, (tube, around) in enumerate(pairwise(robot.tubes)):
         if around.inner_diameter > 0 and tube.outer_diameter > around.inner_diameter:
             yield _too_narrow(around.inner_diameter_mm, i, tube.outer_diameter_mm)
+    home = robot.actuation.home_translation_mm
+    for i, (mm, inside) in enumerate(zip(home, [-np.inf, *home], strict=False)):
+        if mm > 1e3 * AT_PLATE:
+            text = f"{mm:g} mm is in front of the plate: beta is negative behind it"
+            yield ("actuation", "home_translation_mm", i), text
+        elif mm < inside:
+            text = f"{mm:g} mm is behind tube {i} inside it, {inside:g} mm: inner tubes are grasped behind outer ones"
+            yield ("actuation", "home_translation_mm", i), text
+    if not any(np.any(getattr(robot.uncertainty, key)) for key in defaults.UNCERTAINTY):
+        yield ("uncertainty",), "all is 0, known exactly: no fit can change anything, and `ctcr diagnose` needs one"
     if robot.gravity is None:
         yield ("gravity",), "not known: the tubes' own weight is left out"
     elif 0 < (size := np.linalg.norm(robot.gravity)) < 9.7:
@@ -166,7 +175,7 @@ def _mapping(part: Any) -> dict:
 
 
 def _number(section: dict, key: str) -> float:
-    """A field as a number; NaN where it is none."""
+    """A field of a tube as a number; NaN where it is none, or impossible."""
     value = section.get(key)
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number and abs(value) <= LARGEST else np.nan
+    return float(value) if is_number and Tube.quantity(key).is_possible(value) else np.nan

@@ -26,6 +26,7 @@ from ctcr.frames import matrix_from_rotation_vector
 from ctcr.robot.units import Quantity
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 from ctcr.show.result import Glance, Shown
+from ctcr.show.wording import counted
 
 MAX_TUBES = 4  # the compiled model covers 1 to 4
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
@@ -317,7 +318,7 @@ class Robot(Shown, Section):
         ]
         rows.append(["bending stiffness", "N m^2", *(f"{tube.bending_stiffness:.4g}" for tube in self.tubes)])
         columns = ["", "unit", *(f"tube {i + 1}" for i in range(self.n_tubes))]
-        return Glance(f"Robot {self.name}: {self.n_tubes} tubes{effects}", columns, rows, text_columns=2)
+        return Glance(f"Robot {self.name}: {counted(self.n_tubes, 'tube')}{effects}", columns, rows, text_columns=2)
 
     @property
     def standard(self) -> "Robot":

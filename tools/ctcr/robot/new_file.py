@@ -1,10 +1,11 @@
 """A new robot file: what must be known of a robot, defaults for the rest, and comments that say which is which."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isinf, isnan
 from typing import Any
 
-from ctcr.errors import InputError, Problem, suggestion
+from ctcr.errors import ArgumentError, Problem, did_you_mean, suggestion
 from ctcr.robot.defaults import TRACKER, UNCERTAINTY
 
 NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY = 60.0, 0.3, 6450.0
@@ -60,13 +61,25 @@ def example(n_tubes: int) -> NewRobot:
     return NewRobot(list(_EXAMPLES[:n_tubes]), name, note=" Its numbers are invented: replace them.")
 
 
-def tube_of(given: str, where: str) -> NewTube:
-    """A tube of a text such as length_mm=420,outer_diameter_mm=0.88,...; radius_mm may stand for curvature_per_m.
+def tubes_of(given: Sequence[str]) -> list[NewTube]:
+    """Tubes of texts such as length_mm=420,outer_diameter_mm=0.88,...; radius_mm may stand for curvature_per_m.
 
-    Raises InputError with all that is wrong with it.
+    Raises ArgumentError with all that is wrong with them.
     """
+    tubes, problems = [], []
+    for i, text in enumerate(given, start=1):
+        try:
+            tubes.append(_tube_of(text, f"--tube {i}"))
+        except ArgumentError as error:
+            problems += error.problems
+    if problems:
+        raise ArgumentError(problems)
+    return tubes
+
+
+def _tube_of(given: str, where: str) -> NewTube:
     known = [*NewTube.__dataclass_fields__, "radius_mm"]
-    values, faults = {}, []
+    values, faults, meant = {}, [], set()
     for part in given.split(","):
         name, _, text = (piece.strip() for piece in part.partition("="))
         try:
@@ -75,6 +88,7 @@ def tube_of(given: str, where: str) -> NewTube:
             value = float("nan")
         if name not in known:
             faults.append(f"{name} is no field of a tube: {suggestion(name, known, ', '.join(known))}")
+            meant.add(did_you_mean(name, known))  # one mistake, one fault
         elif isnan(value) or (isinf(value) and name != "radius_mm"):  # an infinite radius is straight
             faults.append(f"{name}: {text or 'nothing'} is not a number")
         values[name] = value
@@ -83,17 +97,22 @@ def tube_of(given: str, where: str) -> NewTube:
         faults.append("radius_mm and curvature_per_m say the same: give one")
     elif radius is not None:
         values["curvature_per_m"] = curvature(radius)
-    faults += [
-        f"{name} is missing" for name in ("length_mm", "outer_diameter_mm", "inner_diameter_mm") if name not in values
-    ]
+    needed = {"length_mm", "outer_diameter_mm", "inner_diameter_mm"}
+    faults += [f"{name} is missing" for name in known if name in needed - set(values) - meant]
     if faults:
-        raise InputError([Problem(text, field=where) for text in faults])
+        raise ArgumentError([Problem(text, field=where) for text in faults])
     return NewTube(**values)
 
 
 def curvature(radius_mm: float) -> float:
     """Curvature [1/m] of a radius [mm]; 0 for a straight tube, whose radius is written as 0 or inf."""
     return 1e3 / radius_mm if radius_mm else 0.0
+
+
+def precurvature(answer: str) -> float:
+    """Curvature [1/m] of a text such as 80, a radius in mm, or 12.5/m. Raises ValueError for another one."""
+    per_m = answer.strip().removesuffix("/m")
+    return float(per_m) if per_m != answer.strip() else curvature(float(answer))
 
 
 def text(robot: NewRobot) -> str:

@@ -44,8 +44,9 @@ def parse(content: str | bytes, file: str) -> YamlDocument:
     """Parses one document; `file` is its name in errors. Raises InputError that names the line."""
     try:
         text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
-    except UnicodeDecodeError:
-        raise InputError(Problem("is not text in UTF-8", file)) from None
+    except UnicodeDecodeError as error:
+        line = 1 + content[: error.start].count(b"\n")
+        raise InputError(Problem("is not text in UTF-8: save it as that", file, line)) from None
     if not text.strip():
         raise InputError(Problem("is empty", file))
     yaml = YAML(typ="safe", pure=True)
@@ -55,7 +56,8 @@ def parse(content: str | bytes, file: str) -> YamlDocument:
         return YamlDocument(file, text, data, root)
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
-        raise InputError(Problem(f"not valid YAML: {error.problem or error.context}", file, line)) from None
+        hint = ": indent by spaces, not by tabs" if "'\\t'" in str(error.problem) else ""
+        raise InputError(Problem(f"not valid YAML: {error.problem or error.context}{hint}", file, line)) from None
     except RecursionError:
         raise InputError(Problem("not valid YAML: nested too deeply", file)) from None
     except Exception as error:  # the YAML library leaks all kinds of exceptions on garbage
