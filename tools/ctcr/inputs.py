@@ -17,10 +17,7 @@ _fingerprints: dict[str, str] = {}
 
 @contextmanager
 def open_input(path: object) -> Iterator[BinaryIO]:
-    """An input file to read as bytes. Raises InputError where it cannot be read; a pipe would be waited for in vain.
-
-    What is refused by its beginning or its size is not read to its end: the fingerprint comes last.
-    """
+    """An input file to read as bytes. Raises InputError where it cannot be read; a pipe would be waited for in vain."""
     with (
         file_faults(path, "read"),
         open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file,
@@ -28,7 +25,7 @@ def open_input(path: object) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise InputError(Problem("is a pipe or a device: give a file", file=str(path)))
         yield file
-        file.seek(0)
+        file.seek(0)  # last: what is refused by its size or its beginning is not read to its end
         _fingerprints[str(path)] = hashlib.file_digest(file, "sha256").hexdigest()
 
 

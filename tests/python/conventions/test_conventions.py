@@ -9,9 +9,10 @@ from conventions_bench import RUNS, design, session
 from ctcr.conventions import review
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
+from ctcr.fit.floors import floors
 from ctcr.frames import conjugate, product
 from ctcr.model import simulation
-from ctcr.robot import robot_file
+from ctcr.robot import defaults, robot_file
 from ctcr.table import measurements
 from scipy.spatial.transform import Rotation
 
@@ -126,6 +127,15 @@ def test_frame():
         assert [one.kind for one in found.findings] == [kind]
         np.testing.assert_allclose(found.robot.tracker.position, origin, atol=4e-3)
         np.testing.assert_allclose(found.robot.tracker.rotation, rotation, atol=0.05)
+
+
+def test_all_known_exactly():
+    """Where nothing is uncertain nothing is calibrated: a right table is right, with a floor."""
+    robot, readings = bench(1)
+    exact = robot.uncertainty.model_copy(update=dict.fromkeys(defaults.UNCERTAINTY, 0.0))
+    exact = robot.model_copy(update={"uncertainty": exact})
+    assert review(exact, readings).findings == []
+    assert 0 < floors(exact, readings).expected_error_mm < 1
 
 
 def test_two_faults():

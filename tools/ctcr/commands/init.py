@@ -92,10 +92,12 @@ def _asked(new_file, gravity):
 
 
 def _bent(answer: str) -> float:
-    from ctcr.robot.new_file import precurvature
+    """Curvature [1/m] of a radius in mm such as 80, or of itself such as 12.5/m."""
+    from ctcr.robot.new_file import curvature
 
+    number = answer.strip().removesuffix("/m")
     try:
-        return precurvature(answer)
+        return curvature(float(number)) if number == answer.strip() else float(number)
     except ValueError:
         raise click.BadParameter(f"{answer!r} is neither a radius nor a curvature") from None
 

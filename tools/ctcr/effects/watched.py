@@ -9,8 +9,7 @@ _place = mmap.mmap(-1, 1 << 12)  # shared with the child: the code of the user's
 
 def note(place: str) -> None:
     """Notes which code of the user's runs now; "" where none does."""
-    written = place.encode(errors="replace")[: len(_place) - 1] + b"\0"
-    _place[: len(written)] = written
+    _place[:] = place.encode(errors="replace")[: len(_place)].ljust(len(_place), b"\0")
 
 
 def ended() -> tuple[int, str] | None:
@@ -24,12 +23,9 @@ def ended() -> tuple[int, str] | None:
         signal.signal(number, lambda number, _: os.kill(child, number))
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     shown = code if code >= 0 else 128 - code  # as shells have it
-    place = bytes(_place).partition(b"\0")[0].decode(errors="replace")
+    place = bytes(_place).rstrip(b"\0").decode(errors="replace")
     if not place:
         return shown, ""
-    how = "ends the program, as os._exit() does" if code >= 0 else f"was running when {_name(-code)} ended the program"
-    return shown or 1, f"{place} {how}"
-
-
-def _name(number: int) -> str:
-    return f"{signal.Signals(number).name} ({signal.strsignal(number)})"
+    if code >= 0:
+        return shown or 1, f"{place} ends the program, as os._exit() does"
+    return shown, f"{place} was running when {signal.Signals(-code).name} ended the program: {signal.strsignal(-code)}"

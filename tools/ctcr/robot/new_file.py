@@ -109,12 +109,6 @@ def curvature(radius_mm: float) -> float:
     return 1e3 / radius_mm if radius_mm else 0.0
 
 
-def precurvature(answer: str) -> float:
-    """Curvature [1/m] of a text such as 80, a radius in mm, or 12.5/m. Raises ValueError for another one."""
-    per_m = answer.strip().removesuffix("/m")
-    return float(per_m) if per_m != answer.strip() else curvature(float(answer))
-
-
 def text(robot: NewRobot) -> str:
     """The file, with comments."""
     n = len(robot.tubes)
