@@ -230,7 +230,6 @@ def test_errors(run, arguments, message):
         (["add", ROBOT, "friction", "--set", "bla=1", "-o", "x.yaml"], "has no parameter bla"),
         (["calibrate", "fit", ROBOT, TABLE, "-o", "x.yaml", "--in-place"], "give either -o or --in-place"),
         (["calibrate", "fit", ROBOT, TABLE, "--free", "nonsense"], "no parameter is named nonsense"),
-        (["calibrate", "fit", ROBOT, TABLE, "--sd", "nonsense=1"], "no parameter is named nonsense"),
         (["calibrate", "fit", ROBOT, TABLE, "--hold-out", "1000"], "--hold-out 1000 needs more than 1000 runs"),
         (["next", ROBOT, TABLE, "--masses", "a"], "--masses a"),
     ],

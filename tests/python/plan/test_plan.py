@@ -74,7 +74,7 @@ def test_table(robot, demo, tmp_path):
 
 def test_masses(tmp_path, capsys):
     """Masses must be grams."""
-    assert cli.run(["next", "robot.yaml", "table.csv", "--masses", "ten"]) == 1
+    assert cli.run(["next", "robot.yaml", "table.csv", "--masses", "ten"]) == 2
     assert "grams" in capsys.readouterr().err
 
 

@@ -284,7 +284,7 @@ def cantilever(
     inner = inner_mm if inner_mm is not None else getattr(described, "inner_diameter_mm", None)
     outer = outer_mm if outer_mm is not None else getattr(described, "outer_diameter_mm", None)
     if inner is None or outer is None:
-        raise ArgumentError(Problem("needs the diameters: give --inner-mm and --outer-mm, or --robot and --tube"))
+        raise ArgumentError(Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot, --tube"))
     fit = computed(
         _core.fit_cantilever,
         table.file,
