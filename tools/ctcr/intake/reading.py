@@ -26,7 +26,7 @@ _REFUSED: dict[bytes | tuple[bytes, ...], str] = messages.BAGS | {
 
 def read(path: str | Path) -> Log:
     """The log of a file. Raises InputError where it cannot be read, with all its faulty rows."""
-    content = inputs.read(path, MAX_BYTES, "split it")
+    content = inputs.read(path, "split it", MAX_BYTES)
     if content.startswith(b"PK") and b".npy" not in content:
         raise InputError(Problem(_SHEET, str(path)))
     for starts, text in _REFUSED.items():
