@@ -22,7 +22,8 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
     longest = max(catalogue.parameter_of(readings.n_tubes)[name].hard[1] for name in lags)
     same = np.diff(readings.run) == 0
     steps = np.diff(readings.t)[same]
-    if not (len(steps) and np.nanmedian(steps) > longest):
+    steps = steps[np.isfinite(steps)]
+    if not (len(steps) and np.median(steps) > longest):
         return None
     after = 1 + np.flatnonzero(same & np.isfinite(readings.positions[1:]).all(axis=1))
     positions = points_to_tracker(fit.robot.tracker, tips.predicted(fit.robot, readings))

@@ -125,8 +125,8 @@ class _Whole(Table):
 
 def console(json_target: str | None = None) -> Terminal:
     """A terminal for human readers; it leaves standard output alone when that carries JSON."""
-    wraps = (sys.stderr if json_target == "-" else sys.stdout).isatty() or "COLUMNS" in os.environ
-    return Terminal(stderr=json_target == "-", soft_wrap=not wraps)  # else a file or a pipe gets lines as they are
+    wraps = (sys.stderr if json_target == "-" else sys.stdout).isatty()  # a file or a pipe gets lines as they are
+    return Terminal(stderr=json_target == "-", soft_wrap=not wraps)
 
 
 def table(
