@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ctcr.arrays import Array, Mask
+from ctcr import settings
+from ctcr.arrays import Array, Integers, Mask, evenly
 from ctcr.conventions import tips
-from ctcr.conventions.calibrated import Calibrated
+from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import POSE, QUATERNION, Change
 from ctcr.effects import catalogue
@@ -16,8 +17,8 @@ from ctcr.table.measurements import Measurements
 
 
 def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
-    """Runs whose poses fit the joints of the row before far better than their own. Rows that follow one another faster
-    than a tracker may lag are none: there the delay is an effect."""
+    """Runs whose poses fit the joints of the row before, and their own not at all: friction, by which a tip follows
+    late, leaves more. Rows that follow one another faster than a tracker may lag are none: that delay is an effect."""
     lags = catalogue.names_with("lag", readings.n_tubes)
     longest = max(catalogue.parameter_of(readings.n_tubes)[name].hard[1] for name in lags)
     same = np.diff(readings.run) == 0
@@ -26,13 +27,17 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
     if not (len(steps) and np.median(steps) > longest):
         return None
     after = 1 + np.flatnonzero(same & np.isfinite(readings.positions[1:]).all(axis=1))
-    positions = points_to_tracker(fit.robot.tracker, tips.predicted(fit.robot, readings))
-    own, before = (
-        replace(fit, error=np.linalg.norm(readings.positions[after] - positions[rows], axis=1))
-        for rows in (after, after - 1)
-    )
     runs = readings.run[after]
-    late = [run for run in np.unique(runs) if before.at(runs == run).beats(own.at(runs == run))]
+    own, before = _errors(fit, readings, after)
+    late = [int(run) for run in np.unique(runs) if before.at(runs == run).beats(own.at(runs == run))]
+    if not late:
+        return None
+    moved = _moved_up(late)(readings)
+    located = np.flatnonzero(np.isfinite(moved.positions).all(axis=1))
+    there = calibrated(fit.robot, moved.rows(located[evenly(len(located), settings.CONVENTION_ROWS)]))
+    own, before = _errors(there, readings, after)
+    left = [np.max(before.at(runs == run).left_of(own.at(runs == run))) for run in late]
+    late = [run for run, share in zip(late, left, strict=True) if share < settings.CONVENTION_CONSTANT]
     if not late:
         return None
     rows = np.isin(runs, late)
@@ -40,7 +45,14 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
     fix = "move the pose fields of these runs up by a row, or log the reading that follows each motion"
     columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
     rms = own.at(rows).rms_mm, before.at(rows).rms_mm
-    return Finding("stale", text, columns, fix, runs=[int(run) for run in late], rms_mm=rms), _moved_up(late)
+    return Finding("stale", text, columns, fix, runs=late, rms_mm=rms), _moved_up(late)
+
+
+def _errors(fit: Calibrated, readings: Measurements, after: Integers) -> tuple[Calibrated, Calibrated]:
+    """A calibration with the errors of some readings against the joints of their own rows, and of the rows before."""
+    positions = points_to_tracker(fit.robot.tracker, tips.predicted(fit.robot, readings))
+    own, before = (np.linalg.norm(readings.positions[after] - positions[rows], axis=1) for rows in (after, after - 1))
+    return replace(fit, error=own), replace(fit, error=before)
 
 
 def _moved_up(late: list[int]) -> Change:
