@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from ctcr.errors import InputError, Problem, file_faults
 
-MAX_BYTES = 64 << 20  # of what is parsed as a whole, which takes many times its size of memory
+MAX_BYTES = 64 << 20  # of an input that is parsed as a whole: that takes many times its size in memory
 
 _fingerprints: dict[str, str] = {}
 

@@ -31,7 +31,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     prediction = None if table.refusal else predict(robot.standard, readings, steps=steps)
     if prediction is None or (found.wrong and not np.isfinite(prediction.position).any()):
         robot, readings = found.robot, found.readings
-        corrected = ["as they are, table and robot file cannot be compared: all that follows is of corrected ones"]
+        corrected = ["table and robot file cannot be compared as they are: all that follows is of corrected ones"]
         prediction = predict(robot.standard, readings, steps=steps)
     readings, excluded = without_false_poses(robot, readings, found, prediction.position)
     robot, placed = sensor_pose.placed(robot, readings)

@@ -15,13 +15,15 @@ from ctcr.robot.description import Robot
 from ctcr.show.wording import listed, sentence
 from ctcr.table.measurements import Measurements, check_of
 
+LOOK_FIRST = "look at the robot file first: what follows may come of it"  # where values in it look wrong
+
 
 class WrongConventions(InputError):
     """A table or a robot file that follows other conventions than the format says; `review` holds them."""
 
     def __init__(self, robot: Robot, found: Review, wrong: list[Finding], table: Measurements):
         doubts, said = robot_file.warnings(robot), [Problem(one.sentence, table.source) for one in wrong]
-        first = [*doubts, Problem("look at the robot file first: what follows may come of it")] if doubts else []
+        first = [*doubts, Problem(LOOK_FIRST)] if doubts else []
         advice = "a fit would take that for physics: correct it first, or go on with --anyway (anyway=True)"
         super().__init__([*first, *said, Problem(advice)])
         self.review = found

@@ -10,7 +10,7 @@ from ctcr.commands import options
 ROWS = 20_000
 REPEATS = 5
 SECONDS = 1.0  # that a repeat may take: the model gives some configurations up only after many iterations
-SAMPLE = 100  # configurations that tell how many that are
+SAMPLE = 100  # configurations that are timed first, to choose how many a repeat takes
 
 
 @click.command(name="bench")
@@ -23,7 +23,7 @@ def command(robot: str | None, out) -> None:
     times mean nothing across machines. The benchmark of the library itself, with instruction counts and the rival,
     is `tools/dev bench`.
 
-    Where ROBOT is slow, there are fewer configurations.
+    A robot that is slow to solve gets fewer configurations.
 
     Example: ctcr bench robot.yaml
     """

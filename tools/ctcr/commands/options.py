@@ -172,15 +172,17 @@ def load_any(robot: str, table: str):
 
 def doubtful(loaded, path: str, in_full: bool = False) -> list[str]:
     """A line on the values of a robot file that look wrong; none where none do. In full: a line for each."""
+    from ctcr.api.reviewed import LOOK_FIRST
     from ctcr.robot import robot_file
-    from ctcr.show.wording import counted
+    from ctcr.show.wording import counted, sentence
 
     doubts = robot_file.warnings(loaded)
+    if not doubts:
+        return []
+    if in_full:
+        return [sentence(LOOK_FIRST), *(f"Doubt: {doubt}" for doubt in doubts)]
     look = "looks" if len(doubts) == 1 else "look"
-    lines = [f"{counted(len(doubts), 'value')} {look} wrong in the robot file: ctcr info {path}"] if doubts else []
-    if doubts and in_full:
-        lines = ["Look at the robot file first: what follows may come of it.", *(f"Doubt: {d}" for d in doubts)]
-    return lines
+    return [f"{counted(len(doubts), 'value')} {look} wrong in the robot file: ctcr info {path}"]
 
 
 def with_effects(robot, given):

@@ -11,7 +11,6 @@ from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
 from ctcr.model import parameters
-from ctcr.model.parameters import value_at
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join, listed
@@ -178,13 +177,13 @@ def _units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
 
 
 def _file_units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
-    """The values of the robot file that would be usual ones in another unit, all of them in that."""
+    """All values of the robot file that are unusual in their unit and usual in another one, converted from that."""
     mended, fields, units = robot.model_copy(deep=True), [], []
     for path, quantity, value in robot.unusual():
         if (meant := quantity.meant(value)) is None:
             continue
         unit, size = meant
-        section, last = value_at(mended, path[:-1]), path[-1]
+        section, last = parameters.value_at(mended, path[:-1]), path[-1]
         if isinstance(last, int):
             section[last] = size * value
         else:

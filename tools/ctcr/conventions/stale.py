@@ -17,8 +17,11 @@ from ctcr.table.measurements import Measurements
 
 
 def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
-    """Runs whose poses fit the joints of the row before, and their own not at all: friction, by which a tip follows
-    late, leaves more. Rows that follow one another faster than a tracker may lag are none: that delay is an effect."""
+    """Runs whose poses fit the joints of the row before, and do not fit their own.
+
+    Friction makes the tip follow late too, but leaves a larger error. Rows that are closer in time than the longest lag
+    of a tracker are not tested: their delay is an effect.
+    """
     lags = catalogue.names_with("lag", readings.n_tubes)
     longest = max(catalogue.parameter_of(readings.n_tubes)[name].hard[1] for name in lags)
     same = np.diff(readings.run) == 0

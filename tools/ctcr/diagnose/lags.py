@@ -6,6 +6,7 @@ lag of its own with a normal prior, correlated between segments that are close i
 at a fit; where the data ask for lags, they are noise.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,12 +132,7 @@ def lags_of(engine: Engine, fit: Fit) -> Lags | None:
     columns = np.empty((len(plain.residual), len(each)))
     for some in np.array_split(each, max(1, len(each) // settings.SEGMENTS_AT_ONCE)):
         columns[:, some] = fit.whiten(derivative[:, :, None] * (segment[:, None] == some)[:, None, :])
-    middle = np.array([time[segment == k].mean() for k in each])
-    apart = np.abs(middle[:, None] - middle)
-    roots = []
-    for part in settings.LAG_CORRELATION:
-        alike = np.exp(-apart / (part * np.ptp(time))) if part else np.eye(len(each))
-        roots.append(spread * np.linalg.cholesky(alike + 1e-9 * np.eye(len(each))))
+    roots = [spread * root for root in _correlations(time, segment)]
 
     def with_scatter(part: float) -> Lags:
         scatter = Scatter(fit, part * spread * derivative)
@@ -152,13 +148,22 @@ def lags_of(engine: Engine, fit: Fit) -> Lags | None:
     return max(map(with_scatter, settings.LAG_SCATTER), key=lambda lags: lags.explained[0])
 
 
+def _correlations(time: Array, segment: Integers) -> Iterator[Array]:
+    """Roots of the correlation matrices that lags of segments may have, by the times (M,) [s] of their rows."""
+    middle = np.array([time[segment == k].mean() for k in range(segment.max() + 1)])
+    apart, none = np.abs(middle[:, None] - middle), np.eye(len(middle))
+    for part in settings.LAG_CORRELATION:
+        alike = np.exp(-apart / (part * np.ptp(time))) if part else none
+        yield np.linalg.cholesky(alike + 1e-9 * none)
+
+
 class Scatter:
-    """Noise of independent lags of single readings. No smooth field follows what changes from one reading to the next,
-    so it plays no part."""
+    """Noise of independent lags of single readings. The smooth field error is left out: it cannot follow what changes
+    from one reading to the next."""
 
     def __init__(self, fit: Fit, late: Array) -> None:
         """late (M, 6): change of the residual by one standard deviation of the lag."""
-        numbers = np.flatnonzero(np.repeat(fit.weights > 0, 3, axis=1))
+        numbers = fit.fitted_numbers
         jitter = fit.inflation * [fit.noise.position_jitter, fit.noise.rotation_jitter]
         self._late = (late * np.repeat(np.sqrt(fit.weights) / jitter, 3, axis=1)).ravel()[numbers]
         self._first, self._row = np.unique(numbers // 6, return_index=True, return_inverse=True)[1:]
@@ -169,7 +174,7 @@ class Scatter:
         return np.add.reduceat(of_numbers, self._first)
 
     def whiten(self, columns: Array) -> Array:
-        """Columns (K, k), whitened but for these lags, with them."""
+        """Columns (K, k) that are whitened without these lags, whitened with them too."""
         along = self._sums(self._late[:, None] * columns)
         shrink = 1 / (1 + self._variance + np.sqrt(1 + self._variance))
         return columns - self._late[:, None] * (shrink[:, None] * along)[self._row]
@@ -183,10 +188,9 @@ class Scatter:
         moved = -there.imitation_by(there.jacobian.T @ there.residual + shift)
         there.residual = there.residual + there.jacobian @ moved
         before, after = (of.residual @ of.residual + at @ at for of, at in ((plain, shift), (there, shift + moved)))
-        determinants = (
-            2 * np.log(np.diag(there.cholesky) / np.diag(plain.cholesky)).sum() + np.log1p(self._variance).sum()
-        )
-        return there, (0.5 * float(before - after - determinants), float(before - after))
+        posterior = 2 * np.log(np.diag(there.cholesky) / np.diag(plain.cholesky)).sum()
+        evidence = 0.5 * (before - after - posterior - np.log1p(self._variance).sum())
+        return there, (float(evidence), float(before - after))
 
 
 def segments(measurements: Measurements) -> Integers:

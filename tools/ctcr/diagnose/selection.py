@@ -231,8 +231,8 @@ class Selection:
                 break
         self.fit, best, freed = max(ended, key=lambda end: end[0].log_evidence)
         if self.fit is not fit:
-            judged = [Judged.of(self.engine, one) for one in (fit, freed)]
-            more = judged[0].fraction_explained(judged[1], len(freed.names) - len(fit.names))
+            before, after = Judged.of(self.engine, fit), Judged.of(self.engine, freed)
+            more = before.fraction_explained(after, len(freed.names) - len(fit.names))
             explained = best.explained + (1 - best.explained) * more
             one.best = replace(best, fit=freed.without_readings(), explained=explained)
             one.beside += (1 - one.beside) * more

@@ -152,8 +152,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     of a tube, of all of it. Those that are sure alone."""
     residual, jacobian = fit.whitened()
     linear, jacobian = engine.linear(fit), jacobian * fit.prior_sd
-    numbers = np.flatnonzero(np.repeat(fit.weights > 0, 3, axis=1).ravel())
-    run = engine.measurements.run[numbers // 6]
+    run = engine.measurements.run[fit.fitted_numbers // 6]
     of_run = (run[:, None] == np.unique(run)) * settings.SESSION_PRIOR_WIDER
     of_tubes = [name for name in fit.names if name.startswith("tubes.")]
     groups = [home_names(engine.robot.n_tubes), *([name] for name in of_tubes)]

@@ -246,7 +246,7 @@ class Fit:
         """Columns (M, 6) or (M, 6, k) with the noise of the fit made independent and of unit variance, (K, k), of the K
         numbers that were fitted."""
         columns = np.asarray(columns, dtype=float)
-        return self.core.whiten(columns.reshape(6 * len(columns), -1))[self._fitted_numbers]
+        return self.core.whiten(columns.reshape(6 * len(columns), -1))[self.fitted_numbers]
 
     def whitened(self) -> tuple[Array, Array]:
         """Whitened residual (K,) and its derivative (K, n) by the parameters; the prior is not in it."""
@@ -260,7 +260,8 @@ class Fit:
         return np.where(self.used[:, None], derivative, 0.0)
 
     @cached_property
-    def _fitted_numbers(self) -> Integers:
+    def fitted_numbers(self) -> Integers:
+        """Which (K,) of the 6 M numbers of `residual` were fitted."""
         return np.flatnonzero(np.repeat(self.weights > 0, 3, axis=1))
 
 

@@ -203,16 +203,3 @@ def _moment(text: str, form: str) -> datetime | None:
         return datetime.fromisoformat(text) if form == _ISO else datetime.strptime(text, form)
     except ValueError:
         return None
-
-
-def runs(seconds: Array, notes: list[str]) -> Array:
-    """Runs (M,) by times alone. One begins where the clock starts again, nearer to the first time of the last run than
-    to its end, and goes on from there. Rows that are out of order, or go back in time, begin none."""
-    first, made = 0, np.zeros(len(seconds))
-    for i in np.flatnonzero(seconds[1:] < seconds[:-1]) + 1:
-        last, after = seconds[i - 1], seconds[i + 1 : i + 2]
-        if 2 * seconds[i] < seconds[first] + last and ((seconds[i] <= after) & (after < last)).any():
-            first, made[i:] = i, made[i] + 1
-    if first:
-        notes.append(f"times start again: {int(made[-1]) + 1} runs")
-    return made

@@ -202,11 +202,24 @@ def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None
 
 def _runs(columns: Columns, t: Array) -> Array:
     if not columns.has("run"):
-        return fields.runs(t, columns.notes)
+        return _runs_by_time(t, columns.notes)
     run, texts = fields.labels(columns.log, columns.mapping.used["run"].column, columns.faults)
     if texts:
         columns.notes.append("runs: " + listed([f"{i} = {text or '(empty)'}" for i, text in enumerate(texts)]))
     return run
+
+
+def _runs_by_time(t: Array, notes: list[str]) -> Array:
+    """Runs (M,) of a log that names none. A run begins where the clock starts again, nearer to the first time of the
+    last run than to its end, and goes on from there. Rows out of order, or back in time, begin none."""
+    first, made = 0, np.zeros(len(t))
+    for i in np.flatnonzero(t[1:] < t[:-1]) + 1:
+        last, after = t[i - 1], t[i + 1 : i + 2]
+        if 2 * t[i] < t[first] + last and ((t[i] <= after) & (after < last)).any():
+            first, made[i:] = i, made[i] + 1
+    if first:
+        notes.append(f"times start again: {int(made[-1]) + 1} runs")
+    return made
 
 
 def _weight(columns: Columns, robot: Robot | None) -> Array:

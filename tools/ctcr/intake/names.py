@@ -84,7 +84,8 @@ class Meaning:
 
 
 def with_middle(names: tuple[str, ...]) -> list[str]:
-    """The names, in which a lone m is spelled out that stands where others have i and o: the middle tube, no metre."""
+    """The names, with a lone m spelled out as middle where other names have an i and an o in its place: there it is the
+    middle tube, and not metres."""
     made = []
     for name in names:
         places = [found.start() for found in re.finditer(r"(?<![^\W_])m(?![^\W_])", name)]

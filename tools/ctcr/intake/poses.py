@@ -81,8 +81,8 @@ def off_rotation(matrices: Array) -> Array:
 
 
 def unseen(pose: Pose) -> Mask:
-    """Rows (M,) in which the tracker saw nothing: a missing position, or one number thrice with no rotation: 0 or -1
-    stand for missing there."""
+    """Rows (M,) in which the tracker saw nothing. The position is missing, or its three numbers are equal and there is
+    no rotation: programs write 0 or -1 for missing."""
     missing = ~np.isfinite(pose.position).all(axis=1)
     word = (pose.position == pose.position[:, :1]).all(axis=1)
     if pose.quaternion is None:
