@@ -9,20 +9,21 @@ execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARI
                 OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 find_package(nanobind CONFIG REQUIRED)
 
-# What takes long to compile, for 1 to 4 tubes.
-foreach(part systems control model recording)
-  string(TOUPPER ${part} PART)
-  foreach(tubes 1 2)
-    math(EXPR more_tubes "${tubes} + 2")
-    set(instance ${CMAKE_CURRENT_BINARY_DIR}/_core/${part}_of_${tubes}_${more_tubes}.cpp)
-    configure_file(tools/ctcr/_core/instantiate.cpp.in ${instance} @ONLY)
-    list(APPEND sources ${instance})
+# What takes long to compile, a file for each number of tubes. The other sources know these numbers too.
+set(CTCR_TUBES 1 2 3 4 CACHE STRING "Numbers of tubes of the robots that the Python module models, of 1 to 4")
+foreach(tubes IN LISTS CTCR_TUBES)
+  foreach(part solvers models)
+    set(instance ${CMAKE_CURRENT_BINARY_DIR}/_core/${part}_of_${tubes}.cpp)
+    configure_file(tools/ctcr/_core/${part}_of_n.cpp.in ${instance} @ONLY)
+    list(APPEND instances ${instance})
   endforeach()
 endforeach()
+list(JOIN CTCR_TUBES "," tubes)
+set_source_files_properties(${sources} PROPERTIES COMPILE_DEFINITIONS CTCR_TUBES=${tubes})
 
 # add_core(TARGET FOLDER [OPTION...]): the module, compiled with these options, installed into FOLDER.
 function(add_core target folder)
-  nanobind_add_module(${target} NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources})
+  nanobind_add_module(${target} NB_STATIC NOMINSIZE NB_DOMAIN ctcr ${sources} ${instances})
   set_target_properties(${target} PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/${target})
   target_include_directories(${target} PRIVATE tools/ctcr/_core)
   target_link_libraries(${target} PRIVATE ctcr::calibration ctcr_flags)

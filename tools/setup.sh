@@ -90,13 +90,16 @@ import functools, sys, tomllib
 print(*functools.reduce(dict.get, sys.argv[1:], tomllib.load(open("pyproject.toml", "rb"))), sep="\n")' "$@"
 }
 
-# install_project [OPTION...] -e WHAT: Python sources are used from the tree, the extension is compiled (again).
+# install_project TUBES [OPTION...] -e WHAT: Python sources are used from the tree; the extension is compiled (again) for
+# robots of these numbers of tubes.
 install_project() {
-  pip_install --no-build-isolation --config-settings build-dir=build/python "$@"
+  pip_install --no-build-isolation --config-settings build-dir=build/python --config-settings "cmake.define.CTCR_TUBES=$1" "${@:2}"
 }
+all_tubes="1;2;3;4"
 
 environment_hash() { { pwd; hash_of pyproject.toml tools/setup.sh; } | sha256sum; }
 extension_hash() { hash_of pyproject.toml CMakeLists.txt cmake include tools/ctcr/_core; }
+demonstration_hash() { environment_hash; extension_hash; }
 
 is_stamped() { [ -f ".venv/.$1" ] && [ "$(cat ".venv/.$1")" = "$($1)" ]; }
 
@@ -108,7 +111,8 @@ stamped() {
   echo "$value" >".venv/.$1"
 }
 
-environment() {
+# An environment that can compile the project.
+virtual_environment() {
   system_packages
   local python packages
   python=$(find_python) || { echo "Python 3.11 or newer is needed, with venv and its C headers" >&2; return 1; }
@@ -116,16 +120,35 @@ environment() {
   .venv/bin/python -m pip --version >/dev/null 2>&1 || "$python" -m venv --clear .venv
   mapfile -t packages < <(requirements build-system requires)
   pip_install "${packages[@]}"
-  stamped extension_hash install_project -e '.[dev]'
+}
+
+environment() {
+  virtual_environment
+  stamped extension_hash install_project "$all_tubes" -e '.[dev]'
   # Programs of others that the simulated devices are tested with; the tests say what they skip without them.
   pip_install ndicapi scikit-surgerynditracker kickcat >/dev/null 2>&1 || echo "not installed: ndicapi and others"
 }
 
+is_set_up() { is_stamped environment_hash && .venv/bin/python -c ''; }
+
 setup() {
-  if ! { is_stamped environment_hash && .venv/bin/python -c ''; } 2>/dev/null; then
+  if ! is_set_up 2>/dev/null; then
     stamped environment_hash environment
   elif ! is_stamped extension_hash; then
     say "extension module"
-    stamped extension_hash install_project --no-deps -e .
+    stamped extension_hash install_project "$all_tubes" --no-deps -e .
+  fi
+}
+
+# What the demonstration needs takes half as long: models of its three tubes, and no packages of developers.
+small_environment() {
+  virtual_environment
+  install_project 3 -e .
+}
+setup_for_demonstration() {
+  if is_set_up 2>/dev/null; then
+    setup
+  elif ! is_stamped demonstration_hash 2>/dev/null; then
+    stamped demonstration_hash small_environment
   fi
 }

@@ -208,7 +208,7 @@ def test_bad_steps():
 
 def test_core_refusals():
     """The compiled model refuses arrays that do not fit together."""
-    with pytest.raises(ValueError, match="1 to 4 tubes"):
+    with pytest.raises(ValueError, match="of 5 tubes"):
         _core.Model(5, np.zeros(48))
     with pytest.raises(ValueError, match="do not fit"):
         _core.Model(2, np.zeros(12))

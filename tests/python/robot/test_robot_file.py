@@ -210,6 +210,13 @@ def test_impossible_values():
     assert [problem.field for problem in problems] == ["tubes[0].length_mm"]
 
 
+def test_compiled_for_other_tubes(monkeypatch):
+    """A robot of a number of tubes that the compiled module does not model: the file is right, and ctcr lacks it."""
+    monkeypatch.setattr(robot_file._core, "TUBES", (1, 2))
+    with pytest.raises(InputError, match="compiled here for robots of 1 or 2 tubes"):
+        parse(TEXT)
+
+
 def test_no_warnings():
     """The example has none."""
     assert robot_file.warnings(parse(TEXT)) == []

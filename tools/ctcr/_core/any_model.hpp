@@ -57,7 +57,7 @@ public:
                                                         bool all) const = 0;
 };
 
-/// Defined for N = 1..4.
+/// Defined for modelled_tubes.
 /// @param parameters  of tubes and gravity, the first of ParameterVector<N>   @param effects  values of all of the catalogue; empty: the standard model
 template <int N>
 std::unique_ptr<AnyModel> make_model(const Eigen::VectorXd& parameters, const Eigen::VectorXd& effects);

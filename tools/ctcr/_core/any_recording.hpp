@@ -74,7 +74,7 @@ struct CatalogueEntry {
   std::vector<std::map<std::string, double>> starts;  ///< values of parameters; may be empty
 };
 
-/// Defined for N = 1..4.
+/// Defined for modelled_tubes.
 /// @throws std::invalid_argument unless the arrays fit together
 template <int N>
 std::unique_ptr<AnyRecording> make_recording(const Table& table);

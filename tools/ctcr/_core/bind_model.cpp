@@ -1,6 +1,7 @@
 // Model: poses and shapes of a robot. Use ctcr.model, which names and shapes the arrays.
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/tuple.h>
@@ -72,7 +73,7 @@ NB_MODULE(_core, m) {
   using ctcr::Status;
   m.doc() =
       "The compiled library: arrays of SI values in and out. Use the packages of ctcr, which name and check them.";
-  m.attr("MAX_TUBES") = max_tubes;
+  m.attr("TUBES") = nb::tuple(nb::cast(modelled_tubes));
 
   nb::enum_<Status>(m, "Status", nb::is_arithmetic(), "What came of a solution; see status_text.")
       .value("ok", Status::ok)

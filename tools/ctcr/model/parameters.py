@@ -19,7 +19,7 @@ from ctcr import _core, settings
 from ctcr.arrays import Array
 from ctcr.effects import catalogue
 from ctcr.errors import ArgumentError, InputError, Problem, did_you_mean
-from ctcr.robot.description import MAX_TUBES, Robot
+from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
 
 GROUPS = {  # short names
@@ -92,7 +92,7 @@ def names_of(n_tubes: int) -> tuple[str, ...]:
 def _fields() -> dict[str, Field]:
     """The field of every parameter of any robot."""
     found = {}
-    for p in _core.robot_parameters(MAX_TUBES):
+    for p in _core.robot_parameters(max(_core.TUBES)):
         path, unit, factor = _FIELDS[p.kind]
         path = path and tuple(p.index if step == "#" else step for step in path)
         found[p.name] = Field(path, unit, factor, p.lowest, p.highest)
@@ -103,7 +103,7 @@ def field_of(name: str) -> Field:
     """The field of a parameter such as "tubes.2.length", "tracker.rotation.x" or one of an effect."""
     if name in _fields():
         return _fields()[name]
-    of_effects = catalogue.parameter_of(MAX_TUBES)
+    of_effects = catalogue.parameter_of(max(_core.TUBES))
     return Field(None, of_effects[name].unit if name in of_effects else "", 1.0)
 
 

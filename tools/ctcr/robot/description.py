@@ -28,7 +28,7 @@ from ctcr.robot.yaml_document import FieldPath, YamlDocument
 from ctcr.show.result import Glance, Shown
 from ctcr.show.wording import counted
 
-MAX_TUBES = 4  # the compiled model covers 1 to 4
+MAX_TUBES = 4  # of a robot that ctcr can be compiled for
 AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plate so far in front of it
 
 Three = Annotated[list[float], Len(3, 3)]

@@ -48,6 +48,10 @@ def _robot(document: YamlDocument) -> Robot:
     faults = checks.faults(document.data, errors) + _unknown_effects(document.data)
     if robot is None or faults:
         raise InputError(checks.problems(faults, document))
+    if robot.n_tubes not in _core.TUBES:
+        tubes = " or ".join(map(str, _core.TUBES))
+        text = f"ctcr is compiled here for robots of {tubes} tubes; in a checkout, tools/dev setup compiles it for all"
+        raise InputError(Problem(text, document.file, field="tubes"))
     robot._source = document
     return robot
 
