@@ -1,8 +1,9 @@
 """How often `ctcr compare` names wrong conventions right, and none where there is none, on random robots.
 
 Sessions of the model and of the oracle: robots with one to four tubes, with and without smooth errors of the field,
-hidden effects, loads, wrong data sheets and orientations, in few and many rows. Of three one has no fault, one has one,
-one has two. Even seeds are for tuning, odd ones for reporting. Writes docs/convention_study.md with --keep.
+hidden effects, loads, wrong data sheets and orientations, in few and many rows. Of four one has no fault, one has one,
+one has two, one has one in some of its runs alone. Even seeds are for tuning, odd ones for reporting. Writes
+docs/convention_study.md with --keep.
 """
 
 import argparse
@@ -26,6 +27,8 @@ SAME_ERROR = 1.1  # of a corrected table over that of the right one: another 10 
 FROM_ORACLE = 0.25  # fraction of the sessions
 ORACLE_EFFECTS = ("backlash_rotation", "tip_load", "sensor_offset", "clearance", "periodic_rotation", "frame_jump")
 HALVES = ("tuning", "reporting")
+ASKED = ((0, False), (1, False), (2, False), (1, True))  # faults, and whether of some runs alone
+OF_RUNS_ALONE = ", of some runs alone"
 
 
 @dataclass(frozen=True)
@@ -75,21 +78,28 @@ def oracle_case(random: np.random.Generator):
 def judge(seed: int) -> Answer:
     """The answer on the session of a seed."""
     from ctcr.conventions import review
-    from wrong_conventions import DRAWN, faults, mended, right_case, spoiled
+    from wrong_conventions import DRAWN, OF_RUNS, faults, in_some_runs, mended, right_case, spoiled
 
-    random, number, kinds = np.random.default_rng([31, seed]), seed // 2 % 3, [*DRAWN]
-    draw, first = right_case if random.random() > FROM_ORACLE else oracle_case, kinds[seed // 6 % len(kinds)]
-    while (case := draw(random)) is None or (number and not faults(random, case, [first])):
-        pass  # no equilibrium, or no room for this fault
+    random, (number, of_runs) = np.random.default_rng([31, seed]), ASKED[seed // 2 % len(ASKED)]
+    kinds = [*(OF_RUNS if of_runs else DRAWN)]
+    draw, first = right_case if random.random() > FROM_ORACLE else oracle_case, kinds[seed // 8 % len(kinds)]
     others = random.permutation([kind for kind in kinds if kind != first]).tolist()
-    wrong = faults(random, case, [first, *others])[:number]
+
+    def drawn(case):
+        if of_runs:
+            return [*filter(None, [in_some_runs(random, case, first)])]
+        return faults(random, case, [first, *others])[:number]
+
+    while (case := draw(random)) is None or len(wrong := drawn(case)) < number:
+        pass  # no equilibrium, or no room for such faults
     bad = spoiled(case, wrong)
     found = review(bad.robot, bad.readings)
-    named = len(found.findings) == number and all(any(map(one.agrees, found.findings)) for one in wrong)
+    named = len(found.findings) == len(wrong) and all(any(map(one.agrees, found.findings)) for one in wrong)
     texts = (f"{' '.join((one.kind, *one.columns))} {one.runs or ''}".strip() for one in wrong)
     about = f"{case.about}: {'; '.join(texts) or 'nothing wrong'}"
     said = tuple(one.sentence for one in found.findings)
-    return Answer(seed, about, tuple(one.kind for one in wrong), named, mended(case, found), said)
+    kinds = tuple(one.kind + OF_RUNS_ALONE * of_runs for one in wrong)
+    return Answer(seed, about, kinds, named, mended(case, found), said)
 
 
 def study(seeds: Iterable[int], tell=print) -> Iterator[Answer]:
@@ -120,11 +130,13 @@ def summary(answers: list[Answer]) -> str:
         lines += ["", f"## {half.capitalize()} half", "", "| wrong | named | named and corrected |", "|---|---|---|"]
         groups = {"nothing": [one for one in mine if not one.wrong]}
         groups |= {
-            "one": [one for one in mine if len(one.wrong) == 1],
+            "one": [one for one in mine if len(one.wrong) == 1 and not one.wrong[0].endswith(OF_RUNS_ALONE)],
             "two": [one for one in mine if len(one.wrong) == 2],
+            "one, of some runs alone": [one for one in mine if one.wrong and one.wrong[0].endswith(OF_RUNS_ALONE)],
         }
         for kind in sorted({kind for one in mine for kind in one.wrong}):
-            groups[f"`{kind}`, alone or with another"] = [one for one in mine if kind in one.wrong]
+            name = kind if kind.endswith(OF_RUNS_ALONE) else f"{kind}, alone or with another"
+            groups[name] = [one for one in mine if kind in one.wrong]
         for name, group in groups.items():
             hits = [wilson(sum(getattr(one, what) for one in group), len(group)) for what in ("named", "right")]
             lines.append(f"| {name} | {' | '.join(hits)} |")
@@ -133,7 +145,7 @@ def summary(answers: list[Answer]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sessions", type=int, default=600)
+    parser.add_argument("--sessions", type=int, default=800)
     parser.add_argument("--half", choices=HALVES, help="this half alone")
     parser.add_argument("--keep", action="store_true")
     given = parser.parse_args()

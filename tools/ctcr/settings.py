@@ -113,7 +113,9 @@ ONE_SIDED_GAIN = 0.5  # log evidence that a restart across a kink must gain
 
 SESSION_EXPLAINED = 0.25  # fraction of the unexplained chi-square that terms of each run must explain: less is physics
 SESSION_PRIOR_WIDER = 10.0  # prior sd of the frame and the homes of a run over that of the robot file's
-SESSION_PARTS = (1.0, 0.3, 0.1, 0.03)  # of that sd, which the scatter of the runs about the typical one may have
+# Of that sd, which the scatter of the runs about the typical one may have: from less than the file states to a tracker
+# that stood elsewhere in the room.
+SESSION_PARTS = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1, 0.03)
 SESSION_ALIGNMENTS = 6  # Gauss-Newton steps that align the runs before the first fit
 SESSION_ROWS = 600  # rows on which runs are compared, spread over all runs
 
@@ -192,6 +194,7 @@ SMOOTH_SIZES = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4)  # [m] standard deviations an axis
 
 SURPRISE = 3.0  # error over its expected size, from which a reading is an outlier
 MOST_OUTLIERS = 0.01  # fraction of outliers beyond which the model may be wrong and not the readings
+MOST_OF_A_RUN = 0.5  # fraction of outliers in a run from which it is the run that is unlike the others
 MANY_OUTLIERS = 0.1  # ... and beyond which it hardly can be right
 OUTLIERS_LEFT = 0.5  # outliers with effects over those without, above which the effects do not explain them
 HARDLY_EXPLAINED = 0.4  # fraction of the unexplained chi-square below which the first effect does not explain outliers
@@ -258,7 +261,8 @@ CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts 
 CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between
 CONVENTION_SHIFTS_MM = (20, 40, 80)  # of home translations
 CONVENTION_RUNS = 0.9  # quantile of the typical errors of the other runs, which a run homed elsewhere exceeds
-CONVENTION_SCAN = {"alpha": 3.15, "beta": 0.05}  # [rad], [m] offsets of a run that are looked for: all, and a large one
+# Offsets of a run that are looked for: [rad] all, [m] large ones, and the logarithm of the factor on a curvature.
+CONVENTION_SCAN = {"alpha": 3.15, "beta": 0.05, "curvature": 0.7}
 CONVENTION_SCAN_POINTS, CONVENTION_SCANS = 25, 3  # of a grid, and of grids, each within two points of the one before
 MOST_CONVENTIONS = 4  # findings of a kind that are looked for, one after another
 JOINT_SPEED, JOINT_SPEED_FACTOR = 0.2, 7.0  # [rad/s] usual speed of joints, and factor of one standard deviation

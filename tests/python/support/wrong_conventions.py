@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from conventions_bench import design, session
+from ctcr import settings
 from ctcr.conventions import tips
 from ctcr.conventions.calibrated import calibrated
 from ctcr.conventions.hypotheses import with_frame
@@ -50,7 +51,7 @@ class Fault:
     runs: tuple[int, ...] = ()
 
     def agrees(self, finding) -> bool:
-        of_runs = tuple(finding.runs) if self.kind == "run_offset" else ()
+        of_runs = () if self.kind == "frozen" else tuple(finding.runs)
         return (finding.kind, sorted(finding.columns), of_runs) == (self.kind, sorted(self.columns), self.runs)
 
 
@@ -125,11 +126,13 @@ def spoiled(case: Case, wrong: Sequence[Fault]) -> Case:
 
 def _shows(case: Case, wrong: Fault) -> bool:
     """Whether a fault of joints or loads moves the predicted positions by more than a right table leaves of errors."""
-    if not wrong.kind.startswith(("joint", "force", "run")):
+    if not wrong.kind.startswith(("joint", "force", "run", "tube")):
         return True
     bad = wrong.spoil(case)
     moved = np.linalg.norm(tips.predicted(bad.robot, bad.readings) - tips.predicted(case.robot, case.readings), axis=1)
     moved = np.nan_to_num(moved, nan=np.inf)  # it cannot be predicted at all
+    if wrong.kind == "tube_changed":
+        moved = np.nan_to_num(np.linalg.norm(bad.readings.position - case.readings.position, axis=1))
     rows, error = moved > 0, calibrated(case.robot, case.readings).error
     return bool(rows.any() and np.mean(moved[rows] ** 2) > np.nanmean(error[rows] ** 2))
 
@@ -275,6 +278,47 @@ def _frozen(random, case):
     return Fault("frozen", sum(columns, ()), in_table(spoil)) if len(rows) else None
 
 
+def _tube_changed(random, case):
+    """Another tube, of another curvature."""
+    tube, factor = int(random.integers(case.robot.n_tubes)), float(random.choice([0.75, 1.3]))
+
+    def spoil(m):
+        tubes = list(case.robot.tubes)
+        tubes[tube] = tubes[tube].model_copy(update={"curvature_per_m": factor * tubes[tube].curvature_per_m})
+        new, old = (tips.predicted(r, m) for r in (case.robot.model_copy(update={"tubes": tubes}), case.robot))
+        move = (new - old) @ case.robot.tracker.rotation.T
+        return replace(m, position=m.position + np.where(np.isfinite(move), move, 0.0))
+
+    return Fault("tube_changed", (), in_table(spoil))
+
+
+def in_some_runs(random: np.random.Generator, case: Case, kind: str) -> Fault | None:
+    """A fault of this kind in one run alone, or another tube in the last runs; None where there is no room for it."""
+    runs = np.unique(case.readings.run)
+    fault = OF_RUNS[kind](random, case) if len(runs) >= settings.FEWEST_RUNS else None
+    if fault is None:
+        return None
+    first = int(random.integers(len(runs) // 2 + 1, len(runs)))
+    some = runs[first:] if kind == "tube_changed" and random.random() < 0.5 else runs[[first]]
+
+    def spoil(m):
+        bad, here = fault.spoil(replace(case, readings=m)).readings, np.isin(m.run, some)[:, None]
+        parts = {name: getattr(m, name) for name in ("beta", "alpha", "force", "position", "quaternion")}
+        return replace(m, **{k: np.where(here, getattr(bad, k), old) for k, old in parts.items() if old is not None})
+
+    one = Fault(kind, fault.columns, in_table(spoil), tuple(map(int, some)))
+    return one if _shows(case, one) else None
+
+
+OF_RUNS = {
+    "joint_sign": _joint_sign,
+    "joint_unit": _joint_unit,
+    "joint_order": _joint_order,
+    "mirrored": _mirrored,
+    "force_sign": _force_sign,
+    "position_unit": _position_unit,
+    "tube_changed": _tube_changed,
+}
 DRAWN = {
     "joint_sign": _joint_sign,
     "joint_offset": _joint_offset,

@@ -1,6 +1,8 @@
 """The error of a hypothesis after all that a calibration may move: a short robust fit to few readings."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
@@ -124,6 +126,35 @@ def calibrated(
             if damping > settings.CONVENTION_MOST_DAMPING:
                 break
     return Calibrated(parameters.applied(robot, names, values), error, floor)
+
+
+def own_values(fit: Calibrated, readings: Measurements, patterns: Sequence[str]) -> Array:
+    """Values (R,) in prior standard deviations that one parameter would have to take in each run beside the others: of
+    those with such names the one that explains the readings best, linearised."""
+    names, mean, sd, _, _ = _priors(fit.robot, ())
+    residual, jacobian, _ = recording.recording_of(fit.robot, readings, names).residual(mean, True)
+    residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, len(names))[:, :3] * sd
+    solved = np.isfinite(residual).all(axis=1)
+    residual, jacobian = residual[solved], jacobian[solved]
+    runs, index = np.unique(readings.run, return_inverse=True)
+    of_run = (index[solved, None] == np.arange(len(runs))) * settings.CONVENTION_JUMP
+    best, found = np.inf, np.zeros(len(runs))
+    for p, name in enumerate(names):
+        if not any(fnmatchcase(name, pattern) for pattern in patterns):
+            continue
+        columns = np.concatenate([jacobian, jacobian[:, :, p, None] * of_run[:, None, :]], axis=2)
+        left, flat = residual, columns.reshape(-1, columns.shape[2])
+        for _ in range(settings.CONVENTION_ITERATIONS):
+            error = np.linalg.norm(left, axis=1)
+            size = max(float(np.median(error)), fit.floor, settings.CONVENTION_FINEST)
+            weight = np.repeat(3 / (size**2 + error**2), 3)[:, None]
+            information = flat.T @ (weight * flat) + np.eye(flat.shape[1])
+            moved = np.linalg.solve(information, flat.T @ (weight[:, 0] * residual.ravel()))
+            left = residual - (flat @ moved).reshape(-1, 3)
+        typical = replace(fit, error=np.linalg.norm(left, axis=1)).typical
+        if typical < best:
+            best, found = typical, moved[len(names) :]
+    return found
 
 
 def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:

@@ -53,6 +53,11 @@ class Hypothesis:
         return bool(self.of_positions or self.frame or self.registers)
 
     @property
+    def of_robot(self) -> bool:
+        """Whether it is of the robot file and not of the table."""
+        return self.file is not None or self.frame is not None or self.registers or self.sensor is not None
+
+    @property
     def frees(self) -> tuple[str, ...]:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:

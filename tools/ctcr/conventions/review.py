@@ -61,13 +61,12 @@ def review(robot: Robot, readings: Measurements) -> Review:
     if len(of_runs) != len(case.readings):
         fit = calibrated(case.robot, of_runs)
     for _ in range(settings.MOST_CONVENTIONS):
-        homed = runs.homed_elsewhere(fit, of_runs)
-        if homed is None:
+        odd = runs.unlike(fit, of_runs)
+        if odd is None:
             break
-        finding, change = homed
-        of_runs, right, before = change(of_runs), change(right), fit
+        finding, change = odd
+        found, of_runs, right = [*found, finding], change(of_runs), change(right)
         fit = calibrated(case.robot, of_runs)
-        found.append(finding.with_errors(before.rms_mm, fit.rms_mm))
 
     if late := stale.late_by_a_row(fit, right):
         finding, change = late

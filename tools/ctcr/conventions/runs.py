@@ -1,69 +1,174 @@
-"""Runs that were homed elsewhere than the others: one joint of one run is off by a constant."""
+"""Runs that are unlike the others by one thing: a convention of their own, a joint homed elsewhere, another tube."""
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, Integers
 from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
-from ctcr.conventions.calibrated import Calibrated, calibrated, dearer
+from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, own_values
 from ctcr.conventions.finding import Finding
-from ctcr.conventions.hypotheses import Change, changed, joints
+from ctcr.conventions.hypotheses import POSE, Change, Hypothesis, changed, hypotheses, joints
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
-from ctcr.show.wording import short
+from ctcr.show.wording import join, short
 from ctcr.table.measurements import Measurements
 
 
-def homed_elsewhere(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
-    """The run that is farthest off, where an offset of one joint makes it like the others; its correction.
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """One thing by which some runs may differ from the others."""
 
-    The others alone are calibrated, and predict this one.
+    kind: str
+    columns: tuple[str, ...]
+    text: str
+    fix: str
+    robot: Robot  # theirs
+    change: Change  # that makes their readings like those of the others
+    error: Array  # (K,) [m] that it leaves in them
+    scanned: tuple[str, int, float] | None = None  # what is off in them, of which tube from 0, by how much
+
+
+def unlike(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
+    """The runs that are unlike the others, and the table in which they are like them, or which is without them.
+
+    The others alone are calibrated, and predict these.
     """
-    runs = np.unique(readings.run)
-    if len(runs) < settings.FEWEST_RUNS:
+    if len(np.unique(readings.run)) < settings.FEWEST_RUNS or not fit.may_be_beaten:
         return None
-    clear, of_run = settings.CONVENTION_CLEAR, np.array([_log_error(fit, readings.run == run) for run in runs])
-    worst = int(np.nanargmax(of_run))
-    usual = np.exp(np.quantile(np.delete(of_run, worst), settings.CONVENTION_RUNS))
-    if clear * np.exp(of_run[worst]) < usual:
+    return next(filter(None, (_explained(fit, readings, runs) for runs in _minorities(fit, readings))), None)
+
+
+def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
+    """Runs that may be unlike the others, fewer than these: the one farthest off, all that are far off, and those in
+    which a home or a curvature would have to be another one."""
+    runs, index = np.unique(readings.run, return_inverse=True)
+    error = np.array([fit.log_error[index == k].mean() for k in range(len(runs))])
+    yield runs[[np.argmax(error)]]
+    values = own_values(fit, readings, ("tubes.*.curvature", "actuation.home_*"))
+    for size in (error, values):
+        order = np.argsort(size)
+        above = order[1 + np.argmax(np.diff(size[order])) :]
+        few = above if 2 * len(above) <= len(runs) else np.setdiff1d(order, above)
+        if len(few) > 1 or few[0] != np.argmax(error):
+            yield np.sort(runs[few])
+
+
+def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple[Finding, Change] | None:
+    """What is clearly different in some runs."""
+    clear, theirs = settings.CONVENTION_CLEAR, np.isin(readings.run, some)
+    like, mine = calibrated(fit.robot, readings.rows(~theirs)), readings.rows(theirs)
+    others = [readings.rows(readings.run == run) for run in np.setdiff1d(readings.run, some)]
+    usual = np.quantile([_typical(tips.errors(like.robot, rows), like) for rows in others], settings.CONVENTION_RUNS)
+    before = replace(like, error=tips.errors(like.robot, mine))
+    if not np.isfinite(usual) or clear * before.typical < usual:
         return None
-    others = readings.run != runs[worst]
-    like, mine = calibrated(fit.robot, readings.rows(others)), readings.rows(~others)
-    scanned = sorted(_scan(like, mine, kind, tube) for kind in ("beta", "alpha") for tube in range(fit.robot.n_tubes))
-    (after, kind, tube, offset), second = scanned[0], scanned[1][0] if len(scanned) > 1 else np.inf
-    if clear * after > usual:
-        return None
+    tried = sorted(_differences(like, mine), key=lambda one: _typical(one.error, like))
+    best, after = tried[0], _typical(tried[0].error, like)
+    alike = (one for one in tried[1:] if _typical(one.error, like) < settings.CONVENTION_ALIKE * after)
     moved = dearer(FRAME - 1, len(mine)) * _typical(_moved(like.robot, mine), like)  # the whole frame, not a joint
-    if second < settings.CONVENTION_ALIKE * after or moved < after:
+    left = replace(like, error=best.error).left_of(before)
+    if clear * after > usual or moved < after or np.max(left) > settings.CONVENTION_CONSTANT:
         return None
-    of_others = [_scan(like, readings.rows(readings.run == run), kind, tube)[3] for run in np.delete(runs, worst)]
-    if abs(offset) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
-        return None  # the others would take offsets too: something else acts
-    move = offset * (np.arange(fit.robot.n_tubes) == tube)
-    mended = changed(kind, lambda q: q + move)(mine)
-    before, behind = (replace(like, error=tips.errors(like.robot, rows)) for rows in (mine, mended))
-    if np.max(behind.left_of(before)) > settings.CONVENTION_CONSTANT:
+    if any((one.kind, one.columns) != (best.kind, best.columns) for one in alike):
         return None
-    turned = orientation.error_deg(like.robot, mine)
-    if orientation.error_deg(like.robot, mended) > settings.CONVENTION_ALIKE * turned:
+    if best.scanned:
+        name, tube, value = best.scanned
+        of_others = [_scan(like, rows, name, tube) for rows in others]
+        if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
+            return None  # the others would take offsets too: something else acts
+        if abs(value) < settings.MOVED_FAR * _stated(like.robot, name, tube):
+            return None  # no other home or tube
+    turned, mended = orientation.error_deg(like.robot, mine), orientation.error_deg(best.robot, best.change(mine))
+    if mended > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
-    run = int(runs[worst])
-    unit, size, digits = ("deg", np.degrees(offset), 1) if kind == "alpha" else ("mm", 1e3 * offset, 2)
-    [name] = joints(kind, (tube,))
-    text = f"run {run} was homed elsewhere: {name} stands {short(abs(size))} {unit} off"
-    fix = f"ctcr import --offset {name}@{run}={size:.{digits}f}{unit}, or leave this run out"
 
     def change(m: Measurements) -> Measurements:
-        return changed(kind, lambda q: q + np.where((m.run == run)[:, None], move, 0.0))(m)
+        rows, right = np.isin(m.run, some), best.change(m)
+        if best.robot is not like.robot:
+            return m.rows(~rows)
+        parts = {name: (getattr(right, name), getattr(m, name)) for name in ("beta", "alpha", "force", "position")}
+        return replace(m, **{name: np.where(rows[:, None], new, old) for name, (new, old) in parts.items()})
 
-    return Finding("run_offset", text, (name,), fix, runs=(run,)), change
+    runs = tuple(map(int, some))
+    errors = before.rms_mm, replace(like, error=best.error).rms_mm
+    fix = f"{best.fix}, or leave {_named(some)} out"
+    return Finding(best.kind, best.text, best.columns, fix, runs=runs, rms_mm=errors), change
 
 
-def _log_error(fit: Calibrated, rows: Array) -> float:
-    return float(fit.log_error[rows].mean())
+def _named(runs: Integers) -> str:
+    return f"run{'s' * (len(runs) > 1)} {join([str(run) for run in runs])}"
+
+
+def _differences(like: Calibrated, mine: Measurements) -> Iterator[Difference]:
+    """All that may be different in these readings, as they would then be."""
+    runs = _named(np.unique(mine.run))
+    for one in (*hypotheses(like.robot, mine), *_exchanged()):
+        if one.of_robot or one.offset:
+            continue
+        fix = f"{one.fix or f'negate {one.columns[0]}'}, in the log of {runs} alone"
+        error = tips.errors(like.robot, one.change(mine))
+        yield Difference(one.kind, one.columns, f"{one.text}, in {runs} alone", fix, like.robot, one.change, error)
+    for name in settings.CONVENTION_SCAN:
+        for tube in range(like.robot.n_tubes):
+            yield _scanned(like, mine, name, tube)
+
+
+def _exchanged() -> Iterator[Hypothesis]:
+    """Two axes of the tracker, which a mirror and another frame would explain if all runs had them so."""
+    for a, b in ((0, 1), (1, 2), (0, 2)):
+        order = np.arange(3)
+        order[[a, b]] = b, a
+        text, columns = f"{POSE[a]} and {POSE[b]} are exchanged", (POSE[a], POSE[b])
+        change = changed("position", lambda p, order=order: p[:, order])
+        yield Hypothesis("mirrored", text, columns, f"exchange {POSE[a]} and {POSE[b]}", change)
+
+
+def _scanned(like: Calibrated, mine: Measurements, name: str, tube: int) -> Difference:
+    """Another size of a home or of a curvature."""
+    value = _scan(like, mine, name, tube)
+    robot, readings = _off(like.robot, mine, name, tube, value)
+    error, robot = tips.errors(robot, readings), robot if name == "curvature" else like.robot
+
+    def change(m: Measurements) -> Measurements:
+        return _off(like.robot, m, name, tube, value)[1]
+
+    runs = np.unique(mine.run)
+    many = len(runs) > 1
+    if name == "curvature":
+        size = f"{robot.tubes[tube].curvature:.4g}"
+        text = f"tube {tube + 1} is another one in {_named(runs)}: its curvature is {100 * np.expm1(value):+.0f} %"
+        fix = f"give {_named(runs)} a robot file with curvature_per_m: {size} of tube {tube + 1}"
+        return Difference("tube_changed", (), text, fix, robot, change, error, (name, tube, value))
+    unit, size, digits = ("deg", np.degrees(value), 1) if name == "alpha" else ("mm", 1e3 * value, 2)
+    [column] = joints(name, (tube,))
+    were = "were" if many else "was"
+    text = f"{_named(runs)} {were} homed elsewhere than the others: {column} stands {short(abs(size))} {unit} off"
+    fix = " ".join(["ctcr import", *(f"--offset {column}@{run}={size:.{digits}f}{unit}" for run in runs)])
+    return Difference("run_offset", (column,), text, fix, robot, change, error, (name, tube, value))
+
+
+def _off(robot: Robot, readings: Measurements, name: str, tube: int, value: float) -> tuple[Robot, Measurements]:
+    """Robot and readings where the home of a joint [rad], [m] or the logarithm of a curvature is off by a value."""
+    here = np.arange(robot.n_tubes) == tube
+    if name != "curvature":
+        return robot, changed(name, lambda q: q + value * here)(readings)
+    tubes = [t.model_copy(update={"curvature_per_m": np.exp(value) * t.curvature_per_m}) for t in robot.tubes]
+    tubes = [new if off else old for new, old, off in zip(tubes, robot.tubes, here, strict=True)]
+    return robot.model_copy(update={"tubes": tubes}), readings
+
+
+def _stated(robot: Robot, name: str, tube: int) -> float:
+    """Standard deviation of a home [rad], [m] or of the logarithm of a curvature in the robot file."""
+    key, unit = {
+        "alpha": ("rotation_offset_deg", np.pi / 180),
+        "beta": ("translation_offset_mm", 1e-3),
+        "curvature": ("curvature_percent", 0.01),
+    }[name]
+    return unit * robot.uncertainty.of(key, tube)
 
 
 def _typical(error: Array, like: Calibrated) -> float:
@@ -71,19 +176,15 @@ def _typical(error: Array, like: Calibrated) -> float:
 
 
 def _moved(robot: Robot, readings: Measurements) -> Array:
-    """Errors (K,) [m] where the whole frame moved in that run."""
+    """Errors (K,) [m] where the whole frame moved in those runs."""
     return aligned(tips.predicted(robot, readings), readings.position)[2]
 
 
-def _scan(like: Calibrated, mine: Measurements, kind: str, tube: int) -> tuple[float, str, int, float]:
-    """The offset of one joint that fits a run best: (typical error [m], joint, tube, offset), by ever finer grids."""
-    half, offset, best = settings.CONVENTION_SCAN[kind], 0.0, np.inf
-    count, n = len(mine), settings.CONVENTION_SCAN_POINTS
+def _scan(like: Calibrated, mine: Measurements, name: str, tube: int) -> float:
+    """The value that fits readings best, by ever finer grids."""
+    half, best, n = settings.CONVENTION_SCAN[name], 0.0, settings.CONVENTION_SCAN_POINTS
     for _ in range(settings.CONVENTION_SCANS):
-        grid = offset + np.linspace(-half, half, n)
-        tried = mine.rows(np.tile(np.arange(count), n))
-        getattr(tried, kind)[:, tube] += np.repeat(grid, count)
-        typical = [_typical(part, like) for part in tips.errors(like.robot, tried).reshape(n, count)]
-        k = int(np.argmin(typical))
-        offset, best, half = float(grid[k]), float(typical[k]), 2 * half / (n - 1)
-    return best, kind, tube, offset
+        grid = best + np.linspace(-half, half, n)
+        errors = [tips.errors(*_off(like.robot, mine, name, tube, value)) for value in grid]
+        best, half = float(grid[np.argmin([_typical(error, like) for error in errors])]), 2 * half / (n - 1)
+    return best

@@ -13,11 +13,11 @@ from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
-def outliers(fit: Any, admitted: float = 1.0) -> Mask:
-    """Rows (M,) whose position error is much larger than uncertain parameters and the noise, `admitted` times as large
-    as stated, let expect."""
-    square = np.sum(fit.residual[:, :3] ** 2, axis=1)
-    return np.isfinite(square) & (square > (settings.SURPRISE * admitted) ** 2 * fit.expected_square[:, 0])
+def outliers(fit: Any, admitted: float = 1.0, *, rotation: bool = False) -> Mask:
+    """Rows (M,) whose error of position, or of rotation, is much larger than uncertain parameters and the noise,
+    `admitted` times as large as stated, let expect."""
+    square = np.sum(fit.residual[:, 3 * rotation : 3 + 3 * rotation] ** 2, axis=1)
+    return np.isfinite(square) & (square > (settings.SURPRISE * admitted) ** 2 * fit.expected_square[:, int(rotation)])
 
 
 def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
@@ -34,6 +34,16 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     beside[:-1] |= same & far[1:]
     found[read] = rows[read] & far & ~beside & ~far[_nearest(measurements, read)]
     return found if np.sum(found) <= settings.MOST_ISOLATED * np.sum(rows[read]) else np.zeros_like(found)
+
+
+def unexplained_runs(measurements: Measurements, fit: Any) -> Integers:
+    """Runs, fitted or held out, of which most readings are outliers: no tracker makes those."""
+    read, found = np.isfinite(fit.residual[:, :3]).all(axis=1), set()
+    for rotation in (False, True):
+        far = outliers(fit, max(1.0, fit.inflation[int(rotation)]), rotation=rotation)
+        of_run = {int(k): far[read & (measurements.run == k)] for k in np.unique(measurements.run[read])}
+        found |= {k for k, here in of_run.items() if np.mean(here) > settings.MOST_OF_A_RUN}
+    return np.array(sorted(found), int)
 
 
 def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:

@@ -8,7 +8,7 @@ from ctcr import settings
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.outliers import clustered
+from ctcr.diagnose.outliers import clustered, unexplained_runs
 from ctcr.fit import joint
 from ctcr.model import effect_model
 from ctcr.show.wording import listed
@@ -18,6 +18,7 @@ from ctcr.show.wording import listed
 class Residual:
     p_value: float  # of the noise as stated
     clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
+    runs: list[int]  # of which most readings are outliers, those that no fit saw too
     before: Ranking  # of quantities on which the residual depends, before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
@@ -30,14 +31,17 @@ class Residual:
 
     @property
     def structured(self) -> bool:
-        return self.rejected or bool(self.clusters)
+        return self.rejected or bool(self.clusters) or bool(self.runs)
 
     @property
     def depends_on(self) -> list[str]:
         return [item.name for item in self.after.chosen] if self.structured else []
 
     @property
-    def about_clusters(self) -> list[str]:
+    def about_outliers(self) -> list[str]:
+        if self.runs:
+            run = f"Run {self.runs[0]} is" if len(self.runs) == 1 else f"Runs {listed(self.runs)} are"
+            return [f"{run} unlike the others: most of the readings are outliers there. What was different?"]
         if not self.clusters:
             return []
         return [
@@ -52,7 +56,7 @@ class Residual:
         on = ", ".join(item.label for item in self.after.chosen)
         depends = f"it depends on {on}" if on else "no quantity alone predicts its size on held-out readings"
         rejected = [f"The residual is more than noise; {depends}."] if self.rejected else []
-        return rejected + self.corrections + self.about_clusters
+        return rejected + self.corrections + self.about_outliers
 
 
 def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: list[str]) -> Residual:
@@ -60,7 +64,9 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    return Residual(joint.p_value(fit), clusters, ranked, after, sample, corrections)
+    # A held-out run has nuisance errors of its own, which no fit knows.
+    runs = [] if corrections else unexplained_runs(engine.measurements, fit).tolist()
+    return Residual(joint.p_value(fit), clusters, runs, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:

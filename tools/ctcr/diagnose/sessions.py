@@ -13,6 +13,7 @@ from ctcr import settings
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
+from ctcr.diagnose.outliers import unexplained_runs
 from ctcr.diagnose.round import Judged, parameters_of
 from ctcr.diagnose.selection import Selection
 from ctcr.diagnose.varying_coefficients import label_of
@@ -53,6 +54,9 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     noise, free = noise_of_readings(robot, every), uncertain(robot)
     engine = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
     one = engine.fit()
+    if len(unexplained_runs(table, one)):  # whole runs that the fit takes for outliers
+        engine = replace(engine, robust=False)
+        one = engine.fit()
     if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
         return readings, []
     framed = replace(engine, measurements=as_sessions(robot, table))

@@ -3,7 +3,8 @@
 | word | where |
 |---|---|
 | `nothing_missing` | noise alone is the most probable explanation |
-| `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better |
+| `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better; or more than noise is
+  left, and no effect is sure |
 | `stand_in` | a cause outside the catalogue is; effects imitate it and predict held-out runs better |
 | `ambiguous` | effects are, and the data cannot tell some of them apart |
 | `identified` | effects are, and act with a probability of SURE without a cause outside the catalogue |
@@ -64,11 +65,16 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
             beside = "it" if len(accepted) == 1 else "them"
             acts = f"a cause outside the catalogue acts, alone or beside {beside} (probability {most(outside)})"
             return Verdict("stand_in", outside, every, [f"{names} can explain a part of the error, but {acts}."])
-        sentences = ["Something is missing that no effect of the catalogue explains.", *residual.about_clusters]
+        sentences = ["Something is missing that no effect of the catalogue explains.", *residual.about_outliers]
         if accepted:
             sentences.append(f"With {names} the fitted readings are predicted better, and the held-out ones are not.")
         return Verdict("not_in_catalogue", outside, every, sentences)
     if not accepted:
+        if likeliest.effects and residual.structured:
+            rival = f"the likeliest explanation, {likeliest.text} ({most(likeliest.probability)}), is not decided"
+            sentences = [f"More than noise is left; {rival} by these data.", *residual.about_outliers]
+            noise = next(one.probability for one in every if not one.effects and not one.outside)
+            return Verdict("not_in_catalogue", 1 - noise, every, sentences)
         noise = "Calibration and the tracker's noise explain these measurements."
         return Verdict("nothing_missing", every[0].probability, every, [noise])
     present, alone = probability(every, classes), probability(every, classes, outside=False)
