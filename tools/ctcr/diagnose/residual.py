@@ -8,10 +8,10 @@ from ctcr import settings
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.outliers import clustered, unexplained_runs
+from ctcr.diagnose.outliers import clustered, outliers, unexplained_runs
 from ctcr.fit import joint
 from ctcr.model import effect_model
-from ctcr.show.wording import listed
+from ctcr.show.wording import listed, percent
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,7 @@ class Residual:
     p_value: float  # of the noise as stated
     clusters: list[int]  # rows of the table that are outliers in the same direction as their neighbours
     runs: list[int]  # of which most readings are outliers, those that no fit saw too
+    outliers: float  # fraction of all readings
     before: Ranking  # of quantities on which the residual depends, before effects were added
     after: Ranking
     sample: Sample  # the readings that were ranked
@@ -31,7 +32,12 @@ class Residual:
 
     @property
     def structured(self) -> bool:
-        return self.rejected or bool(self.clusters) or bool(self.runs)
+        return self.rejected or self.strays
+
+    @property
+    def strays(self) -> bool:
+        """Whether there are outliers that a tracker does not make."""
+        return bool(self.clusters or self.runs) or self.outliers > settings.MANY_OUTLIERS
 
     @property
     def depends_on(self) -> list[str]:
@@ -42,6 +48,9 @@ class Residual:
         if self.runs:
             run = f"Run {self.runs[0]} is" if len(self.runs) == 1 else f"Runs {listed(self.runs)} are"
             return [f"{run} unlike the others: most of the readings are outliers there. What was different?"]
+        if self.outliers > settings.MANY_OUTLIERS:
+            many = f"{percent(self.outliers)} of the readings are outliers, more than a tracker makes"
+            return [f"{many}: does the robot snap, or is the sensor loose?"]
         if not self.clusters:
             return []
         return [
@@ -54,8 +63,9 @@ class Residual:
         if not self.structured:
             return [*self.corrections, "The residual is noise."]
         on = ", ".join(item.label for item in self.after.chosen)
-        depends = f"it depends on {on}" if on else "no quantity alone predicts its size on held-out readings"
-        rejected = [f"The residual is more than noise; {depends}."] if self.rejected else []
+        nothing = "no quantity alone predicts its size on held-out readings: is tracker.jitter_mm right?"
+        depends = f"it depends on {on}." if on else nothing
+        rejected = [f"The residual is more than noise; {depends}"] if self.rejected else []
         return rejected + self.corrections + self.about_outliers
 
 
@@ -64,9 +74,11 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
-    # A held-out run has nuisance errors of its own, which no fit knows.
-    runs = [] if corrections else unexplained_runs(engine.measurements, fit).tolist()
-    return Residual(joint.p_value(fit), clusters, runs, ranked, after, sample, corrections)
+    runs, far = [], 0.0
+    if not corrections:  # else a held-out run has nuisance errors of its own, which no fit knows
+        runs = unexplained_runs(engine.measurements, fit).tolist()
+        far = float(np.mean(outliers(fit, max(1.0, fit.inflation[0]))[np.isfinite(fit.residual[:, 0])]))
+    return Residual(joint.p_value(fit), clusters, runs, far, ranked, after, sample, corrections)
 
 
 def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:

@@ -80,8 +80,6 @@ def rows_around(measurements: Measurements, fitted: Mask, when: float) -> Mask:
 def _surfaces(engine: Engine, candidate: Candidate, surface: list[str], by_force: Array, part: float) -> list[Option]:
     """The candidate with each plane that leaves this part of the tips outside: a force along its normal, in proportion
     to the depth of the tip."""
-    tracker = engine.robot.tracker
-    tips = (engine.positions - tracker.position) @ tracker.rotation
     stiffness, shapes = candidate.names, catalogue.get(candidate.id, engine.robot.n_tubes).shapes
     sd = engine.priors(stiffness)[1][0]
     usual = dict(zip(shapes, map(float, engine.priors(shapes)[0]), strict=True))
@@ -89,9 +87,7 @@ def _surfaces(engine: Engine, candidate: Candidate, surface: list[str], by_force
     around = np.deg2rad(np.arange(0, 360, 360 / settings.SURFACE_AZIMUTHS))
     for elevation in np.deg2rad(settings.SURFACE_ELEVATIONS):
         for azimuth in around if elevation < 1.5 else [0.0]:
-            across = np.cos(elevation)
-            normal = np.array([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)])
-            height = tips @ normal
+            height, normal = heights(engine, azimuth, elevation), _normal(azimuth, elevation)
             distance = np.quantile(height, part)
             depth = np.maximum(height - distance, 0.0)
             if np.count_nonzero(depth) < settings.FEWEST_CONTACTS:
@@ -100,6 +96,17 @@ def _surfaces(engine: Engine, candidate: Candidate, surface: list[str], by_force
             shape = usual | dict(zip(surface, map(float, (distance, azimuth, elevation)), strict=True))
             found.append((Candidate(candidate.id, (*stiffness, *shapes), tuple(shape.items())), column[:, :, None]))
     return found
+
+
+def heights(engine: Engine, azimuth: float, elevation: float) -> Array:
+    """Heights (M,) [m] of the tips above a plane through the origin of the base frame, along its normal."""
+    tracker = engine.robot.tracker
+    return (engine.positions - tracker.position) @ tracker.rotation @ _normal(azimuth, elevation)
+
+
+def _normal(azimuth: float, elevation: float) -> Array:
+    across = np.cos(elevation)
+    return np.array([across * np.cos(azimuth), across * np.sin(azimuth), np.sin(elevation)])
 
 
 def _source(engine: Engine, candidate: Candidate, worth: Worth) -> Option:

@@ -3,8 +3,7 @@
 | word | where |
 |---|---|
 | `nothing_missing` | noise alone is the most probable explanation |
-| `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better; or more than noise is
-  left, and no effect is sure |
+| `not_in_catalogue` | a cause outside the catalogue is, and no effect predicts held-out runs better; or none is sure |
 | `stand_in` | a cause outside the catalogue is; effects imitate it and predict held-out runs better |
 | `ambiguous` | effects are, and the data cannot tell some of them apart |
 | `identified` | effects are, and act with a probability of SURE without a cause outside the catalogue |
