@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conventions_bench import RUNS, design, session
-from ctcr.conventions import review
+from ctcr.conventions import review, runs
 from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
 from ctcr.fit.floors import floors
@@ -15,6 +15,7 @@ from ctcr.model import simulation
 from ctcr.robot import defaults, robot_file
 from ctcr.table import measurements
 from scipy.spatial.transform import Rotation
+from wrong_conventions import with_other_tube
 
 
 def bench(seed, n_tubes=2, **options):
@@ -168,6 +169,39 @@ def test_run(kind, move):
     offset = np.where((readings.run == run)[:, None], [move, 0.0], 0.0)
     [one] = review(robot, replace(readings, **{kind: getattr(readings, kind) - offset})).findings
     assert (one.kind, list(one.columns), list(one.runs)) == ("run_offset", [f"{kind}1"], [run])
+
+
+OF_ONE_RUN = {**{name: FAULTS[name] for name in ("one sign", "all signs", "degrees", "order", "reaction")}} | {
+    "left-handed": ("mirrored", ["y_m"], lambda m: scaled(m, "position", [1, -1, 1])),
+    "exchanged": ("mirrored", ["x_m", "z_m"], lambda m: replace(m, position=m.position[:, ::-1])),
+}
+
+
+@pytest.mark.parametrize("name", OF_ONE_RUN)
+def test_one_run(name):
+    """What is wrong in one run alone is named with that run, and only that run is corrected."""
+    kind, columns, spoil = OF_ONE_RUN[name]
+    robot, readings = bench(29, 2)
+    run, bad = 5, spoil(readings)
+    here = (readings.run == run)[:, None]
+    parts = {part: np.where(here, getattr(bad, part), getattr(readings, part)) for part in runs.CHANGED}
+    found = review(robot, replace(readings, **parts))
+    [one] = found.findings
+    assert (one.kind, sorted(one.columns), list(one.runs)) == (kind, sorted(columns), [run])
+    for part in runs.CHANGED:
+        np.testing.assert_allclose(getattr(found.readings, part), getattr(readings, part), atol=1e-12)
+
+
+@pytest.mark.parametrize("last", [[6], [5, 6, 7]])
+def test_other_tube(last):
+    """Runs with another tube are named with the tube, and left out of all that follows."""
+    robot, readings = bench(31)
+    other, here = with_other_tube(robot, readings, 1, 1.25), np.isin(readings.run, last)[:, None]
+    parts = {name: np.where(here, getattr(other, name), getattr(readings, name)) for name in ("position", "quaternion")}
+    found = review(robot, replace(readings, **parts))
+    [one] = found.findings
+    assert (one.kind, list(one.runs)) == ("tube_changed", last) and "tube 2" in one.text
+    assert not np.isin(found.readings.run, last).any()
 
 
 def test_frozen():

@@ -44,6 +44,30 @@ def test_far_runs(robot):
     assert joint.fit(robot, found).rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
 
 
+def test_elsewhere(robot):
+    """So are those of a tracker that stood elsewhere in the room on each day."""
+    random = np.random.default_rng(8)
+    plain = measured(robot, random, {})
+    _, index = np.unique(plain.run, return_inverse=True)
+    shift, turn = 0.2 * random.normal(size=(8, 3))[index], 0.4 * random.normal(size=(8, 3))[index]
+    position = Rotation.from_rotvec(turn).apply(plain.position) + shift
+    quaternion = product(quaternion_from_rotation_vector(turn), plain.quaternion)
+    found, said = sessions.of_runs(robot, replace(plain, position=position, quaternion=quaternion))
+    assert "The runs do not share a frame: " in said[0]
+    assert joint.fit(robot, found).rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
+
+
+def test_one_day(robot):
+    """So is that of one run in which the tracker was moved, which a robust fit takes for outliers."""
+    random = np.random.default_rng(9)
+    plain = measured(robot, random, {})
+    found, said = sessions.of_runs(
+        robot, replace(plain, position=plain.position + np.where(plain.run == 4, 0.02, 0.0)[:, None] * [1, 0, 0])
+    )
+    assert "The runs do not share a frame: " in said[0] and "but for run 4: up to 20" in said[1]
+    assert joint.fit(robot, found).rms_mm() < 1.2 * joint.fit(robot, plain).rms_mm()
+
+
 def test_many_runs(robot):
     """So are those of more runs than are looked at: all of them lie in one frame, and the sentence says how well."""
     random = np.random.default_rng(7)

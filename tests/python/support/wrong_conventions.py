@@ -12,7 +12,8 @@ from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
 from ctcr.conventions.review import Review
 from ctcr.effects import catalogue
-from ctcr.frames import conjugate
+from ctcr.frames import conjugate, of_sensor, product
+from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements, group_columns
 from scipy.spatial.transform import Rotation
@@ -282,14 +283,27 @@ def _tube_changed(random, case):
     """Another tube, of another curvature."""
     tube, factor = int(random.integers(case.robot.n_tubes)), float(random.choice([0.75, 1.3]))
 
-    def spoil(m):
-        tubes = list(case.robot.tubes)
-        tubes[tube] = tubes[tube].model_copy(update={"curvature_per_m": factor * tubes[tube].curvature_per_m})
-        new, old = (tips.predicted(r, m) for r in (case.robot.model_copy(update={"tubes": tubes}), case.robot))
-        move = (new - old) @ case.robot.tracker.rotation.T
-        return replace(m, position=m.position + np.where(np.isfinite(move), move, 0.0))
+    return Fault("tube_changed", (), in_table(lambda m: with_other_tube(case.robot, m, tube, factor)))
 
-    return Fault("tube_changed", (), in_table(spoil))
+
+def with_other_tube(robot: Robot, m: Measurements, tube: int, factor: float) -> Measurements:
+    """The readings moved and turned as far as the model moves and turns the tip by another curvature of a tube."""
+    other = robot.model_copy(deep=True)
+    other.tubes[tube].curvature_per_m *= factor
+    (old, turned), (new, turned_new) = (_predicted(r, m) for r in (robot, other))
+    position = m.position + np.nan_to_num((new - old) @ robot.tracker.rotation.T)
+    if m.quaternion is None:
+        return replace(m, position=position)
+    turn = product(conjugate(turned), turned_new)
+    quaternion = np.where(np.isfinite(turn), product(m.quaternion, turn), m.quaternion)
+    return replace(m, position=position, quaternion=quaternion)
+
+
+def _predicted(robot: Robot, m: Measurements):
+    """Positions (M, 3) [m] and quaternions (M, 4) of the sensor, base frame."""
+    beta, alpha = robot.joints_of_table(m.beta, m.alpha)
+    found = Model(robot.standard).predict(beta, alpha, m.force)
+    return of_sensor(robot.tracker, found.position, found.quaternion)
 
 
 def in_some_runs(random: np.random.Generator, case: Case, kind: str) -> Fault | None:

@@ -17,6 +17,8 @@ from ctcr.robot.description import Robot
 from ctcr.show.wording import join, short
 from ctcr.table.measurements import Measurements
 
+CHANGED = "beta", "alpha", "force", "position"  # of a table, by what may be different
+
 
 @dataclass(frozen=True, eq=False)
 class Difference:
@@ -90,7 +92,7 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
         rows, right = np.isin(m.run, some), best.change(m)
         if best.robot is not like.robot:
             return m.rows(~rows)
-        parts = {name: (getattr(right, name), getattr(m, name)) for name in ("beta", "alpha", "force", "position")}
+        parts = {name: (getattr(right, name), getattr(m, name)) for name in CHANGED}
         return replace(m, **{name: np.where(rows[:, None], new, old) for name, (new, old) in parts.items()})
 
     runs = tuple(map(int, some))

@@ -71,12 +71,12 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     taken = sessions_at(own.apply(robot), every, homes=homed is not None)
     before, after = (wording.mm(_rms_mm(fit.apply(robot), of)) for fit, of in ((one, every), (own, taken)))
     text = f"The runs do not share {shared}: with one for each the calibrated error falls from {before} to {after}."
-    return taken.sessions.taken_out(readings), [text, *_not_shared(explained)]
+    return taken.sessions.taken_out(readings), [text, *_moved_alone(taken.sessions), *_not_shared(explained)]
 
 
 def _may_win(engine: Engine, one: Fit) -> bool:
-    """Whether moves of each run's frame, and with them of the calibration, could explain enough, and small ones are
-    likelier than none."""
+    """Whether moves of each run's frame, and with them of the calibration, could explain enough, and moves of all runs
+    or of one are likelier than none."""
     table = Sessions.alike(engine.robot, engine.measurements).taken_out(engine.measurements)
     recorded = user_recording.recording_of(engine.robot, table)
     columns = recorded.columns(one.residual.ravel()).reshape(*one.residual.shape, -1)
@@ -85,8 +85,13 @@ def _may_win(engine: Engine, one: Fit) -> bool:
     most = free @ np.linalg.lstsq(free, linear.residual, rcond=None)[0]
     if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * Judged.of(engine, one).unexplained:
         return False
-    gains = (linear.gain(part * columns).log_evidence for part in settings.SESSION_PARTS)
-    return max(gains) > settings.DECISIVE
+    of_one = np.split(columns, len(table.sessions.run), axis=1)
+    tried = [(columns, 0.0), *((one, np.log(len(of_one) * len(settings.SESSION_PARTS))) for one in of_one)]
+    return any(
+        linear.gain(part * some).log_evidence - cost > settings.DECISIVE
+        for some, cost in tried
+        for part in settings.SESSION_PARTS
+    )
 
 
 def _wins(engine: Engine, one: Fit, framed: Engine) -> bool:
@@ -127,18 +132,19 @@ def _is_likelier(framed: Engine, own: Fit, chosen: Selection) -> bool:
 
 def _cost(own: Fit) -> float:
     """Log evidence that the numbers of all runs cost, which the fit has profiled out: under the likeliest of the widths
-    that their scatter about the typical run may have."""
+    that their scatter about the typical run may have; or each run has a width of its own, as where one was moved."""
     model, sessions = own.model, own.model.readings.sessions
     columns = own.whiten(model.columns(own.residual.ravel()).reshape(*own.residual.shape, -1))
     information = columns.T @ columns
     values = np.hstack([sessions.shift, sessions.turn]) / model.sd
     values = values - np.median(values, axis=0)
 
-    def cost(part: float) -> float:
-        determinant = np.linalg.slogdet(part**2 * information + np.eye(len(information)))[1]
-        return -0.5 * float(determinant + np.sum(values**2) / part**2)
-
-    return max(map(cost, settings.SESSION_PARTS))
+    n, k = values.shape
+    of_run = information.reshape(n, k, n, k)[np.arange(n), :, np.arange(n), :]  # runs share no reading
+    parts = np.array(settings.SESSION_PARTS)[:, None]
+    determinant = np.linalg.slogdet(parts[:, :, None, None] ** 2 * of_run + np.eye(k))[1]
+    costs = -0.5 * (determinant + np.sum(values**2, axis=1) / parts**2)  # (parts, runs)
+    return float(max(costs.sum(axis=1).max(), costs.max(axis=0).sum() - n * np.log(len(parts))))
 
 
 def _with_homes(framed: Engine) -> Engine | None:
@@ -192,6 +198,16 @@ def _rms_mm(robot: Robot, readings: Measurements) -> float:
     """RMS position error of all readings, those that no fit saw too."""
     recorded = user_recording.recording_of(robot, readings)
     return 1e3 * rms(recorded.residual(recorded.nominal())[0].reshape(-1, 6)[:, :3])
+
+
+def _moved_alone(sessions: Sessions) -> list[str]:
+    """A sentence on runs whose frame lies far from that of the others; none where there are no such runs."""
+    far = np.linalg.norm(sessions.shift - np.median(sessions.shift, axis=0), axis=1)
+    odd = far > settings.OUTLYING_RUN * 1.48 * np.median(far)
+    if not odd.any():
+        return []
+    run = f"run {sessions.run[odd][0]}" if odd.sum() == 1 else f"runs {wording.listed(sessions.run[odd])}"
+    return [f"Most of them do, but for {run}: up to {wording.mm(1e3 * far[odd].max())} away."]
 
 
 def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:
