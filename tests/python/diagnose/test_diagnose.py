@@ -57,6 +57,23 @@ def test_backlash(robot):
     )
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_heavy_cap(robot, seed):
+    """So is a force that is always there, and not a surface which the tip never leaves."""
+    result = diagnose(robot, measured(robot, np.random.default_rng(seed), {"effects.tip_load.force_y": -0.15}))
+    assert [accepted.ids for accepted in result.accepted] == [["tip_load"]]
+
+
+def test_outliers_of_a_part(robot):
+    """Where a part of the readings is far off, as where the robot snapped or a run went wrong, something is missing."""
+    plain = measured(robot, np.random.default_rng(3), {})
+    leap = 0.02 * np.random.default_rng(4).normal(size=(len(plain), 3))
+    for bad in (plain.run == 4, np.random.default_rng(5).random(len(plain)) < 0.2):
+        result = diagnose(robot, replace(plain, position=plain.position + np.where(bad[:, None], leap, 0.0)))
+        assert result.verdict.word == "not_in_catalogue"
+        assert any("outliers" in sentence for sentence in result.verdict.sentences)
+
+
 def test_tip_load(tip_load):
     """A weight at the tip is named, with its mass within its uncertainty."""
     names_what_was_hidden(tip_load, {"effects.tip_load.mass": 2e-3}, "tip_load")

@@ -109,13 +109,6 @@ class Round:
         return self.accepted is None and (self.is_spurious or more * best < self.needed)
 
     @property
-    def was_in_the_dark(self) -> bool:
-        """Whether the noise was so inflated that rivals near the accepted effect can hardly be told from it."""
-        near = settings.CONTENDS * self.accepted.score
-        rival = any(one.id != self.accepted.id and one.score > near for one in self.tried)
-        return rival and bool(np.max(self.before.inflation) > settings.INFLATION_WRONG)
-
-    @property
     def is_clear(self) -> bool:
         """Whether one effect was accepted, far ahead of all others."""
         return len(self.ids) == 1 and self.margin >= settings.DECISIVE
@@ -309,9 +302,10 @@ class Refits:
         for start in (first, values_of(before)):
             try:
                 fit = engine.fit_like(before, [*effects_in(before), *candidate.names], start, **options)
-                break
             except joint.NoFit:
                 continue
+            if not _is_always_touched(engine, fit, candidate):
+                break
         else:
             return replace(one, fit=None)
         return self._by(one, fit)
@@ -343,13 +337,17 @@ def _implausible(engine: Engine, fit: joint.Fit, candidate: Candidate) -> list[s
         i, (low, high) = fit.names.index(name), known[name].soft
         if fit.values[i] + 2 * fit.sd[i] < low or fit.values[i] - 2 * fit.sd[i] > high:
             found.append(f"{name} = {fit.values[i]:.3g} {known[name].unit}".rstrip())
-    effect = catalogue.get(candidate.id, engine.robot.n_tubes)
-    if surface := effect.names_with("surface"):
-        at = dict(candidate.shape) | values_of(fit)
-        outside = np.mean(starts.heights(engine, *(at[name] for name in surface[1:])) < at[surface[0]])
-        if outside < 1 - max(settings.SURFACE_OUTSIDE):
-            found.append("a surface that the tip never leaves")
     return found
+
+
+def _is_always_touched(engine: Engine, fit: joint.Fit, candidate: Candidate) -> bool:
+    """Whether a surface lies where the tip hardly ever leaves it: a constant force, and no contact."""
+    surface = catalogue.get(candidate.id, engine.robot.n_tubes).names_with("surface")
+    if not surface:
+        return False
+    distance, *direction = ((dict(candidate.shape) | values_of(fit))[name] for name in surface)
+    outside = starts.heights(engine, *direction) < distance
+    return bool(np.mean(outside[engine.fitted]) < 1 - max(settings.SURFACE_OUTSIDE))
 
 
 def _without_candidate(

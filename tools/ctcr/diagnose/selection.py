@@ -102,20 +102,18 @@ class Selection:
 
     def revise(self, pool: list[Candidate], more: float = 1.0) -> None:
         """Chooses each effect anew beside all the others, as long as that changes them: one that was accepted early was
-        chosen before the later ones were known, or in a noise that hid which one it is. Then drops those that are not
-        surely causes. more: as for grow()"""
+        chosen before the later ones were known. Then drops those that are not surely causes. more: as for grow()"""
         seen: list[set[str]] = []
         surely = False
         while (found := {a.id for a in self.accepted}) not in seen:
             seen.append(found)
-            early = self.accepted[:-1] + [a for a in self.accepted[-1:] if a.round.was_in_the_dark]
-            if any(self._chosen_anew(a, pool) for a in early):
+            if any(self._chosen_anew(a, pool) for a in self.accepted[:-1]):
                 self.last = None
                 self.grow(pool, more, surely)
             elif len(found) > 1 and self._without_weakest():
                 surely, self.last = True, None
                 self.grow(pool, more, surely)
-        if self.accepted and len(seen) > 1:
+        if len(seen) > 1:
             self.follow()
 
     def _without_weakest(self) -> bool:
@@ -149,8 +147,6 @@ class Selection:
             there.fit = there.calibrate(there.fits, values_of(without))
         elif round_.accepted is None:
             return False
-        elif a.id in round_.ids and a is self.accepted[-1]:
-            return False  # its own round was last, and knew of all others
         elif a.id in round_.ids:
             if set(round_.ids) != set(a.ids):
                 self.history.append(round_)
