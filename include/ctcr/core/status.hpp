@@ -15,6 +15,7 @@ enum class [[nodiscard]] Status : std::uint8_t {
   needs_solve,          ///< a control step has spent its evaluations: solve() has to be asked
   not_finite,           ///< an input or a result is NaN, infinite or too large to compute with
   invalid_robot,        ///< the robot cannot exist, see check_robot(); nothing is computed
+  invalid_settings,     ///< a limit, weight, period or other setting means nothing; nothing is computed
 };
 
 /// Whether the outputs solve the model; where it is about to snap they do, too. Real time: yes.
@@ -39,6 +40,7 @@ constexpr const char* to_string(Status status) noexcept {
     case Status::needs_solve: return "needs solve: the control step has spent its evaluations";
     case Status::not_finite: return "not finite";
     case Status::invalid_robot: return "invalid robot";
+    case Status::invalid_settings: return "invalid settings";
   }
   return "unknown";
 }

@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "ctcr/core/arithmetic.hpp"
+
 namespace ctcr {
 
 template <int N>

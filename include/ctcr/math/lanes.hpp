@@ -3,6 +3,8 @@
 // two); any other compiler gets the array below, which computes the same.
 #include <cstddef>
 
+#include "ctcr/core/arithmetic.hpp"
+
 namespace ctcr {
 
 inline constexpr int lane_count = 4;

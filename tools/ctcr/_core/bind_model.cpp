@@ -85,7 +85,8 @@ NB_MODULE(_core, m) {
       .value("inaccurate", Status::inaccurate)
       .value("needs_solve", Status::needs_solve)
       .value("not_finite", Status::not_finite)
-      .value("invalid_robot", Status::invalid_robot);
+      .value("invalid_robot", Status::invalid_robot)
+      .value("invalid_settings", Status::invalid_settings);
   nb::enum_<Integrator>(m, "Integrator", "Schemes of integration along the robot.")
       .value("standard", Integrator::standard)
       .value("ssp_rk3", Integrator::ssp_rk3)
