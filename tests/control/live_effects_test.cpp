@@ -96,6 +96,42 @@ TEST(LiveEffects, WindTubesUpAsRecordedRowsDo) {
   }
 }
 
+/// Friction, backlash and delay after joints that the model refuses are those without them.
+TEST(LiveEffects, RefusedJointsLeaveNoTrace) {
+  System<3, Path3> system = {{2e-3 / (2 * std::numbers::pi), -1, {-0.298, -0.2205, -0.145}, Vec3::Zero()},
+                             Model<3, Path3>(test::paper_robot()),
+                             {}};
+  Path3::On<3> effects;
+  std::get<0>(effects.list).values = {0.02, 0.02, 0.02, 0.005, 0.1, 1, 0};
+  std::get<1>(effects.list).values = {0.01, 0.02, 0.015};
+  std::get<2>(effects.list).values = {0.06};
+  system.model = Model<3, Path3>(test::paper_robot(), effects);
+  const Joints<3> home{{-0.298, -0.2205, -0.145}, {0.2, 0.9, -1.4}};
+  const auto motors = [&](int k) {
+    const double s = std::sin(0.1 * k);
+    return motor_angles(system.transmission, Joints<3>{home.beta + 1e-3 * Vec3(s, -s, s), home.alpha + Vec3(s, s, -s)});
+  };
+  for (const double bad : {std::nan(""), HUGE_VAL, 1e9, -1e9})
+    for (const bool turns : {false, true}) {
+      Controller<3, PaperTasks, Path3> controller(system, {}, 0.025), other = controller;
+      MotorAngles<3> v, w;
+      const Reference reference{{Mat3::Identity(), {0.01, 0, 0.15}}};
+      for (int k = 0; k < 90; ++k) {
+        const Measurement<3> good{motors(k), {Mat3::Identity(), {0.01, 0, 0.15}}};
+        if (k % 40 == 5) {
+          Measurement<3> wrong = good;
+          (turns ? wrong.theta.rotation : wrong.theta.translation)[1] += bad;
+          EXPECT_NE(controller.advance(wrong, reference, {}, v).status, Status::ok);
+          EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+        }
+        ASSERT_EQ(controller.advance(good, reference, {}, v).status, Status::ok) << "period " << k;
+        ASSERT_EQ(other.advance(good, reference, {}, w).status, Status::ok);
+      }
+      // Solved from another start, and delayed by times that differ by two periods.
+      EXPECT_LT((controller.solution().position - other.solution().position).norm(), 1e-6);
+    }
+}
+
 TEST(LiveEffects, KnownFrictionInClosedLoop) {
   constexpr double period = 0.025;
   const System<3, Rubbing> real = rubbing_robot();
