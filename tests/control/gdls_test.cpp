@@ -63,8 +63,25 @@ TEST(LeastSquares, WhatIsLeftFreeIsSingularAndStandsStill) {
   EXPECT_EQ(goals.minimum(v), Status::singular);
   EXPECT_EQ(v.norm(), 0);
   goals.add_joint_goal(JointVelocity<3>::Constant(std::nan("")), {1, 1});
-  EXPECT_EQ(goals.minimum(v), Status::singular);
+  EXPECT_EQ(goals.minimum(v), Status::not_finite);
   EXPECT_EQ(v.norm(), 0);
+}
+
+TEST(LeastSquares, WeightsThatLeaveNoMinimumAreInvalid) {
+  Random random(5);
+  const test::RandomGoals g(random);
+  for (const double bad : {-1.0, -1e-9, std::nan("")})
+    for (const Weight w : {Weight{bad, 1}, Weight{1, bad}}) {
+      LeastSquares<3> of_tip = g.sum(), of_joints = g.sum(), of_number = g.sum();
+      of_tip.add_tip_goal(g.J, g.v_tip, w);
+      of_joints.add_joint_goal(g.v_joints, w);
+      of_number.add_scalar_goal(g.v_joints, 1, bad);
+      for (const LeastSquares<3>& goals : {of_tip, of_joints, of_number}) {
+        JointVelocity<3> v = JointVelocity<3>::Ones();
+        EXPECT_EQ(goals.minimum(v), Status::invalid_settings);
+        EXPECT_EQ(v.norm(), 0);
+      }
+    }
 }
 
 }  // namespace gdls_test

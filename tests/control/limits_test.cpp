@@ -116,6 +116,54 @@ TEST(Limits, WhatExcludesEverythingIsFound) {
   EXPECT_FALSE(AllowedPositions<3>(test::paper_robot(), {.beta_low = Vec3(0.1, 0.1, 0.1)}).exist());
 }
 
+TEST(Limits, NumbersThatAreNoLimitsAreFound) {
+  EXPECT_EQ(check_limits(Limits<3>{}), Status::ok);
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(check_limits(Limits<3>{.translation_speed = infinity, .rotation_speed = 0}), Status::ok);
+  for (double Limits<3>::* field :
+       {&Limits<3>::base_gap, &Limits<3>::tip_gap, &Limits<3>::translation_speed, &Limits<3>::rotation_speed})
+    for (const double bad : {-1e-3, -infinity, std::nan("")}) {
+      Limits<3> limits;
+      limits.*field = bad;
+      EXPECT_EQ(check_limits(limits), Status::invalid_settings);
+    }
+  for (VecN<3> Limits<3>::* field : {&Limits<3>::beta_low, &Limits<3>::beta_high})
+    for (int i = 0; i < 3; ++i) {
+      Limits<3> limits;
+      (limits.*field)[i] = std::nan("");
+      EXPECT_EQ(check_limits(limits), Status::invalid_settings);
+    }
+}
+
+TEST(Limits, WithoutSpeedTheRobotStands) {
+  Random random(14);
+  const Robot<3> robot = test::paper_robot();
+  for (const bool turns : {false, true}) {
+    Limits<3> limits{.base_gap = 20e-3};
+    (turns ? limits.rotation_speed : limits.translation_speed) = 0;
+    for (const Vec3& beta : {Vec3(-0.3, -0.2, -0.1), Vec3(-0.205, -0.202, -0.1)}) {
+      JointVelocity<3> v;
+      LimitReport report;
+      ASSERT_EQ(limited_minimum(test::RandomGoals(random).sum(), AllowedPositions<3>(robot, limits), limits, beta,
+                                period, AtLimits::hold, v, report),
+                Status::ok);
+      EXPECT_EQ((turns ? v.tail<3>() : v.head<3>()).norm(), 0);
+      EXPECT_TRUE(report.speed && v.allFinite());
+    }
+  }
+}
+
+TEST(Limits, TheReportHoldsAllTubes) {
+  Robot<9> robot;
+  for (std::size_t i = 0; i < 9; ++i) robot.tubes[i].length = 1 - 0.1 * double(i);
+  LimitReport report;
+  VecN<9> beta;
+  for (int i = 0; i < 9; ++i) beta[i] = -0.05 * (9 - i);
+  beta[8] = 0.1;
+  (void)AllowedPositions<9>(robot, {}).clamped(beta, &report);
+  EXPECT_EQ(report.base_gaps, 1 << 8);
+}
+
 TEST(Limits, TheOtherJointsTakeOver) {
   Random random(13);
   const Robot<3> robot = test::paper_robot();

@@ -29,6 +29,7 @@ public:
 
   /// Adds a goal of the tip: v [m/s], [rad/s], base frame.
   void add_tip_goal(const Jacobian& J, const Vec6& v, Weight w) noexcept {
+    has_minimum_ = has_minimum_ && w.translation >= 0 && w.rotation >= 0;
     Vec6 diagonal;
     diagonal << Vec3::Constant(w.translation), Vec3::Constant(w.rotation);
     const Eigen::Matrix<double, 2 * N, 6> JtW = J.transpose() * diagonal.asDiagonal();
@@ -38,6 +39,7 @@ public:
 
   /// Adds a goal of the joints.
   void add_joint_goal(const JointVelocity<N>& v, Weight w) noexcept {
+    has_minimum_ = has_minimum_ && w.translation >= 0 && w.rotation >= 0;
     JointVelocity<N> diagonal;
     diagonal << VecN<N>::Constant(w.translation), VecN<N>::Constant(w.rotation);
     A_.diagonal() += diagonal;
@@ -46,6 +48,7 @@ public:
 
   /// Adds a goal of one number: direction . q' = v.
   void add_scalar_goal(const JointVelocity<N>& direction, double v, double w) noexcept {
+    has_minimum_ = has_minimum_ && w >= 0;
     A_.noalias() += w * direction * direction.transpose();
     b_ += w * v * direction;
   }
@@ -54,18 +57,21 @@ public:
   [[nodiscard]] double largest_weight() const noexcept { return A_.diagonal().maxCoeff(); }
 
   /// The minimum: dF/dq' = 0.
-  /// @return ok; singular: goals leave a direction free (add damping), or are not finite. Then q' = 0.
+  /// @return ok; singular: goals leave a direction free (add damping); not_finite: a goal or a weight is not finite or too
+  ///         large; invalid_settings: a weight is negative or NaN, so there is no minimum. Unless ok, q' = 0.
   Status minimum(JointVelocity<N>& velocity) const noexcept {
     velocity = b_;
-    if (solve_in_place(A_, velocity) > 1e-14 && velocity.allFinite()) return Status::ok;
+    if (has_minimum_ && solve_in_place(A_, velocity) > 1e-14 && velocity.allFinite()) return Status::ok;
     velocity.setZero();
-    return Status::singular;
+    if (!has_minimum_) return Status::invalid_settings;
+    return all_finite(A_, b_) ? Status::singular : Status::not_finite;
   }
 
 private:
   using Matrix = Eigen::Matrix<double, 2 * N, 2 * N>;
   Matrix A_ = Matrix::Zero();
   JointVelocity<N> b_ = JointVelocity<N>::Zero();
+  bool has_minimum_ = true;  ///< no weight is negative
 };
 
 }  // namespace ctcr

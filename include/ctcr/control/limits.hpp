@@ -18,17 +18,29 @@ struct Limits {
   VecN<N> beta_high = VecN<N>::Constant(std::numeric_limits<double>::infinity());
 };
 
+/// Whether these are limits: distances finite and >= 0, speeds >= 0, no travel NaN.
+/// @return ok or invalid_settings; whether they allow any positions, AllowedPositions::exist() says. Real time: yes.
+template <int N>
+[[nodiscard]] Status check_limits(const Limits<N>& limits) noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const auto is_gap = [](double gap) { return gap >= 0 && gap < infinity; };
+  const bool possible = is_gap(limits.base_gap) && is_gap(limits.tip_gap) && limits.translation_speed >= 0 &&
+                        limits.rotation_speed >= 0 && (limits.beta_low.array() < infinity).all() &&
+                        (limits.beta_high.array() > -infinity).all();
+  return possible ? Status::ok : Status::invalid_settings;
+}
+
 /// Which limits a step was held at: bit i stands for tube i, from 0.
 struct LimitReport {
-  std::uint8_t base_gaps = 0;  ///< the grasped end of tube i against that of tube i + 1, or the front plate
-  std::uint8_t tip_gaps = 0;   ///< the tips
-  std::uint8_t travel = 0;
+  std::uint16_t base_gaps = 0;  ///< the grasped end of tube i against that of tube i + 1, or the front plate
+  std::uint16_t tip_gaps = 0;   ///< the tips
+  std::uint16_t travel = 0;
   bool speed = false;
 
   [[nodiscard]] bool any() const noexcept { return base_gaps || tip_gaps || travel || speed; }
 };
 
-/// The positions that limits allow, as intervals of beta_i and of beta_i - beta_i+1 (for the last tube, beta itself).
+/// The positions that limits (check_limits() says ok) allow, as intervals of beta_i and of beta_i - beta_i+1 (for the last tube, beta itself).
 template <int N>
 class AllowedPositions {
 public:
@@ -78,7 +90,7 @@ public:
 
 private:
   void note(int i, double beta, double next, LimitReport& report) const noexcept {
-    const auto bit = std::uint8_t(1u << unsigned(i));
+    const auto bit = std::uint16_t(1u << unsigned(i));
     constexpr double near = 1e-9;
     if (std::abs(beta - next - apart_high_[i]) < near)
       report.base_gaps |= bit;
@@ -98,6 +110,7 @@ enum class AtLimits : std::uint8_t {
 };
 
 /// The minimum of the goals that keeps the limits over one period.
+/// @param limits    check_limits() says ok
 /// @param beta      positions now [m]; where they are not allowed, the step leads back to allowed ones, within the speed
 /// @param velocity  q'; 0 where there is no minimum
 /// @return as LeastSquares::minimum(). Real time: yes, at most N + 1 minima.
@@ -129,8 +142,14 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
     report.travel |= which.travel;
     status = goals.minimum(velocity);
   }
-  const double excess = std::max(velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed,
-                                 velocity.template tail<N>().cwiseAbs().maxCoeff() / limits.rotation_speed);
+  if (status != Status::ok) return status;
+  // A limit of 0 leaves no speed.
+  const auto times = [](const auto& v, double limit) {
+    const double speed = v.cwiseAbs().maxCoeff();
+    return speed > limit ? speed / limit : 1.0;
+  };
+  const double excess = std::max(times(velocity.template head<N>(), limits.translation_speed),
+                                 times(velocity.template tail<N>(), limits.rotation_speed));
   if (excess > 1) {
     velocity /= excess;
     report.speed = true;
@@ -138,12 +157,12 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
   const VecN<N> planned = beta + period * velocity.template head<N>();
   velocity.template head<N>() = (allowed.clamped(planned, &report) - beta) / period;
   // From outside the allowed positions the way back takes several periods.
-  const double hurry = velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed;
+  const double hurry = times(velocity.template head<N>(), limits.translation_speed);
   if (hurry > 1 + 1e-9) {
     velocity.template head<N>() /= hurry;
     report.speed = true;
   }
-  return status;
+  return Status::ok;
 }
 
 }  // namespace ctcr
