@@ -69,6 +69,37 @@ TEST(Paths, WithoutSpeedTheyRestAtTheirStart) {
   }
 }
 
+TEST(Paths, ThroughWhatIsNoWayTheyRestAtTheFirstPoint) {
+  const std::vector<Vec3> good{{0, 0, 0.1}, {0.01, 0, 0.1}, {0.02, 0.01, 0.1}, {0.03, 0.01, 0.12}};
+  EXPECT_EQ(Polyline(good, 1, 1).check(), Status::ok);
+  EXPECT_EQ(SplinePath(good, 1, 1).check(), Status::ok);
+  const auto expect_rest = [](const auto& path, const Vec3& start) {
+    EXPECT_EQ(path.check(), Status::invalid_settings);
+    EXPECT_EQ(path.duration(), 0);
+    for (const double t : {-1.0, 0.0, 1.0}) {
+      EXPECT_EQ(path.at(t).pose.position, start);
+      EXPECT_EQ(path.at(t).velocity.norm(), 0);
+    }
+  };
+  for (std::size_t k = 1; k < good.size(); ++k)
+    for (const double bad : {std::nan(""), HUGE_VAL, 1e200}) {
+      std::vector<Vec3> points = good;
+      points[k][1] = bad;
+      expect_rest(Polyline(points, 1, 1), good[0]);
+      expect_rest(SplinePath(points, 1, 1), good[0]);
+    }
+  for (std::size_t count = 1; count < 4; ++count) expect_rest(SplinePath(std::span(good).first(count), 1, 1), good[0]);
+  for (std::size_t k = 1; k < good.size(); ++k) {
+    std::vector<Vec3> points = good;
+    points[k] = points[k - 1];
+    expect_rest(SplinePath(points, 1, 1), good[0]);
+    EXPECT_EQ(Polyline(points, 1, 1).check(), Status::ok);
+  }
+  EXPECT_EQ(Polyline({}, 1, 1).check(), Status::invalid_settings);
+  EXPECT_FALSE(Polyline({}, 1, 1).at(0).pose.position.allFinite()) << "nowhere, not at the front plate";
+  EXPECT_FALSE(SplinePath({}, 1, 1).at(0).pose.position.allFinite());
+}
+
 TEST(Polyline, RestsAtEachCornerOnTime) {
   const std::vector<Vec3> corners{{0, 0, 0.1}, {0.03, 0, 0.1}, {0.03, 0.03, 0.1}, {0.03, 0.03, 0.13}};
   const Polyline path(corners, 5e-3, 2.5e-3);

@@ -5,16 +5,19 @@
 
 #include "ctcr/control/control_state.hpp"
 #include "ctcr/control/trapezoid.hpp"
+#include "ctcr/control/way.hpp"
 
 namespace ctcr {
 
-/// Straight lines from corner to corner, with a rest at each: a corner at speed would need infinite acceleration.
+/// Straight lines from corner to corner, with a rest at each: a corner at speed would need infinite acceleration. Through
+/// corners that are no way, see check(), it rests at the first one.
 class Polyline {
 public:
   /// @param corners  [m], base frame   @param orientation  of the tip, all along
   /// Allocates. speed and acceleration as Trapezoid.
   Polyline(std::span<const Vec3> corners, double speed, double acceleration, const Mat3& orientation = Mat3::Identity())
-    : orientation_(orientation), start_(corners.empty() ? Vec3(Vec3::Zero()) : corners[0]) {
+    : orientation_(orientation), start_(detail::first_of(corners)), is_way_(detail::are_a_way(corners, -1)) {
+    if (!is_way_) return;
     for (std::size_t i = 1; i < corners.size(); ++i) {
       const Vec3 way = corners[i] - corners[i - 1];
       const double length = way.norm();
@@ -25,6 +28,8 @@ public:
     }
   }
 
+  /// ok; invalid_settings: there is no corner, or one is not finite. Real time: yes.
+  [[nodiscard]] Status check() const noexcept { return is_way_ ? Status::ok : Status::invalid_settings; }
   [[nodiscard]] double duration() const noexcept { return duration_; }
 
   /// Real time: yes.
@@ -49,6 +54,7 @@ private:
   std::vector<Edge> edges_;
   Mat3 orientation_;
   Vec3 start_;
+  bool is_way_;
   double duration_ = 0;
 };
 

@@ -7,36 +7,42 @@
 
 #include "ctcr/control/control_state.hpp"
 #include "ctcr/control/trapezoid.hpp"
+#include "ctcr/control/way.hpp"
 
 namespace ctcr {
 
-/// A cubic spline through points, travelled from rest to rest along its arc length.
+/// A cubic spline through points, travelled from rest to rest along its arc length. Through points that are no way, see
+/// check(), it rests at the first one.
 class SplinePath {
 public:
   /// @param points  at least 4, none twice in a row [m], base frame. Allocates. Otherwise as
   ///                Polyline (polyline.hpp).
   SplinePath(std::span<const Vec3> points, double speed, double acceleration,
              const Mat3& orientation = Mat3::Identity())
-    : orientation_(orientation) {
+    : orientation_(orientation), start_(detail::first_of(points)) {
+    if (points.size() < 4 || !detail::are_a_way(points, 0)) return;
     Eigen::Matrix3Xd columns(3, Eigen::Index(points.size()));
     for (std::size_t i = 0; i < points.size(); ++i) columns.col(Eigen::Index(i)) = points[i];
     curve_ = Eigen::SplineFitting<Curve>::Interpolate(columns, 3);
     const auto parts = 64 * (points.size() - 1);
-    arc_length_.push_back(0);
     for (std::size_t k = 0; k < parts; ++k)
       arc_length_.push_back(arc_length_.back() +
                             length_between(double(k) / double(parts), double(k + 1) / double(parts)));
     motion_ = {arc_length_.back(), speed, acceleration};
   }
 
+  /// ok; invalid_settings: there are fewer than 4 points, one is not finite, or two in a row are the same. Real time: yes.
+  [[nodiscard]] Status check() const noexcept { return length() > 0 ? Status::ok : Status::invalid_settings; }
   [[nodiscard]] double length() const noexcept { return arc_length_.back(); }
   [[nodiscard]] double duration() const noexcept { return motion_.duration(); }
 
   /// Real time: yes.
   [[nodiscard]] Reference at(double t) const noexcept {
+    Reference r{{orientation_, start_}};
+    if (!(duration() > 0)) return r;
     const auto [s, v] = motion_.at(t);
     const auto [point, slope] = here(parameter(s));
-    Reference r{{orientation_, point}};
+    r.pose.position = point;
     r.velocity.head<3>() = v * slope.normalized();
     return r;
   }
@@ -69,9 +75,10 @@ private:
   }
 
   Curve curve_;
-  std::vector<double> arc_length_;
+  std::vector<double> arc_length_{0};  ///< of equal parts of the curve's parameter [m]
   Trapezoid motion_;
   Mat3 orientation_;
+  Vec3 start_;
 };
 
 }  // namespace ctcr
