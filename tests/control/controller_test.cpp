@@ -97,6 +97,177 @@ TEST(Controller, StandsStillOnWhatItCannotUse) {
   EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
 }
 
+TEST(Controller, SettingsThatMeanNothingAreRefused) {
+  Loop loop;
+  const Measurement<3> measured{loop.start, {Mat3::Identity(), loop.at}};
+  const auto expect_refused = [&](const Limits<3>& limits, double of) {
+    Controller<3> controller(loop.system, limits, of);
+    MotorAngles<3> v{Vec3::Ones(), Vec3::Ones()};
+    EXPECT_EQ(controller.check_start(loop.start), Status::invalid_settings);
+    EXPECT_EQ(controller.advance(measured, {}, {}, v).status, Status::invalid_settings);
+    EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+  };
+  for (const double bad : {std::nan(""), -1.0}) {
+    expect_refused({.translation_speed = bad}, period);
+    expect_refused({.rotation_speed = bad}, period);
+    expect_refused({.base_gap = bad}, period);
+    expect_refused({}, bad);
+  }
+  expect_refused({.beta_low = Vec3(-1, std::nan(""), -1)}, period);
+  expect_refused({.beta_high = Vec3(std::nan(""), 0, 0)}, period);
+  expect_refused({}, 0);
+  expect_refused({}, HUGE_VAL);
+}
+
+/// NaN anywhere is not near a bifurcation, and no robot moves by it.
+TEST(Controller, GoalsThatAreNoNumbersAreRefused) {
+  Loop loop;
+  const Measurement<3> measured{loop.start, {Mat3::Identity(), loop.at}};
+  const double nan = std::nan("");
+  const auto status = [&](const auto& change) {
+    Controller<3, TaskList<Tracking, Damping, ObstacleAvoidance, StabilityMargin, Posture<3>>> controller(loop.system,
+                                                                                                          {}, period);
+    controller.tasks.template get<Posture<3>>() = {.weight = {1, 1}, .preferred = home};
+    Reference reference{{Mat3::Identity(), loop.at}};
+    change(controller, reference);
+    MotorAngles<3> v;
+    const auto report = controller.advance(measured, reference, {}, v);
+    EXPECT_TRUE(v.translation.allFinite() && v.rotation.allFinite());
+    if (report.status != Status::ok) {
+      EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+    }
+    return report.status;
+  };
+  EXPECT_EQ(status([](auto&, auto&) {}), Status::ok);
+  EXPECT_EQ(status([&](auto&, auto& r) { r.pose.position[0] = nan; }), Status::not_finite);
+  EXPECT_EQ(status([&](auto&, auto& r) { r.velocity[1] = nan; }), Status::not_finite);
+  EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Tracking>().gain = nan; }), Status::not_finite);
+  EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Tracking>().correction = nan; }), Status::not_finite);
+  EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<ObstacleAvoidance>().obstacle.radius = nan; }),
+            Status::not_finite);
+  EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Posture<3>>().preferred.beta[2] = nan; }),
+            Status::not_finite);
+  EXPECT_EQ(status([&](auto& c, auto&) { c.reading_age = nan; }), Status::not_finite);
+  for (const double bad : {nan, -1.0}) {
+    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Tracking>().weight.translation = bad; }),
+              Status::invalid_settings);
+    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Damping>().weight.rotation = bad; }),
+              Status::invalid_settings);
+  }
+  ControlReport<PaperTasks> report;
+  report.shortfall = {0.5, nan, 1, 2};
+  EXPECT_EQ(report.gave_way(), 0b1010u) << "of a shortfall that is no number nobody knows that it is small";
+}
+
+/// One reading that is missing or far off, whatever is made of the force: later periods are as if it had never been.
+TEST(Controller, RecoversFromAWrongReading) {
+  constexpr double missing = -3.697314e28;  // a tracker's value where it sees nothing
+  for (const auto what : {TipForce::unknown, TipForce::estimated})
+    for (const double off : {0.02, 0.1, 0.3, 1.0, 100.0, missing, std::nan("")}) {
+      Loop loop;
+      Controller<3> controller(loop.system, {}, period);
+      controller.tip_force = what;
+      controller.reading_age = 2 * period;
+      const TipLoad load{.force = {0, -0.1, 0.02}};
+      SimulatedRobot<3> robot(loop.system, loop.start, load);
+      const Reference there{{Mat3::Identity(), robot.tip().position}};
+      Measurement<3> measured;
+      MotorAngles<3> v;
+      for (int k = 0; k < 400; ++k) {
+        ASSERT_EQ(robot.measure(measured), Status::ok);
+        if (k == 200) measured.reading.position[1] += off;
+        const Status status = controller.advance(measured, there, {}, v).status;
+        EXPECT_TRUE(v.translation.allFinite() && v.rotation.allFinite());
+        if (k != 200) {
+          EXPECT_EQ(status, Status::ok) << "period " << k << " after a reading that was off by " << off;
+        } else if (!(off < 1) || off == missing) {
+          EXPECT_EQ(status, Status::not_finite);
+        }
+        ASSERT_EQ(robot.move(v, period), Status::ok);
+      }
+      EXPECT_LT((robot.tip().position - there.pose.position).norm(), 1e-5) << off;
+      EXPECT_LT(controller.estimate.force.norm(), 0.2) << off;
+    }
+}
+
+/// A force that the model cannot bear fades.
+TEST(Controller, RecoversFromAWrongForce) {
+  Loop loop;
+  Controller<3> controller(loop.system, {}, period);
+  controller.tip_force = TipForce::estimated;
+  controller.estimate.force = {300, 0, -400};
+  const Measurement<3> measured{loop.start, {Mat3::Identity(), loop.at}};
+  MotorAngles<3> v;
+  const Reference there{{Mat3::Identity(), loop.at}};
+  EXPECT_NE(controller.advance(measured, there, {}, v).status, Status::ok);
+  for (int k = 0; k < 20; ++k) (void)controller.advance(measured, there, {}, v);
+  for (int k = 0; k < 200; ++k) EXPECT_EQ(controller.advance(measured, there, {}, v).status, Status::ok);
+  EXPECT_LE(controller.estimate.force.norm(), controller.estimate.largest);
+}
+
+TEST(ForceEstimate, IsBoundedAndTakesNoOutliers) {
+  test::Random random(51);
+  ForceEstimate estimate{.largest = 2};
+  for (int k = 0; k < 2000; ++k) {
+    const Mat3 C = 0.1 * Mat3::NullaryExpr([&] { return test::uniform(random, -1, 1); });
+    const double size = std::pow(10, test::uniform(random, -3, 40));
+    const Vec3 before = estimate.force;
+    estimate.update(C, size * test::random_vector(random, 1));
+    EXPECT_LE(estimate.force.norm(), estimate.largest * (1 + 1e-12));
+    EXPECT_LE((estimate.force - before).norm(), 2 * estimate.gain * estimate.largest * (1 + 1e-12));
+    estimate.update(C, Vec3::Constant(std::nan("")));
+    EXPECT_TRUE(estimate.force.allFinite());
+  }
+}
+
+/// Equal tubes turned against each other, curved so much that they almost snap.
+TEST(Controller, StandsStillBeforeASnap) {
+  const auto robot_of = [](double curvature) {
+    const Tube inner{.youngs_modulus = 60e9,
+                     .inner_diameter = 1e-3,
+                     .outer_diameter = 1.3e-3,
+                     .length = 0.2,
+                     .curved_length = 0.2,
+                     .curvature = curvature};
+    Tube outer = inner;
+    outer.bending_stiffness = inner.EI();
+    outer.inner_diameter = 1.4e-3, outer.outer_diameter = 1.6e-3;
+    outer.length = outer.curved_length = 0.196;
+    return Robot<2>{{inner, outer}};
+  };
+  const MotorAngles<2> start{{-0.004, -0.002}, {0, std::numbers::pi}};
+  double curvature = 5;  // [1/m]
+  Solution<2> s;
+  for (; curvature < 15 && s.status != Status::singular; curvature += 2e-3) {
+    Workspace<2> ws;
+    (void)solve<Derivatives::jacobian>(Model<2>(robot_of(curvature)), {start.translation, start.rotation}, TipLoad{},
+                                       ws, s);
+  }
+  curvature -= 2e-3;
+  ASSERT_EQ(s.status, Status::singular);
+  Controller<2> controller({{}, Model<2>(robot_of(curvature)), {}}, {.base_gap = 1e-3, .tip_gap = 1e-3}, period);
+  MotorAngles<2> v;
+  Reference moving{s.pose()};
+  moving.velocity[0] = 5e-3;
+  const auto report = controller.advance({start, s.pose()}, moving, {}, v);
+  EXPECT_EQ(report.status, Status::singular);
+  EXPECT_EQ(v.translation.norm() + v.rotation.norm(), 0);
+  EXPECT_EQ(report.gave_way() & 1, 1u) << "tracking gave way";
+}
+
+TEST(Controller, ALoopWithoutAPeriodOrAPathDoesNotBegin) {
+  Loop loop;
+  Controller<3> controller(loop.system, {}, period);
+  SimulatedRobot<3> robot(loop.system, loop.start, {});
+  const auto status = [&](const auto& path, double of) {
+    return run(controller, robot, path, of, {}, [](const auto&) { return false; });
+  };
+  const Polyline rest(std::vector<Vec3>{loop.at}, 1, 1), none({}, 1, 1);
+  EXPECT_EQ(status(rest, period), Status::ok);
+  EXPECT_EQ(status(none, period), Status::invalid_settings);
+  for (const double bad : {0.0, -1.0, std::nan("")}) EXPECT_EQ(status(rest, bad), Status::invalid_settings);
+}
+
 TEST(Controller, LimitsThatExcludeTheStartAreRefused) {
   Loop loop;
   const Controller<3> wide(loop.system, {}, period), narrow(loop.system, {.base_gap = 0.09}, period),

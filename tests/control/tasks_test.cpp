@@ -82,6 +82,18 @@ TEST(Tracking, FeedforwardAndBoundedFeedback) {
   EXPECT_GT(tracking.shortfall(place.state(), JointVelocity<3>::Zero().eval()), 1);
 }
 
+/// However far away the reference is.
+TEST(Tracking, FeedbackHasADirection) {
+  Place place(somewhere);
+  const Tracking tracking;
+  for (const double far : {1.0, 1e100, 1e200, 1e300}) {
+    place.reference = {place.solution.pose()};
+    place.reference.pose.position += far * Vec3(0.6, 0, -0.8);
+    EXPECT_LT((tracking.velocity(place.state()).head<3>() - tracking.correction * Vec3(0.6, 0, -0.8)).norm(), 1e-12);
+    EXPECT_GT(tracking.shortfall(place.state(), JointVelocity<3>::Zero().eval()), 1);
+  }
+}
+
 TEST(Tracking, OfThePoseTurnsTheTip) {
   Place place(somewhere);
   const Vec3 turn(0.01, -0.02, 0.005);

@@ -15,14 +15,18 @@ struct LoopRow {
 };
 
 /// Runs from time 0 to the path's end.
-/// @param path    has at(time) -> Reference and duration()
+/// @param path    has at(time) -> Reference and duration(), and may have check()
 /// @param record  record(row) after each period; return false to stop
-/// @return ok, or the first status of the device that is not ok. Real time: as path, device and record.
+/// @return ok; invalid_settings: the period is not > 0, or the path without end or none; or the first status of the device that is
+///         not ok. Real time: as path, device and record.
 template <int N, class Tasks, class Fx, Device<N> D, class Path, class Record>
 Status run(Controller<N, Tasks, Fx>& controller, D& device, const Path& path, double period, const TipLoad& load,
            const Record& record) noexcept {
-  const auto periods = static_cast<long>(path.duration() / period + 0.5);
-  for (long k = 0; k <= periods; ++k) {
+  const double periods = path.duration() / period + 0.5;
+  if (!(period > 0 && periods < 1e15)) return Status::invalid_settings;
+  if constexpr (requires { path.check(); })
+    if (path.check() != Status::ok) return path.check();
+  for (long k = 0; k <= static_cast<long>(periods); ++k) {
     LoopRow<N, Tasks> row{.time = double(k) * period};
     Status status = device.measure(row.measured);
     if (status != Status::ok) return status;

@@ -2,6 +2,7 @@
 // The paper's control scheme: one call a period, measured tip in, motor velocities out.
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "ctcr/control/device.hpp"
 #include "ctcr/control/force_estimate.hpp"
@@ -22,16 +23,16 @@ enum class TipForce : std::uint8_t {
 /// What became of a period.
 template <class Tasks>
 struct ControlReport {
-  Status status = Status::not_converged;   ///< of the model and the goals; not ok: the robot is told to stand still
-  LimitReport limits;                      ///< at which the step was held
-  typename Tasks::Shortfalls shortfall{};  ///< of each task, above 1: it gave way
+  Status status = Status::not_converged;  ///< of the period, see advance(); unless ok, the robot is told to stand still
+  LimitReport limits;                     ///< at which the step was held
+  typename Tasks::Shortfalls shortfall{};  ///< of each task, above 1 or NaN: it gave way
   Vec3 force = Vec3::Zero();               ///< that the model was solved with [N], base frame
   double stability = 0;                    ///< of the model
 
   /// Bit k: task k gave way.
   [[nodiscard]] std::uint32_t gave_way() const noexcept {
     std::uint32_t bits = 0;
-    for (std::size_t k = 0; k < shortfall.size(); ++k) bits |= std::uint32_t(shortfall[k] > 1) << k;
+    for (std::size_t k = 0; k < shortfall.size(); ++k) bits |= std::uint32_t(!(shortfall[k] <= 1)) << k;
     return bits;
   }
 };
@@ -51,18 +52,21 @@ public:
   /// predicts the motion of the tip since. Ref: Smith's predictor.
   double reading_age = 0;
 
-  /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s]
+  /// @param system  the sensor sits on the innermost tube   @param period  of the calls [s], > 0
+  /// Settings that mean nothing (check_limits(), the period) are answered by invalid_settings in all calls.
   Controller(const System<N, Fx>& system, const Limits<N>& limits, double period, const Tasks& wanted = {}) noexcept
     : tasks(wanted),
       system_(system),
       limits_(limits),
       allowed_(system.model.robot(), limits),
       period_(period),
+      settings_(period > 0 && period < HUGE_VAL ? check_limits(limits) : Status::invalid_settings),
       now_{LiveEffects<N, Fx>(system.model), system.model, {}, {}} {}
 
   /// Whether the robot may be controlled from these motor angles.
-  /// @return ok; joints_out_of_order: the limits exclude them, or allow no joints at all; else as solve()
+  /// @return ok; invalid_settings; joints_out_of_order: the limits exclude them, or allow no joints at all; else as solve()
   [[nodiscard]] Status check_start(const MotorAngles<N>& theta) const noexcept {
+    if (settings_ != Status::ok) return settings_;
     const Joints<N> q = joints(system_.transmission, theta);
     if (!allowed_.exist() || !allowed_.contain(q.beta)) return Status::joints_out_of_order;
     Workspace<N> ws;
@@ -74,11 +78,19 @@ public:
   /// @param measured   motor angles and tracker reading (its rotation counts where orientation is tracked)
   /// @param reference  wanted pose and velocity of the sensor, base frame
   /// @param load       at the robot tip; only its moment counts unless the force is known
-  /// @param velocity   of the motors [rad/s]; 0 where the status is not ok
+  /// @param velocity   of the motors [rad/s], finite; 0 unless the status is ok
+  /// @return status ok; that of the model: singular: it is about to snap, and its Jacobian leads nowhere; singular: the
+  ///         goals leave a direction free; not_finite: a motor angle, reading, reference or goal is NaN or too large, or the
+  ///         reading is farther from the front plate than twice the length of the robot; invalid_settings: those given to
+  ///         the constructor, or a negative weight. What is refused leaves no trace in later periods.
   ControlReport<Tasks> advance(const Measurement<N>& measured, const Reference& reference, const TipLoad& load,
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
     velocity = {};
+    if (settings_ != Status::ok) {
+      report.status = settings_;
+      return report;
+    }
     Pose tip = tip_of(system_.sensor, measured.reading);
     TipLoad acting = load;
     if (tip_force != TipForce::known)
@@ -90,19 +102,26 @@ public:
     time_ += period_;
     report.status = now_.solution.status;
     report.stability = now_.solution.stability;
-    const bool usable = has_equilibrium(report.status);
-    if (tip_force == TipForce::estimated && usable)
-      estimate.update(now_.solution.compliance.template topLeftCorner<3, 3>(), tip.position - now_.solution.position);
-    if (!usable || !tip.position.allFinite()) {
-      if (usable) report.status = Status::not_finite;
+    if (!has_equilibrium(report.status)) {
+      // Where the joints are possible it may be the estimated force that is not.
+      if (tip_force == TipForce::estimated && check_joints(system_.model.robot(), q) == Status::ok) estimate.doubt();
       now_.ws.reset();
       count_ = 0;
       return report;
     }
-    tip.position += moved_since_reading();
+    const Vec3 moved = moved_since_reading();
+    // The tip is no farther away than the robot is long; twice that forgives wrong frames.
+    if (!(tip.position.norm() <= 2 * system_.model.robot().tubes[0].length)) {
+      report.status = Status::not_finite;
+      return report;
+    }
+    if (tip_force == TipForce::estimated)
+      estimate.update(now_.solution.compliance.template topLeftCorner<3, 3>(), tip.position - now_.solution.position);
+    tip.position += moved;
     ControlState<N, Fx> state{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
-    JointVelocity<N> v;
-    Status found = minimum(state, motors, v, report.limits);
+    JointVelocity<N> v = JointVelocity<N>::Zero();
+    Status found = report.status;
+    if (found == Status::ok) found = minimum(state, motors, v, report.limits);
     if constexpr (Fx::template On<N>::depends_on_torsion) {
       if (found == Status::ok && now_.model.effects().act_by_torsion()) {
         state.reference.velocity.template head<3>() += missing(motors, v, acting);
@@ -110,12 +129,14 @@ public:
       }
     }
     report.shortfall = tasks.shortfalls(state, v);
-    if (found != Status::ok) {
-      report.status = found;
-      return report;
-    }
+    report.status = found;
+    if (found != Status::ok) return report;
     velocity = {v.template head<N>() / system_.transmission.translation_ratio,
                 v.template tail<N>() / system_.transmission.rotation_ratio};
+    if (!all_finite(velocity.translation, velocity.rotation)) {
+      velocity = {};
+      report.status = Status::not_finite;
+    }
     return report;
   }
 
@@ -161,7 +182,7 @@ private:
     past_[0] = now_.solution.position;
     count_ = std::min(count_ + 1, past_.size());
     const double periods = std::clamp(reading_age / period_, 0.0, double(count_ - 1));
-    const auto k = std::min(std::size_t(periods), count_ - 1);
+    const std::size_t k = periods > 0 ? std::min(std::size_t(periods), count_ - 1) : 0;  // NaN stays in the sum below
     const Vec3 &later = past_[k], &earlier = past_[std::min(k + 1, count_ - 1)];
     return past_[0] - (later + (periods - double(k)) * (earlier - later));
   }
@@ -189,6 +210,7 @@ private:
   Limits<N> limits_;
   AllowedPositions<N> allowed_;
   double period_, time_ = 0;
+  Status settings_;  ///< whether limits and period mean something
   Moving now_;
   std::array<Vec3, 9> past_{};  ///< positions of the model's tip, the newest first
   std::size_t count_ = 0;       ///< of those that are known

@@ -10,14 +10,23 @@ namespace ctcr {
 struct ForceEstimate {
   double gain = 0.1;          ///< share of the deflection that one period explains; small: noise is averaged
   double softest = 0.01;      ///< compliance below which a direction is not observed [m/N]
+  double largest = 5;         ///< no force is larger [N]: bounds the estimate, and which deflections are believed
   Vec3 force = Vec3::Zero();  ///< [N], base frame
 
+  /// The force and its estimate are `largest` at most: a deflection that asks for a change by more than twice that is an
+  /// outlier, or not finite, and changes nothing.
   /// @param compliance   of the position by the force [m/N]   @param deflection  measured minus predicted position [m]
   void update(const Mat3& compliance, const Vec3& deflection) noexcept {
     const Mat3 normal = compliance.transpose() * compliance + softest * softest * Mat3::Identity();
-    const Vec3 change = gain * (normal.inverse() * (compliance.transpose() * deflection));
-    if (change.allFinite()) force += change;
+    const Vec3 missing = normal.inverse() * (compliance.transpose() * deflection);
+    if (!(missing.norm() <= 2 * largest)) return;
+    force += gain * missing;
+    const double size = force.norm();
+    if (size > largest) force *= largest / size;
   }
+
+  /// After a period in which the model has no equilibrium: half of the force, so that a wrong one fades.
+  void doubt() noexcept { force *= 0.5; }
 };
 
 }  // namespace ctcr

@@ -4,6 +4,7 @@
 // A task has a name, add(state, goals), which adds its goal to the least-squares problem, and shortfall(state, q'), which
 // says how far a step falls short of what the task wants: above 1 it gave way. All calls are real time.
 #include <array>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -26,8 +27,10 @@ struct Tracking {
     feedback << s.reference.pose.position - s.tip.position,
         rotation_vector(s.reference.pose.rotation * s.tip.rotation.transpose());
     feedback *= gain;
-    const double speed = feedback.head<3>().norm();
-    return s.reference.velocity + (speed > correction ? correction / speed : 1.0) * feedback;
+    double speed = feedback.head<3>().norm();
+    if (!(speed < HUGE_VAL)) [[unlikely]]
+      speed = feedback.head<3>().stableNorm();  // where squares are too large for a number
+    return s.reference.velocity + (speed <= correction ? 1.0 : correction / speed) * feedback;
   }
 
   template <int N, class Fx>
@@ -126,8 +129,8 @@ struct ObstacleAvoidance {
 
   template <int N, class Fx>
   void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
-    if (!(obstacle.radius > 0)) return;
-    constexpr double nearest = 1e-4;  // [m]: the velocity stays finite on the surface, and points out from inside
+    if (obstacle.radius <= 0) return;  // NaN is an obstacle that nobody knows
+    constexpr double nearest = 1e-4;   // [m]: the velocity stays finite on the surface, and points out from inside
     const double d = std::max(distance(s.tip.position), nearest);
     Vec6 away = Vec6::Zero();
     away.head<3>() = gain / (d * d) * (s.tip.position - obstacle.centre).normalized();
@@ -136,7 +139,7 @@ struct ObstacleAvoidance {
 
   template <int N, class Fx>
   [[nodiscard]] double shortfall(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
-    if (!(obstacle.radius > 0)) return 0;
+    if (obstacle.radius <= 0) return 0;
     const Vec3 move = (s.solution.jacobian * v).template head<3>();
     const bool nears = move.dot(s.tip.position - obstacle.centre) < 0;
     return nears ? 2 - distance(s.tip.position) / range : 0;
@@ -200,7 +203,7 @@ struct StabilityMargin {
 
   template <int N, class Fx>
   void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
-    if (!(weight.translation > 0 || weight.rotation > 0) || s.solution.stability >= wanted) return;
+    if ((weight.translation == 0 && weight.rotation == 0) || s.solution.stability >= wanted) return;
     const JointVelocity<N> g = gradient(s);
     const double steepness = g.squaredNorm();
     if (steepness > 0) goals.add_joint_goal(rate * (wanted - s.solution.stability) / steepness * g, weight);
@@ -212,9 +215,19 @@ struct StabilityMargin {
   }
 };
 
+/// What a task has to have.
+template <class Task, int N, class Fx>
+concept ActsAsTask =
+    requires(const Task& task, const ControlState<N, Fx>& s, LeastSquares<N>& goals, const JointVelocity<N>& v) {
+      { Task::name } -> std::convertible_to<const char*>;
+      { task.add(s, goals) } noexcept;
+      { task.shortfall(s, v) } noexcept -> std::convertible_to<double>;
+    };
+
 /// Tasks that act together. Real time: yes.
 template <class... Task>
 struct TaskList {
+  static_assert(detail::all_differ<Task...>, "a task stands in the list twice: get<>() could not tell them apart");
   static constexpr int size = int(sizeof...(Task));
   static constexpr std::array<const char*, sizeof...(Task)> names{Task::name...};
   using Shortfalls = std::array<double, sizeof...(Task)>;
@@ -228,6 +241,8 @@ struct TaskList {
 
   template <int N, class Fx>
   void add(const ControlState<N, Fx>& s, LeastSquares<N>& goals) const noexcept {
+    static_assert((ActsAsTask<Task, N, Fx> && ...),
+                  "a task needs a name, add(state, goals) and shortfall(state, velocity), both noexcept");
     std::apply([&](const Task&... task) { (task.add(s, goals), ...); }, tasks);
   }
 
