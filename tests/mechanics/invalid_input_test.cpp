@@ -103,5 +103,23 @@ TEST(InvalidInput, TooFewIterationsAreReported) {
   EXPECT_TRUE(finite(s));
 }
 
+TEST(InvalidInput, AnAccuracyThatIsNoNumberIsNotKept) {
+  const Model<3> model(robot);
+  Workspace<3> ws;
+  Solution<3> s;
+  EXPECT_EQ(solve<all>(model, good, weight, ws, s, {.accuracy = nan}), Status::inaccurate);
+  EXPECT_TRUE(finite(s));
+}
+
+TEST(InvalidInput, WithoutEvaluationsNothingConverges) {
+  const Model<3> model(robot);
+  for (const int none : {0, -1, std::numeric_limits<int>::min()}) {
+    Workspace<3> ws;
+    Solution<3> s;
+    EXPECT_NE(solve<all>(model, good, weight, ws, s, {.max_iterations = none}), Status::ok);
+    EXPECT_TRUE(finite(s));
+  }
+}
+
 }  // namespace invalid_input_test
 }  // namespace ctcr

@@ -242,5 +242,41 @@ TEST(ShapePlaces, AreUniformWithEveryBreakpointOnce) {
   });
 }
 
+TEST(Shape, RefusesPlacesThatAreNone) {
+  test::Random random(12);
+  const Case<3> c = random_case<3>(random, 2);
+  const std::vector<double> good{0, 0.01, 0.02};
+  EXPECT_EQ(solve_shape(c, good).status, Status::ok);
+  const auto expect_refused = [&](std::vector<double> s, Status expected) {
+    const Solved<3> r = solve_shape(c, s);
+    EXPECT_EQ(r.status, expected);
+    EXPECT_EQ(r.tip.status, expected);
+    for (const ShapePoint<3>& p : r.points) {
+      EXPECT_TRUE(p.bishop.position.isZero(0) && p.bishop.rotation.isIdentity(0));
+      EXPECT_FALSE(p.tube[0].present);
+    }
+  };
+  for (std::size_t k = 0; k < good.size(); ++k)
+    for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+      std::vector<double> s = good;
+      s[k] = bad;
+      expect_refused(s, k == 0 && bad > 0 || k == 2 && bad < 0 ? Status::invalid_settings : Status::not_finite);
+    }
+  expect_refused({0, 0.02, 0.01}, Status::invalid_settings);
+  std::vector<ShapePoint<3>> few(2);
+  Workspace<3> ws;
+  Solution<3> tip;
+  EXPECT_EQ(shape<3>(Model<3>(c.robot), c.q, c.load, good, few, ws, tip), Status::invalid_settings);
+}
+
+TEST(Shape, OfJointsThatAreNoneHasNoPlaces) {
+  test::Random random(13);
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    Case<3> c = random_case<3>(random, 0);
+    c.q.beta[1] = bad;
+    EXPECT_EQ(places(c, 20).size(), 0u);
+  }
+}
+
 }  // namespace shape_test
 }  // namespace ctcr

@@ -1,6 +1,7 @@
 #pragma once
 // The shape of the robot in equilibrium: frame, curvature and internal moment of every tube at any arc length.
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "ctcr/math/frame_algebra.hpp"
@@ -248,18 +249,26 @@ inline void fill_shape_with_effects(const Model<N, Fx>& model, const Joints<N>& 
 /// At a breakpoint, where curvatures jump and effects may kink the robot, the values are those of the base side. s < 0 is behind the front plate.
 /// Beyond the robot tip no tube is present and the frame is that of the tip.
 /// @param s       arc lengths from the front plate, ascending [m]
-/// @param points  out: one for each s (at least as many); no tube is present where solve() computes nothing
+/// @param points  out: one for each s (at least as many); no tube is present where nothing is computed
 /// @param ws      warm start; becomes that of the fine model, so a control loop should keep its own
 /// @param out     the fine solution, without derivatives
 /// @param settings  steps below shape_steps are raised to it
-/// @return as solve()   Real time: yes; solve(), two integrations more, and one step for each point.
+/// @return as solve(); invalid_settings: arc lengths that do not ascend, or too few points; not_finite: of an arc length, too;
+///         then nothing is computed   Real time: yes; solve(), two integrations more, and one step for each point.
 template <int N, class Fx>
 Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load, std::span<const double> s,
              std::span<ShapePoint<N>> points, Workspace<N>& ws, Solution<N>& out, Settings settings = {}) noexcept {
-  points = points.first(s.size());
-  for (std::size_t k = 0; k < s.size(); ++k) {
+  points = points.first(std::min(s.size(), points.size()));
+  Status given = points.size() == s.size() ? Status::ok : Status::invalid_settings;
+  for (std::size_t k = 0; k < points.size(); ++k) {
     points[k] = ShapePoint<N>{};
     points[k].s = s[k];
+    if (!std::isfinite(s[k])) given = Status::not_finite;
+    if (k > 0 && s[k] < s[k - 1]) given = Status::invalid_settings;
+  }
+  if (given != Status::ok) {
+    out.iterations = 0;
+    return detail::blank(given, out);
   }
   settings.steps = std::max(settings.steps, shape_steps);
   const Status status = solve<Derivatives::none>(model, q, load, ws, out, settings);
@@ -278,10 +287,11 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
 /// Arc lengths at which to draw a robot: uniform from the front plate to the tip, and every breakpoint between.
 /// @param points  how many uniform ones, >= 2
 /// @param s       out: ascending, each once [m]; room for points + 2N
-/// @return how many were written   Real time: yes.
+/// @return how many were written: none where joints are not finite   Real time: yes.
 template <int N, class Fx>
 std::size_t shape_arc_lengths(const Model<N, Fx>& model, const Joints<N>& q, std::size_t points,
                               std::span<double> s) noexcept {
+  if (!all_finite(q.beta, q.alpha)) return 0;
   const auto& c = model.coefficients();
   Events<N> events;
   if constexpr (Fx::none)

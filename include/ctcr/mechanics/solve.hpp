@@ -286,7 +286,8 @@ inline constexpr bool is_for_comparison = requires { Stepper::general_equations;
 /// Whether the error of integration is estimated and kept.
 template <class Stepper>
 inline bool takes_more_steps(const Settings& settings) noexcept {
-  return !is_for_comparison<Stepper> && settings.accuracy < std::numeric_limits<double>::infinity();
+  return !is_for_comparison<Stepper> &&
+         settings.accuracy != std::numeric_limits<double>::infinity();  // NaN is met by none
 }
 
 /// Steps in which a solve begins, or a control step integrates.
@@ -312,7 +313,7 @@ inline Status solve_as(const Model<N, Fx>& model, const Joints<N>& q, const TipL
   TipGuess<N> guess;
   const auto solved = [&] { return ev.residual < settings.tolerance; };
   const auto way = [&] { return way_of(model, q, load, guess, ws); };
-  const auto left = [&] { return settings.max_iterations - reserve - out.iterations; };
+  const auto left = [&] { return std::max(settings.max_iterations, 0) - reserve - out.iterations; };
   bool stable = false;
   const auto attempt = [&](int most) {
     out.iterations += newton<D, L, Stepper>(c, q, load, settings, std::min(most, left()), steps, guess, ev);
