@@ -178,6 +178,12 @@ template <template <int, class> class... E>
 struct EffectList;
 
 namespace detail {
+/// Whether no type stands among them twice.
+template <class... T>
+inline constexpr bool all_differ = true;
+template <class First, class... Rest>
+inline constexpr bool all_differ<First, Rest...> = (true && ... && !std::is_same_v<First, Rest>) && all_differ<Rest...>;
+
 /// Kept, followed by those of E for which `picked` holds.
 template <auto picked, class Kept, template <int, class> class... E>
 struct Picked {
@@ -208,6 +214,10 @@ CTCR_NOINLINE inline void seed_all(std::span<const From> from, std::span<To> to,
 /// Effects that act together, in their order.
 template <template <int, class> class... E>
 struct EffectList {
+  static_assert(detail::all_differ<E<2, double>...>, "an effect stands in the list twice");
+  static_assert((true && ... && requires { typename E<2, double>::History; }),
+                "an effect derives from EffectValues<parameters, N, P> (effect.hpp)");
+
   static constexpr bool none = sizeof...(E) == 0;
   /// Those that change the equilibrium of the rod, in the same order.
   using OnRod =
