@@ -197,6 +197,22 @@ def test_refusals(monkeypatch):
     monkeypatch.setitem(robot_file.user_effects, "mine", None)
     with pytest.raises(InputError, match="mine is written in Python"):
         cpp_header(robot_file.load(TABLE2).with_effects({"mine": {}}))
-    for name in ("std", "ctcr::x", "a b", "", "1x", "x;int y", "é"):
-        with pytest.raises(InputError, match="no name"):
+    for name in (
+        "std",
+        "ctcr::x",
+        "a b",
+        "",
+        "1x",
+        "x;int y",
+        "é",
+        "x::",
+        "class",
+        "and",
+        "a::co_await",
+        "NULL",
+        "main",
+    ):
+        with pytest.raises(InputError, match="no free name"):
             cpp_header(robot_file.load(TABLE2), name)
+    for name in ("robot", "a::b_2", "classes", "Main"):
+        assert f"namespace {name} {{" in cpp_header(robot_file.load(TABLE2), name)

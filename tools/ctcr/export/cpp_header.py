@@ -21,6 +21,19 @@ from ctcr.robot.description import Robot
 from ctcr.show.wording import deviation, number, visible
 
 RATIOS = ("translation_mm_per_rev", "rotation_rev_per_rev")
+# Of C++20: keywords, other spellings of operators, and what standard headers and GCC define.
+TAKEN = set(
+    """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class
+    co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype default
+    delete do double dynamic_cast else enum explicit export extern false float for friend goto if inline int long
+    mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public register
+    reinterpret_cast requires return short signed sizeof static static_assert static_cast struct switch template this
+    thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t while xor
+    xor_eq
+    EOF NAN NULL assert errno linux main offsetof unix
+    """.split()
+)
 SAME = 1e-6  # relative: a ledger and a file round the same value to eight digits
 SYSTEM = """\
 /// The robot with its effects, motors and tracker, ready for a controller; share it between threads.
@@ -94,9 +107,11 @@ def _check(robot: Robot, namespace: str) -> None:
         Problem(f"{identity} is written in Python: write it in C++ first (docs/effects.md)", robot.file or None)
         for identity in own
     ]
-    if not re.fullmatch(r"(?!(?:std|ctcr)\b)[A-Za-z]\w*(::[A-Za-z]\w*)*", namespace, re.ASCII):
+    names = namespace.split("::")
+    possible = all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in TAKEN for name in names)
+    if not possible or names[0] in ("std", "ctcr"):
         problems.append(
-            Problem("is no name of C++: use letters, digits and _", field=f"namespace {visible(namespace)}")
+            Problem("is no free name in C++: use letters, digits and _", field=f"namespace {visible(namespace)}")
         )
     if problems:
         raise InputError(problems)
