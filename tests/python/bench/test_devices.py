@@ -5,15 +5,17 @@ import os
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from ctcr import cli
-from ctcr.bench.devices import bench_file, emergency_stop
+from ctcr.bench.devices import bench_file, emergency_stop, stepper_drive
 from ctcr.bench.devices.axis_control import AxisControl
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motion import StraightMove, VelocityMove
+from ctcr.bench.devices.stepper_drive import StepperDrive
 from ctcr.bench.shared import ethercat
 from ctcr.bench.shared.real_time import BUS, TRACKER, Lateness, real_time
 from ctcr.bench.shared.shared_record import SharedRecord
@@ -188,6 +190,38 @@ def test_encoder_jump(settings):
     control.cycle(DT, HOME)
     control.cycle(DT, HOME + [0.8e-3, 0, 0, 0, 0, 0])
     assert "translation of tube 1: its encoder jumped" in str(control.fault)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_no_numbers(settings, wrong):
+    """A request that is not finite is refused and changes nothing; a stop ends also a motion that has no numbers."""
+    control = AxisControl(settings, HOME, homed=True)
+    for request in (
+        lambda: control.move(HOME, speed=wrong),
+        lambda: control.jog(np.full(6, wrong)),
+        lambda: control.velocity(np.full(6, wrong), 1.0),
+        lambda: control.velocity(np.zeros(6), wrong),
+    ):
+        with pytest.raises(DeviceFault, match="not a number"):
+            request()
+        assert not control.is_moving
+    control._go_at(np.full(6, wrong), 1.0, wrong)
+    control.stop(DeviceFault("a test", "stop", "none"))
+    Motors(control).run(2)
+    assert not control.is_moving
+    control = AxisControl(settings, HOME, homed=True)
+    control._go_at(np.full(6, np.nan), 1.0, 9.0)
+    assert not control.cycle(DT, HOME).any() and "not numbers" in str(control.fault) and not control.is_moving
+
+
+def test_drive_at_rest():
+    """A speed that is not a number is commanded as 0, not as the full speed."""
+    entries = [(0x7010 << 16) + (1 << 8) + 8, (0x7010 << 16) + (2 << 8) + 8, (0x7010 << 16) + (0x21 << 8) + 16]
+    drive = StepperDrive(SimpleNamespace(name="EL7041"), 1, None, ())
+    drive.full_speed, drive._images = 10.0, {stepper_drive._RX: ethercat.ProcessImage(entries)}
+    for speed, expected in ((np.nan, 0), (-np.inf, 0), (5.0, 16384), (99.0, 32767)):
+        drive.command(True, speed)
+        assert ethercat.ProcessImage(entries).unpack(drive.slave.output)[(0x7010, 0x21)] == expected
 
 
 def test_start_outside_limits(settings):

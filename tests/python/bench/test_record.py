@@ -151,8 +151,8 @@ def test_forbidden_rows(tmp_path, capfd):
 
 
 def test_person(monkeypatch, capfd):
-    """The prompts for weights and tubes."""
-    answers = io.StringIO("\n\n12.5\n")
+    """The prompts for weights and tubes; an answer that is not a finite number is asked for again."""
+    answers = io.StringIO("\n\nnan\ninf\n12.5\n")
     monkeypatch.setattr("sys.stdin", answers)
     person = Person()
     person.hang(np.array([0.0, -0.0980665, 0.0]))
@@ -160,6 +160,7 @@ def test_person(monkeypatch, capfd):
     assert person.deployed(1) == pytest.approx(12.5e-3)
     said = capfd.readouterr().err
     assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
+    assert said.count("is not a finite number") == 2
     assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
 
 

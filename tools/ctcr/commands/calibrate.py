@@ -51,7 +51,7 @@ _tube = click.option("--tube", type=click.IntRange(1, 9), help="The tube measure
 
 
 def _length(name: str, default: float | None, text: str, least: float = 0):
-    return options.setting(name, click.FloatRange(least), default, text)
+    return options.setting(name, options.Finite(least), default, text)
 
 
 def _run(procedure: str, table: str, robot, target, in_place, out, **chosen) -> None:
@@ -84,7 +84,7 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
 @click.argument("table", type=options.read)
 @click.option("--ratio", type=float, help="Turns of a tube per turn of its motor; default: as in ROBOT.")
 @_live
-@options.setting("--step-deg", click.FloatRange(1, 90), 20.0, "With --live: angle between rows.")
+@options.setting("--step-deg", options.Finite(1, 90), 20.0, "With --live: angle between rows.")
 @_length("--deployed-mm", None, "With --live: deployed length; default: the curved length.", least=1)
 @_procedure
 def rotation_offset(
@@ -224,7 +224,7 @@ def cantilever(table: str, deflection_sd_mm, free_length_sd_mm, diameter_sd_mm, 
 @command.command(name="curvature")
 @click.argument("table", type=options.read)
 @_tube
-@click.option("--mm-per-px", "scale_mm", type=click.FloatRange(min=0, min_open=True), help="Scale of the picture.")
+@click.option("--mm-per-px", "scale_mm", type=options.Finite(min=0, min_open=True), help="Scale of the picture.")
 @_length("--scale-sd-percent", 0.0, "Standard deviation of the scale.")
 @click.option(
     "--reference",

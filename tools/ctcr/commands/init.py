@@ -103,7 +103,7 @@ def _bent(answer: str) -> float:
 
 
 def _ask(text: str) -> float:
-    return click.prompt(text, type=click.FloatRange(min=0))
+    return click.prompt(text, type=options.Finite(min=0))
 
 
 def _ask_sensor(count: int) -> int:

@@ -11,7 +11,7 @@ from ctcr.commands import options
 @options.joints(required=False)
 @click.option("--home", is_flag=True, help="Home the joints: retract each tube until its tip is flush with the plate.")
 @click.option("--at-home", is_flag=True, help="Take the present joints, set to their marks by hand, for home.")
-@options.setting("--speed", click.FloatRange(0.01, 1.0), 0.5, "Fraction of the highest speed.")
+@options.setting("--speed", options.Finite(0.01, 1.0), 0.5, "Fraction of the highest speed.")
 @options.folder
 def command(robot, bench_path, beta_mm, alpha_deg, home, at_home, speed, folder) -> None:
     """Move the joints of a robot.

@@ -10,6 +10,8 @@ from importlib import import_module
 
 import click
 
+from ctcr.show.finite import Finite as Finite  # the type of numbers, for all commands
+
 
 def setting(name: str, kind, default, text: str, **more):
     """An option with a default, which the help shows."""

@@ -12,18 +12,18 @@ from ctcr.commands import options
     "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
 )
 @options.bench("The devices and their limits.")
-@options.setting("--dwell", click.FloatRange(0), 0.5, "Rest before the first reading [s].")
+@options.setting("--dwell", options.Finite(0), 0.5, "Rest before the first reading [s].")
 @options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")
-@options.setting("--speed", click.FloatRange(0.01, 1), 1.0, "Fraction of the highest speed.")
+@options.setting("--speed", options.Finite(0.01, 1), 1.0, "Fraction of the highest speed.")
 @options.setting(
     "--approach",
     click.Choice(["planned", "forward", "backward"]),
     "planned",
     "Approach each row as planned, or always with all joints moving up (forward) or down (backward).",
 )
-@options.setting("--approach-mm", click.FloatRange(0), 2.0, "Length of the approach [mm].")
-@options.setting("--approach-deg", click.FloatRange(0), 5.0, "Length of the approach [deg].")
-@options.setting("--patience", click.FloatRange(0.1), 30.0, "How long the tracker may lose the sensor [s].")
+@options.setting("--approach-mm", options.Finite(0), 2.0, "Length of the approach [mm].")
+@options.setting("--approach-deg", options.Finite(0), 5.0, "Length of the approach [deg].")
+@options.setting("--patience", options.Finite(0.1), 30.0, "How long the tracker may lose the sensor [s].")
 @options.effects
 @click.option(
     "--page",

@@ -10,9 +10,9 @@ from ctcr.commands import options
 @click.option("--open-loop", type=click.IntRange(min=1), metavar="N", help="Predict tips at N random configurations.")
 @click.option("--closed-loop", type=options.read, metavar="SCENARIO", help="Track the path of this scenario file.")
 @options.setting(
-    "--accuracy", click.FloatRange(0, min_open=True), 1.0, "Wanted accuracy [mm]: which parameters need calibration?"
+    "--accuracy", options.Finite(0, min_open=True), 1.0, "Wanted accuracy [mm]: which parameters need calibration?"
 )
-@options.setting("--force", click.FloatRange(0), 0.3, "Open loop: largest tip force [N].")
+@options.setting("--force", options.Finite(0), 0.3, "Open loop: largest tip force [N].")
 @options.setting("--points", click.IntRange(2, 101), 5, "Closed loop: values over each range.")
 @options.seed
 @click.option(

@@ -14,8 +14,8 @@ from ctcr.commands import options
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
 @options.bench("The devices and their limits.", required=False)
 @click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; one that is there is resumed.")
-@options.setting("--patience", click.FloatRange(0.1), 2.0, "How long the tracker may lose the sensor [s].")
-@options.setting("--most-error-mm", click.FloatRange(1), 20.0, "Stop where the tip is farther from its reference [mm].")
+@options.setting("--patience", options.Finite(0.1), 2.0, "How long the tracker may lose the sensor [s].")
+@options.setting("--most-error-mm", options.Finite(1), 20.0, "Stop where the tip is farther from its reference [mm].")
 @options.folder_name
 @options.outputs
 def command(robot, scenario, plant, live, bench_path, target, patience, most_error_mm, folder, out) -> None:

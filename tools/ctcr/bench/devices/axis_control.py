@@ -62,6 +62,7 @@ class AxisControl:
     def move(self, target: ArrayLike, speed: float = 1.0) -> None:
         """A straight line to `target` (2N,) at a fraction of the highest speed. Raises DeviceFault where forbidden."""
         self._require(homed=True)
+        _finite(target, speed)
         if problem := self._settings.limits.problem(target):
             raise _fault(problem, "choose other joints; nothing has moved")
         self._start(target, speed)
@@ -69,6 +70,7 @@ class AxisControl:
     def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
         """A short move by `way` (2N,) without limits, for homing. Raises DeviceFault where it is too long."""
         self._require(homed=False)
+        _finite(way, speed)
         longest = np.repeat([JOG_M, JOG_RAD], len(self.setpoint) // 2)
         if (np.abs(way) > longest + 1e-9).any():
             text = f"a jog is at most {1e3 * JOG_M:g} mm and {np.rad2deg(JOG_RAD):.0f} deg long"
@@ -78,6 +80,7 @@ class AxisControl:
     def velocity(self, speeds: ArrayLike, valid_s: float) -> None:
         """Speeds (2N,) [m/s], [rad/s] for `valid_s` or until the next request; brakes before a limit."""
         self._require(homed=True)
+        _finite(speeds, valid_s)
         most = self._settings.speeds
         self._go_at(np.clip(speeds, -most, most), 1.0, valid_s)
         self._guarded, self.limited = True, False
@@ -85,7 +88,7 @@ class AxisControl:
     def halt(self, ramps: float = 1.0) -> None:
         """Brakes to rest, `ramps` times as hard as a move does."""
         if self._motion or self._speeds.any():
-            self._go_at(0 * self._speeds, ramps, 0.0)
+            self._go_at(np.zeros_like(self._speeds), ramps, 0.0)
 
     def stop(self, fault: DeviceFault) -> None:
         """Brakes hard and refuses all motion from now on."""
@@ -119,8 +122,15 @@ class AxisControl:
                     self._motion, self._speeds, self._settling = None, 0 * self._speeds, 0.0
         if self.fault and not self._motion:
             self.setpoint = joints  # hold, do not push
-            return 0 * joints
-        return self._speeds + GAIN * (self.setpoint - joints)
+            return np.zeros_like(joints)
+        speeds = self._speeds + GAIN * (self.setpoint - joints)
+        return speeds if np.isfinite(speeds).all() else self._rest(joints)
+
+    def _rest(self, joints: Array) -> Array:
+        """Ends a motion that has no numbers, and so neither a direction nor an end. Requests let none in."""
+        self.fault = self.fault or _fault("the speeds of a motion are not numbers", "connect again, and report it")
+        self.setpoint, self._motion, self._speeds = joints, None, np.zeros_like(joints)
+        return self._speeds
 
     def _watch(self, dt: float, joints: Array) -> None:
         settings = self._settings
@@ -152,6 +162,12 @@ class AxisControl:
             raise self.fault
         if homed and not self.homed:
             raise _fault("the joints are not known since power on", "home first: `ctcr move --home`")
+
+
+def _finite(*values: ArrayLike) -> None:
+    """Raises DeviceFault for NaN, which passes every comparison with a limit, and for infinity."""
+    if not all(np.isfinite(value).all() for value in values):
+        raise _fault("a joint, speed or time is not a number", "give finite numbers; nothing has moved")
 
 
 def _axis_fault(which: Mask, what: str, remedy: str) -> DeviceFault:

@@ -235,6 +235,8 @@ class _Owner:
         if self._control.is_moving:
             raise DeviceFault("joints", "they are still moving", "wait")
         counts = HOME_COUNT + np.round(np.asarray(turns) * self._settings.drive.encoder_counts)
+        if not np.isfinite(counts).all():
+            raise DeviceFault("joints", "a joint at home is not a number", "home again")
         self._new_counters = counts.astype(int).tolist()
         enable = self._enabled_at is not None
         for drive, count in zip(self._bus.drives, self._new_counters, strict=True):

@@ -9,6 +9,7 @@ from ctcr.arrays import Array
 from ctcr.bench.devices.bench_file import SIMULATED, Bench
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import AURORA
+from ctcr.show.finite import Finite
 from ctcr.show.wording import visible
 
 GRAVITY = 9.80665  # [m/s^2]
@@ -29,7 +30,7 @@ class Person:
     def deployed(self, tube: int) -> float:
         """How far the tip of a tube (0: innermost) stands out of the plate [m]; negative: inside."""
         text = f"How far does the tip of tube {tube + 1} stand out of the plate? 0: flush [mm]"
-        return 1e-3 * click.prompt(text, type=float, err=True)
+        return 1e-3 * click.prompt(text, type=Finite(), err=True)
 
     def fasten(self, tube: int | None) -> None:
         """Puts the sensor on the tip of a tube, or takes it off."""

@@ -3,6 +3,7 @@
 import struct
 from dataclasses import dataclass
 from functools import partial
+from math import isfinite
 
 from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.fault import DeviceFault
@@ -87,9 +88,10 @@ class StepperDrive:
     def command(self, enable: bool, speed: float, counter: int | None = None, reset: bool = False) -> None:
         """For the next cycle: `speed` [turns/s], cut at the full speed; `counter`: its value from now on.
 
-        A terminal takes the rising edge of `reset` as the acknowledgement of its error.
+        A speed that is not a number is rest. A terminal takes the rising edge of `reset` as the acknowledgement of its
+        error.
         """
-        fraction = max(-1.0, min(1.0, speed / self.full_speed))
+        fraction = max(-1.0, min(1.0, speed / self.full_speed)) if isfinite(speed) else 0.0  # NaN compares to 1
         outputs = {_ENABLE: enable, _RESET: reset, _VELOCITY: round(fraction * _FULL)}
         if counter is not None:
             outputs |= {_SET_COUNTER: 1, _COUNTER_VALUE: counter}
