@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +13,13 @@ import pytest
 from ctcr import cli
 from ctcr.bench.devices import bench_file, emergency_stop, stepper_drive
 from ctcr.bench.devices.axis_control import AxisControl
+from ctcr.bench.devices.bus_process import bus_lock, last_bus
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motion import StraightMove, VelocityMove
 from ctcr.bench.devices.stepper_drive import StepperDrive
 from ctcr.bench.shared import ethercat
+from ctcr.bench.shared.folder import private_folder
 from ctcr.bench.shared.real_time import BUS, TRACKER, Lateness, real_time
 from ctcr.bench.shared.shared_record import SharedRecord
 from ctcr.effects import catalogue
@@ -258,14 +261,61 @@ def test_bench_of_other_robot(robot):
 
 def test_stop_and_release(tmp_path, capfd):
     """The first reason stays until the release."""
-    folder = tmp_path / "bench"
-    assert cli.run(["stop", "--folder", str(folder)]) == 0
+    folder = private_folder(tmp_path / "bench")
+    with bus_lock(folder):
+        assert cli.run(["stop", "--folder", str(folder)]) == 0
     emergency_stop.stop(folder, "a later reason")
     assert emergency_stop.is_stopped(folder) and "ctcr stop was called" in str(emergency_stop.stop_fault(folder))
     assert cli.run(["stop", "--release", "--folder", str(folder)]) == 0
     assert not emergency_stop.is_stopped(folder) and emergency_stop.reason(folder) is None
     cli.run(["stop", "--release", "--folder", str(folder)])
     assert "nothing was stopped" in capfd.readouterr().out
+
+
+def test_stop_elsewhere(tmp_path, capfd):
+    """Where nothing moves from the folder of the stop, the stop latches, fails, and names the folder of what moves."""
+    here, there = private_folder(tmp_path / "here"), private_folder(tmp_path / "there")
+    with bus_lock(there):
+        assert cli.run(["stop", "--folder", str(here)]) == 1
+    said = capfd.readouterr().err
+    assert "no program drives a bus from this folder" in said and f"ctcr stop --folder {there}" in said
+    assert emergency_stop.is_stopped(here) and not emergency_stop.is_stopped(there)
+
+
+def test_stop_on_full_disk(tmp_path, monkeypatch):
+    """A stop needs no temporary folder, and holds without its reason where only the name of a file can be written."""
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: pytest.fail("no temporary folder"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    folder = private_folder()
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    emergency_stop.stop(folder, "a test")
+    assert "reason was not written" in str(emergency_stop.stop_fault(folder))
+    emergency_stop.release(folder)
+    monkeypatch.setattr(Path, "touch", full)
+    with pytest.raises(InputError, match="cut the motors' power"):
+        emergency_stop.stop(folder, "a test")
+
+
+def test_latch_is_folder(tmp_path):
+    """It stops, and the release names it."""
+    (tmp_path / "stop").mkdir()
+    emergency_stop.stop(tmp_path, "a test")
+    assert emergency_stop.is_stopped(tmp_path) and emergency_stop.reason(tmp_path)
+    with pytest.raises(InputError, match="stop: cannot remove it: is a directory"):
+        emergency_stop.release(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["[]", "{", "{}", "3"])
+def test_damaged_memory(tmp_path, text):
+    """A bus that is not remembered whole counts as none."""
+    (tmp_path / "bus.json").write_text(text)
+    assert last_bus(tmp_path) is None
 
 
 def test_codes():

@@ -11,7 +11,8 @@ from ctcr.commands import options
 def command(release: bool, folder) -> None:
     """Stop all motors of the bench at once.
 
-    They stay stopped until `ctcr stop --release`, which also resets the terminals that report an error. This stops by
+    It is an error where no program drives a bus from this folder: another one may do so from its own. Motors stay
+    stopped until `ctcr stop --release`, which also resets the terminals that report an error. This stops by
     software. The switch that cuts the motors' power is the emergency stop of the bench.
 
     Example: ctcr stop
@@ -24,4 +25,15 @@ def command(release: bool, folder) -> None:
         options.Output().say(*released(folder))
         return
     emergency_stop.stop(folder, "ctcr stop was called")
-    options.Output().say("stopped; release with `ctcr stop --release`")
+    from ctcr.bench.devices.bus_process import driven_folders, is_driven
+    from ctcr.errors import InputError, Problem
+
+    if is_driven(folder):
+        options.Output().say("stopped; release with `ctcr stop --release`")
+        return
+    text = (
+        "no program drives a bus from this folder: nothing that moves was stopped, and nothing moves from here before "
+    )
+    text += "`ctcr stop --release`; name the folder of a bench that moves with --folder or CTCR_BENCH"
+    others = "".join(f"; a program drives one from {other}: `ctcr stop --folder {other}`" for other in driven_folders())
+    raise InputError(Problem(text + others, str(folder)))

@@ -27,6 +27,7 @@ from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.stepper_drive import DriveInputs
 from ctcr.bench.shared.real_time import BUS, Lateness, real_time
 from ctcr.bench.shared.shared_record import MOST_AXES, SharedRecord
+from ctcr.errors import InputError
 from ctcr.show.output import write_json
 
 HOME_COUNT = 1_000_000  # of the counters at home; terminals count from 0 after power on, so 0 would prove nothing
@@ -85,12 +86,33 @@ def bus_lock(folder: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def is_driven(folder: Path) -> bool:
+    """Whether a program drives a bus from this folder now."""
+    with suppress(OSError), open(folder / "bus.lock", "rb") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def driven_folders() -> list[Path]:
+    """The folders from which programs of this user drive a bus now: each holds its lock open."""
+    found = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # of others, or just ended
+            for entry in os.scandir(process / "fd"):
+                with suppress(OSError):
+                    found.add(Path(os.readlink(entry.path)))
+    return sorted(path.parent for path in found if path.name == "bus.lock" and is_driven(path.parent))
+
+
 def last_bus(folder: Path) -> Bus | None:
     """The bus that a program drove last from this folder, for programs without a bench file."""
     try:
         known = json.loads((folder / "bus.json").read_text(encoding="utf-8"))
         return Bus(known["interface"], known["positions"], Motors.model_validate(known["drive"]))
-    except (OSError, ValueError, LookupError):  # none, or another version of this program wrote it
+    except (OSError, ValueError, LookupError, TypeError):  # none, or another version of this program wrote it
         return None
 
 
@@ -158,7 +180,8 @@ class _Owner:
 
     def _stopped(self) -> DeviceFault:
         """Latches the fault; what whoever asks for a motion is told, with the way to release it."""
-        emergency_stop.stop(self._folder, str(self._control.fault))
+        with suppress(InputError):  # this process brakes its motors also where the latch cannot be written
+            emergency_stop.stop(self._folder, str(self._control.fault))
         return emergency_stop.stop_fault(self._folder)
 
     def _cycle(self, now: float, dt: float) -> bool:

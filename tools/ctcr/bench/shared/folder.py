@@ -6,7 +6,6 @@ latch of the emergency stop, and records in shared memory.
 
 import os
 import stat
-import tempfile
 from pathlib import Path
 
 from ctcr.errors import InputError, Problem
@@ -22,9 +21,7 @@ def private_folder(path: str | Path | None = None) -> Path:
     Without `path` it is that of the environment variable CTCR_BENCH, or one of this user's. Raises InputError where
     others own it or may enter it.
     """
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    of_this_user = Path(runtime) / "ctcr" if runtime else Path(tempfile.gettempdir()) / f"ctcr-{os.getuid()}"
-    folder = Path(path or os.environ.get(VARIABLE) or of_this_user)
+    folder = Path(path or os.environ.get(VARIABLE) or _of_this_user())
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = folder.stat()
@@ -36,3 +33,9 @@ def private_folder(path: str | Path | None = None) -> Path:
         text = f"others may enter it, and so command the devices: chmod 700 {folder}"
         raise InputError(Problem(text, str(folder)))
     return folder
+
+
+def _of_this_user() -> Path:
+    """The same for all programs: `tempfile` would name another one while the disk is full."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(runtime) / "ctcr" if runtime else Path(os.environ.get("TMPDIR", "/tmp")) / f"ctcr-{os.getuid()}"
