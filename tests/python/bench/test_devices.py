@@ -227,11 +227,47 @@ def test_drive_at_rest():
         assert ethercat.ProcessImage(entries).unpack(drive.slave.output)[(0x7010, 0x21)] == expected
 
 
-def test_start_outside_limits(settings):
-    """Nothing moves from there."""
-    control = AxisControl(settings, HOME - [0.06, 0, 0, 0, 0, 0], homed=True)
-    with pytest.raises(DeviceFault, match="5.00 mm inside tube 2"):
-        control.move(HOME)
+OUTSIDE = {  # where: joints, what the message says of joints farther out, their way
+    "tips": (HOME - [0.06, 0, 0, 0, 0, 0], "6.00 mm inside tube 2", [-1e-3, 0, 0, 0, 0, 0]),
+    "one alone": ([-0.463, -0.2805, -0.2, 0, 0, 0], "tube 1 would end 51.00 mm inside", [0, 1e-3, 0, 0, 0, 0]),
+    "travel": (HOME + [0.1, 0.1, 0.05, 0, 0, 0], "beta1 = -197.00 mm: may be", [1e-3, 0, 0, 0, 0, 0]),
+    "rotation": (HOME + [0, 0, 0, 0, 8, 0], "alpha2", [0, 0, 0, 0, 0.1, 0]),
+}
+
+
+@pytest.mark.parametrize("where", OUTSIDE)
+def test_start_outside_limits(settings, where):
+    """Joints come back from there, in steps or at once, and do not go farther out; homing is possible too."""
+    start, says, farther = OUTSIDE[where]
+    start = np.array(start)
+    control = AxisControl(settings, start, homed=True)
+    with pytest.raises(DeviceFault, match=says):
+        control.move(start + farther)
+    motors = Motors(control)
+    for target in ((start + HOME) / 2, HOME):
+        control.move(target)
+        motors.run(99)
+        assert control.fault is None
+        np.testing.assert_allclose(motors.joints, target, atol=1e-3)
+    with pytest.raises(DeviceFault, match="nothing has moved"):
+        control.move(start)
+    control = AxisControl(settings, start, homed=True)
+    control.cycle(DT, start)
+    assert control.fault is None
+    control.jog(np.array(farther))
+    Motors(control).run(9)
+    control.set_joints(start)
+    control.cycle(DT, start)
+    assert control.fault is None and control.homed
+
+
+def test_driven_outside_limits(settings):
+    """A limit that is violated at the start, and then more, stops all joints."""
+    start = HOME - [0.06, 0, 0, 0, 0, 0]
+    control = AxisControl(settings, start, homed=True)
+    for far in np.linspace(0, 0.9e-3, 50):
+        control.cycle(DT, start - [far, 0, 0, 0, 0, 0])
+    assert "inside tube 2: its tip must stand out: move back" in str(control.fault)
 
 
 # ---- bench file

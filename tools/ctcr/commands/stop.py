@@ -31,9 +31,8 @@ def command(release: bool, folder) -> None:
     if is_driven(folder):
         options.Output().say("stopped; release with `ctcr stop --release`")
         return
-    text = (
-        "no program drives a bus from this folder: nothing that moves was stopped, and nothing moves from here before "
-    )
-    text += "`ctcr stop --release`; name the folder of a bench that moves with --folder or CTCR_BENCH"
-    others = "".join(f"; a program drives one from {other}: `ctcr stop --folder {other}`" for other in driven_folders())
-    raise InputError(Problem(text + others, str(folder)))
+    text = "no program drives a bus from this folder: nothing that moves was stopped, and nothing moves here until "
+    text += "a release; name the folder of a bench that moves with --folder or CTCR_BENCH"
+    for other in driven_folders():
+        text += f"; a program drives one from {other}: `ctcr stop --folder {other}`"
+    raise InputError(Problem(text, str(folder)))

@@ -50,8 +50,7 @@ class AxisControl:
         self._guarded = False  # a velocity, which must stop before a limit
         self.limited = False  # the last velocity ended at a limit
         self.fault: DeviceFault | None = None
-        if homed and (problem := settings.limits.problem(self.joints, SLACK_M, SLACK_RAD)):
-            self.fault = _fault(problem, "move the carriages by hand, or home again with `ctcr move --home`")
+        self._come_to_rest()
 
     @property
     def is_moving(self) -> bool:
@@ -60,15 +59,21 @@ class AxisControl:
     # ---- requests
 
     def move(self, target: ArrayLike, speed: float = 1.0) -> None:
-        """A straight line to `target` (2N,) at a fraction of the highest speed. Raises DeviceFault where forbidden."""
+        """A straight line to `target` (2N,) at a fraction of the highest speed. Raises DeviceFault where forbidden.
+
+        Joints that rest outside of a limit may come back: no limit may be violated by more than there.
+        """
         self._require(homed=True)
         _finite(target, speed)
-        if problem := self._settings.limits.problem(target):
+        if problem := self._settings.limits.problem(target, allowed=self._allowed):
             raise _fault(problem, "choose other joints; nothing has moved")
         self._start(target, speed)
 
     def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
-        """A short move by `way` (2N,) without limits, for homing. Raises DeviceFault where it is too long."""
+        """A short move by `way` (2N,) without limits, for homing. Raises DeviceFault where it is too long.
+
+        From now on the joints are not known: limits of a wrong homing must not hinder the next one.
+        """
         self._require(homed=False)
         _finite(way, speed)
         longest = np.repeat([JOG_M, JOG_RAD], len(self.setpoint) // 2)
@@ -76,6 +81,7 @@ class AxisControl:
             text = f"a jog is at most {1e3 * JOG_M:g} mm and {np.rad2deg(JOG_RAD):.0f} deg long"
             raise _fault(text, "jog in several steps")
         self._start(self.setpoint + way, speed)
+        self.homed = False
 
     def velocity(self, speeds: ArrayLike, valid_s: float) -> None:
         """Speeds (2N,) [m/s], [rad/s] for `valid_s` or until the next request; brakes before a limit."""
@@ -101,6 +107,7 @@ class AxisControl:
         self.setpoint = self.joints = np.array(joints, float)
         self._motion, self.homed = None, True
         self._speeds = 0 * self.setpoint
+        self._come_to_rest()
 
     # ---- every cycle
 
@@ -120,6 +127,7 @@ class AxisControl:
                 left = np.abs(self.setpoint - joints)
                 if (left < SETTLED * self._settings.following_error).all() or self._settling > SETTLE_S:
                     self._motion, self._speeds, self._settling = None, 0 * self._speeds, 0.0
+                    self._come_to_rest()
         if self.fault and not self._motion:
             self.setpoint = joints  # hold, do not push
             return np.zeros_like(joints)
@@ -132,6 +140,10 @@ class AxisControl:
         self.setpoint, self._motion, self._speeds = joints, None, np.zeros_like(joints)
         return self._speeds
 
+    def _come_to_rest(self) -> None:
+        """Notes by how much limits are violated here: the next motion may not violate them more."""
+        self._allowed = np.maximum(0.0, self._settings.limits.excess(self.setpoint, SLACK_M))
+
     def _watch(self, dt: float, joints: Array) -> None:
         settings = self._settings
         allowed = settings.following_error
@@ -142,7 +154,7 @@ class AxisControl:
         elif behind.any():
             remedy = "something blocks it, or its motor is too weak: look, then move slower"
             self.stop(_axis_fault(behind, "it does not follow", remedy))
-        elif self.homed and (problem := settings.limits.problem(joints, SLACK_M, SLACK_RAD)):
+        elif self.homed and (problem := settings.limits.problem(joints, SLACK_M, SLACK_RAD, self._allowed)):
             self.stop(_fault(problem, "move back by `ctcr move` after releasing the stop"))
 
     def _start(self, target: ArrayLike, speed: float) -> None:

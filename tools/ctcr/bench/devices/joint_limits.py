@@ -21,33 +21,51 @@ class JointLimits:
     clearance: float  # [m] between neighbouring grasped points, the size of the carriages
     one_by_one: bool = False
 
-    def problem(self, joints: ArrayLike, slack_m: float = 1e-6, slack_rad: float = 1e-6) -> str | None:
-        """Which limit the joints (2N,) [m], [rad] violate by more than the slack; None where they are allowed."""
+    def excess(self, joints: ArrayLike, slack_m: float = 1e-6) -> Array:
+        """By how much joints (2N,) violate each limit (6N,) [m], [rad]; negative: they keep it.
+
+        `slack_m`: a tip that stands out no farther does not stand out.
+        """
         n = len(self.length)
         beta, alpha = np.asarray(joints, float)[:n], np.asarray(joints, float)[n:]
+        tip = self.length + beta
+        behind = np.append(np.diff(tip), -tip[-1])  # the next tip, or the plate
+        if self.one_by_one and (tip > slack_m).sum() <= 1:
+            behind = np.minimum(behind, 0.0)
+        low, high = self.travel.T
+        least, most = self.rotation.T
+        near = self.clearance - np.diff(beta)
+        return np.concatenate([low - beta, beta - high, least - alpha, alpha - most, near, beta[-1:], behind])
+
+    def problem(
+        self, joints: ArrayLike, slack_m: float = 1e-6, slack_rad: float = 1e-6, allowed: ArrayLike = 0.0
+    ) -> str | None:
+        """Which limit the joints (2N,) [m], [rad] violate by more than the slack; None where they are allowed.
+
+        `allowed`: an `excess` that counts as none, such as that of where the joints come from.
+        """
         if not np.isfinite(joints).all():
             return "a joint is not a number"
-        ranges = (
-            ("beta", "mm", 1e3, beta, self.travel, slack_m),
-            ("alpha", "deg", 180 / np.pi, alpha, self.rotation, slack_rad),
-        )
-        for name, unit, scale, values, limits, slack in ranges:
-            for i, (value, (low, high)) in enumerate(zip(values, limits, strict=True), start=1):
-                if not low - slack <= value <= high + slack:
-                    allowed = f"may be {scale * low:.2f} to {scale * high:.2f} {unit}"
-                    return f"{name}{i} = {scale * value:.2f} {unit}: {allowed}"
-        for i, gap in enumerate(np.diff(beta), start=1):
-            if gap < self.clearance - slack_m:
-                least = f"must be {1e3 * self.clearance:.2f} mm at least"
-                return f"the carriages of tubes {i} and {i + 1} come too near: {1e3 * gap:.2f} mm, {least}"
-        if beta[-1] > slack_m:
-            return f"tube {n} would be grasped {1e3 * beta[-1]:.2f} mm in front of the plate"
-        tip = self.length + beta
-        if self.one_by_one and (tip > slack_m).sum() <= 1:
-            return None
-        for i, gap in enumerate(-np.diff(tip), start=1):
-            if gap < -slack_m:
-                return f"tube {i} would end {-1e3 * gap:.2f} mm inside tube {i + 1}: its tip must stand out"
-        if tip[-1] < -slack_m:
-            return f"the tip of tube {n} would be {-1e3 * tip[-1]:.2f} mm behind the plate"
-        return None
+        slack = np.repeat([slack_m, slack_rad, slack_m], 2 * len(self.length))
+        over = np.flatnonzero(self.excess(joints, slack_m) > slack + allowed)
+        return self._text(over[0], np.asarray(joints, float)) if len(over) else None
+
+    def _text(self, limit: int, joints: Array) -> str:
+        """What the violated limit, an index of `excess`, demands of the joints."""
+        n = len(self.length)
+        kind, tube = divmod(int(limit), n)
+        i, beta, gap = tube + 1, 1e3 * joints[:n], 1e3 * self.excess(joints)[limit]
+        if kind < 2:
+            low, high = 1e3 * self.travel[tube]
+            return f"beta{i} = {beta[tube]:.2f} mm: may be {low:.2f} to {high:.2f} mm"
+        if kind < 4:
+            low, high = np.rad2deg(self.rotation[tube])
+            return f"alpha{i} = {np.rad2deg(joints[n + tube]):.2f} deg: may be {low:.2f} to {high:.2f} deg"
+        if kind == 4 and i < n:
+            least = f"must be {1e3 * self.clearance:.2f} mm at least"
+            return f"the carriages of tubes {i} and {i + 1} come too near: {beta[i] - beta[tube]:.2f} mm, {least}"
+        if kind == 4:
+            return f"tube {n} would be grasped {gap:.2f} mm in front of the plate"
+        if i < n:
+            return f"tube {i} would end {gap:.2f} mm inside tube {i + 1}: its tip must stand out"
+        return f"the tip of tube {n} would be {gap:.2f} mm behind the plate"
