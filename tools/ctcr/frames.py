@@ -5,6 +5,10 @@ from numpy.typing import ArrayLike
 
 from ctcr.arrays import Array
 
+# What trackers and their logs hold where nothing was seen, or that is no pose
+BEYOND = 1e20  # a number beyond it, such as NDI's -3.697314e28, stands for a missing one
+QUATERNION_SLACK = 0.02  # of the norm, in two or three digits
+
 
 def quaternion_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
     """Unit quaternion (..., 4) of a rotation vector (..., 3) [rad]; w >= 0 up to half a turn."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from ctcr.arrays import Array, Mask
 from ctcr.errors import shown
+from ctcr.frames import BEYOND
 from ctcr.intake.log import Log
 from ctcr.intake.units import CLOCK, Unit, named, parsed
 from ctcr.table.csv_table import Faults
@@ -19,7 +20,6 @@ MISSING |= {"disabled", "lost", "out of volume", "not visible", "nat", "inf", "-
 _NOT_A_NUMBER = re.compile(r"[-+]?(nan(\(\w*\))?|1\.#[a-z]+\d*)")  # as C and Windows write it: nan(ind), -1.#IND
 _FORTRAN = re.compile(r"([-+]?[\d.]+)[dD]([-+]?\d+)")  # 1.0D+02
 SEEN_WORDS = {"ok", "1", "1.0", "true", "yes", "valid", "visible", "tracked", "seen", "enabled", "good"}
-BEYOND = 1e20  # trackers write numbers beyond it, such as -3.697314e28, where they see nothing
 STAMP_S = 1e6  # times beyond it are stamps: the table's clock begins with its first row
 # numbers beyond these are stamps in this unit since 1970; in 100 ns, since 1601 or 1, as Windows and .NET count
 _STAMPS = ((1e18, "ns"), (1e17, "100ns"), (1e14, "us"), (1e11, "ms"))

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import frames
 from ctcr.arrays import Array, Integers, Mask
+from ctcr.frames import QUATERNION_SLACK
 from ctcr.table.csv_table import Faults
 
-QUATERNION_SLACK = 0.02  # of the norm, in logs of two or three digits
 ORTHOGONAL_SLACK = 0.02  # of R R^T - 1, in such logs
 
 

@@ -95,12 +95,7 @@ class Aurora(AbstractContextManager):
         if not self._line:
             raise self._fault("not connected", "connect first")
         with self._port_errors():
-            frame = self._retried(once)
-        for reading in frame.readings:
-            if not reading.is_possible:
-                what = f"tool {reading.handle:02X} has a pose that is none, though its reply is whole"
-                raise self._fault(what, "switch the device off and on; look at the tool and its cable")
-        return frame
+            return self._retried(once)
 
     # ---- steps of the connection
 

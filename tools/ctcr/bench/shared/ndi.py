@@ -10,6 +10,8 @@ import struct
 from dataclasses import dataclass
 from functools import reduce
 
+from ctcr.frames import BEYOND, QUATERNION_SLACK
+
 RESET_MESSAGE = b"RESETBE6F\r"
 RESET_BAUD = 9600
 BAUD_CODES = {9600: "0", 14400: "1", 19200: "2", 38400: "3", 57600: "4", 115200: "5", 921600: "6", 230400: "A"}
@@ -46,6 +48,7 @@ SYSTEM_STATUS = {  # bit: fault, remedy
 _CRC = [reduce(lambda crc, _: crc >> 1 ^ 0xA001 * (crc & 1), range(8), byte) for byte in range(256)]
 _TX_POSE = struct.Struct("6s 6s 6s 6s 7s 7s 7s 6s")  # quaternion, position, error indicator: signed decimal numbers
 _TX_TOOL = re.compile(rb"([0-9A-F]{2})(?:MISSING|DISABLED|([-+0-9]{51}))([0-9A-F]{8})([0-9A-F]{8})\n")
+Numbers = tuple[float, ...]
 
 
 class Garbled(Exception):
@@ -54,7 +57,7 @@ class Garbled(Exception):
 
 @dataclass(frozen=True)
 class ToolReading:
-    """One tool in one frame; position and quaternion are None where the tracker did not see it."""
+    """One tool in one frame; position and quaternion are None where the tracker did not see it, or sent no pose."""
 
     handle: int
     position: tuple[float, float, float] | None  # [m], tracker frame
@@ -66,13 +69,6 @@ class ToolReading:
     @property
     def out_of_volume(self) -> bool:
         return bool(self.status & OUT_OF_VOLUME)
-
-    @property
-    def is_possible(self) -> bool:
-        """Whether the pose, where there is one, is one: finite, with a quaternion that tells a rotation."""
-        if self.position is None or self.quaternion is None:
-            return True
-        return all(map(math.isfinite, (*self.position, *self.quaternion))) and any(self.quaternion)
 
     @property
     def is_seen(self) -> bool:
@@ -101,8 +97,8 @@ def parse_tx(text: bytes) -> tuple[list[ToolReading], int]:
             position = quaternion = error = None
             if pose:
                 w, i, j, k, x, y, z, indicator = map(int, _TX_POSE.unpack(pose))
-                quaternion, position = (1e-4 * w, 1e-4 * i, 1e-4 * j, 1e-4 * k), (1e-5 * x, 1e-5 * y, 1e-5 * z)
-                error = 1e-4 * indicator
+                quaternion, position = (1e-4 * w, 1e-4 * i, 1e-4 * j, 1e-4 * k), (1e-2 * x, 1e-2 * y, 1e-2 * z)
+                position, quaternion, error = _possible(position, quaternion, 1e-4 * indicator)
             readings.append(ToolReading(int(handle, 16), position, quaternion, error, int(status, 16), int(frame, 16)))
             at = tool.end()
         return readings, int(text[at : at + 4], 16)
@@ -122,7 +118,7 @@ def parse_bx(body: bytes) -> tuple[list[ToolReading], int]:
             position = quaternion = error = None
             if state == BX_VALID:
                 *quaternion, x, y, z, error = struct.unpack_from("<8f", body, at)
-                position, quaternion = (1e-3 * x, 1e-3 * y, 1e-3 * z), tuple(quaternion)
+                position, quaternion, error = _possible((x, y, z), tuple(quaternion), error)
                 at += 32
             status, frame = struct.unpack_from("<II", body, at)
             readings.append(ToolReading(handle, position, quaternion, error, status, frame))
@@ -130,3 +126,11 @@ def parse_bx(body: bytes) -> tuple[list[ToolReading], int]:
         return readings, struct.unpack_from("<H", body, at)[0]
     except (struct.error, ValueError, IndexError):
         raise Garbled("not a BX reply") from None
+
+
+def _possible(position: Numbers, quaternion: Numbers, error: float) -> tuple:
+    """Position [m] of one in mm, quaternion and error; None for each where they are no pose."""
+    numbers = all(abs(number) < BEYOND for number in (*position, *quaternion))  # neither NaN nor infinite
+    if not numbers or abs(math.hypot(*quaternion) - 1) > QUATERNION_SLACK:
+        return None, None, None
+    return tuple(1e-3 * number for number in position), quaternion, error
