@@ -6,7 +6,9 @@ import os
 import random
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from ctcr.bench.devices.person import Person
 from ctcr.bench.record.display import picture
 from ctcr.bench.record.live_page import LivePage
 from ctcr.bench.record.row_file import RowFile
-from ctcr.bench.record.session import Approach, Progress, steps_of
+from ctcr.bench.record.session import Approach, Progress, Session, steps_of
 from ctcr.errors import InputError
 from ctcr.robot import robot_file
 from ctcr.table import measurements
@@ -138,6 +140,30 @@ def test_approach(limits):
     assert all(step.way_point is None for step in steps_of(plan, Approach(), limits, "plan"))
 
 
+@pytest.mark.parametrize(
+    ("loads", "weight_left", "asked"),
+    [
+        ([0, 0], False, []),
+        ([0, 0], True, [0]),  # left there by an interrupted recording
+        ([0, 1, 1], False, [0, 1, 0]),
+        ([1, 0], True, [1, 0]),
+    ],
+)
+def test_weights(limits, monkeypatch, loads, weight_left, asked):
+    """A person is asked wherever the weight changes, and at the start where one may hang there; no weight is left."""
+    plan = steps_of(measurements.load(DATA / "plan.csv", 3), Approach(), limits, "plan")
+    steps = [replace(step, force=np.array([0.0, load, 0])) for step, load in zip(plan, loads, strict=False)]
+    monkeypatch.setattr(Session, "_measured", Session._approach)
+    monkeypatch.setattr(Session, "_go", lambda self, joints: None)
+    rows, motors, hung = SimpleNamespace(groups=0, append=list), SimpleNamespace(halt=list), []
+    robot = robot_file.load(DATA / "demo" / "robot.yaml")
+    session = Session(
+        robot, motors, None, rows, None, None, lambda force: hung.append(force[1]), weight_left=weight_left
+    )
+    session.run(steps)
+    assert hung == asked
+
+
 def test_forbidden_rows(tmp_path, capfd):
     """They are named before anything moves or is written."""
     lines = (DATA / "plan.csv").read_text().splitlines()[:5]
@@ -150,18 +176,21 @@ def test_forbidden_rows(tmp_path, capfd):
     assert not (tmp_path / "out").exists()
 
 
-def test_person(monkeypatch, capfd):
-    """The prompts for weights and tubes; an answer that is not a finite number is asked for again."""
+def test_person(tmp_path, monkeypatch, capfd):
+    """The prompts. Later programs remember a weight; an answer that is not a finite number is asked for again."""
     answers = io.StringIO("\n\nnan\ninf\n12.5\n")
     monkeypatch.setattr("sys.stdin", answers)
-    person = Person()
+    person = Person(tmp_path)
+    assert not person.weight_left
     person.hang(np.array([0.0, -0.0980665, 0.0]))
+    assert Person(tmp_path).weight_left
     person.hang(np.zeros(3))
+    assert not Person(tmp_path).weight_left
     assert person.deployed(1) == pytest.approx(12.5e-3)
     said = capfd.readouterr().err
     assert "Hang 10.0 g at the tip (force +0, -0.09807, +0 N in the base frame), then press Enter" in said
     assert said.count("is not a finite number") == 2
-    assert "Take the weight off" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
+    assert "See that nothing hangs" in said and "tip of tube 2 stand out of the plate? 0: flush [mm]" in said
 
 
 def test_live_page(tmp_path, monkeypatch):

@@ -190,9 +190,9 @@ def test_tube_not_retractable(robot, bench, tmp_path):
     assert "tube 2 cannot stand out alone: beta1 = -463.00 mm: may be -450.00 to" in str(caught.value)
 
 
-def test_person(monkeypatch, capfd):
+def test_person(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
-    person = Person()
+    person = Person(tmp_path)
     person.fasten(1)
     person.fasten(None)
     person.touch("B", np.array([0.06, -0.04, -0.02]))

@@ -38,7 +38,8 @@ def command(robot, plan, target, bench_path, dwell, readings, speed, patience, p
 
     ROBOT moves through PLAN in its order, and FOLDER/measurements.csv holds the readings. Every row is on the disk
     as soon as it is measured; the same command resumes an interrupted recording. Where the force changes from one
-    row to the next, you are asked to hang the weight. Home the joints first: `ctcr move --home`.
+    row to the next you are asked to hang the weight; before the first row too, where one may hang there. Home the
+    joints first: `ctcr move --home`.
 
     Example: ctcr record robot.yaml plan.csv --bench bench.yaml -o recordings/first
     """
@@ -80,7 +81,8 @@ def command(robot, plan, target, bench_path, dwell, readings, speed, patience, p
                 with display.paused():
                     person.hang(force)
 
-            session = Session(loaded, motors, tracker, recording.rows, how, recording.clock, hang, show)
+            devices, weighted = (loaded, motors, tracker), person.weight_left
+            session = Session(*devices, recording.rows, how, recording.clock, hang, show, weighted)
             with recording.sitting(motors, tracker):
                 done = session.run(steps)
     path = recording.path / TABLE

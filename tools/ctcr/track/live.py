@@ -141,7 +141,7 @@ def _run_all(
 ) -> None:
     """All runs that are not in the folder yet."""
     done = {(entry["mass_g"], entry["repetition"]) for entry in finished(device.folder)}
-    hung = 0.0
+    hung = None if person.weight_left or any(scenario.load.mass_g) else 0.0  # None: it must be looked at
     for mass, repetition in product(scenario.load.mass_g, range(1, scenario.repetitions + 1)):
         if (mass, repetition) in done:
             continue

@@ -9,6 +9,7 @@ from ctcr.arrays import Array
 from ctcr.bench.devices.bench_file import SIMULATED, Bench
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import AURORA
+from ctcr.errors import file_faults
 from ctcr.show.finite import Finite
 from ctcr.show.wording import visible
 
@@ -16,16 +17,30 @@ GRAVITY = 9.80665  # [m/s^2]
 
 
 class Person:
-    """Does what no device does, asked on the terminal; each method returns when it is done."""
+    """Does what no device does, asked on the terminal; each method returns when it is done.
+
+    A file in the folder of the bench remembers a weight, which outlasts the program that asked for it.
+    """
+
+    def __init__(self, folder: Path):
+        self._weight = folder / "weight"
+
+    @property
+    def weight_left(self) -> bool:
+        """Whether a weight may hang at the tip from before."""
+        return self._weight.exists()
 
     def hang(self, force: Array) -> None:
         """Makes the known force (3,) [N], base frame, act at the tip."""
         size = float(np.linalg.norm(force))
-        if size == 0:
-            _ask("Take the weight off the tip")
-        else:
-            direction = ", ".join(f"{part:+.4g}" for part in force)
-            _ask(f"Hang {1e3 * size / GRAVITY:.1f} g at the tip (force {direction} N in the base frame)")
+        with file_faults(self._weight, "write"):
+            if size == 0:
+                _ask("See that nothing hangs at the tip")
+                self._weight.unlink(missing_ok=True)
+            else:
+                self._weight.touch()
+                direction = ", ".join(f"{part:+.4g}" for part in force)
+                _ask(f"Hang {1e3 * size / GRAVITY:.1f} g at the tip (force {direction} N in the base frame)")
 
     def deployed(self, tube: int) -> float:
         """How far the tip of a tube (0: innermost) stands out of the plate [m]; negative: inside."""
@@ -55,6 +70,10 @@ class SimulatedPerson(Person):
     def __init__(self, folder: Path):
         self._folder = folder
 
+    @property
+    def weight_left(self) -> bool:
+        return any(request(self._folder, AURORA, {})["force"])
+
     def hang(self, force: Array) -> None:
         request(self._folder, AURORA, {"force": np.asarray(force, float).tolist()})
 
@@ -69,4 +88,4 @@ class SimulatedPerson(Person):
 
 
 def person_of(bench: Bench, folder: Path) -> Person:
-    return SimulatedPerson(folder) if bench.person == SIMULATED else Person()
+    return SimulatedPerson(folder) if bench.person == SIMULATED else Person(folder)

@@ -104,10 +104,13 @@ class Session:
     clock: Callable[[float], float]  # t_s of the rows from a time of `time.monotonic`
     hang: Callable[[Array], None]  # a weight, as Person.hang
     show: Callable[[Progress], None] = lambda progress: None
+    weight_left: bool = False  # as Person.weight_left
 
     def run(self, steps: list[Step]) -> Progress:
         """Raises DeviceFault or InputError where it cannot go on; what has been measured is in the file."""
-        self._model, self._force = MovingModel(self.robot), np.full(3, np.nan)
+        self._model = MovingModel(self.robot)
+        doubtful = self.weight_left or any(step.force.any() for step in steps)
+        self._force = np.full(3, np.nan if doubtful else 0.0)  # NaN, what hangs there, differs from every force
         self.progress = Progress(len(steps), self.rows.groups)
         if 0 < self.rows.groups < len(steps):
             self._approach(steps[self.rows.groups - 1])  # the path to the next row is that of the plan
@@ -136,9 +139,8 @@ class Session:
     def _approach(self, step: Step) -> list[Array]:
         """Moves to the joints of a step; the row of its way point, where it has one."""
         if not np.array_equal(step.force, self._force):
-            if np.isfinite(self._force).all() or step.force.any():
-                self._announce(f"row {step.row}: weight")
-                self.hang(step.force)
+            self._announce(f"row {step.row}: weight")
+            self.hang(step.force)
             self._force = step.force
         rows = []
         self._announce(f"row {step.row}: moving")
