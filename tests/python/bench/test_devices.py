@@ -285,6 +285,28 @@ def test_bench_file_faults(tmp_path):
     assert "line 3" in said
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("rotation_terminals: [4,", "rotation_terminals: [3,", "rotation_terminals: 3 stands there twice: needs"),
+        ("[1, 2, 3]", "[1, -2, 3]", "translation_terminals.1: .* or equal to 1: needs positions on the bus"),
+        ("[4, 5, 6]", "[4, 5, 0]", "rotation_terminals.2: .*the coupler is 0"),
+        ("1000", "500000", "motors.current_mA: 500000 is impossible: needs a number in mA, > 0 and <= 5000"),
+        ("1000", "1000\n  encoder_counts: 70000", "motors.encoder_counts: 70000 is impossible: .* <= 65535"),
+        ("1000", "1000\n  full_steps: 400000", "motors.full_steps: 400000 is impossible: .* <= 65535"),
+        ("1000", "1000\n  period_ms: 1000", "motors.period_ms: 1000 is impossible: .* in ms, > 0 and <= 50"),
+        ("[-335, -180]", "[-180, -335]", "translation_mm.1: the highest is below the lowest: needs a pair .* mm"),
+    ],
+)
+def test_impossible_bench(tmp_path, old, new, says):
+    """What a terminal cannot take, or limits that exclude all joints, are named with field, unit and range."""
+    path, text = tmp_path / "bench.yaml", BENCH.read_text()
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=says):
+        bench_file.load(path)
+
+
 def test_bench_of_other_robot(robot):
     """The number of tubes must agree."""
     two = robot.model_copy(update={"tubes": robot.tubes[:2]})

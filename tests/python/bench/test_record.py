@@ -16,6 +16,7 @@ from ctcr import cli
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.person import Person
 from ctcr.bench.record.display import picture
+from ctcr.bench.record.folder import Folder
 from ctcr.bench.record.live_page import LivePage
 from ctcr.bench.record.row_file import RowFile
 from ctcr.bench.record.session import Approach, Progress, Session, steps_of
@@ -162,6 +163,23 @@ def test_weights(limits, monkeypatch, loads, weight_left, asked):
     )
     session.run(steps)
     assert hung == asked
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", "3", '{"started_unix_s": null, "settings": {}, "sittings": []}'])
+def test_damaged_about(tmp_path, text):
+    """A damaged session.json is named, and what was recorded stays."""
+    Folder(tmp_path / "out", {}, {}, 3)
+    (tmp_path / "out" / "session.json").write_text(text)
+    with pytest.raises(InputError, match="session.json: does not describe a recording"):
+        Folder(tmp_path / "out", {}, {}, 3)
+
+
+@pytest.mark.parametrize("option", ["--speed", "--dwell", "--patience"])
+def test_nan_option(tmp_path, capfd, option):
+    """Options are finite numbers."""
+    files = [DATA / "demo" / "robot.yaml", DATA / "plan.csv", "--bench", DATA / "bench" / "bench.yaml"]
+    assert cli.run([*map(str, ["record", *files, "-o", tmp_path / "out"]), option, "nan"]) == 2
+    assert f"Invalid value for '{option}': 'nan' is not a finite number" in capfd.readouterr().err
 
 
 def test_forbidden_rows(tmp_path, capfd):

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Len
-from pydantic import Field, ValidationError
+from annotated_types import Ge, Len
+from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import PydanticCustomError
 
 from ctcr.bench.devices.axis_control import AxisSettings
 from ctcr.bench.devices.joint_limits import JointLimits
@@ -17,8 +18,16 @@ from ctcr.robot.units import Quantity
 
 SIMULATED = "simulated"
 
-Pair = Annotated[list[float], Len(2, 2)]
-Axes = Annotated[list[int], Len(1, MAX_TUBES)]
+
+def _rising(pair: list[float]) -> list[float]:
+    if pair[0] > pair[1]:
+        raise PydanticCustomError("reversed", "the highest is below the lowest")
+    return pair
+
+
+Pair = Annotated[list[float], Len(2, 2), AfterValidator(_rising)]
+Axes = Annotated[list[Annotated[int, Ge(1)]], Len(1, MAX_TUBES)]
+WORD = 0xFFFF  # settings of a terminal have 16 bits
 
 
 class TrackerPort(Section):
@@ -38,17 +47,26 @@ class Motors(Section):
     """The stepper terminals; the lists hold one value a tube, innermost first."""
 
     interface: str = Field(description="a network interface such as enp3s0, or simulated")
-    translation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
-    rotation_terminals: Axes = Field(description="positions on the bus, the coupler is 0")
-    current_mA: Annotated[int, Quantity("mA", usual=(50, 5000), above=0)] = 1000
-    full_steps: Annotated[int, Quantity("", usual=(20, 1000), above=0)] = 200  # a turn
-    encoder_counts: Annotated[int, Quantity("", usual=(100, 100000), above=0)] = 4096  # a turn, four a line
-    period_ms: Annotated[float, Quantity("ms", usual=(1, 20), above=0)] = 4.0
+    translation_terminals: Axes = Field(description="positions on the bus from 1, each once; the coupler is 0")
+    rotation_terminals: Axes = Field(description="positions on the bus from 1, each once; the coupler is 0")
+    current_mA: Annotated[int, Quantity("mA", usual=(50, 5000), above=0, most=5000)] = 1000  # most: of the terminals
+    full_steps: Annotated[int, Quantity("", usual=(20, 1000), above=0, most=WORD)] = 200  # a turn
+    encoder_counts: Annotated[int, Quantity("", usual=(100, WORD), above=0, most=WORD)] = 4096  # a turn, four a line
+    period_ms: Annotated[float, Quantity("ms", usual=(1, 20), above=0, most=50)] = 4.0  # twice in the watchdog's 100 ms
     speed_mm_s: Annotated[float, Quantity("mm/s", usual=(0.1, 100), above=0)] = 10.0
     speed_deg_s: Annotated[float, Quantity("deg/s", usual=(1, 720), above=0)] = 60.0
     ramp_s: Annotated[float, Quantity("s", usual=(0.05, 5), above=0)] = 0.2
     lag_mm: Annotated[float, Quantity("mm", usual=(0.1, 10), above=0)] = 1.0
     lag_deg: Annotated[float, Quantity("deg", usual=(0.5, 45), above=0)] = 5.0
+
+    @field_validator("translation_terminals", "rotation_terminals")
+    @classmethod
+    def _once(cls, positions: list[int], info: ValidationInfo) -> list[int]:
+        others = info.data.get("translation_terminals", []) if info.field_name == "rotation_terminals" else []
+        used = [*others, *positions]
+        if twice := next((position for position in used if used.count(position) > 1), None):
+            raise PydanticCustomError("twice", "{position} stands there twice", {"position": twice})
+        return positions
 
 
 class Limits(Section):

@@ -108,14 +108,26 @@ class Folder:
         self.save()
 
     def _check(self, contents: dict[str, bytes], settings: dict[str, Any]) -> None:
-        self.about = json.loads(_read(self.path / ABOUT))
+        self.about = _about(self.path / ABOUT)
         changed = [name for name, content in contents.items() if _read(self.path / COPIES[name]) != content]
         before = self.about["settings"]
         differs = [f"another {COPIES[name]}" for name in changed]
-        differs += [f"{name} {before[name]}, not {value}" for name, value in settings.items() if before[name] != value]
+        for name, value in settings.items():
+            if before.get(name) != value:
+                differs.append(f"{name} {before.get(name)}, not {value}")
         if differs:
             text = f"holds a recording with {'; '.join(differs)}: choose another folder"
             raise InputError(Problem(text, str(self.path)))
+
+
+def _about(path: Path) -> dict[str, Any]:
+    try:
+        about = json.loads(_read(path))
+        float(about["started_unix_s"]), dict(about["settings"]), list(about["sittings"])
+    except (ValueError, LookupError, TypeError):
+        text = "does not describe a recording: restore it, or choose another folder for the recording"
+        raise InputError(Problem(text, str(path))) from None
+    return about
 
 
 def _read(path: str | Path) -> bytes:
