@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ctcr import cli
+from ctcr.bench.devices import health, tracker_process
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.shared import ndi
 from ctcr.bench.shared.control import request
@@ -340,9 +341,12 @@ def whole(name, arguments):
     return waiting[arguments] if name == "PHSR" else "OKAY"
 
 
-def pose_reply(*numbers) -> bytes:
+def pose_reply(*numbers, frame=7, status=0) -> bytes:
     """A whole BX reply of one tool: quaternion, position [mm], error."""
-    body = struct.pack("<BBB8fIIH", 1, SENSOR, ndi.BX_VALID, *numbers, 0x31, 7, 0)
+    return bx_reply(struct.pack("<BBB8fIIH", 1, SENSOR, ndi.BX_VALID, *numbers, 0x31, frame, status))
+
+
+def bx_reply(body) -> bytes:
     head = struct.pack("<HH", ndi.BX_START, len(body))
     return head + struct.pack("<H", ndi.crc16(head)) + body + struct.pack("<H", ndi.crc16(body))
 
@@ -392,6 +396,63 @@ def test_no_pose(on_line, numbers):
         aurora.connect()
         (reading,) = aurora.read().readings
         assert reading.is_seen is is_seen and (reading.quaternion is not None) is is_seen
+
+
+POSE = (1, 0, 0, 0, 1, 2, 3, 0)
+
+
+@pytest.mark.parametrize(
+    ("version", "reply", "well", "says"),
+    [
+        ("AURORA Rev 007", pose_reply(*POSE), [True, True], ["AURORA Rev 007", "seen, serial"]),
+        ("AURORA Rev 007", bx_reply(bytes(3)), [True, False], ["AURORA", "not tracked: disabled, or unplugged"]),
+        ("AURORA Rev 007", pose_reply(*POSE, status=4), [False, True], ["failure of the hardware: switch", "seen"]),
+        ("Polaris Rev 024", pose_reply(*POSE), [False, True], ["Polaris Rev 024; calls itself no Aurora", "seen"]),
+    ],
+)
+def test_tracker_health(on_line, monkeypatch, version, reply, well, says):
+    """Faults in the system status, tools that a reply leaves out, and other devices are not well."""
+    aurora, _ = on_line(lambda *asked: {"BX": reply, "VER": version}.get(asked[0]) or whole(*asked))
+    monkeypatch.setattr(health, "Aurora", lambda *_: aurora)
+    bench = SimpleNamespace(tracker=SimpleNamespace(baud=9600, replies="BX"))
+    found = list(health._tracker(bench, "port"))
+    assert [one.is_well for one in found] == well
+    assert all(text in one.about for text, one in zip(says, found, strict=True))
+
+
+class Pipe:
+    """The reader's end, closed after the given number of polls; holds what was sent."""
+
+    def __init__(self, polls):
+        self.polls, self.sent = polls, []
+
+    def poll(self, _):
+        self.polls -= 1
+        return self.polls < 0
+
+    def send(self, message): ...
+
+    def send_bytes(self, data):
+        self.sent.append(tracker_process.TrackedFrame.unpacked(data))
+
+
+def test_frame_numbers(on_line):
+    """Missed frames are counted; numbers that run backward, as of a device that began anew, miss none."""
+    numbers = iter([5, 6, 9, 2, 3])
+    aurora, _ = on_line(lambda *asked: pose_reply(*POSE, frame=next(numbers)) if asked[0] == "BX" else whole(*asked))
+    aurora.connect()
+    pipe = Pipe(5)
+    tracker_process._read(aurora, SENSOR, pipe)
+    assert [frame.missed for frame in pipe.sent] == [0, 0, 2, 0, 0]
+
+
+@pytest.mark.parametrize(("handle", "says"), [(SENSOR, "0A is not tracked"), (0x0B, "handle 0B .there are 0A")])
+def test_absent_tool(on_line, handle, says):
+    """A tool that the device knows but does not track is told from one that it does not know."""
+    aurora, _ = on_line(lambda *asked: bx_reply(bytes(3)) if asked[0] == "BX" else whole(*asked))
+    aurora.connect()
+    with pytest.raises(DeviceFault, match=says):
+        tracker_process._read(aurora, handle, Pipe(5))
 
 
 def test_endless_tools(on_line):

@@ -1,10 +1,13 @@
 """When the tracker is asked, and how a frame gets from the process that asks to the one that controls."""
 
+import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from ctcr.bench.devices import tracker_process
+from ctcr.bench.devices import bench_file, tracker_process
+from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.devices.tracker_process import PERIOD_S, FrameClock, TrackedFrame
 from ctcr.bench.shared.ndi import ToolReading
 
@@ -18,6 +21,16 @@ UNSEEN = replace(SEEN, reading=ToolReading(10, None, None, None, 0x100, 7))
 def test_packed_frame(frame):
     """A frame is the same behind the pipe."""
     assert TrackedFrame.unpacked(frame.packed()) == frame
+
+
+def test_frozen_frames(tmp_path):
+    """A tracker that sends no new frame is not said to miss the sensor."""
+    bench = bench_file.load(Path(__file__).parents[3] / "examples" / "data" / "bench" / "bench.yaml")
+    tracker = Tracker(bench, tmp_path, 1.0)
+    tracker.last = replace(SEEN, t=time.monotonic() - 2)
+    assert "has sent no new frame for 2.0 s: switch it off" in str(tracker.unseen_fault())
+    tracker.last = replace(UNSEEN, t=time.monotonic())
+    assert "does not see the sensor" in str(tracker.unseen_fault())
 
 
 class Time:

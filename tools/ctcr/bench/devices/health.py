@@ -9,6 +9,7 @@ from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.bus import Bus
 from ctcr.bench.devices.bus_process import bus_lock
 from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.shared.ndi import NOT_TRACKED, ToolReading, system_faults
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,22 @@ def _tracker(bench: Bench, port: str) -> Iterator[Health]:
     with Aurora(port, bench.tracker.baud, bench.tracker.replies) as aurora:
         aurora.connect()
         frame = aurora.read()
-        tag = next((line for line in aurora.version.splitlines() if "Freeze Tag" in line), aurora.version)
-        yield Health("tracker", port, True, tag.strip())
-        for tool, reading in zip(aurora.tools, frame.readings, strict=True):
-            seen = "out of volume" if reading.out_of_volume else "seen" if reading.position else "not seen"
-            text = f"{seen}, serial number {tool.serial_number}, part {tool.part_number}"
-            yield Health(f"tool {tool.handle:02X}", port, True, text)
+        tag = next((line for line in aurora.version.splitlines() if "Freeze Tag" in line), aurora.version).strip()
+        faults = [f"{what}: {remedy}" for what, remedy in system_faults(frame.system_status)]
+        if "aurora" not in aurora.version.lower():
+            faults.append("calls itself no Aurora: is this the tracker's port?")
+        yield Health("tracker", port, not faults, "; ".join([tag, *faults]))
+        readings = {reading.handle: reading for reading in frame.readings}
+        for tool in aurora.tools:
+            reading = readings.get(tool.handle)
+            text = f"{_sight(reading)}, serial number {tool.serial_number}, part {tool.part_number}"
+            yield Health(f"tool {tool.handle:02X}", port, reading is not None, text)
+
+
+def _sight(reading: ToolReading | None) -> str:
+    if reading is None:
+        return NOT_TRACKED
+    return "out of volume" if reading.out_of_volume else "seen" if reading.position else "not seen"
 
 
 def _bus(bench: Bench, folder: Path) -> Iterator[Health]:

@@ -74,6 +74,9 @@ class Tracker(ProcessClient):
         """Why the sensor is not seen."""
         if self.faults and (not self.last or self.faults[-1][0] > self.last.t):
             return self.faults[-1][1]
+        if self.last and time.monotonic() - self.last.t > STALE_S:
+            text = f"the tracker has sent no new frame for {time.monotonic() - self.last.t:.1f} s"
+            return DeviceFault("tracker", text, "switch it off and on, then run the same command again: it resumes")
         out = self.last and self.last.reading.out_of_volume
         what = "the sensor is outside of the tracker's volume" if out else "the tracker does not see the sensor"
         remedy = "look at the sensor, its cable and the field generator, then run the same command again: it resumes"

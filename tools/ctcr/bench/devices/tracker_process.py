@@ -12,7 +12,7 @@ import numpy as np
 from ctcr.arrays import Array
 from ctcr.bench.devices.aurora import Aurora
 from ctcr.bench.devices.fault import DeviceFault
-from ctcr.bench.shared.ndi import RATE_HZ, SYSTEM_STATUS, ToolReading
+from ctcr.bench.shared.ndi import NOT_TRACKED, RATE_HZ, ToolReading, system_faults
 from ctcr.bench.shared.real_time import TRACKER, real_time
 
 AGAIN_S = 0.5  # from a fault to the next connection
@@ -114,18 +114,24 @@ def _read(aurora: Aurora, handle: int, pipe: Connection) -> None:
         frame = aurora.read()
         reading = next((r for r in frame.readings if r.handle == handle), None)
         if reading is None:
-            known = ", ".join(f"{tool.handle:02X}" for tool in aurora.tools)
-            text = f"no tool has the handle {handle:02X} (there are {known})"
-            raise DeviceFault(f"tracker {aurora.port}", text, "change `tool` in the bench file")
+            raise _absent(aurora, handle)
         if frame.system_status != status:
             status = frame.system_status
-            for bit, (what, remedy) in SYSTEM_STATUS.items():
-                if status & bit:
-                    pipe.send(DeviceFault(f"tracker {aurora.port}", what, remedy, status))
+            for what, remedy in system_faults(status):
+                pipe.send(DeviceFault(f"tracker {aurora.port}", what, remedy, status))
         if reading.frame == last:
             clock.was_early()
             continue
         clock.was_new()
-        missed = 0 if last is None else reading.frame - last - 1
+        missed = 0 if last is None else max(0, reading.frame - last - 1)  # a device that began anew counts from 0
         last = reading.frame
         pipe.send_bytes(TrackedFrame(frame.t, reading, missed, late).packed())
+
+
+def _absent(aurora: Aurora, handle: int) -> DeviceFault:
+    """Why a reply does not hold the tool."""
+    known, device = [tool.handle for tool in aurora.tools], f"tracker {aurora.port}"
+    if handle in known:
+        return DeviceFault(device, f"the tool {handle:02X} is {NOT_TRACKED}", "look at its plug, then connect again")
+    text = f"no tool has the handle {handle:02X} (there are {', '.join(f'{other:02X}' for other in known)})"
+    return DeviceFault(device, text, "change `tool` in the bench file")

@@ -45,6 +45,7 @@ SYSTEM_STATUS = {  # bit: fault, remedy
     0x0010: ("a tool was plugged in or unplugged", "connect again, so that its handle is known"),
     0x0100: ("diagnostic pending", "look at the device's lamps"),
 }
+NOT_TRACKED = "not tracked: disabled, or unplugged meanwhile"  # a tool that a reply leaves out
 _CRC = [reduce(lambda crc, _: crc >> 1 ^ 0xA001 * (crc & 1), range(8), byte) for byte in range(256)]
 _TX_POSE = struct.Struct("6s 6s 6s 6s 7s 7s 7s 6s")  # quaternion, position, error indicator: signed decimal numbers
 _TX_TOOL = re.compile(rb"([0-9A-F]{2})(?:MISSING|DISABLED|([-+0-9]{51}))([0-9A-F]{8})([0-9A-F]{8})\n")
@@ -73,6 +74,11 @@ class ToolReading:
     @property
     def is_seen(self) -> bool:
         return self.position is not None and not self.out_of_volume
+
+
+def system_faults(status: int) -> list[tuple[str, str]]:
+    """Fault and remedy of each bit of a system status."""
+    return [text for bit, text in SYSTEM_STATUS.items() if status & bit]
 
 
 def crc16(data: bytes) -> int:
