@@ -1,6 +1,7 @@
 """Recordings without hardware: rows survive kills and power cuts, plans are checked before moves."""
 
 import io
+import json
 import multiprocessing
 import os
 import random
@@ -15,6 +16,7 @@ import pytest
 from ctcr import cli
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.person import Person
+from ctcr.bench.devices.tracker import Tracker
 from ctcr.bench.record.display import picture
 from ctcr.bench.record.folder import Folder
 from ctcr.bench.record.live_page import LivePage
@@ -172,6 +174,20 @@ def test_damaged_about(tmp_path, text):
     (tmp_path / "out" / "session.json").write_text(text)
     with pytest.raises(InputError, match="session.json: does not describe a recording"):
         Folder(tmp_path / "out", {}, {}, 3)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_interrupted(tmp_path, number):
+    """A recording that a signal ends says so in its session.json."""
+    folder, bench = Folder(tmp_path / "out", {}, {}, 3), bench_file.load(DATA / "bench" / "bench.yaml")
+    figures = dict.fromkeys(["cycles", "bad_cycles", "p99_late", "worst_late", "real_time"], 0)
+    motors = SimpleNamespace(state=figures, settings=SimpleNamespace(interface="none", period=0.004), names=[])
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), folder.sitting(motors, Tracker(bench, tmp_path, 1.0)):
+        os.kill(os.getpid(), number)
+        time.sleep(1)
+    ended = json.loads((tmp_path / "out" / "session.json").read_text())["sittings"][0]["ended"]
+    assert ended == f"interrupted by {number.name}" and signal.getsignal(number) == before
 
 
 @pytest.mark.parametrize("option", ["--speed", "--dwell", "--patience"])

@@ -123,7 +123,8 @@ def _remember(settings: BusSettings, folder: Path) -> None:
 
 def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
     """The process: sends ("ready", names of devices) or ("fault", DeviceFault), then serves until the pipe closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
+    for number in (signal.SIGINT, signal.SIGHUP):  # of the terminal: the other end of the pipe decides
+        signal.signal(number, signal.SIG_IGN)
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
         with bus_lock(folder), real_time(BUS) as granted:

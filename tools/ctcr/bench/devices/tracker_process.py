@@ -92,7 +92,8 @@ def run(port: str, baud: int, replies: str, tool: int, pipe: Connection) -> None
 
     `tool`: handle of the sensor; the others are as in Aurora.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the other end of the pipe decides
+    for number in (signal.SIGINT, signal.SIGHUP):  # of the terminal: the other end of the pipe decides
+        signal.signal(number, signal.SIG_IGN)
     with Aurora(port, baud, replies) as aurora, real_time(TRACKER):
         try:
             while not pipe.poll(0):

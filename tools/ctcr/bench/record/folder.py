@@ -1,9 +1,11 @@
 """The folder of a recording: the table, and beside it the files that it was made with."""
 
 import json
+import signal
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -54,7 +56,7 @@ class Folder:
     def sitting(self, motors: Motors, tracker: Tracker) -> Iterator[None]:
         """Work with the devices at real-time priority; in the end `about` says how they did and how it ended."""
         try:
-            with real_time(CONTROLLER):
+            with _interruptible(), real_time(CONTROLLER):
                 yield
         except BaseException as error:
             with suppress(InputError):  # a full disk must not hide the first error
@@ -118,6 +120,20 @@ class Folder:
         if differs:
             text = f"holds a recording with {'; '.join(differs)}: choose another folder"
             raise InputError(Problem(text, str(self.path)))
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """SIGTERM and SIGHUP, of a terminal that closes, interrupt the block as Ctrl+C does. In the main thread only."""
+
+    def interrupt(number: int, _: object) -> None:
+        raise KeyboardInterrupt(f"interrupted by {signal.Signals(number).name}")
+
+    with ExitStack() as undo:
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGTERM, signal.SIGHUP):
+                undo.callback(signal.signal, number, signal.signal(number, interrupt))
+        yield
 
 
 def _about(path: Path) -> dict[str, Any]:
