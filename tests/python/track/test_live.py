@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.fault import DeviceFault
+from ctcr.bench.devices.motors import Motors
 from ctcr.bench.devices.person import Person
 from ctcr.bench.record.row_file import RowFile
 from ctcr.calibrate import tables
-from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, rotation_table, still_reading
+from ctcr.calibrate.live import ROTATION_COLUMNS, Circles, Desk, _Turner, rotation_table, still_reading
 from ctcr.calibrate.procedures import ROTATION_OFFSETS, tracker_noise
 from ctcr.calibrate.tables import Column
 from ctcr.effects.one_tube import one_tube
@@ -178,6 +179,19 @@ def test_one_by_one(robot, bench):
         assert all(one_by_one.problem(flush + s * (place - flush)) is None for s in np.linspace(0, 1, 9))
     two = flush + [0, 0.05, 0.06, 0, 0, 0]
     assert "tube 1 would end 50.00 mm inside tube 2" in one_by_one.problem(two)
+
+
+def test_straight_tube(robot, bench, tmp_path):
+    """It is named and left out: a whole table of the other tubes needs no device."""
+    robot.tubes[0].curvature_per_m = 0.0
+    table, said = tmp_path / "circles.csv", []
+    desk = Desk(bench, tmp_path, None, said.append)
+    turner = _Turner(robot, Motors(bench, robot, tmp_path, one_by_one=True), None, None, Circles(np.pi, 8))
+    jobs = [(tube, turner._motor_deg(tube, turner._alone(tube, a)), s) for tube in (1, 2) for a, s in turner.jobs]
+    rows = "".join(f"{tube + 1},{motor},{sign},0,0,0,0.03,8\n" for tube, motor, sign in jobs)
+    table.write_text(",".join(ROTATION_COLUMNS) + "\n" + rows)
+    rotation_table(table, robot, desk, Circles(np.pi, 8))
+    assert len(said) == 1 and "tube 1 is straight" in said[0]
 
 
 def test_tube_not_retractable(robot, bench, tmp_path):

@@ -65,16 +65,18 @@ def rotation_table(path: str | Path, robot: Robot, desk: Desk, circles: Circles)
         turner.check()
         turner.check_last(rows)
         done, angles = divmod(rows.groups, len(turner.jobs))
-        if done < robot.n_tubes:
+        for tube in sorted(set(range(robot.n_tubes)) - set(turner.tubes)):
+            desk.say(f"tube {tube + 1} is straight in the robot file: its tip draws no circle, and it is left out")
+        if done < len(turner.tubes):
             motors.connect()
             tracker.connect()
             turner.look()
-        for tube in range(done, robot.n_tubes):
+        for tube in turner.tubes[done:]:
             desk.say(f"tube {tube + 1}: alone out of the plate, turning both ways")
             turner.take_out(tube)
             turner.turn(tube, rows, angles)
             angles = 0
-        if done < robot.n_tubes:
+        if done < len(turner.tubes):
             turner.take_out(robot.tracker.sensor_on_tube - 1)
 
 
@@ -140,6 +142,7 @@ class _Turner:
     def __init__(self, robot: Robot, motors: Motors, tracker: Tracker, person: Person, circles: Circles):
         self._robot, self._motors, self._tracker, self._person = robot, motors, tracker, person
         self._circles, self._limits = circles, motors.settings.axes.limits
+        self.tubes = [i for i, tube in enumerate(robot.tubes) if tube.curvature and tube.curved_length]  # that bend
         self.jobs = self._jobs()
         self._worn: int | None = None  # the tube with the sensor on it
 
@@ -151,9 +154,11 @@ class _Turner:
         return [*((angle, 1) for angle in angles), *((angle, -1) for angle in angles[::-1])]
 
     def check(self) -> None:
-        """Raises InputError where a tube cannot stand out alone."""
-        problems = []
-        for tube in range(self._robot.n_tubes):
+        """Raises InputError where a tube cannot stand out alone, or none is bent."""
+        problems = (
+            [] if self.tubes else [Problem("all tubes are straight: there is no rotation to find", field="tubes")]
+        )
+        for tube in self.tubes:
             if problem := self._limits.problem(self._alone(tube)):
                 text = f"tube {tube + 1} cannot stand out alone: {problem}; widen the limits, or take the tubes in the "
                 problems.append(Problem(f"{text}way out of the robot and make the table by hand", field="limits"))
@@ -164,9 +169,10 @@ class _Turner:
         """Raises InputError where the rows that are there were made at other angles."""
         if not rows.last:
             return
-        tube, job = divmod(rows.groups - 1, len(self.jobs))
+        place, job = divmod(rows.groups - 1, len(self.jobs))
         number, motor, sign = (float(field) for field in rows.last[:3])
-        if tube < self._robot.n_tubes:
+        if place < len(self.tubes):
+            tube = self.tubes[place]
             angle, wanted = self.jobs[job]
             off = abs(motor - self._motor_deg(tube, self._alone(tube, angle)))
             if (number, sign) == (tube + 1, wanted) and off < OTHER_DEG:
