@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 import pytest
-from ctcr.bench.devices import bus_process, emergency_stop, homing
+from ctcr.bench.devices import bus_lock, emergency_stop, homing
 from ctcr.bench.devices.bus import Bus
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.health import health_of
@@ -89,7 +89,7 @@ def test_interrupted_move(robot, bench, folder):
 
 def test_bus_lock(robot, bench, folder, monkeypatch):
     """A second program is refused; the first one goes on."""
-    monkeypatch.setattr(bus_process, "LOCK_S", 0.2)
+    monkeypatch.setattr(bus_lock, "LOCK_S", 0.2)
     with Motors(bench, robot, folder) as motors:
         motors.connect()
         tracker, *_, bus = health_of(bench, folder)

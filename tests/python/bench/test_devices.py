@@ -13,7 +13,8 @@ import pytest
 from ctcr import cli
 from ctcr.bench.devices import bench_file, emergency_stop, stepper_drive
 from ctcr.bench.devices.axis_control import AxisControl
-from ctcr.bench.devices.bus_process import bus_lock, last_bus
+from ctcr.bench.devices.bus_lock import bus_lock
+from ctcr.bench.devices.bus_process import last_bus
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.devices.motion import StraightMove, VelocityMove

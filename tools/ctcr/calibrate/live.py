@@ -155,9 +155,7 @@ class _Turner:
 
     def check(self) -> None:
         """Raises InputError where a tube cannot stand out alone, or none is bent."""
-        problems = (
-            [] if self.tubes else [Problem("all tubes are straight: there is no rotation to find", field="tubes")]
-        )
+        problems = [] if self.tubes else [Problem("all are straight: there is no rotation to find", field="tubes")]
         for tube in self.tubes:
             if problem := self._limits.problem(self._alone(tube)):
                 text = f"tube {tube + 1} cannot stand out alone: {problem}; widen the limits, or take the tubes in the "

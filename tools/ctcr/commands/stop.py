@@ -18,17 +18,17 @@ def command(release: bool, folder) -> None:
     Example: ctcr stop
     """
     from ctcr.bench.devices import emergency_stop
+    from ctcr.bench.devices.bus_lock import driven_folders, is_driven
+    from ctcr.errors import InputError, Problem
 
     if release:
         from ctcr.bench.devices.release import release as released
 
         options.Output().say(*released(folder))
         return
+    was_driven = is_driven(folder)  # before: a program that is stopped ends at once
     emergency_stop.stop(folder, "ctcr stop was called")
-    from ctcr.bench.devices.bus_process import driven_folders, is_driven
-    from ctcr.errors import InputError, Problem
-
-    if is_driven(folder):
+    if was_driven:
         options.Output().say("stopped; release with `ctcr stop --release`")
         return
     text = "no program drives a bus from this folder: nothing that moves was stopped, and nothing moves here until "

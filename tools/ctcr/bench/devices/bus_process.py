@@ -5,14 +5,11 @@ so the bus has a process of its own. Requests come through a pipe, its state is 
 of the pipe closes, it stops the motors and ends.
 """
 
-import fcntl
 import gc
 import json
-import os
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -23,6 +20,7 @@ from ctcr.bench.devices import emergency_stop
 from ctcr.bench.devices.axis_control import AxisControl, AxisSettings
 from ctcr.bench.devices.bench_file import Motors
 from ctcr.bench.devices.bus import Bus
+from ctcr.bench.devices.bus_lock import bus_lock
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.devices.stepper_drive import DriveInputs
 from ctcr.bench.shared.real_time import BUS, Lateness, real_time
@@ -35,7 +33,6 @@ HOME_RANGE = 500_000  # counts: more than any axis travels
 SILENCE_S = 0.06  # of cycles without a good frame, before it is a fault; the terminals' watchdog waits for 0.1 s
 STATE_CYCLES = 25  # between two checks of the terminals' states
 READY_S = 0.5  # from enabling to ready
-LOCK_S = 3.0  # patience with a program that is just ending
 _FIELDS = {
     "f8": ("t", "p99_late", "worst_late"),  # [s]
     f"{MOST_AXES}f8": ("joints",),
@@ -61,50 +58,6 @@ class BusSettings:
 def state_record(folder: Path, writer: bool = False) -> SharedRecord:
     """STATE, written every cycle."""
     return SharedRecord(folder / "bus", STATE, writer)
-
-
-@contextmanager
-def bus_lock(folder: Path) -> Iterator[None]:
-    """One program at a time drives the bus: a second master would take over the terminals of the first.
-
-    Raises DeviceFault while another program holds it. A process that ends releases it.
-    """
-    handle = os.open(folder / "bus.lock", os.O_RDWR | os.O_CREAT, 0o600)
-    try:
-        end = time.monotonic() + LOCK_S
-        while True:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() > end:
-                    remedy = "wait until it has ended, or end it"
-                    raise DeviceFault("bus", "another program drives it", remedy) from None
-                time.sleep(0.05)
-        yield
-    finally:
-        os.close(handle)
-
-
-def is_driven(folder: Path) -> bool:
-    """Whether a program drives a bus from this folder now."""
-    with suppress(OSError), open(folder / "bus.lock", "rb") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
-
-
-def driven_folders() -> list[Path]:
-    """The folders from which programs of this user drive a bus now: each holds its lock open."""
-    found = set()
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):  # of others, or just ended
-            for entry in os.scandir(process / "fd"):
-                with suppress(OSError):
-                    found.add(Path(os.readlink(entry.path)))
-    return sorted(path.parent for path in found if path.name == "bus.lock" and is_driven(path.parent))
 
 
 def last_bus(folder: Path) -> Bus | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from ctcr.bench.devices.aurora import Aurora
 from ctcr.bench.devices.bench_file import Bench
 from ctcr.bench.devices.bus import Bus
-from ctcr.bench.devices.bus_process import bus_lock
+from ctcr.bench.devices.bus_lock import bus_lock
 from ctcr.bench.devices.fault import DeviceFault
 from ctcr.bench.shared.ndi import NOT_TRACKED, ToolReading, system_faults
 

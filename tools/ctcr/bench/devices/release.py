@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from ctcr.bench.devices import emergency_stop
-from ctcr.bench.devices.bus_process import bus_lock, last_bus
+from ctcr.bench.devices.bus_lock import bus_lock
+from ctcr.bench.devices.bus_process import last_bus
 from ctcr.bench.devices.fault import DeviceFault
 
 
