@@ -6,6 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 from ctcr import Model, _core
+from ctcr.errors import ArgumentError
 from ctcr.frames import angle_between, matrix_from_quaternion, product, quaternion_from_rotation_vector
 from ctcr.model.model import status_text
 from model_bench import make_robot, random_force, random_joints
@@ -193,9 +194,11 @@ def test_no_rows():
     ],
 )
 def test_bad_shapes(arguments):
-    """Shapes that do not fit are refused."""
+    """Shapes that do not fit are refused, with the name of the argument and its unit."""
     good = dict(beta=np.full((4, 3), -0.1), alpha=np.zeros((4, 3)))
-    with pytest.raises(ValueError):
+    [name] = arguments
+    unit = {"beta": "m", "alpha": "rad", "force": "N", "moment": "N m"}[name]
+    with pytest.raises(ArgumentError, match=f"{name}: .*in {unit}"):
         Model(make_robot(3)).predict(**good | arguments)
 
 
@@ -305,7 +308,7 @@ def test_shape_unsolved():
     model = Model(make_robot(2))
     with pytest.raises(ValueError, match="joints out of order"):
         model.shape([-0.1, -0.2], [0, 0])
-    with pytest.raises(ValueError, match="shape"):
+    with pytest.raises(ArgumentError, match="shape"):
         model.shape([[-0.2, -0.1]], [[0, 0]])
     with pytest.raises(ValueError, match="points"):
         model.shape([-0.2, -0.1], [0, 0], points=1)

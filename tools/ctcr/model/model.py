@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ctcr import _core
 from ctcr.arrays import Array, Mask
 from ctcr.effects import catalogue
-from ctcr.errors import InputError, Problem
+from ctcr.errors import ArgumentError, InputError, Problem, shown
 from ctcr.frames import product
 from ctcr.model import parameters as free_parameters
 from ctcr.model import recording
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 POSE_COLUMNS = ("pred_x_m", "pred_y_m", "pred_z_m", "pred_qw", "pred_qx", "pred_qy", "pred_qz")
 SHOWN = 5  # rows at a glance
+UNITS = {"beta": "m", "alpha": "rad", "force": "N", "moment": "N m"}
 INTEGRATORS = {
     "default": _core.Integrator.standard,
     "ssprk3": _core.Integrator.ssp_rk3,
@@ -153,6 +154,8 @@ class Model:
         n = self.robot.n_tubes
         beta, alpha = (_array(name, q, n, rows=True) for name, q in (("beta", beta), ("alpha", alpha)))
         rows = len(beta)
+        if len(alpha) != rows:
+            raise _wrong_shape("alpha", f"({rows}, {n})", alpha)
         own = [name for name in self.parameters if not name.startswith("actuation.")] if by_parameters else []
         known = recording.names_of(n)
         *pose, jacobian, compliance, by_own = self._core.predict(
@@ -255,17 +258,28 @@ def _acting(robot: Robot, integrator: str) -> dict[str, Any]:
 
 def _array(name: str, values: ArrayLike, last: int, rows: bool = False) -> Array:
     """The values as an array (last,), or with `rows` (M, last)."""
-    array = np.ascontiguousarray(values, dtype=np.float64)
+    array = _numbers(name, values)
     if array.ndim != 1 + rows or array.shape[-1] != last:
-        shape = f"(M, {last})" if rows else f"({last},)"
-        raise ValueError(f"{name} must have the shape {shape}, not {array.shape}")
-    return array
+        raise _wrong_shape(name, f"(M, {last})" if rows else f"({last},)", array)
+    return np.ascontiguousarray(array)
 
 
 def _load(name: str, values: ArrayLike | None, rows: int) -> Array | None:
     if values is None:
         return None
-    array = np.asarray(values, dtype=np.float64)
+    array = _numbers(name, values)
     if array.shape not in ((3,), (rows, 3)):
-        raise ValueError(f"{name} must have the shape ({rows}, 3) or (3,), not {array.shape}")
+        raise _wrong_shape(name, f"({rows}, 3) or (3,)", array)
     return np.ascontiguousarray(np.broadcast_to(array, (rows, 3)))
+
+
+def _numbers(name: str, values: ArrayLike) -> Array:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        text = f"{shown(values)} is no array of numbers in {UNITS[name]}"
+        raise ArgumentError(Problem(text, field=name)) from None
+
+
+def _wrong_shape(name: str, wanted: str, array: Array) -> ArgumentError:
+    return ArgumentError(Problem(f"must have the shape {wanted}, in {UNITS[name]}, not {array.shape}", field=name))
