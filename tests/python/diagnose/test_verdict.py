@@ -87,6 +87,16 @@ def test_implausible_values(tip_load):
     assert judged(tip_load, accepted=[odd]).probability < judged(tip_load).probability
 
 
+def test_implausible_final_values(tip_load):
+    """The values said to be implausible are the fitted ones, whatever an earlier fit asked for."""
+    (one,), final = tip_load.accepted, tip_load.final
+    early = replace(one, best=replace(one.best, implausible=("mass = 3 kg",)))
+    assert replace(tip_load, accepted=[early]).in_doubt == []
+    heavy = final.values.copy()
+    heavy[final.names.index("effects.tip_load.mass")] = 70.0
+    assert "effects.tip_load.mass = 70 kg" in replace(tip_load, final=replace(final, values=heavy)).in_doubt[0]
+
+
 @pytest.mark.parametrize("rejected", [True, False])
 def test_held_out_runs(tip_load, rejected):
     """The less effects explain of held-out runs, the less sure the verdict, and where they explain nothing they are not

@@ -17,7 +17,7 @@ from ctcr.diagnose.engine import Engine, Progress, values_of
 from ctcr.diagnose.explanations import probability
 from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
-from ctcr.diagnose.round import Round, outlier_fraction, parameters_of
+from ctcr.diagnose.round import Round, implausible_values, outlier_fraction, parameters_of
 from ctcr.diagnose.selection import Accepted, select_effects
 from ctcr.diagnose.starts import rows_around
 from ctcr.diagnose.varying_coefficients import VaryingModel, varying_model
@@ -30,7 +30,7 @@ from ctcr.fit.widening import Widened, widened
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
 from ctcr.show.result import Glance, Result, frame
-from ctcr.show.wording import counted, sentence
+from ctcr.show.wording import counted, listed, sentence
 from ctcr.table.measurements import Measurements
 
 if TYPE_CHECKING:
@@ -102,6 +102,13 @@ class Diagnosis(Result):
         is_wrong = before > settings.MANY_OUTLIERS and np.max(self.final.inflation) > settings.INFLATION_WRONG
         many = before > settings.MOST_OUTLIERS and after > max(settings.MOST_OUTLIERS, settings.OUTLIERS_LEFT * before)
         return many and bool(explained < settings.HARDLY_EXPLAINED or others_fit or is_wrong)
+
+    @property
+    def in_doubt(self) -> list[str]:
+        """A sentence on fitted values of its effects that no real robot has, if there are any."""
+        n = self.robot.n_tubes
+        odd = [text for a in self.accepted for text in implausible_values(n, self.final, a.best.candidate)]
+        return [f"The data ask for implausible values: {listed(odd)}."] if odd else []
 
     @property
     def judged(self) -> Mask:
@@ -315,6 +322,8 @@ def _diagnose(
         verdict=verdict,
         notices=outliers.messages(robot, engine.measurements, with_effects, isolated),
     )
+    if not verdict.names_no_cause:
+        verdict.sentences += result.in_doubt
     if verdict.word == "not_in_catalogue" and accepted:
         plain = engine.continued(chosen.calibrated)
         _, _, residual = structure(plain)

@@ -317,7 +317,7 @@ class Refits:
         explained = before.fraction_explained(after, len(candidate.names))
         # A chi-square removed has a standard deviation of twice its root.
         sd = 2 * np.sqrt(max(explained, 0.0) / max(before.unexplained, 1.0))
-        implausible = tuple(_implausible(self.engine, fit, candidate))
+        implausible = tuple(implausible_values(self.engine.robot.n_tubes, fit, candidate))
         return replace(one, refit=refit, explained=explained, explained_sd=sd, fit=fit, implausible=implausible)
 
 
@@ -330,9 +330,9 @@ def linearised_end(engine: Engine, before: joint.Fit, one: CandidateFit) -> dict
     return dict(zip(before.names, map(float, moved), strict=True)) | dict(one.candidate.shape) | own
 
 
-def _implausible(engine: Engine, fit: joint.Fit, candidate: Candidate) -> list[str]:
+def implausible_values(n_tubes: int, fit: joint.Fit, candidate: Candidate) -> list[str]:
     """Values beyond the soft bounds of their effect, by more than two standard deviations."""
-    known, found = catalogue.parameter_of(engine.robot.n_tubes), []
+    known, found = catalogue.parameter_of(n_tubes), []
     for name in candidate.names:
         i, (low, high) = fit.names.index(name), known[name].soft
         if fit.values[i] + 2 * fit.sd[i] < low or fit.values[i] - 2 * fit.sd[i] > high:

@@ -80,9 +80,6 @@ def judge(rounds: list[Round], accepted: list[Accepted], residual: Residual, exp
     names = join([" or ".join(ids) for ids in classes])
     verb = "explains" if len(accepted) == 1 else "explain"
     sentences = [f"Given this catalogue, {names} {verb} the error (probability {most(alone)})."]
-    odd = [text for a in accepted for text in a.best.implausible]
-    if odd:
-        sentences.append(f"The data ask for implausible values: {listed(odd)}.")
     if residual.rejected:
         usual = 1 - (2 * form_error(accepted)) ** 2
         odd = [run for run, share in explained.items() if share < usual]
