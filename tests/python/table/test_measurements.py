@@ -193,6 +193,15 @@ def test_other_files(faults, content, message):
     assert message in problem.message and "\n" not in str(problem)
 
 
+def test_robot_file(tmp_path):
+    """A robot file given as a table is called one."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("name: mine\ntubes: []\n")
+    with pytest.raises(InputError, match="is a robot file, not a table") as caught:
+        measurements.read(path)
+    assert len(caught.value.problems) == 1
+
+
 def test_binary(faults):
     problems = faults(HEADER.encode() + b"\n" + bytes(range(256)), 1)
     assert problems and all(problem.line >= 2 for problem in problems)

@@ -129,6 +129,7 @@ def header_names(header: bytes, file: str) -> tuple[str, ...]:
         text = "\0"
     names = tuple(name.strip() for name in text.split(","))
     faults = {
+        "is a robot file, not a table of measurements": file.endswith((".yaml", ".yml")),
         "is text in UTF-16: save it as UTF-8": header.startswith((b"\xff\xfe", b"\xfe\xff")),
         "is a spreadsheet, not text: save it as CSV": header.startswith(b"PK"),
         "is not text": any(ord(letter) < 32 and letter not in "\t\r" for letter in text),

@@ -20,7 +20,7 @@ from ctcr.robot.description import MAX_TUBES, Robot
 from ctcr.robot.units import Quantity
 from ctcr.show.output import Progress
 from ctcr.show.result import Glance, Shown, frame
-from ctcr.show.wording import listed
+from ctcr.show.wording import counted, listed
 from ctcr.table.csv_table import SHOWN, Faults, NumberTable, open_table
 from ctcr.table.frame_table import FrameTable
 from ctcr.table.sessions import Sessions
@@ -139,7 +139,8 @@ class Measurements(Shown):
     def glance(self) -> Glance:
         runs = len(np.unique(self.run))
         name = f"Measurements {self.file}".rstrip()
-        line = f"{name}: {len(self)} rows, {int(self.measured.sum())} with a pose, {runs} runs, {self.n_tubes} tubes"
+        said = [counted(len(self), "row"), f"{int(self.measured.sum())} with a pose", counted(runs, "run")]
+        line = f"{name}: {', '.join([*said, counted(self.n_tubes, 'tube')])}"
 
         def row(name: str, unit: str, values: Array) -> list[list[str]]:
             known = values[np.isfinite(values)]
@@ -224,7 +225,7 @@ def check_of(robot: Robot, table: Measurements) -> None:
         if not isinstance(value, kind):
             raise InputError(Problem(f"a value of type {type(value).__name__} is no {wanted} gives one"))
     if table.n_tubes != robot.n_tubes:
-        text = f"holds the joints of {table.n_tubes} tubes: the robot has {robot.n_tubes}"
+        text = f"holds the joints of {counted(table.n_tubes, 'tube')}: the robot has {robot.n_tubes}"
         raise InputError(Problem(text, table.source))
 
 
@@ -268,7 +269,7 @@ def _unknown(column: str, present: tuple[str, ...], n_tubes: int) -> tuple[str, 
         return "this column is there more than once" if present.count(column) > 1 else "", None
     joint = re.match(r"(?:beta|alpha)([0-9]+)_", column)
     if joint and int(joint[1][:9]) > n_tubes:
-        return f"unknown column: the robot has {n_tubes} tubes", None
+        return f"unknown column: the robot has {counted(n_tubes, 'tube')}", None
     near = did_you_mean(column, [name for name in known if name not in present])
     other_unit = near and near.partition("_")[0] == column.partition("_")[0]
     hint = f": did you mean {near}?" + (" Columns are in SI units" if other_unit else "") if near else ""
@@ -280,7 +281,7 @@ def _missing(present: tuple[str, ...], groups: dict[str, tuple[str, ...]], n_tub
     for name, columns in groups.items():
         absent = [column for column in columns if column not in present]
         joints = name in ("beta", "alpha")
-        reason = f"the robot has {n_tubes} tubes" if joints else f"{', '.join(columns)} come together"
+        reason = f"the robot has {counted(n_tubes, 'tube')}" if joints else f"{', '.join(columns)} come together"
         if joints or len(absent) < len(columns):
             yield from ((column, f"this column is missing: {reason}") for column in absent)
 
