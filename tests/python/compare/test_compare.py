@@ -1,13 +1,14 @@
 """`ctcr compare` finds planted errors, finds none in noise, and counts the rows that it left out."""
 
 import json
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from compare_bench import JITTER_MM, bench, outward, stop_and_go, stream, tips
 from ctcr import settings
-from ctcr.compare import compare, terminal
+from ctcr.compare import compare, report, terminal
 from ctcr.compare.same_joints import pairs_of_runs
 from ctcr.compare.summary import differs, findings, headline, is_noise, limits, quiet
 from ctcr.errors import InputError
@@ -137,6 +138,31 @@ def test_outliers():
     assert result.direction.outliers == 3
     assert result.direction.typical_rms_mm == pytest.approx(JITTER_MM * 6**0.5, rel=0.15)
     assert any("Pairs far beyond that: 3" in text for text in quiet(result))
+
+
+@pytest.mark.parametrize("stops, rows, far", [(5, 6, 1), (9, 17, 3)])
+def test_few_pairs(stops, rows, far):
+    """A few pairs of visits, of which some lie far apart, neither show hysteresis nor rule it out."""
+    random = np.random.default_rng(4)
+    path = [column[:rows] for column in stop_and_go(random, runs=1, stops=stops)]
+    late = np.arange(rows)[:, None] >= rows - far
+    result = compare(*bench(random, path, lambda q, t, run: late * np.full(3, 1e-3)))
+    assert not differs(result.direction)
+    assert not any("hysteresis" in text for text in quiet(result))
+    [text] = [text for text in limits(result) if "hysteresis" in text]
+    assert text.startswith("Too few joints") and ("(1 pair:" in text) == (rows == 6)
+
+
+def test_one_pose():
+    """Readings at one pose are drawn without a warning, and nothing is a hint on their error."""
+    random = np.random.default_rng(1)
+    path = [np.repeat(column[:1], 30, axis=0) for column in stop_and_go(random)]
+    path[2] = 2.0 * np.arange(30)
+    result = compare(*bench(random, path, constant((0.0, 0.0, 2.0))))
+    assert not any("hint" in text for text in quiet(result))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert report.page(result)
 
 
 def test_poor_repeatability():

@@ -12,7 +12,7 @@ import pytest
 from ctcr.robot import history, robot_file
 from ctcr.show import html_page, output, pictures, scene
 from ctcr.show.html_page import as_html, bullets, cards, paragraph, table
-from ctcr.show.wording import visible
+from ctcr.show.wording import percent, visible
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -43,6 +43,12 @@ def test_visible(name, other):
     assert shown.isprintable() and visible(shown) == shown and visible(name + other) == shown + visible(other)
     assert shown == name or not name.isprintable()
     shown.encode()
+
+
+@pytest.mark.parametrize("text", ["0.00 %", "0.62 %", "1.4 %", "17 %", "100 %", "120 %", "-0.50 %", "-130 %"])
+def test_percent(text):
+    """No part is shown as a power of ten, whether it is small, negative, or more than the whole."""
+    assert percent(float(text.removesuffix(" %")) / 100) == text
 
 
 @laws

@@ -172,7 +172,7 @@ def _against(axes, item: Dependence, against: Abscissa, c: Comparison, found: bo
         means = np.array([(x[rows].mean(), local[rows, axis].mean()) for rows in cells])
         axes.plot(*means.T, color=AXES[axis], lw=1.8, marker="o", ms=3, label=name)
     axes.axhline(0, color=NOISE, lw=0.7)
-    limit = np.percentile(np.abs(local), 99) * 1.15
+    limit = max(np.percentile(np.abs(local), 99) * 1.15, 1e-3)  # mm: less is rounding
     axes.set(xlabel=label, ylabel="error, mm", ylim=(-limit, limit))
     axes.set_title(f"{100 * item.share:.0f} % of the squared error{' *' if found else ''}")
     axes.legend(fontsize=7, handlelength=1, labelspacing=0.25, frameon=True, framealpha=0.8, edgecolor="none")

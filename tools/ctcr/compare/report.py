@@ -11,6 +11,7 @@ from ctcr.compare.summary import findings, headline, held_out
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, bullets, cards, figure, paragraph, table, view
+from ctcr.show.wording import counted, percent
 
 MOST_ARROWS = 1500
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
@@ -26,7 +27,7 @@ def page(c: Comparison) -> str:
 def _opening(c: Comparison) -> str:
     p, n, d = c.position_mm, c.noise, c.direction
     numbers = [
-        ("error", f"{p.rms:.3g} mm", f"RMS error: {c.percent_of_length.rms:.2g} % of the deployed length"),
+        ("error", f"{p.rms:.3g} mm", f"RMS error: {percent(c.percent_of_length.rms / 100)} of the deployed length"),
         ("error", f"{p.p95:.3g} mm", f"95 % are below; the largest is {p.maximum:.3g} mm"),
     ]
     if c.angle_deg:
@@ -36,7 +37,7 @@ def _opening(c: Comparison) -> str:
         sources = {"revisits": f"{n.pairs} same-direction revisits", "rest": "at rest", "stated": "as stated"}
         numbers.append(("noise", f"{n.rms_mm:.2g} mm", f"scatter of a reading, RMS ({sources[n.source]})"))
     if d:
-        numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {d.pairs} pairs of visits"))
+        numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {counted(d.pairs, 'pair')} of visits"))
     wrong = [one.sentence for one in c.wrong]
     first = f"<h2>{c.WRONG}</h2>{bullets(wrong)}" if wrong else ""
     return first + paragraph(headline(c), "lead") + cards(numbers)

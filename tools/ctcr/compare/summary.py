@@ -46,7 +46,7 @@ def headline(c: Comparison) -> str:
     p, length, noise = c.position_mm, c.percent_of_length, c.noise
     text = (
         f"The model is wrong by {mm(p.rms)} RMS (mean {mm(p.mean)}, 95 % below {mm(p.p95)}, at most {mm(p.maximum)}) "
-        f"or {length.rms:.2g} % of the deployed length, over {p.count} readings. "
+        f"or {percent(length.rms / 100)} of the deployed length, over {counted(p.count, 'reading')}. "
     )
     if is_noise(c):
         return text + f"Readings repeat only to {mm(noise.rms_mm)} RMS: there is nothing to explain."
@@ -136,7 +136,7 @@ def _run_text(c: Comparison) -> str:
             within = f"noise gives {mm(r.noise_mm)}"
         text += (
             f"The same joints give positions {mm(r.rms_between_mm)} RMS apart in different runs "
-            f"({r.pairs_between} pairs), but {within}. "
+            f"({counted(r.pairs_between, 'pair')}), but {within}. "
         )
     if r.outlying:
         text += f"{_runs(r.outlying)} about {mm(r.outlying_mm)} from the others. "
@@ -161,8 +161,8 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
     if np.isfinite(d.p_against_same) and d.p_against_same > settings.LEVEL:
         return (
             f"The same joints do not give the same pose again: visits from opposite directions differ by "
-            f"{mm(d.rms_mm)} RMS ({d.pairs} pairs), visits from the same direction by {mm(d.same_rms_mm)} "
-            f"({c.noise.pairs} pairs), where the tracker's scatter gives {mm(d.quiet_rms_mm)}. No model without "
+            f"{mm(d.rms_mm)} RMS ({counted(d.pairs, 'pair')}), visits from the same direction by {mm(d.same_rms_mm)} "
+            f"({counted(c.noise.pairs, 'pair')}), where the tracker's scatter gives {mm(d.quiet_rms_mm)}. No model without "
             f"history can be better than about {mm(d.floor_mm)} RMS there. Possible causes: friction, play, drift or "
             f"creep."
         )
@@ -185,12 +185,17 @@ def coverage(d: DirectionDifference) -> str:
     """How many pairs there are, and what moved in them: friction between tubes shows in rotation alone, say."""
     counts = [(n, f"while {how}") for n, how in zip(d.moved.values(), _MOTIONS, strict=True)]
     said = [f"{n or 'none'} {text}" for n, text in counts]
-    return f"{d.pairs} pairs: {join(said)}"
+    return f"{counted(d.pairs, 'pair')}: {join(said)}"
 
 
 def differs(d: DirectionDifference) -> bool:
     """Whether the pose at the same joints depends on how they were reached."""
     return any(p <= settings.LEVEL / 2 for p in (d.p_against_same, d.p_against_quiet))
+
+
+def too_few(d: DirectionDifference) -> bool:
+    """Whether the pairs are too few to tell: more than the quarter that the tests allow lie far apart, but not surely."""
+    return not differs(d) and (d.pairs < settings.FEWEST_PAIRS or d.outliers > d.pairs / 4)
 
 
 def _dependence_text(item: Dependence, c: Comparison) -> str:
@@ -214,7 +219,7 @@ def quiet(c: Comparison) -> list[str]:
     """Questions that the data answer with no, and hints too weak to be findings."""
     found = []
     d = c.direction
-    if d and not differs(d):
+    if d and not differs(d) and not too_few(d):
         like = f"no more than noise ({mm(d.quiet_rms_mm)})"
         if np.isfinite(d.p_against_same):
             like = f"like visits from the same direction ({mm(d.same_rms_mm)})"
@@ -229,17 +234,19 @@ def quiet(c: Comparison) -> list[str]:
         size, p = mm(c.shift.size_mm), probability(c.shift.p_value)
         found.append(f"There is no significant constant offset (mean error {size}, p = {p}).")
     if c.ranking.alone and not c.ranking.chosen and not is_noise(c):
-        best = c.ranking.alone[0]
-        found.append(
-            f"No single quantity predicts the error well on {held_out(c)}. The strongest hint is the {best.label}: "
-            f"{percent(best.share)} of the squared error, which chance reaches in {100 * best.p_value:.2g} % of cases."
-        )
+        best, text = c.ranking.alone[0], f"No single quantity predicts the error well on {held_out(c)}."
+        if best.share >= settings.LEAST_DEPENDENCE:
+            text += (
+                f" The strongest hint is the {best.label}: {percent(best.share)} of the squared error, which chance "
+                f"reaches in {percent(best.p_value)} of cases."
+            )
+        found.append(text)
     return found
 
 
 def limits(c: Comparison) -> Iterator[str]:
     """Questions that these data cannot answer."""
-    n, r = c.noise, c.run_offsets
+    n, r, d = c.noise, c.run_offsets, c.direction
     if n.source == "rest":
         yield (
             f"Too few joints were visited twice from the same direction in one run: the scatter of a reading "
@@ -255,8 +262,14 @@ def limits(c: Comparison) -> Iterator[str]:
             f"Repeated readings do not show the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
             f"which is the same at every visit of a position."
         )
-    if c.direction is None:
+    if d is None:
         yield "No joints were visited from opposite directions in one run: hysteresis and delay cannot be examined."
+    elif too_few(d):
+        yield (
+            f"Too few joints were visited from opposite directions in one run to tell whether there is hysteresis: the "
+            f"visits lie {mm(d.rms_mm)} RMS apart ({coverage(d)}), where the tracker's scatter gives "
+            f"{mm(d.quiet_rms_mm)}."
+        )
     if len(c.runs) == 1:
         yield "There is one run: the findings are not tested on another run."
     if c.fixed:
@@ -277,7 +290,7 @@ def limits(c: Comparison) -> Iterator[str]:
     if len(c.ranking.rows) < len(c.sample.row):
         yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."
     if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not c.sessions and not is_noise(c):
-        pairs = f"{r.pairs_between} pairs of visits" if r.pairs_between else "no joints"
+        pairs = f"{counted(r.pairs_between, 'pair')} of visits" if r.pairs_between else "no joints"
         yield (
             f"Too few joints were visited in two runs ({pairs}): an offset that belongs to a run (frame, homing, "
             "drift) cannot be separated from an error that belongs to the joints of that run."
