@@ -162,9 +162,9 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
         return (
             f"The same joints do not give the same pose again: visits from opposite directions differ by "
             f"{mm(d.rms_mm)} RMS ({counted(d.pairs, 'pair')}), visits from the same direction by {mm(d.same_rms_mm)} "
-            f"({counted(c.noise.pairs, 'pair')}), where the tracker's scatter gives {mm(d.quiet_rms_mm)}. No model without "
-            f"history can be better than about {mm(d.floor_mm)} RMS there. Possible causes: friction, play, drift or "
-            f"creep."
+            f"({counted(c.noise.pairs, 'pair')}), where the tracker's scatter gives {mm(d.quiet_rms_mm)}. No model "
+            f"without history can be better than about {mm(d.floor_mm)} RMS there. Possible causes: friction, play, "
+            f"drift or creep."
         )
     text = (
         f"There is hysteresis: visits of the same joints from opposite directions differ by {mm(d.rms_mm)} RMS (at "
@@ -194,7 +194,7 @@ def differs(d: DirectionDifference) -> bool:
 
 
 def too_few(d: DirectionDifference) -> bool:
-    """Whether the pairs are too few to tell: more than the quarter that the tests allow lie far apart, but not surely."""
+    """Whether the pairs are too few to tell: more than a quarter lie far apart, which the tests allow by chance."""
     return not differs(d) and (d.pairs < settings.FEWEST_PAIRS or d.outliers > d.pairs / 4)
 
 
