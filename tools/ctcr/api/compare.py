@@ -3,7 +3,7 @@
 import numpy as np
 
 from ctcr.api.reviewed import reviewed, without_false_poses
-from ctcr.audit import missing_motion, sensor_pose
+from ctcr.audit import copies, missing_motion, sensor_pose
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
 from ctcr.conventions import Review
@@ -26,6 +26,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     """
     check_of(robot, table)
     files = [*robot.files, *table.files]
+    table, copied = copies.left_out(table)
     found = reviewed(robot, table)
     readings, corrected = table, []
     prediction = None if table.refusal else predict(robot.standard, readings, steps=steps)
@@ -40,7 +41,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     if robot.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
-    notices = [*map(sentence, (*corrected, *placed)), *excluded, *map(sentence, added)]
+    notices = [*map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
     try:
         return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
     except InputError as error:  # nothing is left to compare: the robot file may say why

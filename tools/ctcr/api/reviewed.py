@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr.arrays import Array
-from ctcr.audit import spikes
+from ctcr.audit import copies, spikes
 from ctcr.conventions import Finding, Review, review
 from ctcr.diagnose import sessions
 from ctcr.errors import InputError, Problem
@@ -70,11 +70,14 @@ def to_fit(
 ) -> tuple[Measurements, list[str], Review]:
     """The readings as a fit takes them, sentences on what was left out, and the review of the conventions.
 
-    Left out are poses that the tracker repeated, spikes, and where the runs are sessions, what each has of its own.
+    Left out are copies of rows, poses that the tracker repeated, spikes, and where the runs are sessions, what each has
+    of its own.
     frame_per_run    whether each run has a frame of its own; None: where the readings say so
     finds            kinds of wrong conventions that the fit itself corrects
     Raises WrongConventions where a convention is wrong, unless `anyway`.
     """
+    check_of(robot, table)
+    table, copied = copies.left_out(table)
     found = reviewed(robot, table)
     wrong = [one for one in found.wrong if one.kind not in finds]
     if wrong and not anyway:
@@ -84,4 +87,4 @@ def to_fit(
     readings, said = without_false_poses(robot, table, found)
     said += without_pose(table)
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
-    return readings, [*said, *more], found
+    return readings, [*map(sentence, copied), *said, *more], found

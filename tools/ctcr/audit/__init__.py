@@ -1,4 +1,4 @@
-"""Checks of a table before any fit: spikes, missing motion, a sensor of unknown pose."""
+"""Checks of a table before any fit: copies, spikes, missing motion, a sensor of unknown pose."""
 
 from ctcr.audit import missing_motion, sensor_pose
 from ctcr.robot.description import Robot
