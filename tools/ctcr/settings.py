@@ -48,6 +48,7 @@ DETOUR_SIGNIFICANCE = 0.01  # p-value below which missing motion is added to the
 
 LEVEL = 0.05 / 4  # p-value of a finding: four tests (shift, runs, direction, dependence) on noise alone find one in 5 %
 STOP_AND_GO_S = 1.0  # [s] between readings, beyond which they are stops, whose speed is not in the table
+LONG_PAUSE_S = 3600.0  # [s] between readings of a run, from which somebody may have switched the robot off
 REVERSAL = 2e-4  # part of its whole range by which a joint that reverses comes back: less is encoder noise or dither
 CLEAR_DELAY = 0.2  # fraction of the squared hysteresis that a delay must explain to be mentioned
 

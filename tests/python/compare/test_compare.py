@@ -153,6 +153,19 @@ def test_few_pairs(stops, rows, far):
     assert text.startswith("Too few joints") and ("(1 pair:" in text) == (rows == 6)
 
 
+@pytest.mark.parametrize("hours", [0.5, 14])
+def test_long_pause(hours):
+    """A night inside a run is named with the row after it; one between runs, or a break, is not."""
+    random = np.random.default_rng(1)
+    joints, run, t = stop_and_go(random, runs=2)
+    first = int(np.argmax(run == 1))
+    for row in (first, first + 5):
+        t[row:] += 3600.0 * hours
+    said = [text for text in limits(compare(*bench(random, (joints, run, t)))) if " pauses for " in text]
+    assert len(said) == (hours > 1)
+    assert not said or said[0].startswith(f"Run 1 pauses for 14.0 h before row {first + 7}. ")
+
+
 def test_one_pose():
     """Readings at one pose are drawn without a warning, and nothing is a hint on their error."""
     random = np.random.default_rng(1)

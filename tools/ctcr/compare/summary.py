@@ -12,6 +12,7 @@ from ctcr import settings
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.noise import DirectionDifference
+from ctcr.compare.sample import Sample
 from ctcr.show.wording import counted, join, listed, mm, most, percent, probability
 
 MOST = 6
@@ -270,6 +271,7 @@ def limits(c: Comparison) -> Iterator[str]:
             f"visits lie {mm(d.rms_mm)} RMS apart ({coverage(d)}), where the tracker's scatter gives "
             f"{mm(d.quiet_rms_mm)}."
         )
+    yield from _long_pause(c.headline)
     if len(c.runs) == 1:
         yield "There is one run: the findings are not tested on another run."
     if c.fixed:
@@ -294,4 +296,18 @@ def limits(c: Comparison) -> Iterator[str]:
         yield (
             f"Too few joints were visited in two runs ({pairs}): an offset that belongs to a run (frame, homing, "
             "drift) cannot be separated from an error that belongs to the joints of that run."
+        )
+
+
+def _long_pause(sample: Sample) -> Iterator[str]:
+    """The longest pause inside a run, where the run may be two."""
+    pause = np.where(np.diff(sample.run) == 0, np.diff(sample.t), 0.0)
+    long = np.flatnonzero(pause > settings.LONG_PAUSE_S)
+    if len(long):
+        after = long[np.argmax(pause[long])]
+        others = f", the longest of {len(long)} such pauses" if len(long) > 1 else ""
+        yield (
+            f"Run {sample.run[after]} pauses for {pause[after] / 3600:.1f} h before row {sample.row[after + 1]}{others}. "
+            f"If the robot was switched off or homed there, this is another run: give it another number in the column "
+            f"run."
         )
