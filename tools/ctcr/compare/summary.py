@@ -307,7 +307,7 @@ def _long_pause(sample: Sample) -> Iterator[str]:
         after = long[np.argmax(pause[long])]
         others = f", the longest of {len(long)} such pauses" if len(long) > 1 else ""
         yield (
-            f"Run {sample.run[after]} pauses for {pause[after] / 3600:.1f} h before row {sample.row[after + 1]}{others}. "
-            f"If the robot was switched off or homed there, this is another run: give it another number in the column "
-            f"run."
+            f"Run {sample.run[after]} pauses for {pause[after] / 3600:.1f} h before row {sample.row[after + 1]}"
+            f"{others}. If the robot was switched off or homed there, this is another run: give it another number in "
+            f"the column run."
         )
