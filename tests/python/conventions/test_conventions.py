@@ -101,6 +101,20 @@ def test_wrong_data_sheet():
     assert found.findings == []
 
 
+def test_out_of_order():
+    """Where a tube is too short in the file for half of the readings, nothing is named that leaves a larger error."""
+    random = np.random.default_rng(0)
+    robot = design(random, 2)
+    inner, outer = robot.actuation.home_translation_mm
+    near = outer - 15.0 - inner  # so near to the outer tube's base that the inner one may not come from further out
+    robot.tubes[0].length_mm -= near
+    robot.actuation.home_translation_mm = [inner + near, outer]
+    readings = session(robot, random)
+    tips = 1e3 * readings.beta + [tube.length_mm for tube in robot.tubes]
+    robot.tubes[0].length_mm -= float(np.quantile(tips[:, 0] - tips[:, 1], 0.45))
+    assert all(before > after for before, after in (one.rms_mm for one in review(robot, readings).findings))
+
+
 @pytest.mark.parametrize(("field", "size"), [("curvature_per_m", 1e-3), ("length_mm", 1e-3)])
 def test_unit_of_file(field, size, files, run):
     """Values of the robot file in another unit are named as that, and what looks wrong in the file is said first."""

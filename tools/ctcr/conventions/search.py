@@ -117,7 +117,9 @@ def _needed(case: Case, tried: Tried) -> Iterator[bool]:
     for one, half in zip(tried.wrong, _halves(case, tried), strict=True):
         rows = _rows_of(one, case.readings)
         jumps = not (one.offset or one.registers) or _is_jump(case, one, tried, half)
-        yield jumps and tried.case.fit.at(rows).beats(half.at(rows))
+        fit = tried.case.fit
+        # Readings that have a solution only with it make no finding of one that shows a larger error.
+        yield jumps and fit.at(rows).beats(half.at(rows)) and fit.rms_mm < half.rms_mm
 
 
 def _rows_of(hypothesis: Hypothesis, readings: Measurements) -> Mask:
