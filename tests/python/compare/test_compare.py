@@ -334,10 +334,10 @@ def test_rows_left_out():
     assert result.as_dict()["rows"] == {"compared": 177, "not_measured": [5, 22], "not_solved": [7]}
     said = terminal.left_out(result, 10)
     assert said == ["2 rows not measured: 5, 22", f"1 row not solved ({status_text(NOT_CONVERGED)}): 7"]
-    first = f"The model has no solution for 1 of 178 readings ({status_text(NOT_CONVERGED)}: 1). "
-    assert headline(result).startswith(f"{first}The model is wrong")
-    prediction.status[5] = OUT_OF_ORDER
-    assert headline(compare(robot, readings, prediction)).startswith(f"{first.replace('not converged', 'joints out of order')}Where")
+    for status, then in ((NOT_CONVERGED, "The model is wrong"), (OUT_OF_ORDER, "Where joints are out of order")):
+        prediction.status[5] = status
+        first = f"The model has no solution for 1 of 178 readings ({status_text(status)}: 1). {then}"
+        assert headline(compare(robot, readings, prediction)).startswith(first)
     readings.position[:] = np.nan
     with pytest.raises(InputError, match="no row can be compared"):
         compare(robot, readings, prediction)
