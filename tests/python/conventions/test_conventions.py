@@ -129,6 +129,19 @@ def test_unit_of_file(field, size, files, run):
     assert error.index("is this ") < error.index("Wrong conventions")
 
 
+@pytest.mark.parametrize("wrong", [(0,), (0, 1)])
+def test_radius(wrong):
+    """Curvatures typed as radii in mm are named as that, and no other unit is."""
+    robot, readings = bench(37)
+    right = [tube.curvature_per_m for tube in robot.tubes]
+    given = robot.model_copy(deep=True)
+    for i in wrong:
+        given.tubes[i].curvature_per_m = 1e3 / right[i]
+    [one] = (found := review(given, readings)).findings
+    assert one.kind == "file_unit" and "mm, not 1/m" in one.text
+    np.testing.assert_allclose([tube.curvature_per_m for tube in found.robot.tubes], right)
+
+
 def test_frame():
     """An inverse frame and a frame that is somewhere else are told apart, both with the right six numbers."""
     robot, readings = bench(7)

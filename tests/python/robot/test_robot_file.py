@@ -182,6 +182,7 @@ def test_tubes_in_reverse_order():
         ("density_kg_m3", "6.45", "is this g/cm^3?"),
         ("curvature_per_m", "0.01", "is this 1/mm?"),
         ("curvature_per_m", "150", "strains it by"),
+        ("curvature_per_m", "130", "is this the radius in mm?"),
         ("jitter_mm", "9", "accuracy"),
         ("curved_length_mm", "0", "counts as straight"),
         ("home_translation_mm", "[420, -330.5, -199]", "in front of the plate"),

@@ -80,7 +80,7 @@ class Hypothesis:
 
 def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
     """All that the table and the robot have room for."""
-    parts = (_signs, _zeros, _offsets, _units, _file_units, _orders, _forces, _positions, _frames, _sensor)
+    parts = (_signs, _zeros, _offsets, _units, _file_units, _radii, _orders, _forces, _positions, _frames, _sensor)
     return [one for part in parts for one in part(robot, readings)]
 
 
@@ -198,6 +198,22 @@ def _file_units(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     if fields:
         text = f"values of the robot file are in {join([*dict.fromkeys(units)])}, not in the unit of their field"
         yield Hypothesis("file_unit", text, (), f"write {listed(fields, 12)}", file=mended)
+
+
+def _radii(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """Radii of curvature in mm in the place of curvatures: of tubes one sees bent, the radius is the larger number."""
+    given = [tube.curvature_per_m for tube in robot.tubes]
+    large = tuple(i for i, k in enumerate(given) if k * k > 1e3)
+    for tubes in dict.fromkeys([*((i,) for i in large), large]):
+        if not tubes:
+            continue
+        file = robot.model_copy(update={"tubes": [tube.model_copy() for tube in robot.tubes]})
+        for i in tubes:
+            file.tubes[i].curvature_per_m = 1e3 / given[i]
+        numbers, verb = join([str(i + 1) for i in tubes]), "s are radii" if len(tubes) > 1 else " is a radius"
+        text = f"the curvature{verb} in mm, not 1/m, of tube{'s' * (len(tubes) > 1)} {numbers}"
+        fix = "write " + ", ".join(f"tubes[{i}].curvature_per_m: {1e3 / given[i]:g}" for i in tubes)
+        yield Hypothesis("file_unit", text, (), fix, file=file)
 
 
 def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

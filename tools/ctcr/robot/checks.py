@@ -50,6 +50,9 @@ def doubts(robot: Robot) -> Iterator[Fault]:
         if (strain := tube.straightened_strain) > _MAX_STRAIN:
             text = f"straightening this tube strains it by {100 * strain:.1f} %: it yields"
             yield ("tubes", i, "curvature_per_m"), text
+        if (bend := tube.curved_length * abs(tube.curvature)) > 2 * np.pi:
+            text = f"bends this tube by {np.degrees(bend):.0f} degrees, more than a circle: is this the radius in mm?"
+            yield ("tubes", i, "curvature_per_m"), text
         if (tube.curved_length == 0) != (tube.curvature == 0):
             text = "only one of curvature and curved length is zero: this tube counts as straight"
             yield ("tubes", i, "curved_length_mm"), text
