@@ -201,6 +201,7 @@ OUTLIERS_LEFT = 0.5  # outliers with effects over those without, above which the
 HARDLY_EXPLAINED = 0.4  # fraction of the unexplained chi-square below which the first effect does not explain outliers
 MOST_ISOLATED = 0.03  # fraction of readings that may be isolated outliers: of more, the model is to blame
 SNAP_ERROR = 0.1  # fraction of an isolated outlier's error that another equilibrium leaves, where it is a snap
+SNAPS_LOOKED_AT = 300  # readings of a table, those of the largest errors, for which other equilibria are sought
 CLUSTER_COSINE, CLUSTER_CHANCE = 0.5, 0.25  # between errors of neighbours that agree; how often it is that by chance
 CLUSTER_SIGNIFICANCE = 1e-3  # p-value below which outliers that agree with their neighbours are no chance
 CLUSTER_ROWS = 4  # outliers of a cluster that only agree in direction, at least

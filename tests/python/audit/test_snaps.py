@@ -1,6 +1,7 @@
 """A reading in another equilibrium than the one that the model predicts is called a snap, any other an outlier."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,8 +9,11 @@ import numpy as np
 import pytest
 from ctcr import Model
 from ctcr.audit import snaps
+from ctcr.compare import analysis
+from ctcr.compare.summary import findings
 from ctcr.diagnose.outliers import messages
 from ctcr.frames import base_to_tracker
+from ctcr.model.table_poses import predict
 from ctcr.robot import robot_file
 from ctcr.table.measurements import Measurements
 
@@ -67,6 +71,21 @@ def test_snap_or_outlier(robot):
     table = readings(robot, ALIGNED, in_tracker(robot, first.position[-1]))
     assert len(snaps.other_tips(robot, table, 0)) == 0
     assert "no other stable equilibrium there" in said(robot, table, Model(robot).shape(BETA, ALIGNED))
+
+
+def test_comparison(robot):
+    """Of a robot that rests elsewhere in one reading, and is noisy in all, that reading is said to be a snap."""
+    random = np.random.default_rng(3)
+    first, other, *_ = Model(robot).all_shapes(BETA, OPPOSED)
+    tips = np.array([in_tracker(robot, shape.position[-1]) for shape in [first] * 9 + [other]])
+    table = readings(robot, OPPOSED, tips[0]).rows(np.zeros(10, int))
+    table = replace(table, t=np.arange(10.0), position=tips + 1e-3 * random.normal(size=tips.shape), quaternion=None)
+    prediction = predict(robot, table)
+    assert snaps.snapped(robot, table, prediction).tolist() == [9]
+    compared = analysis.compare(robot, table, prediction, snapped=[11])
+    assert any("1 reading (11) lies at another stable equilibrium" in one.text for one in findings(compared))
+    spike = replace(table, position=np.where(np.arange(10)[:, None] == 9, tips[0] + 0.05, table.position))
+    assert len(snaps.snapped(robot, spike, prediction)) == 0
 
 
 def said(robot, table, predicted):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ctcr.api.reviewed import reviewed, without_false_poses
-from ctcr.audit import copies, missing_motion, sensor_pose
+from ctcr.audit import copies, missing_motion, sensor_pose, snaps
 from ctcr.compare import analysis
 from ctcr.compare.analysis import Comparison
 from ctcr.conventions import Review
@@ -42,8 +42,9 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
     notices = [*map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
+    snapped = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
     try:
-        return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files)
+        return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files, snapped)
     except InputError as error:  # nothing is left to compare: the robot file may say why
         raise InputError([*error.problems, *robot_file.warnings(robot)]) from None
 

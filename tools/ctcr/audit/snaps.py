@@ -2,12 +2,29 @@
 
 import numpy as np
 
-from ctcr.arrays import Array
+from ctcr import settings
+from ctcr.arrays import Array, Integers
 from ctcr.frames import base_to_tracker
 from ctcr.model.effect_model import without_the_path
-from ctcr.model.model import Model
+from ctcr.model.model import Model, Prediction
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
+
+
+def snapped(robot: Robot, measurements: Measurements, prediction: Prediction) -> Integers:
+    """Indices of the readings that err far more than usual, and lie where the robot may rest instead; of the
+    SNAPS_LOOKED_AT that err most."""
+    tips, _ = base_to_tracker(robot.tracker, prediction.position, prediction.quaternion)
+    error = np.linalg.norm(measurements.positions - tips, axis=1)
+    known = np.flatnonzero(np.isfinite(error))
+    far = known[error[known] > settings.SURPRISE * np.median(error[known])] if len(known) else known
+    far = far[np.argsort(-error[far])][: settings.SNAPS_LOOKED_AT]
+
+    def is_there(k: int) -> bool:
+        others = np.linalg.norm(other_tips(robot, measurements, k) - measurements.position[k], axis=1)
+        return bool(np.any(others < settings.SNAP_ERROR * error[k]))
+
+    return np.sort([k for k in far.tolist() if is_there(k)]).astype(int)
 
 
 def other_tips(robot: Robot, measurements: Measurements, index: int) -> Array:

@@ -88,6 +88,7 @@ class Comparison(Result):
     floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
     files: Sequence[str] = ()  # that were compared
+    snapped: Sequence[int] = ()  # rows on another stable equilibrium than the one predicted
 
     WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
 
@@ -117,6 +118,7 @@ class Comparison(Result):
         data["notices"] = list(self.notices)
         data["conventions"] = [one.as_dict() for one in self.conventions]
         data["sessions"] = list(self.sessions)
+        data["snapped"] = list(self.snapped)
         data |= self.floors
         return data
 
@@ -156,10 +158,11 @@ def compare(
     sessions: Sequence[str] = (),
     floors: Mapping[str, float] | None = None,
     files: Sequence[str] = (),
+    snapped: Sequence[int] = (),
 ) -> Comparison:
     """Compare measured with predicted tip poses; `notices` tell what was done before, `conventions` what
     `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
-    `ctcr.fit.floors` as_dict(), `files` what is compared.
+    `ctcr.fit.floors` as_dict(), `files` what is compared, `snapped` the rows that `ctcr.audit.snaps` found.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -227,6 +230,7 @@ def compare(
         floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
         sessions=sessions,
         files=files,
+        snapped=snapped,
     )
 
 

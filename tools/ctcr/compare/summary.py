@@ -101,6 +101,8 @@ def _all(c: Comparison) -> Iterator[Finding]:
     if c.sessions:
         text = " ".join([*c.sessions, *_same_joints_text(c)])
         yield Finding(f"{text} All that follows is computed with a frame for each run.", 1.0)
+    if c.snapped:
+        yield _snaps(c)
     shifted = c.shift if c.shift and c.shift.p_value <= settings.LEVEL else None
     if c.turn and c.turn.gross:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
@@ -125,6 +127,18 @@ def _all(c: Comparison) -> Iterator[Finding]:
     before = 1.0 - (shifted.share if shifted else 0.0)
     for item in c.ranking.chosen:
         yield Finding(_dependence_text(item, c), item.share * before)
+
+
+def _snaps(c: Comparison) -> Finding:
+    """Readings of a robot that rests elsewhere than predicted: no friction, though it depends on the way there too."""
+    square = np.sum(c.headline.error**2, axis=1)
+    share = float(np.sum(square[np.isin(c.headline.row, c.snapped)]) / np.sum(square))
+    subject, verb = counted(len(c.snapped), "reading"), "lies" if len(c.snapped) == 1 else "lie"
+    return Finding(
+        f"{subject} ({listed(c.snapped)}) {verb} at another stable equilibrium of the robot than the one predicted: "
+        f"it snapped. This makes {percent(share)} of the squared error, and hysteresis where the way there decides.",
+        share,
+    )
 
 
 def _same_joints_text(c: Comparison) -> list[str]:
@@ -192,7 +206,7 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
             f"{percent(share)} of this squared difference; without it {mm(d.rms_without_delay_mm)} RMS remain, a floor "
             f"of {mm(d.rms_without_delay_mm / 2)}."
         )
-    return text + " Possible causes: friction, play or delay."
+    return text + f" Possible causes: {'snapping, ' if c.snapped else ''}friction, play or delay."
 
 
 def coverage(d: DirectionDifference) -> str:
