@@ -10,6 +10,7 @@ import argparse
 import os
 import sys
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -104,15 +105,15 @@ def judge(seed: int) -> Answer:
 
 def study(seeds: Iterable[int], tell=print) -> Iterator[Answer]:
     """The answers on the sessions of some seeds; tells of those that are not right."""
-    for seed in seeds:
-        answer = judge(seed)
-        if not answer.right:
-            tell(
-                f"{seed}: {answer.about}; error of the corrected table x {answer.mended:.2f}",
-                *answer.said,
-                sep="\n    ",
-            )
-        yield answer
+    with ProcessPoolExecutor() as pool:
+        for answer in pool.map(judge, seeds):
+            if not answer.right:
+                tell(
+                    f"{answer.seed}: {answer.about}; error of the corrected table x {answer.mended:.2f}",
+                    *answer.said,
+                    sep="\n    ",
+                )
+            yield answer
 
 
 def summary(answers: list[Answer]) -> str:

@@ -33,6 +33,7 @@ UNSEEN = """Other seeds than those by which thresholds were set, scored once
 VISIBLE = 30.0  # chi-square after calibration from which a cause can be seen at all (see oracle/detectable.py)
 
 # Causes outside the catalogue that depend on one quantity: how the ids of such quantities begin.
+CONVENTIONS = {"grip_slip": "run_offset"}  # causes outside the catalogue that a convention describes, by its kind
 DEPENDS = {"rotation_with_translation": "length", "tooth_error": "alpha", "temperature": "time", "grip_slip": "time"}
 
 
@@ -98,8 +99,9 @@ def judged(said: dict | None, truth: dict, group: str) -> list[tuple[str, bool]]
         scores["controls: nothing named"] = word == "nothing_missing"
     elif truth["verdict"] == "not_in_catalogue":
         scores["outside the catalogue: never identified"] = word != "identified"
-        scores["outside the catalogue: flagged"] = word in ("not_in_catalogue", "stand_in")
         [cause] = truth["causes"]
+        described = [one["kind"] for one in (said or {}).get("conventions", [])] == [CONVENTIONS.get(cause["name"])]
+        scores["outside the catalogue: flagged"] = word in ("not_in_catalogue", "stand_in") or described
         if cause["name"] in DEPENDS:
             named = said["leftover"]["depends_on"] if said else []
             dependence = any(name.startswith(DEPENDS[cause["name"]]) for name in named)
