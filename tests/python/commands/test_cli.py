@@ -200,7 +200,7 @@ def test_faulty_robot(run, tmp_path):
     "arguments, message",
     [
         (["info", "absent.yaml"], "absent.yaml: cannot read it: no such file or directory"),
-        (["predict", ROBOT, ROBOT, "-o", "x.csv"], "alpha1_rad"),
+        (["predict", ROBOT, ROBOT, "-o", "x.csv"], "is a robot file, not a table"),
         (["shape", ROBOT, "--beta-mm", "-300,-200,-100", "--alpha-deg", "178,0,0"], "at these joints: not converged"),
     ],
 )
