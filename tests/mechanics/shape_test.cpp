@@ -260,7 +260,7 @@ TEST(Shape, RefusesPlacesThatAreNone) {
     for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
       std::vector<double> s = good;
       s[k] = bad;
-      expect_refused(s, k == 0 && bad > 0 || k == 2 && bad < 0 ? Status::invalid_settings : Status::not_finite);
+      expect_refused(s, Status::not_finite);
     }
   expect_refused({0, 0.02, 0.01}, Status::invalid_settings);
   std::vector<ShapePoint<3>> few(2);
