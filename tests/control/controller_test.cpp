@@ -148,11 +148,12 @@ TEST(Controller, GoalsThatAreNoNumbersAreRefused) {
   EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Posture<3>>().preferred.beta[2] = nan; }),
             Status::not_finite);
   EXPECT_EQ(status([&](auto& c, auto&) { c.reading_age = nan; }), Status::not_finite);
-  for (const double bad : {nan, -1.0}) {
-    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Tracking>().weight.translation = bad; }),
-              Status::invalid_settings);
-    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Damping>().weight.rotation = bad; }),
-              Status::invalid_settings);
+  for (const auto& [bad, expected] : {std::pair{nan, Status::not_finite}, {-1.0, Status::invalid_settings}}) {
+    const double weight = bad;
+    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Tracking>().weight.translation = weight; }), expected);
+    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Damping>().weight.rotation = weight; }), expected);
+    EXPECT_EQ(status([&](auto& c, auto&) { c.tasks.template get<Posture<3>>().weight.translation = weight; }),
+              expected);
   }
   ControlReport<PaperTasks> report;
   report.shortfall = {0.5, nan, 1, 2};

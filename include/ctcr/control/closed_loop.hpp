@@ -17,8 +17,8 @@ struct LoopRow {
 /// Runs from time 0 to the path's end.
 /// @param path    has at(time) -> Reference and duration(), and may have check()
 /// @param record  record(row) after each period; return false to stop
-/// @return ok; invalid_settings: the period is not > 0, or the path without end or none; or the first status of the device that is
-///         not ok. Real time: as path, device and record.
+/// @return ok; invalid_settings: the period is not > 0, or the path is none or has no end; or the first status of the device
+///         that is not ok. Real time: as path, device and record.
 template <int N, class Tasks, class Fx, Device<N> D, class Path, class Record>
 Status run(Controller<N, Tasks, Fx>& controller, D& device, const Path& path, double period, const TipLoad& load,
            const Record& record) noexcept {

@@ -82,7 +82,7 @@ public:
   /// @return status ok; that of the model: singular: it is about to snap, and its Jacobian leads nowhere; singular: the
   ///         goals leave a direction free; not_finite: a motor angle, reading, reference or goal is NaN or too large, or the
   ///         reading is farther from the front plate than twice the length of the robot; invalid_settings: those given to
-  ///         the constructor, or a negative weight. What is refused leaves no trace in later periods.
+  ///         the constructor, or a negative weight. What is refused stays out of the memory of effects, force and warm start.
   ControlReport<Tasks> advance(const Measurement<N>& measured, const Reference& reference, const TipLoad& load,
                                MotorAngles<N>& velocity) noexcept {
     ControlReport<Tasks> report;
@@ -103,9 +103,11 @@ public:
     report.status = now_.solution.status;
     report.stability = now_.solution.stability;
     if (!has_equilibrium(report.status)) {
-      // Where the joints are possible it may be the estimated force that is not.
-      if (tip_force == TipForce::estimated && check_joints(system_.model.robot(), q) == Status::ok) estimate.doubt();
-      now_.ws.reset();
+      // Joints that are refused tell nothing of the robot. With others it may be the estimated force that is impossible.
+      if (check_joints(system_.model.robot(), q) == Status::ok) {
+        if (tip_force == TipForce::estimated) estimate.doubt();
+        now_.ws.reset();
+      }
       count_ = 0;
       return report;
     }
@@ -119,9 +121,12 @@ public:
       estimate.update(now_.solution.compliance.template topLeftCorner<3, 3>(), tip.position - now_.solution.position);
     tip.position += moved;
     ControlState<N, Fx> state{now_.model, system_.settings, acting, q, tip, reference, now_.ws, now_.solution};
-    JointVelocity<N> v = JointVelocity<N>::Zero();
+    JointVelocity<N> v;
     Status found = report.status;
-    if (found == Status::ok) found = minimum(state, motors, v, report.limits);
+    if (found == Status::ok)
+      found = minimum(state, motors, v, report.limits);
+    else
+      v.setZero();
     if constexpr (Fx::template On<N>::depends_on_torsion) {
       if (found == Status::ok && now_.model.effects().act_by_torsion()) {
         state.reference.velocity.template head<3>() += missing(motors, v, acting);
@@ -133,7 +138,7 @@ public:
     if (found != Status::ok) return report;
     velocity = {v.template head<N>() / system_.transmission.translation_ratio,
                 v.template tail<N>() / system_.transmission.rotation_ratio};
-    if (!all_finite(velocity.translation, velocity.rotation)) {
+    if (!(std::abs(velocity.translation.sum() + velocity.rotation.sum()) < HUGE_VAL)) [[unlikely]] {
       velocity = {};
       report.status = Status::not_finite;
     }

@@ -1,5 +1,7 @@
 #pragma once
 // Generalised damped least squares: competing goals as one sum of weighted squares, quadratic in q'.
+#include <algorithm>
+
 #include "ctcr/core/status.hpp"
 #include "ctcr/core/types.hpp"
 #include "ctcr/math/small_solve.hpp"
@@ -29,7 +31,7 @@ public:
 
   /// Adds a goal of the tip: v [m/s], [rad/s], base frame.
   void add_tip_goal(const Jacobian& J, const Vec6& v, Weight w) noexcept {
-    has_minimum_ = has_minimum_ && w.translation >= 0 && w.rotation >= 0;
+    least_weight_ = std::min({least_weight_, w.translation, w.rotation});
     Vec6 diagonal;
     diagonal << Vec3::Constant(w.translation), Vec3::Constant(w.rotation);
     const Eigen::Matrix<double, 2 * N, 6> JtW = J.transpose() * diagonal.asDiagonal();
@@ -39,7 +41,7 @@ public:
 
   /// Adds a goal of the joints.
   void add_joint_goal(const JointVelocity<N>& v, Weight w) noexcept {
-    has_minimum_ = has_minimum_ && w.translation >= 0 && w.rotation >= 0;
+    least_weight_ = std::min({least_weight_, w.translation, w.rotation});
     JointVelocity<N> diagonal;
     diagonal << VecN<N>::Constant(w.translation), VecN<N>::Constant(w.rotation);
     A_.diagonal() += diagonal;
@@ -48,7 +50,7 @@ public:
 
   /// Adds a goal of one number: direction . q' = v.
   void add_scalar_goal(const JointVelocity<N>& direction, double v, double w) noexcept {
-    has_minimum_ = has_minimum_ && w >= 0;
+    least_weight_ = std::min(least_weight_, w);
     A_.noalias() += w * direction * direction.transpose();
     b_ += w * v * direction;
   }
@@ -58,12 +60,12 @@ public:
 
   /// The minimum: dF/dq' = 0.
   /// @return ok; singular: goals leave a direction free (add damping); not_finite: a goal or a weight is not finite or too
-  ///         large; invalid_settings: a weight is negative or NaN, so there is no minimum. Unless ok, q' = 0.
+  ///         large; invalid_settings: a weight is negative, so there may be no minimum. Unless ok, q' = 0.
   Status minimum(JointVelocity<N>& velocity) const noexcept {
     velocity = b_;
-    if (has_minimum_ && solve_in_place(A_, velocity) > 1e-14 && velocity.allFinite()) return Status::ok;
+    if (least_weight_ >= 0 && solve_in_place(A_, velocity) > 1e-14 && velocity.allFinite()) return Status::ok;
     velocity.setZero();
-    if (!has_minimum_) return Status::invalid_settings;
+    if (least_weight_ < 0) return Status::invalid_settings;
     return all_finite(A_, b_) ? Status::singular : Status::not_finite;
   }
 
@@ -71,7 +73,7 @@ private:
   using Matrix = Eigen::Matrix<double, 2 * N, 2 * N>;
   Matrix A_ = Matrix::Zero();
   JointVelocity<N> b_ = JointVelocity<N>::Zero();
-  bool has_minimum_ = true;  ///< no weight is negative
+  double least_weight_ = 0;
 };
 
 }  // namespace ctcr

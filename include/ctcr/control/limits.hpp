@@ -40,7 +40,8 @@ struct LimitReport {
   [[nodiscard]] bool any() const noexcept { return base_gaps || tip_gaps || travel || speed; }
 };
 
-/// The positions that limits (check_limits() says ok) allow, as intervals of beta_i and of beta_i - beta_i+1 (for the last tube, beta itself).
+/// The positions that limits allow, as intervals of beta_i and of beta_i - beta_i+1 (for the last tube, beta itself).
+/// check_limits() says ok.
 template <int N>
 class AllowedPositions {
 public:
@@ -143,13 +144,10 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
     status = goals.minimum(velocity);
   }
   if (status != Status::ok) return status;
-  // A limit of 0 leaves no speed.
-  const auto times = [](const auto& v, double limit) {
-    const double speed = v.cwiseAbs().maxCoeff();
-    return speed > limit ? speed / limit : 1.0;
-  };
-  const double excess = std::max(times(velocity.template head<N>(), limits.translation_speed),
-                                 times(velocity.template tail<N>(), limits.rotation_speed));
+  // Where a limit is 0, no speed is left; 0 / 0 is none that is too high.
+  const double excess =
+      std::max(std::max(1.0, velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed),
+               velocity.template tail<N>().cwiseAbs().maxCoeff() / limits.rotation_speed);
   if (excess > 1) {
     velocity /= excess;
     report.speed = true;
@@ -157,7 +155,7 @@ Status limited_minimum(LeastSquares<N> goals, const AllowedPositions<N>& allowed
   const VecN<N> planned = beta + period * velocity.template head<N>();
   velocity.template head<N>() = (allowed.clamped(planned, &report) - beta) / period;
   // From outside the allowed positions the way back takes several periods.
-  const double hurry = times(velocity.template head<N>(), limits.translation_speed);
+  const double hurry = velocity.template head<N>().cwiseAbs().maxCoeff() / limits.translation_speed;
   if (hurry > 1 + 1e-9) {
     velocity.template head<N>() /= hurry;
     report.speed = true;

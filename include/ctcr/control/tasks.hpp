@@ -4,7 +4,6 @@
 // A task has a name, add(state, goals), which adds its goal to the least-squares problem, and shortfall(state, q'), which
 // says how far a step falls short of what the task wants: above 1 it gave way. All calls are real time.
 #include <array>
-#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -27,10 +26,9 @@ struct Tracking {
     feedback << s.reference.pose.position - s.tip.position,
         rotation_vector(s.reference.pose.rotation * s.tip.rotation.transpose());
     feedback *= gain;
-    double speed = feedback.head<3>().norm();
-    if (!(speed < HUGE_VAL)) [[unlikely]]
-      speed = feedback.head<3>().stableNorm();  // where squares are too large for a number
-    return s.reference.velocity + (speed <= correction ? 1.0 : correction / speed) * feedback;
+    const double speed = feedback.head<3>().norm();
+    // From where squares are too large for a number, the error has no direction: NaN, instead of none.
+    return s.reference.velocity + (speed <= correction ? 1.0 : correction / speed + 0 * speed) * feedback;
   }
 
   template <int N, class Fx>

@@ -263,10 +263,8 @@ Status shape(const Model<N, Fx>& model, const Joints<N>& q, const TipLoad& load,
   for (std::size_t k = 0; k < points.size(); ++k) {
     points[k] = ShapePoint<N>{};
     points[k].s = s[k];
-    if (!std::isfinite(s[k]))
-      given = Status::not_finite;
-    else if (k > 0 && s[k] < s[k - 1] && given == Status::ok)
-      given = Status::invalid_settings;
+    if (k > 0 && s[k] < s[k - 1] && given == Status::ok) given = Status::invalid_settings;
+    if (!std::isfinite(s[k])) given = Status::not_finite;
   }
   if (given != Status::ok) {
     out.iterations = 0;
