@@ -246,6 +246,8 @@ struct TaskList {
 
   template <int N, class Fx>
   [[nodiscard]] Shortfalls shortfalls(const ControlState<N, Fx>& s, const JointVelocity<N>& v) const noexcept {
+    static_assert((ActsAsTask<Task, N, Fx> && ...),
+                  "a task needs a name, add(state, goals) and shortfall(state, velocity)");
     return std::apply([&](const Task&... task) { return Shortfalls{task.shortfall(s, v)...}; }, tasks);
   }
 };
