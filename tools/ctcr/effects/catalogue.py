@@ -93,7 +93,7 @@ def full_names(effect: str, parameter: str, per_tube: bool, n_tubes: int) -> tup
 
 
 @cache
-def catalogue(n_tubes: int) -> dict[str, Effect]:
+def catalogue(n_tubes: int = _core.TUBES[0]) -> dict[str, Effect]:
     """All effects of the library by id, in the order in which they act."""
     parameters: dict[str, list[EffectParameter]] = {}
     for p in _core.effect_parameters(n_tubes):
@@ -141,7 +141,7 @@ def parameter_of(n_tubes: int) -> dict[str, EffectParameter]:
     return {name: p for effect in all_effects(n_tubes).values() for p in effect.parameters for name in p.full_names}
 
 
-def get(name: str, n_tubes: int = 1) -> Effect:
+def get(name: str, n_tubes: int = _core.TUBES[0]) -> Effect:
     """An effect by its id; raises InputError that suggests the nearest."""
     effects = all_effects(n_tubes)
     if name not in effects:

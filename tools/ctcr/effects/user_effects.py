@@ -273,7 +273,7 @@ def _faults(found: type[Effect], file: str) -> list[Problem]:
 
     if not isinstance(found.id, str) or not _NAME.fullmatch(found.id):
         say("needs an id of small letters, digits and _, such as rotation_pickup", "id")
-    elif found.id in catalogue.catalogue(1):
+    elif found.id in catalogue.catalogue():
         say("the library has an effect of this id: choose another one", "id")
     for name in TEXTS:
         given = getattr(found, name)
