@@ -50,8 +50,10 @@ def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
     runs, index = np.unique(readings.run, return_inverse=True)
     error = np.array([fit.log_error[index == k].mean() for k in range(len(runs))])
     yield runs[[np.argmax(error)]]
-    values = own_values(fit, readings, ("tubes.*.curvature", "actuation.home_*"))
-    for size in (error, values):
+    sizes = [error]
+    if fit.solved.any():
+        sizes.append(own_values(fit, readings, ("tubes.*.curvature", "actuation.home_*")))
+    for size in sizes:
         order = np.argsort(size)
         above = order[1 + np.argmax(np.diff(size[order])) :]
         few = above if 2 * len(above) <= len(runs) else np.setdiff1d(order, above)
@@ -64,7 +66,8 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     clear, theirs = settings.CONVENTION_CLEAR, np.isin(readings.run, some)
     like, mine = calibrated(fit.robot, readings.rows(~theirs)), readings.rows(theirs)
     others = [readings.rows(readings.run == run) for run in np.setdiff1d(readings.run, some)]
-    usual = np.quantile([_typical(tips.errors(like.robot, rows), like) for rows in others], settings.CONVENTION_RUNS)
+    of_others = [_typical(tips.errors(like.robot, rows), like) for rows in others]
+    usual = np.quantile(of_others, settings.CONVENTION_RUNS, method="higher")  # infinite where nothing is solved
     before = replace(like, error=tips.errors(like.robot, mine))
     if not np.isfinite(usual) or clear * before.typical < usual:
         return None
@@ -79,8 +82,8 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
         return None
     if best.scanned:
         name, tube, value = best.scanned
-        of_others = [_scan(like, rows, name, tube) for rows in others]
-        if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(of_others)):
+        scanned = [_scan(like, rows, name, tube) for rows in others]
+        if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(scanned)):
             return None  # the others would take offsets too: something else acts
         if abs(value) < settings.MOVED_FAR * _stated(like.robot, name, tube):
             return None  # no other home or tube
