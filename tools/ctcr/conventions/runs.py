@@ -100,7 +100,7 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
 
     runs = tuple(map(int, some))
     errors = before.rms_mm, replace(like, error=best.error).rms_mm
-    fix = f"{best.fix}, or leave {_named(some)} out"
+    fix = f"{best.fix}; or leave {_named(some)} out"
     return Finding(best.kind, best.text, best.columns, fix, runs=runs, rms_mm=errors), change
 
 
@@ -114,7 +114,7 @@ def _differences(like: Calibrated, mine: Measurements) -> Iterator[Difference]:
     for one in (*hypotheses(like.robot, mine), *_exchanged()):
         if one.of_robot or one.offset:
             continue
-        fix = f"{one.fix or f'negate {one.columns[0]}'}, in the log of {runs} alone"
+        fix = f"in the log of {runs} alone: {one.fix or f'negate {one.columns[0]}'}"
         error = tips.errors(like.robot, one.change(mine))
         yield Difference(one.kind, one.columns, f"{one.text}, in {runs} alone", fix, like.robot, one.change, error)
     for name in settings.CONVENTION_SCAN:
