@@ -85,8 +85,9 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
         scanned = [_scan(like, rows, name, tube) for rows in others]
         if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(scanned)):
             return None  # the others would take offsets too: something else acts
-        if abs(value) < settings.MOVED_FAR * _stated(like.robot, name, tube):
-            return None  # no other home or tube
+        stated = 0.01 * like.robot.uncertainty.of("curvature_percent", tube)
+        if name == "curvature" and abs(value) < settings.MOVED_FAR * stated:
+            return None  # a tube like the one in the file
     turned, mended = orientation.error_deg(like.robot, mine), orientation.error_deg(best.robot, best.change(mine))
     if mended > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
@@ -164,16 +165,6 @@ def _off(robot: Robot, readings: Measurements, name: str, tube: int, value: floa
     tubes = [t.model_copy(update={"curvature_per_m": np.exp(value) * t.curvature_per_m}) for t in robot.tubes]
     tubes = [new if off else old for new, old, off in zip(tubes, robot.tubes, here, strict=True)]
     return robot.model_copy(update={"tubes": tubes}), readings
-
-
-def _stated(robot: Robot, name: str, tube: int) -> float:
-    """Standard deviation of a home [rad], [m] or of the logarithm of a curvature in the robot file."""
-    key, unit = {
-        "alpha": ("rotation_offset_deg", np.pi / 180),
-        "beta": ("translation_offset_mm", 1e-3),
-        "curvature": ("curvature_percent", 0.01),
-    }[name]
-    return unit * robot.uncertainty.of(key, tube)
 
 
 def _typical(error: Array, like: Calibrated) -> float:
