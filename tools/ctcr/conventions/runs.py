@@ -75,9 +75,11 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     best, after = tried[0], _typical(tried[0].error, like)
     alike = (one for one in tried[1:] if _typical(one.error, like) < settings.CONVENTION_ALIKE * after)
     moved = dearer(FRAME - 1, len(mine)) * _typical(_moved(like.robot, mine), like)  # the whole frame, not a joint
-    left = replace(like, error=best.error).left_of(before)
-    if clear * after > usual or moved < after or np.max(left) > settings.CONVENTION_CONSTANT:
+    then = replace(like, error=best.error)
+    if clear * after > usual or moved < after or np.max(then.left_of(before)) > settings.CONVENTION_CONSTANT:
         return None
+    if not then.beats(before):
+        return None  # a few readings agree by chance
     if any((one.kind, one.columns) != (best.kind, best.columns) for one in alike):
         return None
     if best.scanned:
@@ -100,7 +102,7 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
         return replace(m, **{name: np.where(rows[:, None], new, old) for name, (new, old) in parts.items()})
 
     runs = tuple(map(int, some))
-    errors = before.rms_mm, replace(like, error=best.error).rms_mm
+    errors = before.rms_mm, then.rms_mm
     fix = f"{best.fix}; or leave {_named(some)} out"
     return Finding(best.kind, best.text, best.columns, fix, runs=runs, rms_mm=errors), change
 
