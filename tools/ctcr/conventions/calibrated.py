@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
@@ -97,8 +97,7 @@ def calibrated(
     damping, found = settings.CONVENTION_DAMPING, None
     for iteration in range(settings.CONVENTION_ITERATIONS):
         if found is None:
-            residual, jacobian, _ = table.residual(values, True)
-            residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, len(names))[:, :3]
+            residual, jacobian = _positions(table, values)
             error = np.linalg.norm(residual, axis=1)
             solved = np.isfinite(error)
             if not names or solved.mean() <= settings.CONVENTION_SOLVED:  # all is known exactly, or nothing fits
@@ -128,33 +127,39 @@ def calibrated(
     return Calibrated(parameters.applied(robot, names, values), error, floor)
 
 
-def own_values(fit: Calibrated, readings: Measurements, patterns: Sequence[str]) -> Array:
-    """Values (R,) in prior standard deviations that one parameter would have to take in each run beside the others: of
-    those with such names the one that explains the readings best, linearised."""
+def own_values(fit: Calibrated, readings: Measurements, which: Sequence[str]) -> Array:
+    """Values (R,) that one parameter would have to take in each run, while all runs share the others; linearised.
+
+    Of the parameters `which`, named as in `parameters.expand`, the one that explains the readings best; in units of its
+    widened prior standard deviation times CONVENTION_JUMP.
+    """
     names, mean, sd, _, _ = _priors(fit.robot, ())
-    residual, jacobian, _ = recording.recording_of(fit.robot, readings, names).residual(mean, True)
-    residual, jacobian = residual.reshape(-1, 6)[:, :3], jacobian.reshape(len(readings), 6, len(names))[:, :3] * sd
+    residual, jacobian = _positions(recording.recording_of(fit.robot, readings, names), mean)
     solved = np.isfinite(residual).all(axis=1)
-    residual, jacobian = residual[solved], jacobian[solved]
+    residual, jacobian = residual[solved], jacobian[solved] * sd
     runs, index = np.unique(readings.run, return_inverse=True)
     of_run = (index[solved, None] == np.arange(len(runs))) * settings.CONVENTION_JUMP
     best, found = np.inf, np.zeros(len(runs))
-    for p, name in enumerate(names):
-        if not any(fnmatchcase(name, pattern) for pattern in patterns):
-            continue
+    for p in np.flatnonzero(np.isin(names, parameters.expand(which, fit.robot))):
         columns = np.concatenate([jacobian, jacobian[:, :, p, None] * of_run[:, None, :]], axis=2)
         left, flat = residual, columns.reshape(-1, columns.shape[2])
         for _ in range(settings.CONVENTION_ITERATIONS):
             error = np.linalg.norm(left, axis=1)
             size = max(float(np.median(error)), fit.floor, settings.CONVENTION_FINEST)
-            weight = np.repeat(3 / (size**2 + error**2), 3)[:, None]
-            information = flat.T @ (weight * flat) + np.eye(flat.shape[1])
-            moved = np.linalg.solve(information, flat.T @ (weight[:, 0] * residual.ravel()))
+            weighted = flat.T * np.repeat(3 / (size**2 + error**2), 3)
+            moved = np.linalg.solve(weighted @ flat + np.eye(flat.shape[1]), weighted @ residual.ravel())
             left = residual - (flat @ moved).reshape(-1, 3)
         typical = replace(fit, error=np.linalg.norm(left, axis=1)).typical
         if typical < best:
             best, found = typical, moved[len(names) :]
     return found
+
+
+def _positions(table: Any, values: Array) -> tuple[Array, Array]:
+    """Residual (K, 3) [m] of the positions of a recording, and its derivatives (K, 3, P) by the parameters."""
+    residual, jacobian, _ = table.residual(values, True)
+    rows = len(residual) // 6  # not -1: where all is known exactly there are no columns
+    return residual.reshape(rows, 6)[:, :3], jacobian.reshape(rows, 6, len(values))[:, :3]
 
 
 def _cost(error: Array, solved: Mask, size: float, shift: Array) -> float:

@@ -14,7 +14,7 @@ from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import POSE, Change, Hypothesis, changed, hypotheses, joints
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
-from ctcr.show.wording import join, short
+from ctcr.show.wording import runs_named, short
 from ctcr.table.measurements import Measurements
 
 CHANGED = "beta", "alpha", "force", "position"  # of a table, by what may be different
@@ -35,7 +35,8 @@ class Difference:
 
 
 def unlike(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
-    """The runs that are unlike the others, and the table in which they are like them, or which is without them.
+    """The runs that differ from the others by one thing, and the change of the table that corrects them; where their
+    robot is another one, it leaves them out.
 
     The others alone are calibrated, and predict these.
     """
@@ -52,7 +53,7 @@ def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
     yield runs[[np.argmax(error)]]
     sizes = [error]
     if fit.solved.any():
-        sizes.append(own_values(fit, readings, ("tubes.*.curvature", "actuation.home_*")))
+        sizes.append(own_values(fit, readings, ("tubes.*.curvature", "homes")))
     for size in sizes:
         order = np.argsort(size)
         above = order[1 + np.argmax(np.diff(size[order])) :]
@@ -103,17 +104,13 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
 
     runs = tuple(map(int, some))
     errors = before.rms_mm, then.rms_mm
-    fix = f"{best.fix}; or leave {_named(some)} out"
+    fix = f"{best.fix}; or leave {runs_named(some)} out"
     return Finding(best.kind, best.text, best.columns, fix, runs=runs, rms_mm=errors), change
-
-
-def _named(runs: Integers) -> str:
-    return f"run{'s' * (len(runs) > 1)} {join([str(run) for run in runs])}"
 
 
 def _differences(like: Calibrated, mine: Measurements) -> Iterator[Difference]:
     """All that may be different in these readings, as they would then be."""
-    runs = _named(np.unique(mine.run))
+    runs = runs_named(np.unique(mine.run))
     for one in (*hypotheses(like.robot, mine), *_exchanged()):
         if one.of_robot or one.offset:
             continue
@@ -145,16 +142,15 @@ def _scanned(like: Calibrated, mine: Measurements, name: str, tube: int) -> Diff
         return _off(like.robot, m, name, tube, value)[1]
 
     runs = np.unique(mine.run)
-    many = len(runs) > 1
     if name == "curvature":
         size = f"{robot.tubes[tube].curvature:.4g}"
-        text = f"tube {tube + 1} is another one in {_named(runs)}: its curvature is {100 * np.expm1(value):+.0f} %"
-        fix = f"give {_named(runs)} a robot file with curvature_per_m: {size} of tube {tube + 1}"
+        text = f"tube {tube + 1} is another one in {runs_named(runs)}: its curvature is {100 * np.expm1(value):+.0f} %"
+        fix = f"give {runs_named(runs)} a robot file with curvature_per_m: {size} of tube {tube + 1}"
         return Difference("tube_changed", (), text, fix, robot, change, error, (name, tube, value))
     unit, size, digits = ("deg", np.degrees(value), 1) if name == "alpha" else ("mm", 1e3 * value, 2)
     [column] = joints(name, (tube,))
-    were = "were" if many else "was"
-    text = f"{_named(runs)} {were} homed elsewhere than the others: {column} stands {short(abs(size))} {unit} off"
+    were = "were" if len(runs) > 1 else "was"
+    text = f"{runs_named(runs)} {were} homed elsewhere than the others: {column} stands {short(abs(size))} {unit} off"
     fix = " ".join(["ctcr import", *(f"--offset {column}@{run}={size:.{digits}f}{unit}" for run in runs)])
     return Difference("run_offset", (column,), text, fix, robot, change, error, (name, tube, value))
 

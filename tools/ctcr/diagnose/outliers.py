@@ -20,6 +20,11 @@ def outliers(fit: Any, admitted: float = 1.0, *, rotation: bool = False) -> Mask
     return np.isfinite(square) & (square > (settings.SURPRISE * admitted) ** 2 * fit.expected_square[:, int(rotation)])
 
 
+def beyond_noise(fit: Any, *, rotation: bool = False) -> Mask:
+    """Those by the noise as stated, or as far as it had to be inflated."""
+    return outliers(fit, max(1.0, fit.inflation[int(rotation)]), rotation=rotation)
+
+
 def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     """Those of `rows` (M,) that are outliers though their neighbours are not, in time within their run and in joints
     and load: errors of the tracker, or snaps to an equilibrium that nothing else shows. None where there are many."""
@@ -27,7 +32,7 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     found = np.zeros(len(measurements), bool)
     if len(read) < 2:
         return found
-    far = outliers(fit, max(1.0, fit.inflation[0]))[read]
+    far = beyond_noise(fit)[read]
     beside = np.zeros(len(read), bool)
     same = np.diff(measurements.run[read]) == 0
     beside[1:] |= same & far[:-1]
@@ -36,14 +41,12 @@ def isolated(measurements: Measurements, fit: Any, rows: Mask) -> Mask:
     return found if np.sum(found) <= settings.MOST_ISOLATED * np.sum(rows[read]) else np.zeros_like(found)
 
 
-def unexplained_runs(measurements: Measurements, fit: Any) -> Integers:
+def unexplained_runs(measurements: Measurements, fit: Any) -> list[int]:
     """Runs, fitted or held out, of which most readings are outliers: no tracker makes those."""
-    read, found = np.isfinite(fit.residual[:, :3]).all(axis=1), set()
-    for rotation in (False, True):
-        far = outliers(fit, max(1.0, fit.inflation[int(rotation)]), rotation=rotation)
-        of_run = {int(k): far[read & (measurements.run == k)] for k in np.unique(measurements.run[read])}
-        found |= {k for k, here in of_run.items() if np.mean(here) > settings.MOST_OF_A_RUN}
-    return np.array(sorted(found), int)
+    read = np.isfinite(fit.residual[:, :3]).all(axis=1)
+    runs, index = np.unique(measurements.run[read], return_inverse=True)
+    shares = [np.bincount(index, beyond_noise(fit, rotation=r)[read]) / np.bincount(index) for r in (False, True)]
+    return runs[np.max(shares, axis=0) > settings.MOST_OF_A_RUN].tolist()
 
 
 def messages(robot: Robot, measurements: Measurements, fit: Any, isolated: Mask) -> list[str]:

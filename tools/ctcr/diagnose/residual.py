@@ -8,10 +8,10 @@ from ctcr import settings
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
-from ctcr.diagnose.outliers import clustered, outliers, unexplained_runs
+from ctcr.diagnose.outliers import beyond_noise, clustered, unexplained_runs
 from ctcr.fit import joint
 from ctcr.model import effect_model
-from ctcr.show.wording import listed, percent
+from ctcr.show.wording import listed, percent, runs_named
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ class Residual:
     @property
     def about_outliers(self) -> list[str]:
         if self.runs:
-            run = f"Run {self.runs[0]} is" if len(self.runs) == 1 else f"Runs {listed(self.runs)} are"
-            return [f"{run} unlike the others: most of the readings are outliers there. What was different?"]
+            are = f"{runs_named(self.runs)} {'are' if len(self.runs) > 1 else 'is'}".capitalize()
+            return [f"{are} unlike the others: most of the readings are outliers there. What was different?"]
         if self.outliers > settings.MANY_OUTLIERS:
             many = f"{percent(self.outliers)} of the readings are outliers, more than a tracker makes"
             return [f"{many}: does the robot snap, or is the sensor loose?"]
@@ -76,8 +76,8 @@ def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: 
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()
     runs, far = [], 0.0
     if not corrections:  # else a held-out run has nuisance errors of its own, which no fit knows
-        runs = unexplained_runs(engine.measurements, fit).tolist()
-        far = float(np.mean(outliers(fit, max(1.0, fit.inflation[0]))[np.isfinite(fit.residual[:, 0])]))
+        runs = unexplained_runs(engine.measurements, fit)
+        far = float(np.mean(beyond_noise(fit)[np.isfinite(fit.residual[:, 0])]))
     return Residual(joint.p_value(fit), clusters, runs, far, ranked, after, sample, corrections)
 
 

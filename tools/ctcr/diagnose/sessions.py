@@ -54,7 +54,7 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     noise, free = noise_of_readings(robot, every), uncertain(robot)
     engine = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
     one = engine.fit()
-    if len(unexplained_runs(table, one)):  # whole runs that the fit takes for outliers
+    if unexplained_runs(table, one):  # whole runs that the fit takes for outliers
         engine = replace(engine, robust=False)
         one = engine.fit()
     if asked is None and not (joint.rejects(one) and _may_win(engine, one)):
@@ -206,8 +206,8 @@ def _moved_alone(sessions: Sessions) -> list[str]:
     odd = far > settings.OUTLYING_RUN * 1.48 * np.median(far)
     if not odd.any():
         return []
-    run = f"run {sessions.run[odd][0]}" if odd.sum() == 1 else f"runs {wording.listed(sessions.run[odd])}"
-    return [f"Most of them do, but for {run}: up to {wording.mm(1e3 * far[odd].max())} away."]
+    size = wording.mm(1e3 * far[odd].max())
+    return [f"One frame holds for all but for {wording.runs_named(sessions.run[odd])}: up to {size} away from it."]
 
 
 def _not_shared(explained: Mapping[tuple[str, ...], float]) -> list[str]:

@@ -18,6 +18,7 @@ from ctcr.errors import InputError, Problem
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
+from ctcr.show.wording import runs_named
 from ctcr.table.measurements import Measurements
 
 
@@ -125,7 +126,7 @@ def named(measurements: Measurements, held_out: Mask) -> str:
     runs = np.unique(measurements.run[held_out])
     if np.isin(measurements.run[~held_out], runs).any():
         return "one of every four blocks of time"
-    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
+    return runs_named(runs)
 
 
 def _regions(readings: Measurements, lever: float) -> Integers:

@@ -91,6 +91,11 @@ def join(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
+def runs_named(runs: Sequence[int]) -> str:
+    """Runs as the subject of a sentence: run 3, or runs 2, 7."""
+    return f"run{'s' * (len(runs) > 1)} {', '.join(map(str, runs))}"
+
+
 def listed(items: Sequence[Any], most: int = NAMED) -> str:
     """At most `most` items, and dots where there are more."""
     return ", ".join(map(str, items[:most])) + (", ..." if len(items) > most else "")
