@@ -42,7 +42,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
     notices = [*map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
-    snapped = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
+    snapped: list[int] = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
     try:
         return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files, snapped)
     except InputError as error:  # nothing is left to compare: the robot file may say why
