@@ -258,6 +258,8 @@ CONVENTION_UNLIKELY = 10.0  # [log odds] prior against each of the many faults t
 CONVENTION_CLEAR = 0.5  # error that a clear finding leaves at most, over that of the table as it is
 CONVENTION_ALIKE = 1.2  # errors of two hypotheses that explain the readings alike
 CONVENTION_CONSTANT = 0.1  # of the error: what a wrong home or frame leaves at most; a physical effect leaves more
+PHYSICS_LEAVES = 0.08  # typical error of a calibrated model over the deployed length that no effect exceeds: twice the
+# largest of some 500 robots, simulated and real
 CONVENTION_JUMP = 20.0  # stated sd that a home or a frame moves at least: data sheets err by less, and fits find that
 CONVENTION_MOST_JUMP_DEG = 45.0  # ... but no more than this: a fit that starts so far off finds nothing
 CONVENTION_OFFSET_STEP_DEG = 20  # of the home rotations that are tried: calibration finds what lies between

@@ -12,7 +12,7 @@ from ctcr.conventions.hypotheses import with_frame
 from ctcr.conventions.orientation import mirror
 from ctcr.conventions.review import Review
 from ctcr.effects import catalogue
-from ctcr.frames import conjugate, of_sensor, product
+from ctcr.frames import conjugate, matrix_from_quaternion, of_sensor, product
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements, group_columns
@@ -183,9 +183,8 @@ def _joint_offset(random, case):
 
 
 def _joint_unit(random, case):
-    kind, factor = [("alpha", 180 / np.pi), ("alpha", 1 / (2 * np.pi)), ("beta", 1e3), ("beta", 1e2)][
-        random.integers(4)
-    ]
+    units = [("alpha", 180 / np.pi), ("alpha", 1 / (2 * np.pi)), ("beta", 1e3), ("beta", 1e2), ("beta", 1 / 0.0254)]
+    kind, factor = units[random.integers(len(units))]
     return Fault("joint_unit", _names(kind, range(case.robot.n_tubes)), in_table(scaled(kind, factor)))
 
 
@@ -196,6 +195,27 @@ def _joint_order(random, case):
     names = tuple(name for kind in groups for name in _names(kind, moved))
     swap = in_table(lambda m: replace(m, **{kind: getattr(m, kind)[:, ::-1] for kind in groups}))
     return Fault("joint_order", names, swap) if moved else None
+
+
+def _joint_relative(random, case):
+    n = case.robot.n_tubes
+    groups = [("beta", "alpha"), ("beta",), ("alpha",)][random.integers(3)]
+
+    def spoil(m):
+        outer = {kind: np.append(getattr(m, kind)[:, 1:], np.zeros((len(m), 1)), axis=1) for kind in groups}
+        return replace(m, **{kind: getattr(m, kind) - outer[kind] for kind in groups})
+
+    names = tuple(name for kind in groups for name in _names(kind, range(n - 1)))
+    return Fault("joint_relative", names, in_table(spoil)) if n > 1 else None
+
+
+def _pose_inverse(random, case):
+    def spoil(m):
+        back = conjugate(m.quaternion)
+        return replace(m, position=-np.einsum("mij,mj->mi", matrix_from_quaternion(back), m.position), quaternion=back)
+
+    columns = group_columns(1)["position"] + group_columns(1)["quaternion"]
+    return None if case.readings.quaternion is None else Fault("pose_inverse", columns, in_table(spoil))
 
 
 def _frame_inverse(random, case):
@@ -241,8 +261,14 @@ def _force_sign(random, case):
     return Fault("force_sign", group_columns(1)["force"], in_table(scaled("force", -1))) if loaded else None
 
 
+def _force_unit(random, case):
+    loaded, factor = case.readings.force.any(), random.choice([1e3, 1e3 / 9.80665])
+    return Fault("force_unit", group_columns(1)["force"], in_table(scaled("force", factor))) if loaded else None
+
+
 def _position_unit(random, case):
-    return Fault("position_unit", group_columns(1)["position"], in_table(scaled("position", random.choice([1e3, 1e2]))))
+    factor = random.choice([1e3, 1e2, 1 / 0.0254])
+    return Fault("position_unit", group_columns(1)["position"], in_table(scaled("position", factor)))
 
 
 def _time_unit(random, case):
@@ -338,12 +364,15 @@ DRAWN = {
     "joint_offset": _joint_offset,
     "joint_unit": _joint_unit,
     "joint_order": _joint_order,
+    "joint_relative": _joint_relative,
     "frame_inverse": _frame_inverse,
     "frame_wrong": _frame_wrong,
     "mirrored": _mirrored,
     "quaternion_order": _of_quaternions("quaternion_order", lambda q: np.roll(q, -1, 1)),
     "quaternion_inverse": _of_quaternions("quaternion_inverse", conjugate),
+    "pose_inverse": _pose_inverse,
     "force_sign": _force_sign,
+    "force_unit": _force_unit,
     "position_unit": _position_unit,
     "time_unit": _time_unit,
     "run_offset": _run_offset,

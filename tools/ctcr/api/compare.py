@@ -43,8 +43,9 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         prediction = predict(robot, readings, steps=steps)
     notices = [*map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
     snapped: list[int] = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
+    known = (notices, found.findings, own, floor, files, snapped, found.unexplained)
     try:
-        return analysis.compare(robot, readings, prediction, notices, found.findings, own, floor, files, snapped)
+        return analysis.compare(robot, readings, prediction, *known)
     except InputError as error:  # nothing is left to compare: the robot file may say why
         raise InputError([*error.problems, *robot_file.warnings(robot)]) from None
 

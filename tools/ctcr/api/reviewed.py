@@ -85,6 +85,6 @@ def to_fit(
     if table.refusal:
         raise table.refusal
     readings, said = without_false_poses(robot, table, found)
-    said += without_pose(table)
+    said = [*filter(None, [found.unexplained]), *said, *without_pose(table)]
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
     return readings, [*map(sentence, copied), *said, *more], found

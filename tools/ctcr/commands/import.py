@@ -84,6 +84,7 @@ def _list_option(name: str, field: str, metavar: str, text: str):
 @click.option(
     "--invert-quaternion", is_flag=True, help="The log holds the inverse rotation; of 4 x 4 matrices, the inverse pose."
 )
+@click.option("--invert-pose", is_flag=True, help="The log holds the pose of the tracker in the frame of the sensor.")
 @click.option(
     "--euler", metavar="AXES", help="Euler angles: ZYX is R = Rz Ry Rx; zyx, fixed axes; vector: a rotation vector."
 )

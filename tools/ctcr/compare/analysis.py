@@ -89,6 +89,7 @@ class Comparison(Result):
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
     files: Sequence[str] = ()  # that were compared
     snapped: Sequence[int] = ()  # rows on another stable equilibrium than the one predicted
+    unexplained: str = ""  # that something is wrong which no known convention explains
 
     WRONG = "Wrong conventions: correct these first (errors of the calibrated robot)"
 
@@ -117,6 +118,7 @@ class Comparison(Result):
         data["never_varied"] = self.fixed
         data["notices"] = list(self.notices)
         data["conventions"] = [one.as_dict() for one in self.conventions]
+        data["unexplained"] = self.unexplained
         data["sessions"] = list(self.sessions)
         data["snapped"] = list(self.snapped)
         data |= self.floors
@@ -145,7 +147,10 @@ class Comparison(Result):
         rows += [[name, "mm", "", f"{value:.2g}", "", ""] for name, value in small.items() if isfinite(value)]
         count, rms = self.position_mm.count, self.position_mm.rms
         line = f"Comparison {self.robot}: {rms:.3g} mm RMS over {count} readings"
-        notes = [*([self.WRONG] if self.wrong else []), *(one.sentence for one in self.wrong)]
+        notes = [
+            *filter(None, [self.unexplained, self.WRONG if self.wrong else ""]),
+            *(one.sentence for one in self.wrong),
+        ]
         return Glance(line, ["error", "unit", "mean", "RMS", "95 %", "max"], rows, notes, 2)
 
 
@@ -159,10 +164,12 @@ def compare(
     floors: Mapping[str, float] | None = None,
     files: Sequence[str] = (),
     snapped: Sequence[int] = (),
+    unexplained: str = "",
 ) -> Comparison:
-    """Compare measured with predicted tip poses; `notices` tell what was done before, `conventions` what
-    `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
+    """Compare measured with predicted tip poses; `notices` tell what was done before, `conventions` and `unexplained`
+    what `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
     `ctcr.fit.floors` as_dict(), `files` what is compared, `snapped` the rows that `ctcr.audit.snaps` found.
+    On what the error depends is examined only where no convention is wrong.
 
     robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
     `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
@@ -180,7 +187,8 @@ def compare(
         sample = _in_one_frame(sample)
     rows, label, _ = split(sample.run, sample.motion.scaled)
     folds, shift, turn = make_folds(label, settings.SIGN_TRIALS), None, None
-    if folds.count >= settings.FEWEST_BLOCKS:
+    is_right = all(one.kind == "frozen" for one in conventions)
+    if is_right and folds.count >= settings.FEWEST_BLOCKS:
         shift = find_shift(sample.error[rows], folds)
         turn = find_turn(sample.predicted[rows], sample.measured[rows], folds)
     if turn and turn.gross:
@@ -198,7 +206,7 @@ def compare(
     run_offsets = find_run_offsets(as_taken, visits, pairs, noise)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
-    ranking = rank(sample, error, settings.LEVEL)
+    ranking = rank(sample, error if is_right else 0 * error, settings.LEVEL)
     length = np.linalg.norm(headline.error, axis=1) * 1e3
     rotation = headline.rotation_error
     angle = np.full(len(length), np.nan) if rotation is None else np.degrees(np.linalg.norm(rotation, axis=1))
@@ -231,6 +239,7 @@ def compare(
         sessions=sessions,
         files=files,
         snapped=snapped,
+        unexplained=unexplained,
     )
 
 

@@ -40,6 +40,7 @@ def _opening(c: Comparison) -> str:
         numbers.append(("back", f"{d.rms_mm:.3g} mm", f"hysteresis, RMS over {counted(d.pairs, 'pair')} of visits"))
     wrong = [one.sentence for one in c.wrong]
     first = f"<h2>{c.WRONG}</h2>{bullets(wrong)}" if wrong else ""
+    first += paragraph(c.unexplained, "lead") if c.unexplained else ""
     return first + paragraph(headline(c), "lead") + cards(numbers)
 
 
@@ -52,7 +53,7 @@ def _findings(c: Comparison) -> str:
         f'<ol class="findings">{items}</ol><p class="soft">A bar is the share of the squared error that the finding '
         f"concerns; shares overlap.</p>"
         if items
-        else "<p>No finding beyond noise.</p>"
+        else f"<p>{'None before the conventions are right' if c.wrong else 'No finding beyond noise'}.</p>"
     )
     lists = "".join(f"<h2>{title}</h2>{bullets(lines)}" for title, lines in terminal.remarks(c) if lines)
     return f"<h2>Findings</h2>{found}{lists}"

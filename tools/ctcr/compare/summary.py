@@ -107,9 +107,9 @@ def _all(c: Comparison) -> Iterator[Finding]:
     if c.turn and c.turn.gross:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
         yield Finding(
-            f"The tracker frame in the robot file is grossly wrong: rotated by {c.turn.turn_deg:.0f} degrees about "
-            f"({axis}) and shifted, it leaves {mm(c.turn.rms_after_mm)} RMS instead of {mm(c.turn.rms_before_mm)} "
-            f"(held out). All that follows is computed in the fitted frame.",
+            f"Another tracker frame, rotated by {c.turn.turn_deg:.0f} degrees about ({axis}) and shifted, leaves "
+            f"{mm(c.turn.rms_after_mm)} RMS instead of {mm(c.turn.rms_before_mm)} (held out): that of the robot file "
+            f"is wrong, or homes and tubes are, which turn the tip too. All that follows is in the other frame.",
             1.0,
         )
     elif shifted and shifted.share > 0:
@@ -120,7 +120,7 @@ def _all(c: Comparison) -> Iterator[Finding]:
             f"tracker frame.",
             shifted.share,
         )
-    if c.run_offsets.found and not c.sessions:
+    if c.run_offsets.found and not c.sessions and not c.wrong:
         yield Finding(_run_text(c), c.run_offsets.share)
     if c.direction and differs(c.direction):
         yield Finding(_hysteresis_text(c, c.direction), (c.direction.floor_mm / c.position_mm.rms) ** 2)
@@ -311,12 +311,14 @@ def limits(c: Comparison) -> Iterator[str]:
         yield "No orientation was measured."
     elif c.angle_kind != "orientation":
         yield "The sensor's rotation differs from reading to reading: only the direction of the tip is compared."
-    if not c.ranking.alone:
+    if c.wrong:
+        yield "What the error depends on is examined once the conventions are right."
+    elif not c.ranking.alone:
         yield (
             f"The readings fall into {c.ranking.blocks} independent parts, too few to judge a constant offset or "
             f"dependences."
         )
-    if len(c.ranking.rows) < len(c.sample.row):
+    if len(c.ranking.rows) < len(c.sample.row) and not c.wrong:
         yield f"Dependences were examined on {len(c.ranking.rows)} of {len(c.sample.row)} readings, evenly spread."
     if len(c.runs) > 1 and not np.isfinite(r.p_value) and not r.found and not c.sessions and not is_noise(c):
         pairs = f"{counted(r.pairs_between, 'pair')} of visits" if r.pairs_between else "no joints"

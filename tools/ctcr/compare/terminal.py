@@ -23,6 +23,8 @@ SIZES = {
 def show(console, c: Comparison) -> None:
     """Print a comparison on a rich console."""
     console.print(c.robot, style="bold")
+    if c.unexplained:
+        console.print(c.unexplained, style="bold")
     if c.wrong:
         console.print(c.WRONG, style="bold")
         for one in c.wrong:

@@ -5,11 +5,13 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
+from scipy.constants import g as G
 from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
+from ctcr.frames import conjugate, matrix_from_quaternion
 from ctcr.model import parameters
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
@@ -20,8 +22,9 @@ Change = Callable[[Measurements], Measurements]
 
 OTHER_UNITS = {  # of a group of columns: unit, factor to SI
     "alpha": (("deg", np.pi / 180), ("rev", 2 * np.pi)),
-    "beta": (("mm", 1e-3), ("cm", 1e-2)),
-    "position": (("mm", 1e-3), ("cm", 1e-2)),
+    "beta": (("mm", 1e-3), ("cm", 1e-2), ("inch", 0.0254)),
+    "force": (("g", 1e-3 * G), ("mN", 1e-3), ("kg", G)),
+    "position": (("mm", 1e-3), ("cm", 1e-2), ("inch", 0.0254)),
 }
 POSE, QUATERNION, FORCE = (group_columns(1)[name] for name in ("position", "quaternion", "force"))
 
@@ -45,7 +48,7 @@ class Hypothesis:
     @property
     def of_positions(self) -> bool:
         """Whether it is of the positions that the tracker reads."""
-        return self.kind in ("position_unit", "mirrored")
+        return self.kind in ("position_unit", "mirrored", "pose_inverse")
 
     @property
     def of_tracker(self) -> bool:
@@ -80,7 +83,10 @@ class Hypothesis:
 
 def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
     """All that the table and the robot have room for."""
-    parts = (_signs, _zeros, _offsets, _units, _file_units, _radii, _orders, _forces, _positions, _frames, _sensor)
+    parts = (
+        *(_signs, _zeros, _offsets, _units, _orders, _relative, _forces),
+        *(_file_units, _radii, _positions, _poses, _frames, _sensor),
+    )
     return [one for part in parts for one in part(robot, readings)]
 
 
@@ -236,10 +242,29 @@ def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
             yield Hypothesis("joint_order", text, names, fix, change, doubts=1 if reverse else 2)
 
 
+def _relative(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """Each joint counted from that of the next outer tube."""
+    n = robot.n_tubes
+    for groups in (("beta", "alpha"), ("beta",), ("alpha",)) if n > 1 else ():
+        names = tuple(name for kind in groups for name in joints(kind, tuple(range(n - 1))))
+        text = f"{join(names)} count{'s' * (len(names) == 1)} from the joint of the next outer tube"
+        sums = (" + ".join(joints(kind, tuple(range(i, n)))) for kind in groups for i in range(n - 1))
+        fix = "write " + ", ".join(f"{total} in place of {name}" for name, total in zip(names, sums, strict=True))
+
+        def change(m: Measurements, groups=groups) -> Measurements:
+            return replace(m, **{kind: np.cumsum(getattr(m, kind)[:, ::-1], axis=1)[:, ::-1] for kind in groups})
+
+        yield Hypothesis("joint_relative", text, names, fix, change, doubts=2)
+
+
 def _forces(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
-    if readings.force.any():
-        text, fix = "the force columns hold the reaction", "ctcr import --flip force negates them"
-        yield Hypothesis("force_sign", text, FORCE, fix, changed("force", np.negative))
+    if not readings.force.any():
+        return
+    text, fix = "the force columns hold the reaction", "ctcr import --flip force negates them"
+    yield Hypothesis("force_sign", text, FORCE, fix, changed("force", np.negative))
+    for unit, factor in OTHER_UNITS["force"]:
+        text, fix = f"forces are in {unit}, not in N", f"ctcr import --unit force={unit}"
+        yield Hypothesis("force_unit", text, FORCE, fix, changed("force", lambda f, factor=factor: factor * f))
 
 
 def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
@@ -251,6 +276,20 @@ def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
         sign[axis] = -1.0
         text = f"the tracker frame of the table is left-handed: {name} is mirrored"
         yield Hypothesis("mirrored", text, (POSE[axis],), "", changed("position", lambda p, s=sign: p * s))
+
+
+def _poses(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """The tracker in the frame of the sensor in place of the sensor in that of the tracker."""
+    if readings.oriented.any():
+        text = "the poses are the inverse ones, of the tracker in the frame of the sensor"
+
+        def change(m: Measurements) -> Measurements:
+            back = conjugate(m.quaternions)
+            return replace(
+                m, position=-np.einsum("mij,mj->mi", matrix_from_quaternion(back), m.positions), quaternion=back
+            )
+
+        yield Hypothesis("pose_inverse", text, (*POSE, *QUATERNION), "ctcr import --invert-pose", change)
 
 
 def _frames(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

@@ -21,6 +21,7 @@ class Review:
     findings: list[Finding]
     robot: Robot
     readings: Measurements
+    unexplained: str = ""  # a sentence on what is wrong by no known convention
 
     @property
     def frozen(self) -> list[Finding]:
@@ -43,7 +44,9 @@ def review(robot: Robot, readings: Measurements) -> Review:
     few = np.flatnonzero(located)
     of_runs = _of_every_run(readings, located)
     sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
-    case, found = search.corrected(robot, sample, readings.rows(of_runs))
+    case, found, unexplained = search.corrected(robot, sample, readings.rows(of_runs))
+    if unexplained:
+        return Review([], robot, readings, unexplained)
 
     # Orientations are judged where positions are right.
     axis = next(("xyz".index(one.columns[0][0]) for one in found if one.kind == "mirrored"), None)

@@ -17,7 +17,7 @@ from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
-from ctcr.show.wording import numbers
+from ctcr.show.wording import join, numbers, short
 from ctcr.table.measurements import Measurements
 
 Wrong = tuple[Hypothesis, ...]
@@ -31,6 +31,12 @@ class Case:
     readings: Measurements
     fit: Calibrated
     changes: tuple[Change, ...] = ()  # that made these readings of those of the table
+
+    def share_of(self, error: float) -> float:
+        """An error [m] over the mean deployed length; infinite where nothing is deployed."""
+        beta, _ = self.robot.joints_of_table(self.readings.beta, self.readings.alpha)
+        deployed = np.mean(np.max(beta + [tube.length for tube in self.robot.tubes], axis=1))
+        return error / deployed if deployed > 0 else np.inf
 
 
 @dataclass(frozen=True)
@@ -51,18 +57,37 @@ class Tried:
         return next((one for one in self.wrong if one.offset), None)
 
 
-def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding]]:
-    """The case after all clear findings, and these.
+def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tuple[Case, list[Finding], str]:
+    """The case after all clear findings, these, and a sentence where something is wrong that no hypothesis explains:
+    what comes nearest then is no finding.
 
     `readings` are a sample of the table, `of_runs` some of each run.
     """
-    case, found = Case(robot, readings, calibrated(robot, readings)), []
+    given = Case(robot, readings, calibrated(robot, readings))
+    case, found = given, []
     while len(found) < settings.MOST_CONVENTIONS and (better := _clearest(case)):
         if not _of_one_session(case, better, of_runs):
             break
         found += _findings(case, better)
         case = better.case
-    return case, found
+    # Runs need not share a frame: what each has of its own is told apart later.
+    left = min(case.fit.typical, _with_run_frames(case, of_runs).typical)
+    if case.share_of(left) < settings.PHYSICS_LEAVES:
+        return case, found, ""
+    return given, [], _unexplained(case, left, found)
+
+
+def _unexplained(case: Case, error: float, found: list[Finding]) -> str:
+    """That an error [m] is left which is no physics, and what comes nearest."""
+    left = f"{short(1e3 * error)} mm remain" if np.isfinite(error) else "the model has no solution"
+    share = f", {case.share_of(error):.0%} of the deployed length" if np.isfinite(case.share_of(error)) else ""
+    nearest = f" Nearest comes: {join([one.text for one in found])}." if found else ""
+    return (
+        f"After calibration and whatever convention is tried {left}{share}: more than effects and data sheets make. So "
+        "the table or the robot file is wrong in another way, and no comparison with physics means anything: look at "
+        "the point and the frame of the poses, the order, the units and the zeros of columns, and the values of the "
+        f"tubes.{nearest}"
+    )
 
 
 def _clearest(case: Case) -> Tried | None:

@@ -53,6 +53,7 @@ class Choices:
     relative_to: str | None = None
     quaternion: str | None = None
     invert_quaternion: bool = False
+    invert_pose: bool = False
     euler: str | None = None
     mirror: str | None = None
 

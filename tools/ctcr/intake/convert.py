@@ -92,6 +92,7 @@ def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tupl
         ("--flip force", "force" in choices.flip, forces, "force"),
         ("--quaternion", choices.quaternion is not None, columns.has("qw"), "quaternion"),
         ("--invert-quaternion", choices.invert_quaternion, turned, "rotation"),
+        ("--invert-pose", choices.invert_pose, turned, "rotation"),
         ("--euler", choices.euler is not None, columns.has("rx"), "angle"),
         ("--mirror", choices.mirror is not None, pose is not None, "position"),
         ("--offset t", "t" in choices.offsets, columns.has("t"), "time"),

@@ -91,12 +91,6 @@ def unseen(pose: Pose) -> Mask:
     return missing | (word & ~turned)
 
 
-def is_constant(quaternion: Array) -> bool:
-    """Whether a rotation never changes: the sensor has none, or the program wrote a constant."""
-    known = quaternion[np.isfinite(quaternion).all(axis=1)]
-    return len(known) > 2 and bool((known == known[0]).all())
-
-
 def inverse(pose: Pose) -> Pose:
     """The tracker in the frame of the marker."""
     count = len(pose.position)

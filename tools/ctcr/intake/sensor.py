@@ -9,6 +9,7 @@ from ctcr.intake.bodies import EULER, GRID, POSITION, QUATERNION, SEQUENCE, TRAN
 from ctcr.intake.columns import Columns, angle_unit, length_unit
 from ctcr.intake.motion import row_ranges
 from ctcr.intake.poses import Pose
+from ctcr.table.measurements import never_turns
 
 MATRIX = "matrix"  # the unit of positions in matrices is kept under this name
 
@@ -26,7 +27,7 @@ def of(columns: Columns) -> Pose | None:
             text = "its position and orientation are both needed"
             raise InputError(Problem(text, str(columns.log.path), field="--relative-to"))
         pose = poses.seen_from(reference, pose)
-    if pose.quaternion is not None and poses.is_constant(pose.quaternion):
+    if pose.quaternion is not None and never_turns(pose.quaternion):
         columns.notes.append("the rotation of the sensor never changes: it is left out")
         pose.quaternion = None
     if choices.mirror:
@@ -56,9 +57,10 @@ def _marker(columns: Columns, prefix: str) -> Pose | None:
         who = "the reference" if prefix else "the sensor"
         columns.notes.append(f"{who} was not seen in {row_ranges(columns.log.rows[hidden])}: the pose is left empty")
     pose.hide(hidden)
-    if pose.quaternion is not None and columns.choices.invert_quaternion:
+    rotation_alone, whole = columns.choices.invert_quaternion, columns.choices.invert_pose
+    if pose.quaternion is not None and (rotation_alone or whole):
         turned = poses.inverse(pose)
-        return turned if is_whole else Pose(position=pose.position, quaternion=turned.quaternion)
+        return turned if is_whole or whole else Pose(position=pose.position, quaternion=turned.quaternion)
     return pose
 
 

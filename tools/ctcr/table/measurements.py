@@ -335,11 +335,21 @@ def _measurements(data: dict[str, Array], table: Table) -> Measurements:
     absent = {name: np.repeat(row, table.n_rows, axis=0) for name, row in absent.items()}
     data = absent | {"position": None, "quaternion": None} | data
     data["t"], data["run"] = data["t"][:, 0], data["run"][:, 0].astype(np.int64)
+    warnings = list(_warnings(data["t"], data["run"], str(table.path)))
     if data["quaternion"] is not None:
         data["quaternion"] /= np.linalg.norm(data["quaternion"], axis=1, keepdims=True)
-    warnings = list(_warnings(data["t"], data["run"], str(table.path)))
+        if never_turns(data["quaternion"]):
+            data["quaternion"] = None
+            text = "the orientation never changes: the tracker measures none, and it is left out"
+            warnings.append(Problem(text, str(table.path), field="qw..qz"))
     file = str(table.path) if isinstance(table, NumberTable) else ""
     return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings, file=file)
+
+
+def never_turns(quaternion: Array) -> bool:
+    """Whether a rotation (M, 4) never changes: the sensor has none, or the program wrote a constant."""
+    known = quaternion[np.isfinite(quaternion).all(axis=1)]
+    return len(known) > 2 and bool((known == known[0]).all())
 
 
 def _warnings(t: Array, run: Integers, file: str) -> Iterator[Problem]:
