@@ -231,6 +231,34 @@ def test_hidden_faults():
     np.testing.assert_allclose(found.readings.quaternion, readings.quaternion, atol=1e-9)
 
 
+@pytest.mark.parametrize("spoil", ["signs", "mirror"])
+def test_mirror_or_signs(spoil):
+    """Where the frame is wrong too, readings do not tell a mirror from angles that all count the other way."""
+    robot, readings = bench(11)
+    turn = Rotation.from_rotvec([0.5, -1.0, 0.7]).as_matrix()
+    other = with_frame(robot, turn @ robot.tracker.rotation, robot.tracker.position + 0.1)
+    if spoil == "signs":
+        table = scaled(readings, "alpha", -1)
+    else:
+        table = replace(scaled(readings, "position", [-1, 1, 1]), quaternion=mirror(readings.quaternion, 0))
+    for quaternion in (table.quaternion, None):
+        frame, handed = sorted(review(other, replace(table, quaternion=quaternion)).findings, key=lambda one: one.kind)
+        assert (frame.kind, {handed.kind, *(one.kind for one in handed.rivals)}) == (
+            "frame_wrong",
+            {"joint_sign", "mirrored"},
+        )
+    turned = replace(table, quaternion=np.roll(table.quaternion, -1, 1))
+    assert "quaternion_order" in {one.kind for one in review(other, turned).findings}
+
+
+def test_sensor_on_another_tube():
+    """A sensor that sits on another tube than the file says is named with its tube."""
+    robot, readings = bench(47)
+    wrong = robot.model_copy(update={"tracker": robot.tracker.model_copy(update={"sensor_on_tube": 2})})
+    [one] = (found := review(wrong, readings)).findings
+    assert (one.kind, found.robot.tracker.sensor_on_tube) == ("sensor_tube", robot.tracker.sensor_on_tube)
+
+
 @pytest.mark.parametrize(("kind", "move"), [("alpha", 0.35), ("beta", 4e-3)])
 def test_run(kind, move):
     """A run that was homed elsewhere is named with its joint, and by how much it is off."""

@@ -85,7 +85,7 @@ def hypotheses(robot: Robot, readings: Measurements) -> list[Hypothesis]:
     """All that the table and the robot have room for."""
     parts = (
         *(_signs, _zeros, _offsets, _units, _orders, _relative, _forces),
-        *(_file_units, _radii, _positions, _poses, _frames, _sensor),
+        *(_file_units, _radii, _tubes_of_sensor, _positions, _poses, _frames, _sensor),
     )
     return [one for part in parts for one in part(robot, readings)]
 
@@ -135,12 +135,13 @@ def _signs(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
             text = f"{named(kind, tubes, n)} {verb} the other way"
             fix = f"ctcr import {flip}, or reverse the sign of the ratio in the controller"
             names = joints(kind, tubes)
-            yield Hypothesis("joint_sign", text, names, fix, changed(kind, lambda q, s=sign: q * s), doubts=len(tubes))
+            doubts = 1 if len(tubes) == n else len(tubes)
+            yield Hypothesis("joint_sign", text, names, fix, changed(kind, lambda q, s=sign: q * s), doubts=doubts)
             if (home := homes[kind] * (sign < 0)).any():
                 what = f"{text}, from home on"
                 fix = f"correct the sign of the motor and count from home: {join(names)} -> 2 home - {join(names)}"
                 change = changed(kind, lambda q, s=sign, h=home: 2 * h + q * s)
-                yield Hypothesis("joint_sign", what, names, fix, change, doubts=len(tubes) + 1)
+                yield Hypothesis("joint_sign", what, names, fix, change, doubts=doubts + 1)
 
 
 def _zeros(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
@@ -220,6 +221,17 @@ def _radii(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
         text = f"the curvature{verb} in mm, not 1/m, of tube{'s' * (len(tubes) > 1)} {numbers}"
         fix = "write " + ", ".join(f"tubes[{i}].curvature_per_m: {1e3 / given[i]:g}" for i in tubes)
         yield Hypothesis("file_unit", text, (), fix, file=file)
+
+
+def _tubes_of_sensor(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
+    """The sensor on another tube."""
+    given = robot.tracker.sensor_on_tube
+    for tube in range(1, robot.n_tubes + 1):
+        if tube != given:
+            tracker = robot.tracker.model_copy(update={"sensor_on_tube": tube})
+            text = f"the sensor is on tube {tube}, not on tube {given}"
+            fix = f"set tracker.sensor_on_tube to {tube}"
+            yield Hypothesis("sensor_tube", text, (), fix, file=robot.model_copy(update={"tracker": tracker}), doubts=2)
 
 
 def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

@@ -65,6 +65,17 @@ def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     return options[1] < options[0]
 
 
+def least_error_deg(fit: Calibrated, readings: Measurements, axis: int | None) -> float:
+    """RMS error of the orientations in the form that suits them best, mirrored along an axis of the tracker or not; 0
+    where none was measured."""
+    use = fit.solved & readings.oriented
+    if not use.any():
+        return 0.0
+    predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
+    forms = ((*form, along) for form in np.ndindex(2, 2) for along in {None, axis})
+    return min(_error_deg(predicted, _in_form(given, *form), _is_known(fit.robot)) for form in forms)
+
+
 def error_deg(robot: Robot, readings: Measurements) -> float:
     """RMS error of the orientations; NaN where none was measured."""
     some = readings.rows(readings.oriented)
@@ -99,10 +110,12 @@ def _predicted(robot: Robot, readings: Measurements) -> Array:
 
 
 def _error_deg(predicted: Array, measured: Array, known: bool) -> float:
-    """RMS angle between orientations (K, 4), but for a turn of the sensor where its rotation is not known."""
+    """RMS angle between orientations (K, 4), but for a turn of the sensor where its rotation is not known; NaN without
+    any."""
     turn = Rotation.identity() if known else _turn_between(predicted, measured)
     angle = angle_between(product(predicted, turn.as_quat(scalar_first=True)), measured)
-    return float(np.degrees(np.sqrt(np.nanmean(angle**2))))
+    angle = angle[np.isfinite(angle)]
+    return float(np.degrees(np.sqrt(np.mean(angle**2)))) if len(angle) else np.nan
 
 
 def _turn_between(predicted: Array, measured: Array) -> Rotation:

@@ -46,10 +46,10 @@ def review(robot: Robot, readings: Measurements) -> Review:
     sample = readings.rows(few[evenly(len(few), settings.CONVENTION_ROWS)])
     case, found, unexplained = search.corrected(robot, sample, readings.rows(of_runs))
     if unexplained:
-        return Review([], robot, readings, unexplained)
+        return _late(case, readings) or Review([], robot, readings, unexplained)
 
     # Orientations are judged where positions are right.
-    axis = next(("xyz".index(one.columns[0][0]) for one in found if one.kind == "mirrored"), None)
+    axis = search.mirror_of(found)
     if axis is not None and not orientation.mirrored(case.fit, case.readings, axis):
         axis = None
     found = [_with_quaternion(one, case.readings, axis) for one in found]
@@ -86,16 +86,24 @@ def review(robot: Robot, readings: Measurements) -> Review:
     return Review(sorted(found, key=lambda one: -one.clarity), case.robot, right)
 
 
+def _late(case: search.Case, readings: Measurements) -> Review | None:
+    """The review of a table that can be explained once poses of the row before stand in their own row."""
+    late = stale.late_by_a_row(case.fit, readings)
+    if late is None:
+        return None
+    finding, change = late
+    again = review(case.robot, change(readings))
+    return None if again.unexplained else replace(again, findings=[finding, *again.findings])
+
+
 def _with_quaternion(finding: Finding, readings: Measurements, axis: int | None) -> Finding:
     """A mirror with words on the quaternions, which may be mirrored too, along this axis."""
     if finding.kind != "mirrored":
         return finding
     [column] = finding.columns
-    fix, rivals = f"ctcr import --mirror {column[0]}", finding.rivals
-    if axis is None and readings.oriented.any():
-        fix = f"negate {column}"
-        rivals = ()  # joints that count the other way would mirror the orientations too
-    return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame", rivals=rivals)
+    alone = axis is None and readings.oriented.any()
+    fix = f"negate {column}" if alone else f"ctcr import --mirror {column[0]}"
+    return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame")
 
 
 def _of_every_run(readings: Measurements, located: Mask) -> Integers:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from ctcr import settings
 from ctcr.arrays import Array, Mask
-from ctcr.conventions import tips
+from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, jump
 from ctcr.conventions.finding import Finding
@@ -45,7 +45,7 @@ class Tried:
 
     wrong: Wrong
     case: Case
-    rivals: Wrong = ()  # of another kind, which explain the readings as well
+    rivals: tuple[Wrong, ...] = ()  # of each hypothesis, those of another kind that explain the readings as well
 
     @property
     def doubts(self) -> int:
@@ -109,16 +109,30 @@ def _clearest(case: Case) -> Tried | None:
         exact = offset_by(best.offset, offset_of(best), case.robot.n_tubes)
         wrong = tuple(exact if one.offset else one for one in best.wrong)
         best = Tried(wrong, _applied(case, wrong))
-    rivals = (one.wrong[0] for one in alike if len(best.wrong) == len(one.wrong) == 1)
-    other = (one for one in rivals if one.kind != best.wrong[0].kind)
-    return replace(best, rivals=tuple(one for one in other if not one.offset and not one.registers))
+    return replace(best, rivals=tuple(_rivals(k, best.wrong, alike) for k in range(len(best.wrong))))
 
 
 def _alike(tried: list[Tried]) -> list[Tried]:
-    """Those that leave the least error, or hardly more; first the one by which least is wrong."""
+    """Those that leave the least error, or hardly more, and that the orientations do not deny; first the one by which
+    least is wrong."""
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    return sorted(alike, key=lambda one: (one.doubts, one.case.fit.typical))
+    turned = [orientation.least_error_deg(one.case.fit, one.case.readings, mirror_of(one.wrong)) for one in alike]
+    agree = [one for one, error in zip(alike, turned, strict=True) if settings.CONVENTION_CLEAR * error <= min(turned)]
+    return sorted(agree, key=lambda one: (one.doubts, one.case.fit.typical))
+
+
+def mirror_of(wrong: Iterable[Hypothesis | Finding]) -> int | None:
+    """The axis of the tracker that one of these mirrors."""
+    return next(("xyz".index(one.columns[0][0]) for one in wrong if one.kind == "mirrored"), None)
+
+
+def _rivals(k: int, wrong: Wrong, alike: Iterable[Tried]) -> Wrong:
+    """Hypotheses of another kind that explain the readings as well as one of those that are wrong, beside the rest."""
+    rest = {one.text for one in wrong[:k] + wrong[k + 1 :]}
+    others = ([one for one in tried.wrong if one.text not in rest] for tried in alike)
+    found = {new[0].text: new[0] for new in others if len(new) == 1 and new[0].kind != wrong[k].kind}
+    return tuple(one for one in found.values() if not one.offset and not one.registers)
 
 
 def _exchanged(case: Case, pair: Tried) -> Iterator[Wrong]:
@@ -299,15 +313,15 @@ def offset_of(tried: Tried) -> float:
 
 def _findings(case: Case, tried: Tried) -> Iterator[Finding]:
     """A finding of each hypothesis, with the error where all others hold but this."""
-    rivals = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in tried.rivals]
-    for one, without in zip(tried.wrong, _halves(case, tried), strict=True):
+    for one, without, rivals in zip(tried.wrong, _halves(case, tried), tried.rivals, strict=True):
         text, fix = _offset_in_words(one, tried.case.robot) if one.offset else (one.text, one.fix)
         if one.sensor is not None:
             place = numbers(tried.case.fit.robot.tracker.sensor_position_mm, 1)
             fix = f"set tracker.sensor_position_mm to {place}, or to null: ctcr calibrate fit finds it"
         if one.frame or one.registers:
             fix = _frame_in_words(tried.case.fit.robot if one.registers else tried.case.robot)
-        yield Finding(one.kind, text, one.columns, fix, rms_mm=(without.rms_mm, tried.case.fit.rms_mm), rivals=rivals)
+        others = [Finding(rival.kind, rival.text, rival.columns, rival.fix) for rival in rivals]
+        yield Finding(one.kind, text, one.columns, fix, rms_mm=(without.rms_mm, tried.case.fit.rms_mm), rivals=others)
 
 
 def _offset_in_words(hypothesis: Hypothesis, robot: Robot) -> tuple[str, str]:

@@ -33,22 +33,30 @@ def late_by_a_row(fit: Calibrated, readings: Measurements) -> tuple[Finding, Cha
     runs = readings.run[after]
     own, before = _errors(fit, readings, after)
     late = [int(run) for run in np.unique(runs) if before.at(runs == run).beats(own.at(runs == run))]
-    if not late:
-        return None
-    moved = _moved_up(late)(readings)
-    located = np.flatnonzero(np.isfinite(moved.positions).all(axis=1))
-    there = calibrated(fit.robot, moved.rows(located[evenly(len(located), settings.CONVENTION_ROWS)]))
-    own, before = _errors(there, readings, after)
-    left = [np.max(before.at(runs == run).left_of(own.at(runs == run))) for run in late]
-    late = [run for run, share in zip(late, left, strict=True) if share < settings.CONVENTION_CONSTANT]
-    if not late:
-        return None
+    for _ in range(settings.MOST_CONVENTIONS):  # a calibration to right poses shows further ones
+        if not late:
+            return None
+        moved = _moved_up(late)(readings)
+        located = np.flatnonzero(np.isfinite(moved.positions).all(axis=1))
+        there = calibrated(fit.robot, moved.rows(located[evenly(len(located), settings.CONVENTION_ROWS)]))
+        own, before = _errors(there, readings, after)
+        tested, late = (
+            late,
+            [int(run) for run in np.unique(runs) if _is_late(own.at(runs == run), before.at(runs == run))],
+        )
+        if late == tested:
+            break
     rows = np.isin(runs, late)
     text = f"poses of {counted(len(late), 'run')} ({listed(late)}) are those of the row before"
     fix = "move the pose fields of these runs up by a row, or log the reading that follows each motion"
     columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
     rms = own.at(rows).rms_mm, before.at(rows).rms_mm
     return Finding("stale", text, columns, fix, runs=late, rms_mm=rms), _moved_up(late)
+
+
+def _is_late(own: Calibrated, before: Calibrated) -> bool:
+    """Whether readings fit the joints of the rows before them and hardly leave an error, but do not fit their own."""
+    return before.beats(own) and np.max(before.left_of(own)) < settings.CONVENTION_CONSTANT
 
 
 def _errors(fit: Calibrated, readings: Measurements, after: Integers) -> tuple[Calibrated, Calibrated]:

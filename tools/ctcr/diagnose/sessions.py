@@ -64,7 +64,7 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
         return readings, []
     own, shared = framed.fit(), "a frame"
     homes = tuple(home_names(robot.n_tubes))
-    explained = _explained_by_run(framed, own)
+    explained = _explained_by_run(framed, own) if joint.rejects(own) else {}
     homed = _with_homes(framed) if homes in explained else None
     if homed:
         own, shared, explained = homed.fit(), "a frame and homes", {}
