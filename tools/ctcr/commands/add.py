@@ -9,19 +9,10 @@ from ctcr.errors import InputError, Problem
 @click.command(name="add")
 @options.robot
 @click.argument("names", nargs=-1, metavar="[EFFECT..]")
-@click.option(
-    "--diagnosis",
-    type=options.read,
-    metavar="FILE.json",
-    help="Add the effects that `ctcr diagnose --json FILE.json` found.",
-)
-@click.option("--fit", "measurements", type=options.read, metavar="MEASUREMENTS", help="Fit the effects to this table.")
-@click.option(
-    "--set",
-    "given",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Fix a parameter instead of fitting it, SI units: friction.coefficient.1=0.02. May be repeated.",
+@options.reads("--diagnosis", "FILE.json", "Add the effects that `ctcr diagnose --json FILE.json` found.")
+@options.reads("--fit", "MEASUREMENTS", "Fit the effects to this table.", "measurements")
+@options.repeated(
+    "--set", "given", "NAME=VALUE", "Fix a parameter instead of fitting it, SI units: friction.coefficient.1=0.02."
 )
 @options.free
 @options.anyway

@@ -18,9 +18,7 @@ def command() -> None:
 
 def _procedure(function):
     """The options that all procedures share: `robot`, `target`, `in_place` and `out`."""
-    robot = click.option(
-        "--robot", type=options.read, metavar="ROBOT", help="The robot file: its values are used, and updated with -o."
-    )
+    robot = options.reads("--robot", "ROBOT", "The robot file: its values are used, and updated with -o.")
     return robot(options.new_robot(options.outputs(function)))
 
 
@@ -118,12 +116,7 @@ def rotation_offset(
 @click.argument("points", type=options.read)
 @_length("--placement-sd-mm", 0.0, "Standard deviation of the probe from a CAD point, per axis; 0: from the residuals.")
 @_live
-@click.option(
-    "--cad",
-    type=options.read,
-    metavar="CAD.csv",
-    help="With --live: names and coordinates of the points, columns as POINTS.",
-)
+@options.reads("--cad", "CAD.csv", "With --live: names and coordinates of the points, columns as POINTS.")
 @options.setting("--rounds", click.IntRange(1), 1, "With --live: over all points.")
 @_procedure
 def registration(
@@ -249,12 +242,8 @@ def curvature(table: str, **others) -> None:
 @options.robot
 @options.measurements
 @options.free
-@click.option(
-    "--sd",
-    "widths",
-    multiple=True,
-    metavar="NAME=SD",
-    help="Prior standard deviation of a parameter, in the unit of the robot file, or inf. May be repeated.",
+@options.repeated(
+    "--sd", "widths", "NAME=SD", "Prior standard deviation of a parameter, in the unit of the robot file, or inf."
 )
 @options.frames
 @click.option(

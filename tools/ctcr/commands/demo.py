@@ -5,16 +5,13 @@ import click
 from ctcr.commands import options
 
 
+def _folder(what: str, default: str):
+    text = f"{what}; that of an earlier demonstration is removed."
+    return options.output("FOLDER", text, kind=None, default=default, show_default=True)
+
+
 @click.group(name="demo", invoke_without_command=True)
-@click.option(
-    "-o",
-    "--output",
-    "target",
-    default="ctcr_demo",
-    show_default=True,
-    metavar="FOLDER",
-    help="Folder of the files, results and reports; that of an earlier demonstration is removed.",
-)
+@_folder("Folder of the files, results and reports", "ctcr_demo")
 @click.pass_context
 def command(context, target) -> int:
     """Find the effect that measurements of a robot hide, add it, and see the error fall.
@@ -34,15 +31,7 @@ def command(context, target) -> int:
 
 
 @command.command(name="bench")
-@click.option(
-    "-o",
-    "--output",
-    "target",
-    default="build/bench_demo",
-    show_default=True,
-    metavar="FOLDER",
-    help="Folder of the recordings, results and the report; that of an earlier demonstration is removed.",
-)
+@_folder("Folder of the recordings, results and the report", "build/bench_demo")
 @click.option("--short", is_flag=True, help="Leave out the steps that only illustrate.")
 def bench(target, short) -> int:
     """Find the effect that a robot on a simulated bench hides, add it to the model, and track with it.

@@ -7,12 +7,10 @@ from ctcr.commands import options
 
 @click.command(name="export")
 @click.argument("source", type=options.read)
-@click.option("--cpp", type=options.written, metavar="FILE.hpp", help="Write the robot of SOURCE as a C++ header.")
+@options.writes("--cpp", "FILE.hpp", "Write the robot of SOURCE as a C++ header.")
 @options.bench("With --cpp: the bench whose limits it holds.", required=False)
 @options.setting("--namespace", str, "robot", "With --cpp: the namespace of what the header declares.")
-@click.option(
-    "-o", "--output", "target", type=options.written, metavar="FILE.mcap", help="Write the recording of SOURCE as MCAP."
-)
+@options.output("FILE.mcap", "Write the recording of SOURCE as MCAP.")
 def command(source, cpp, bench_path, namespace, target) -> None:
     """Write a robot as a C++ header, or a recording as MCAP.
 

@@ -1,5 +1,7 @@
 """`ctcr import`: a log of another program as a table of measurements."""
 
+from functools import partial
+
 import click
 
 from ctcr.commands import options
@@ -23,45 +25,17 @@ def _names(context, parameter, given: tuple[str, ...]) -> list[str]:
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
-def _numbers(context, parameter, text: str | None) -> list[float] | None:
-    try:
-        return None if text is None else [float(number) for number in text.split(",")]
-    except ValueError:
-        raise click.BadParameter(f"{text}: write numbers in mm, separated by commas") from None
-
-
-def _pair_option(name: str, field: str, metavar: str, text: str):
-    return click.option(name, field, multiple=True, callback=_pairs, metavar=metavar, help=f"{text} May be repeated.")
-
-
-def _list_option(name: str, field: str, metavar: str, text: str):
-    return click.option(name, field, multiple=True, callback=_names, metavar=metavar, help=f"{text} May be repeated.")
+_pair_option = partial(options.repeated, callback=_pairs)
+_list_option = partial(options.repeated, callback=_names)
 
 
 @click.command(name="import")
 @click.argument("log", type=options.read)
-@click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="TABLE", help="The table to write."
-)
-@click.option(
-    "--robot", type=options.read, metavar="ROBOT", help="Robot file: number of tubes, their lengths and homes."
-)
-@click.option(
-    "--joints",
-    "joint_log",
-    type=options.read,
-    metavar="LOG",
-    help="Another log with the joints, where LOG holds poses alone.",
-)
-@click.option(
-    "--mapping",
-    type=options.read,
-    metavar="FILE.yaml",
-    help="What was said about an earlier log; options go before it.",
-)
-@click.option(
-    "--save-mapping", type=options.written, metavar="FILE.yaml", help="Keep what is said and guessed, for the next log."
-)
+@options.output("TABLE", "The table to write.", required=True)
+@options.reads("--robot", "ROBOT", "Robot file: number of tubes, their lengths and homes.")
+@options.reads("--joints", "LOG", "Another log with the joints, where LOG holds poses alone.", "joint_log")
+@options.reads("--mapping", "FILE.yaml", "What was said about an earlier log; options go before it.")
+@options.writes("--save-mapping", "FILE.yaml", "Keep what is said and guessed, for the next log.")
 @_pair_option("--column", "columns", "ROLE=NAME", "Column of a role, such as beta1, alpha1, x, qw, t; #3: the third.")
 @click.option("--columns", "listed", metavar="ROLES", help="Roles of all columns in their order; - for none, m1..m16.")
 @_list_option("--ignore", "ignore", "NAME", "A column that must not be used.")
@@ -72,7 +46,9 @@ def _list_option(name: str, field: str, metavar: str, text: str):
 @click.option(
     "--translation", metavar="KIND", help="beta (default), from-home or from-flush: travel outwards from there."
 )
-@click.option("--home-mm", callback=_numbers, metavar="B1,B2,..", help="beta at home or at flush tips; else of ROBOT.")
+@click.option(
+    "--home-mm", type=options.Numbers(), metavar="B1,B2,..", help="beta at home or at flush tips; else of ROBOT."
+)
 @click.option("--order", metavar="ORDER", help="Numbers of the tubes: innermost-first (default) or outermost-first.")
 @_list_option("--flip", "flip", "NAME", "Change the sign of alpha2, alpha, beta or force.")
 @_list_option("--unwrap", "unwrap", "NAME", "Take jumps of a whole turn out of alpha2 or alpha.")

@@ -10,9 +10,7 @@ DIRECTIONS = {"unknown": None, "-x": 0, "-y": 1, "-z": 2, "+x": 0, "+y": 1, "+z"
 
 
 @click.command(name="init")
-@click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="ROBOT", help="The robot file to write."
-)
+@options.output("ROBOT", "The robot file to write.", required=True)
 @click.option("--name", help="Name of the robot.")
 @click.option(
     "--tube",
@@ -29,7 +27,9 @@ DIRECTIONS = {"unknown": None, "-x": 0, "-y": 1, "-z": 2, "+x": 0, "+y": 1, "+z"
     help="Where weights fall in the base frame, whose z is along the insertion; unknown (default): no weight.",
 )
 @click.option("--sensor-on-tube", type=click.IntRange(1, 4), help="The tube with the sensor; default 1, innermost.")
-@click.option("--home-mm", metavar="B1,B2,..", help="beta of each tube at home; default: flush tips.")
+@click.option(
+    "--home-mm", type=options.Numbers(), metavar="B1,B2,..", help="beta of each tube at home; default: flush tips."
+)
 def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> None:
     """Write a new robot file.
 
@@ -56,9 +56,10 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     robot.name = name or robot.name
     robot.sensor_on_tube = sensor_on_tube or 1
     robot.gravity = _vector(gravity or "unknown")
-    robot.home_mm = _numbers(home_mm)
+    robot.home_mm = home_mm or []
     if any(home > 0 for home in robot.home_mm):
-        text = f"{home_mm}: beta is 0 at the front plate and negative behind it: write --home-mm=-400,-300"
+        given = ",".join(f"{home:g}" for home in home_mm)
+        text = f"{given}: beta is 0 at the front plate and negative behind it: write --home-mm=-400,-300"
         raise InputError(Problem(text, field="--home-mm"))
     text = new_file.text(robot)
     loaded = robot_file.parse(text.encode(), target)
@@ -113,10 +114,3 @@ def _ask_sensor(count: int) -> int:
 def _vector(direction: str) -> list[float] | None:
     axis = DIRECTIONS[direction]
     return None if axis is None else [(-9.80665 if direction[0] == "-" else 9.80665) * (i == axis) for i in range(3)]
-
-
-def _numbers(text: str | None) -> list[float]:
-    try:
-        return [float(number) for number in text.split(",")] if text else []
-    except ValueError:
-        raise click.BadParameter(f"{text}: write numbers in mm, separated by commas") from None

@@ -8,9 +8,7 @@ from ctcr.commands import options
 @click.command(name="join")
 @options.robot
 @click.argument("tables", nargs=-1, type=options.read, required=True, metavar="MEASUREMENTS...")
-@click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="TABLE", help="The table to write."
-)
+@options.output("TABLE", "The table to write.", required=True)
 def command(robot, tables, target) -> None:
     """Join the tables of one session.
 

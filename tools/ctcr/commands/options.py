@@ -73,6 +73,28 @@ def finite(option: str, values: list[float], count: int):
 
 
 read, written = File(written=False), File(written=True)
+
+
+def reads(name: str, metavar: str, text: str, *field: str):
+    """An option that names a file to read; `field`: the parameter that holds it, where that has another name."""
+    return click.option(name, *field, type=read, metavar=metavar, help=text)
+
+
+def writes(name: str, metavar: str, text: str, *field: str, **more):
+    """An option that names a file to write."""
+    return click.option(name, *field, type=written, metavar=metavar, help=text, **more)
+
+
+def output(metavar: str, text: str, required: bool = False, kind: click.ParamType | None = written, **more):
+    """-o, as `target`: the file or, without a `kind`, the folder to write."""
+    return click.option("-o", "--output", "target", type=kind, required=required, metavar=metavar, help=text, **more)
+
+
+def repeated(name: str, field: str, metavar: str, text: str, **more):
+    """An option that may be given several times."""
+    return click.option(name, field, multiple=True, metavar=metavar, help=f"{text} May be repeated.", **more)
+
+
 robot = click.argument("robot", type=read)
 measurements = click.argument("measurements", type=read)
 folder_name = click.option(
@@ -87,12 +109,11 @@ noise = setting(
     "jitter",
     "jitter: white noise as the robot file states; realistic: also the tracker's smooth field error and outliers.",
 )
-hide = click.option(
+hide = repeated(
     "--hide",
     "hidden",
-    multiple=True,
-    metavar="EFFECT[.PARAMETER[.TUBE]]=VALUE",
-    help="Give the simulated robot an effect that ROBOT lacks; SI units (`ctcr effects EFFECT`). May be repeated.",
+    "EFFECT[.PARAMETER[.TUBE]]=VALUE",
+    "Give the simulated robot an effect that ROBOT lacks; SI units (`ctcr effects EFFECT`).",
 )
 free = setting(
     "--free",
@@ -130,8 +151,8 @@ def folder(function):
 
 def new_robot(function):
     """-o and --in-place, as `target` and `in_place`: the robot file to write."""
-    target = click.option("-o", "--output", "target", type=written, metavar="NEW", help="Write the changed robot file.")
-    return target(click.option("--in-place", is_flag=True, help="Change the robot file itself.")(function))
+    in_place = click.option("--in-place", is_flag=True, help="Change the robot file itself.")
+    return output("NEW", "Write the changed robot file.")(in_place(function))
 
 
 def _load_effects(context, parameter, files) -> None:
@@ -142,15 +163,15 @@ def _load_effects(context, parameter, files) -> None:
 
 
 # Eager: the robot file may name these effects.
-effects = click.option(
+effects = repeated(
     "--effects",
-    multiple=True,
+    "effects",
+    "FILE.py",
+    "Python file with effects of your own, which then count as those of the catalogue.",
     type=read,
-    metavar="FILE.py",
     is_eager=True,
     expose_value=False,
     callback=_load_effects,
-    help="Python file with effects of your own, which then count as those of the catalogue. May be repeated.",
 )
 
 
@@ -263,5 +284,5 @@ def _gives_output(*options):
 _json = click.option(
     "--json", "json_target", type=written, metavar="FILE", help="Write the result as JSON; - for standard output."
 )
-_report = click.option("--report", type=written, metavar="FILE.html", help="Write one self-contained HTML page.")
+_report = writes("--report", "FILE.html", "Write one self-contained HTML page.")
 json, outputs = _gives_output(_json), _gives_output(_json, _report)

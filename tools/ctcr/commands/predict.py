@@ -14,9 +14,7 @@ LISTED_ROWS = 20
 @click.command(name="predict")
 @options.robot
 @click.argument("table", type=options.read)
-@click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="FILE", help="The table to write."
-)
+@options.output("FILE", "The table to write.", required=True)
 @options.setting(
     "--frame", click.Choice(["tracker", "base"]), "tracker", "Frame of the predicted poses; tracker: as measured ones."
 )

@@ -8,9 +8,7 @@ from ctcr.commands import options
 @click.command(name="record")
 @options.robot
 @click.argument("plan", type=options.read)
-@click.option(
-    "-o", "--output", "target", required=True, metavar="FOLDER", help="The recording; one that is there is resumed."
-)
+@options.output("FOLDER", "The recording; one that is there is resumed.", required=True, kind=None)
 @options.bench("The devices and their limits.")
 @options.setting("--dwell", options.Finite(0), 0.5, "Rest before the first reading [s].")
 @options.setting("--readings", click.IntRange(1), 1, "Readings per row of the plan.")
@@ -25,12 +23,7 @@ from ctcr.commands import options
 @options.setting("--approach-deg", options.Finite(0), 5.0, "Length of the approach [deg].")
 @options.setting("--patience", options.Finite(0.1), 30.0, "How long the tracker may lose the sensor [s].")
 @options.effects
-@click.option(
-    "--page",
-    type=options.written,
-    metavar="FILE.html",
-    help="Show progress and error on a page that the browser reloads.",
-)
+@options.writes("--page", "FILE.html", "Show progress and error on a page that the browser reloads.")
 @options.folder
 @options.json
 def command(robot, plan, target, bench_path, dwell, readings, speed, patience, page, folder, out, **approach) -> None:

@@ -7,15 +7,7 @@ from ctcr.commands import options
 
 @click.command(name="reproduce")
 @click.option("--quick", is_flag=True, help="Fewer designs, configurations and repetitions: under a minute.")
-@click.option(
-    "--report",
-    "target",
-    type=options.written,
-    metavar="FILE.html",
-    default="reproduction.html",
-    show_default=True,
-    help="The page.",
-)
+@options.writes("--report", "FILE.html", "The page.", "target", default="reproduction.html", show_default=True)
 @options.json
 def command(quick: bool, target: str, out) -> None:
     """Compute the paper's results beside ours.

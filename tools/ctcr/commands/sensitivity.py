@@ -8,19 +8,14 @@ from ctcr.commands import options
 @click.command(name="sensitivity")
 @options.robot
 @click.option("--open-loop", type=click.IntRange(min=1), metavar="N", help="Predict tips at N random configurations.")
-@click.option("--closed-loop", type=options.read, metavar="SCENARIO", help="Track the path of this scenario file.")
+@options.reads("--closed-loop", "SCENARIO", "Track the path of this scenario file.")
 @options.setting(
     "--accuracy", options.Finite(0, min_open=True), 1.0, "Wanted accuracy [mm]: which parameters need calibration?"
 )
 @options.setting("--force", options.Finite(0), 0.3, "Open loop: largest tip force [N].")
 @options.setting("--points", click.IntRange(2, 101), 5, "Closed loop: values over each range.")
 @options.seed
-@click.option(
-    "--resume",
-    type=options.written,
-    metavar="FILE",
-    help="Keep the progress in FILE, and resume from it after an interruption.",
-)
+@options.writes("--resume", "FILE", "Keep the progress in FILE, and resume from it after an interruption.")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a dask.distributed cluster that does the work.")
 @options.outputs
 def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume, dask, out) -> None:

@@ -4,11 +4,8 @@ import click
 
 from ctcr.commands import options
 
-scenario_option = click.option(
-    "--scenario",
-    type=options.read,
-    metavar="FILE.yaml",
-    help="Faults at set times: a list of `at_s` with the faults that change.",
+scenario_option = options.reads(
+    "--scenario", "FILE.yaml", "Faults at set times: a list of `at_s` with the faults that change."
 )
 
 
@@ -78,8 +75,8 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @options.folder
 @robot_options
-@click.option("--tracker-scenario", type=options.read, metavar="FILE.yaml", help="Faults of the tracker at set times.")
-@click.option("--bus-scenario", type=options.read, metavar="FILE.yaml", help="Faults of the bus at set times.")
+@options.reads("--tracker-scenario", "FILE.yaml", "Faults of the tracker at set times.")
+@options.reads("--bus-scenario", "FILE.yaml", "Faults of the bus at set times.")
 def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physics) -> int:
     """Simulate a whole bench around ROBOT while COMMAND runs (default: a shell); its motors move the tracked tip.
 

@@ -12,9 +12,7 @@ from ctcr.commands import options
 @options.noise
 @options.seed
 @options.effects
-@click.option(
-    "-o", "--output", "target", type=options.written, required=True, metavar="MEASUREMENTS", help="The table to write."
-)
+@options.output("MEASUREMENTS", "The table to write.", required=True)
 def command(robot, plan, hidden, noise, seed, target) -> None:
     """Simulate the measurements of a plan.
 

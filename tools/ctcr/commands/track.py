@@ -8,12 +8,10 @@ from ctcr.commands import options
 @click.command(name="track")
 @options.robot
 @click.argument("scenario", type=options.read)
-@click.option(
-    "--plant", type=options.read, metavar="ROBOT2", help="The robot that is controlled, where it differs from ROBOT."
-)
+@options.reads("--plant", "ROBOT2", "The robot that is controlled, where it differs from ROBOT.")
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
 @options.bench("The devices and their limits.", required=False)
-@click.option("-o", "--output", "target", metavar="FOLDER", help="The recording; one that is there is resumed.")
+@options.output("FOLDER", "The recording; one that is there is resumed.", kind=None)
 @options.setting("--patience", options.Finite(0.1), 2.0, "How long the tracker may lose the sensor [s].")
 @options.setting("--most-error-mm", options.Finite(1), 20.0, "Stop where the tip is farther from its reference [mm].")
 @options.folder_name
