@@ -78,16 +78,11 @@ def open_loop(plan: scenario.Scenario, controller: Robot, plant: Robot) -> np.nd
     )
     values = runs.system_values(controller)
     run = runs.run_once(own, values, values, 0.0)
-    n, count, drive = plant.n_tubes, len(run.time), controller.actuation
-    replay = Measurements(
+    n, drive = plant.n_tubes, controller.actuation
+    replay = Measurements.of_joints(
+        run.joints[:, :n] - drive.translation_correction,
+        run.joints[:, n:] - drive.rotation_correction,
         t=run.time,
-        run=np.zeros(count, int),
-        beta=run.joints[:, :n] - drive.translation_correction,
-        alpha=run.joints[:, n:] - drive.rotation_correction,
-        force=np.zeros((count, 3)),
-        position=None,
-        quaternion=None,
-        row=np.arange(count) + 2,
         from_home=False,  # as the controller planned: at rest at the start of the path
     )
     read = simulation.simulate(plant, replay, "none")

@@ -31,16 +31,8 @@ def sweeps(plan: Measurements) -> tuple[Measurements, np.ndarray]:
     alpha = np.concatenate([plan.alpha[k] + way[:, None] * t for k, t in zip(starts, turn, strict=True)])
     count = len(way)
     hidden = np.tile(np.arange(count) == count - 2, RUNS)
-    return Measurements(
-        t=2.0 * np.arange(RUNS * count),
-        run=np.repeat(np.arange(RUNS), count),
-        beta=np.repeat(plan.beta[starts], count, axis=0),
-        alpha=alpha,
-        force=np.zeros((RUNS * count, 3)),
-        position=None,
-        quaternion=None,
-        row=np.arange(RUNS * count) + 2,
-    ), hidden
+    beta, run = np.repeat(plan.beta[starts], count, axis=0), np.repeat(np.arange(RUNS), count)
+    return Measurements.of_joints(beta, alpha, t=2.0 * np.arange(RUNS * count), run=run), hidden
 
 
 @pytest.fixture(scope="module")

@@ -34,8 +34,7 @@ def readings(robot, alpha, position):
     """A table of one reading, at the joints of the robot."""
     beta, alpha = BETA - robot.actuation.translation_correction, alpha - robot.actuation.rotation_correction
     quaternion = np.array([[1.0, 0.0, 0.0, 0.0]])
-    run, row = np.zeros(1, int), np.array([2])
-    return Measurements(np.zeros(1), run, beta[None], alpha[None], np.zeros((1, 3)), position[None], quaternion, row)
+    return Measurements.of_joints(beta[None], alpha[None], position=position[None], quaternion=quaternion)
 
 
 def in_tracker(robot, position):

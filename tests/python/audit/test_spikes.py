@@ -42,16 +42,9 @@ def paths(plan):
     count = RUNS * len(way)
     force = np.zeros((count, 3))
     force[:, 1] = -0.1 * np.repeat(np.arange(RUNS) % 3, len(way))
-    return Measurements(
-        t=2.0 * np.arange(count),
-        run=np.repeat(np.arange(RUNS), len(way)),
-        beta=np.repeat(plan.beta[starts], len(way), axis=0),
-        alpha=np.concatenate([plan.alpha[k] + way[:, None] * t for k, t in zip(starts, turn, strict=True)]),
-        force=force,
-        position=None,
-        quaternion=None,
-        row=np.arange(count) + 2,
-    )
+    beta, run = np.repeat(plan.beta[starts], len(way), axis=0), np.repeat(np.arange(RUNS), len(way))
+    alpha = np.concatenate([plan.alpha[k] + way[:, None] * t for k, t in zip(starts, turn, strict=True)])
+    return Measurements.of_joints(beta, alpha, t=2.0 * np.arange(count), run=run, force=force)
 
 
 def measured(robot, paths, effect=None, seed=1):

@@ -18,16 +18,8 @@ def table():
     random = np.random.default_rng(5)
     beta, alpha = random.uniform(-0.2, -0.1, (120, 3))[VISITS], random.uniform(-3, 3, (120, 3))[VISITS]
     count, nothing = len(VISITS), np.full((len(VISITS), 4), np.nan)
-    return Measurements(
-        2.0 * np.arange(count),
-        np.arange(count) // 24,
-        beta,
-        alpha,
-        np.zeros((count, 3)),
-        nothing[:, :3],
-        nothing,
-        np.arange(count) + 2,
-    )
+    poses = {"position": nothing[:, :3], "quaternion": nothing}
+    return Measurements.of_joints(beta, alpha, t=2.0 * np.arange(count), run=np.arange(count) // 24, **poses)
 
 
 def fit(random, errors):

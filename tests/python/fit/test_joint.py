@@ -86,15 +86,12 @@ def table(truth: Robot, rows: int = 80, seed: int = 0, noise: Noise = NOISE) -> 
     beta, alpha, tips = beta[quiet], alpha[quiet], replace(tips, **_taken(tips, quiet))
     position, quaternion = base_to_tracker(truth.tracker, tips.position, tips.quaternion)
     turn = quaternion_from_rotation_vector(noise.rotation_jitter * random.standard_normal((rows, 3)))
-    return Measurements(
-        t=np.arange(rows, dtype=float),
+    return Measurements.of_joints(
+        beta,
+        alpha,
         run=np.arange(rows) * 8 // rows,
-        beta=beta,
-        alpha=alpha,
-        force=np.zeros((rows, 3)),
         position=position + noise.position_jitter * random.standard_normal((rows, 3)),
         quaternion=product(turn, quaternion),
-        row=np.arange(2, rows + 2),
     )
 
 

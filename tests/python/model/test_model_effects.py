@@ -53,17 +53,7 @@ def bench_robot(sensor: int = 1):
 
 
 def table_of(beta, alpha, force) -> Measurements:
-    rows = len(beta)
-    return Measurements(
-        t=np.full(rows, np.nan),
-        run=np.zeros(rows, np.int64),
-        beta=beta,
-        alpha=alpha,
-        force=force,
-        position=None,
-        quaternion=None,
-        row=np.arange(rows) + 2,
-    )
+    return Measurements.of_joints(beta, alpha, t=np.full(len(beta), np.nan), force=force)
 
 
 @pytest.mark.parametrize("identity", STRENGTHS)

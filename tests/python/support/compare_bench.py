@@ -78,16 +78,8 @@ def bench(random, path, error=None, noise_mm=JITTER_MM, quaternion=None, **optio
     planted = np.zeros_like(position) if error is None else error(joints, t, run)
     measured = (position + planted) @ description.tracker.rotation.T + description.tracker.position
     measured = measured + random.normal(0, noise_mm * 1e-3, position.shape)
-    readings = Measurements(
-        np.asarray(t, float),
-        np.asarray(run),
-        joints[:, :2],
-        joints[:, 2:],
-        np.zeros_like(position),
-        measured,
-        quaternion,
-        row=np.arange(len(run)) + 2,
-    )
+    given = {"t": np.asarray(t, float), "run": np.asarray(run), "position": measured, "quaternion": quaternion}
+    readings = Measurements.of_joints(*np.hsplit(joints, 2), **given)
     prediction = SimpleNamespace(position=position, quaternion=orientation, status=np.zeros(len(run), int))
     return description, readings, prediction
 

@@ -82,16 +82,9 @@ def session(
         hung = [0.0, -weight * (run % 2), 0.0]
         rows += [[run, *(ends[0] + k * (ends[1] - ends[0])), *hung] for k in part]
     table = np.array(rows)
-    plan = Measurements(
-        t=2.0 * np.arange(len(table)),
-        run=table[:, 0].astype(np.int64),
-        beta=table[:, 1 : 1 + n],
-        alpha=table[:, 1 + n : 1 + 2 * n],
-        force=table[:, 1 + 2 * n :],
-        position=None,
-        quaternion=None,
-        row=np.arange(len(table)) + 2,
-    )
+    beta, alpha, force = np.split(table[:, 1:], [n, 2 * n], axis=1)
+    t, run = 2.0 * np.arange(len(table)), table[:, 0].astype(np.int64)
+    plan = Measurements.of_joints(beta, alpha, t=t, run=run, force=force)
     built = simulation.as_built(robot, random)
     built.actuation.recorded_home_translation_mm = robot.actuation.home_translation_mm
     built.actuation.recorded_home_rotation_deg = robot.actuation.home_rotation_deg

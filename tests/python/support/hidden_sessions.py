@@ -28,10 +28,9 @@ def session(robot, random, runs=8, stops=6):
         for beta, alpha in [*way, *reversed(way)]:
             rows.append((2.0 * len(rows), run, beta, alpha, (0, -0.1 * (run % 2), 0)))
     t, run, beta, alpha, force = (np.array(column) for column in zip(*rows, strict=True))
-    empty = np.full((len(t), 3), np.nan)
-    return Measurements(
-        t, run, beta, alpha, force.astype(float), empty, np.full((len(t), 4), np.nan), np.arange(len(t)) + 2
-    )
+    position, quaternion = np.full((len(t), 3), np.nan), np.full((len(t), 4), np.nan)
+    given = {"t": t, "run": run, "force": force.astype(float), "position": position, "quaternion": quaternion}
+    return Measurements.of_joints(beta, alpha, **given)
 
 
 def measured(robot, random, hidden, calibration=0.5, fixed=None):

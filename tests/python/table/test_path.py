@@ -24,17 +24,7 @@ def stream(random: np.random.Generator, timed: bool = True) -> tuple[Measurement
     count = len(joints)
     times = np.array(t) if timed else np.full(count, np.nan)
     nothing = np.full((count, 3), np.nan)
-    table = Measurements(
-        times,
-        np.zeros(count, int),
-        joints[:, :2],
-        joints[:, 2:],
-        np.zeros((count, 3)),
-        nothing,
-        None,
-        np.arange(2, count + 2),
-    )
-    return table, at
+    return Measurements.of_joints(*np.hsplit(joints, 2), t=times, position=nothing), at
 
 
 @pytest.mark.parametrize("timed", [True, False])

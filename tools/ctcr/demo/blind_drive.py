@@ -33,14 +33,14 @@ def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:
     for number, point in enumerate(np.asarray(points, float), start=1):
         rows.append(rows[-1])
         for _ in range(MOST_STEPS):
-            table = _table(np.array(rows))
+            table = _table(rows)
             error = robot.tracker.rotation.T @ (point - simulation.simulate(robot, table, "none").position[-1])
             if np.linalg.norm(error) < CLOSE:
                 break
             rows[-1] = rows[-1] + _step(robot, table, error)
         else:
             raise InputError(Problem(f"the model does not reach point {number}", field="drive"))
-    return _table(np.array(rows))
+    return _table(rows)
 
 
 def _step(robot: Robot, table: Measurements, error: Array) -> Array:
@@ -54,15 +54,5 @@ def _step(robot: Robot, table: Measurements, error: Array) -> Array:
     return scale * (scaled.T @ np.linalg.solve(square + DAMPING * np.trace(square) * np.eye(3), error))
 
 
-def _table(joints: Array) -> Measurements:
-    rows, n = len(joints), joints.shape[1] // 2
-    return Measurements(
-        t=np.arange(rows, dtype=float),
-        run=np.zeros(rows, np.int64),
-        beta=joints[:, :n],
-        alpha=joints[:, n:],
-        force=np.zeros((rows, 3)),
-        position=None,
-        quaternion=None,
-        row=np.arange(rows) + 2,
-    )
+def _table(joints: list[Array]) -> Measurements:
+    return Measurements.of_joints(*np.hsplit(np.array(joints), 2))

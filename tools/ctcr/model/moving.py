@@ -46,13 +46,10 @@ class MovingModel:
         """What the tracker reads without noise, now: position (3,) [m], quaternion (4,); NaN where unsolved."""
         t, joints, force = (np.array(column) for column in zip(*self._turns, *self._recent, strict=True))
         end = max(SESSION_S + self._start, t[-1] + 1.0)  # the session goes on behind the last row
-        t, rows = np.append(t, end), len(t) + 1
-        n = self.robot.n_tubes
         joints, force = (np.vstack([column, column[-1:]]) for column in (joints, force))
-        run, row = np.zeros(rows, np.int64), np.arange(rows)
-        table = Measurements(t, run, joints[:, :n], joints[:, n:], force, None, None, row, from_home=False)
+        table = Measurements.of_joints(*np.hsplit(joints, 2), t=np.append(t, end), force=force, from_home=False)
         model = user_recording.recording_of(self.robot, table, threads=1)
-        now = np.arange(rows) == rows - 2
+        now = np.arange(len(table)) == len(table) - 2
         model.activate(now.tolist())
         model.residual(np.empty(0))
         position, quaternion = model.predicted()

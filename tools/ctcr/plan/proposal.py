@@ -180,16 +180,11 @@ def _orders(beta: Array, robot: Robot) -> Array:
 
 def table(robot: Robot, runs: list[Run], first_run: int = 0) -> Measurements:
     """The runs one after the other as a table without poses."""
-    rows = sum(len(run.beta) for run in runs)
-    down = np.array(robot.gravity if robot.gravity is not None else (0.0, 0.0, 0.0))
-    mass = np.concatenate([np.full(len(run.beta), run.mass) for run in runs])
-    return Measurements(
-        t=settings.PLAN_STOP_S * np.arange(rows),
-        run=np.repeat(np.arange(first_run, first_run + len(runs)), [len(run.beta) for run in runs]),
+    stops = [len(run.beta) for run in runs]
+    return Measurements.of_joints(
         beta=np.vstack([run.beta for run in runs]),
         alpha=np.vstack([run.alpha for run in runs]),
-        force=mass[:, None] * down,
-        position=None,
-        quaternion=None,
-        row=np.arange(rows) + 2,
+        t=settings.PLAN_STOP_S * np.arange(sum(stops)),
+        run=np.repeat(first_run + np.arange(len(runs)), stops),
+        force=np.repeat([run.mass for run in runs], stops)[:, None] * robot.gravity_vector,
     )

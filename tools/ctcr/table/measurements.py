@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Union
+from typing import TYPE_CHECKING, Any, ClassVar, Union
 
 import numpy as np
 
@@ -65,6 +65,14 @@ class Measurements(Shown):
     about: Array | None = None  # (3,) `centre` [m] of the whole table, where these are some of its rows
 
     COLUMNS: ClassVar = ("t", "run", "beta", "alpha", "force", "position", "quaternion", "row")  # one value a row
+
+    @classmethod
+    def of_joints(cls, beta: Array, alpha: Array, **others: Any) -> "Measurements":
+        """Rows of these joints (M, N) [m], [rad], numbered as in a file; of what `others` do not say: without poses and
+        loads, in one run, a second apart."""
+        rows = np.arange(len(beta))
+        nothing = {"t": rows.astype(float), "run": np.zeros_like(rows), "force": np.zeros((len(rows), 3))}
+        return cls(**nothing | {"position": None, "quaternion": None} | others, beta=beta, alpha=alpha, row=rows + 2)
 
     def __len__(self) -> int:
         return len(self.run)
