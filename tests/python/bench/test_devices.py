@@ -290,13 +290,13 @@ def test_bench_file_faults(tmp_path):
     ("old", "new", "says"),
     [
         ("rotation_terminals: [4,", "rotation_terminals: [3,", "rotation_terminals: 3 stands there twice: needs"),
-        ("[1, 2, 3]", "[1, -2, 3]", "translation_terminals.1: .* or equal to 1: needs positions on the bus"),
-        ("[4, 5, 6]", "[4, 5, 0]", "rotation_terminals.2: .*the coupler is 0"),
+        ("[1, 2, 3]", "[1, -2, 3]", "translation_terminals.1.: -2 does not fit: needs positions on the bus"),
+        ("[4, 5, 6]", "[4, 5, 0]", "rotation_terminals.2.: .*the coupler is 0"),
         ("1000", "500000", "motors.current_mA: 500000 is impossible: needs a number in mA, > 0 and <= 5000"),
         ("1000", "1000\n  encoder_counts: 70000", "motors.encoder_counts: 70000 is impossible: .* <= 65535"),
         ("1000", "1000\n  full_steps: 400000", "motors.full_steps: 400000 is impossible: .* <= 65535"),
         ("1000", "1000\n  period_ms: 1000", "motors.period_ms: 1000 is impossible: .* in ms, > 0 and <= 50"),
-        ("[-335, -180]", "[-180, -335]", "translation_mm.1: the highest is below the lowest: needs a pair .* mm"),
+        ("[-335, -180]", "[-180, -335]", "translation_mm.1.: the highest is below the lowest: needs a pair .* mm"),
     ],
 )
 def test_impossible_bench(tmp_path, old, new, says):

@@ -2,16 +2,18 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import ValidationError
 
-from ctcr.errors import Problem, did_you_mean, shown
+from ctcr.errors import InputError, Problem, did_you_mean, shown
 from ctcr.robot import defaults
 from ctcr.robot.description import AT_PLATE, Robot, Section, Tube, path_of
 from ctcr.robot.yaml_document import FieldPath, YamlDocument
 
 Fault = tuple[FieldPath, str]
+S = TypeVar("S", bound=Section)
 
 _PER_TUBE = ("home_translation_mm", "home_rotation_deg", "recorded_home_translation_mm", "recorded_home_rotation_deg")
 _MAX_STRAIN = 0.08  # superelastic nitinol recovers about that much
@@ -32,13 +34,19 @@ def faults(data: Any, errors: list[dict[str, Any]]) -> list[Fault]:
         if is_unknown:
             meant = did_you_mean(str(field), section.model_fields)
             missing = [other for other in missing if other != (*path[:-1], meant)]  # one mistake, one fault
-            found.append((path, _unknown(section, str(field), meant)))
-        elif error["type"] != "missing":
-            found.append((path, f"{_complaint(error)}: needs {section.expected(field)}"))
-    for path in dict.fromkeys(missing):
-        section, field = Robot.owner(path)
-        found.append((path, f"is missing: needs {section.expected(field)}"))
+        if error["type"] != "missing":
+            found.append(_of_field(Robot, error))
+    found += [_of_field(Robot, {"loc": path, "type": "missing"}) for path in dict.fromkeys(missing)]
     return found + list(_relations(data, tubes))
+
+
+def validated(kind: type[S], document: YamlDocument) -> S:
+    """The section that a document describes. Raises InputError with all faults of its fields."""
+    try:
+        return kind.model_validate(document.data)
+    except ValidationError as error:
+        found = [_of_field(kind, one) for one in error.errors(include_url=False)]
+        raise InputError(problems(found, document)) from None
 
 
 def doubts(robot: Robot) -> Iterator[Fault]:
@@ -148,7 +156,17 @@ def _missing_of_tubes(tubes: list[dict], weighed: bool) -> list[FieldPath]:
     return absent
 
 
-def _unknown(section: type[Section], field: str, meant: str | None) -> str:
+def _of_field(kind: type[Section], error: dict[str, Any]) -> Fault:
+    """What pydantic found in a field of a section or of those below it, and what the field needs."""
+    path, is_unknown = path_of(error)
+    section, field = kind.owner(path)
+    if is_unknown:
+        return path, _unknown(section, str(field))
+    return path, f"{_complaint(error)}: needs {section.expected(field)}"
+
+
+def _unknown(section: type[Section], field: str) -> str:
+    meant = did_you_mean(field, section.model_fields)
     if meant is None:
         return "unknown field: the fields here are " + ", ".join(section.model_fields)
     quantity = section.quantity(meant)
@@ -157,8 +175,10 @@ def _unknown(section: type[Section], field: str, meant: str | None) -> str:
 
 
 def _complaint(error: dict[str, Any]) -> str:
-    value = error["input"]
+    value = error.get("input")
     match error["type"]:
+        case "missing":
+            return "is missing"
         case "impossible":
             return error["msg"]
         case "too_short" | "too_long":

@@ -11,13 +11,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Len
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr
 
 from ctcr.arrays import Array
-from ctcr.errors import InputError, Problem, did_you_mean, shown
+from ctcr.errors import InputError, Problem
 from ctcr.robot import yaml_document
-from ctcr.robot.checks import problems
-from ctcr.robot.description import Section, Three, path_of
+from ctcr.robot.checks import problems, validated
+from ctcr.robot.description import Section, Three
 from ctcr.robot.units import Quantity
 
 # All twelve edges of a cube: three are travelled twice, as each of its eight corners has three edges. Bit k of a
@@ -158,27 +158,11 @@ def _scenario(document: yaml_document.YamlDocument, n_tubes: int) -> Scenario:
     if not isinstance(document.data, dict):
         text = "does not describe a scenario: no fields such as name, trajectory, start"
         raise InputError(Problem(text, document.file))
-    try:
-        scenario = Scenario.model_validate(document.data)
-        faults = [*_relations(scenario, n_tubes), *_unusual(scenario)]
-    except ValidationError as error:
-        faults = [_fault(item) for item in error.errors(include_url=False)]
-    if faults:
+    scenario = validated(Scenario, document)
+    if faults := [*_relations(scenario, n_tubes), *_unusual(scenario)]:
         raise InputError(problems(faults, document))
     scenario._source = document
     return scenario
-
-
-def _fault(error: dict) -> tuple[tuple, str]:
-    """Path and message of a fault that pydantic found."""
-    path, is_unknown = path_of(error)
-    section, field = Scenario.owner(path)
-    if is_unknown:
-        meant = did_you_mean(str(field), section.model_fields)
-        return path, f"unknown field{f': did you mean {meant}?' if meant else ''}"
-    expected = section.expected(field) if field in section.model_fields else "its fields"
-    fault = "is missing" if error["type"] == "missing" else shown(error["input"])
-    return path, f"{fault}: needs {expected}"
 
 
 def _relations(s: Scenario, n: int):

@@ -5,15 +5,16 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Len
-from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from ctcr.bench.devices.axis_control import AxisSettings
 from ctcr.bench.devices.joint_limits import JointLimits
 from ctcr.bench.shared.folder import AURORA, MASTER
-from ctcr.errors import InputError, Problem, did_you_mean
+from ctcr.errors import InputError, Problem
 from ctcr.robot import yaml_document
-from ctcr.robot.description import MAX_TUBES, Robot, Section, path_of
+from ctcr.robot.checks import validated
+from ctcr.robot.description import MAX_TUBES, Robot, Section
 from ctcr.robot.units import Quantity
 
 SIMULATED = "simulated"
@@ -21,7 +22,7 @@ SIMULATED = "simulated"
 
 def _rising(pair: list[float]) -> list[float]:
     if pair[0] > pair[1]:
-        raise PydanticCustomError("reversed", "the highest is below the lowest")
+        raise PydanticCustomError("impossible", "the highest is below the lowest")
     return pair
 
 
@@ -65,7 +66,7 @@ class Motors(Section):
         others = info.data.get("translation_terminals", []) if info.field_name == "rotation_terminals" else []
         used = [*others, *positions]
         if twice := next((position for position in used if used.count(position) > 1), None):
-            raise PydanticCustomError("twice", "{position} stands there twice", {"position": twice})
+            raise PydanticCustomError("impossible", "{position} stands there twice", {"position": twice})
         return positions
 
 
@@ -128,23 +129,7 @@ class Bench(Section):
 
 def load(path: str | Path) -> Bench:
     """The bench that a file describes. Raises InputError with all its faults."""
-    document, file = yaml_document.load(path), str(path)
+    document = yaml_document.load(path)
     if not isinstance(document.data, dict):
-        raise InputError(Problem("does not describe a bench: no fields tracker, motors, limits", file))
-    try:
-        return Bench.model_validate(document.data)
-    except ValidationError as error:
-        raise InputError(_problem(fault, document, file) for fault in error.errors(include_url=False)) from None
-
-
-def _problem(fault: dict, document: yaml_document.YamlDocument, file: str) -> Problem:
-    """What pydantic found, where, and what the field needs."""
-    path, is_unknown = path_of(fault)
-    section, field = Bench.owner(path)
-    if is_unknown:
-        meant = did_you_mean(str(field), section.model_fields)
-        text = "unknown field" + (f": did you mean {meant}?" if meant else "")
-    else:
-        complaint = "is missing" if fault["type"] == "missing" else fault["msg"].lower()
-        text = f"{complaint}: needs {section.expected(str(field))}"
-    return Problem(text, file, document.line(path), ".".join(map(str, path)))
+        raise InputError(Problem("does not describe a bench: no fields tracker, motors, limits", str(path)))
+    return validated(Bench, document)
