@@ -1,13 +1,20 @@
 """What a user says about the logs of a laboratory, by options and in a small YAML file kept for the next log."""
 
 import re
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any
 
-from ctcr.errors import InputError, Problem, shown, suggestion
+from pydantic import BeforeValidator, Field
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+
+from ctcr.errors import InputError, Problem
 from ctcr.intake.names import quantity
 from ctcr.robot import yaml_document
+from ctcr.robot.checks import validated
+from ctcr.robot.description import Section
+from ctcr.robot.robot_file import LINE_WIDTH
 from ctcr.show.output import atomic_writer
 
 TRANSLATIONS = ("beta", "from-home", "from-flush")
@@ -19,10 +26,22 @@ _ROLE = re.compile(rf"t|nsec|run|seen|weight|(?:beta|alpha)[1-9]|f[xyz]|(?:ref_)
 ROLES = (
     "t, nsec, run, beta1.., alpha1.., fx, fy, fz, weight, x, y, z, qw, qx, qy, qz, rx, ry, rz, m11.. or m1..m16, seen"
 )
+HEAD = "# How the columns of these logs become measurements: ctcr import LOG --mapping THIS -o measurements.csv\n"
 
 
-@dataclass
-class Choices:
+def _text(value: Any) -> Any:
+    return str(value) if isinstance(value, int | float) else value
+
+
+Texts = Annotated[
+    dict[str, Annotated[str, BeforeValidator(_text)]], Field(description="names with values, indented below it")
+]
+Names = Annotated[list[str], Field(description="a list of names")]
+Numbers = Annotated[list[float] | None, Field(description="a list of numbers")]
+Text = Annotated[str | None, Field(description="text")]
+
+
+class Choices(Section):
     """Fields of the YAML file, which the options of `ctcr import` go before. Numbers of tubes: 1 is the innermost.
 
     columns     role -> name of a column, or #3; roles are those of ROLES, with ref_ before those of a reference marker
@@ -38,38 +57,38 @@ class Choices:
     mirror      an axis of a left-handed tracker frame
     """
 
-    columns: dict[str, str] = field(default_factory=dict)
-    ignore: list[str] = field(default_factory=list)
-    units: dict[str, str] = field(default_factory=dict)
-    missing: list[str] = field(default_factory=list)
-    translation: str | None = None
-    home_mm: list[float] | None = None
-    order: str | None = None
-    flip: list[str] = field(default_factory=list)
-    unwrap: list[str] = field(default_factory=list)
-    offsets: dict[str, str] = field(default_factory=dict)
-    constants: dict[str, str] = field(default_factory=dict)
-    sensor: str | None = None
-    relative_to: str | None = None
-    quaternion: str | None = None
-    invert_quaternion: bool = False
-    invert_pose: bool = False
-    euler: str | None = None
-    mirror: str | None = None
+    columns: Texts = {}
+    ignore: Names = []
+    units: Texts = {}
+    missing: Names = []
+    translation: Text = None
+    home_mm: Numbers = None
+    order: Text = None
+    flip: Names = []
+    unwrap: Names = []
+    offsets: Texts = {}
+    constants: Texts = {}
+    sensor: Text = None
+    relative_to: Text = None
+    quaternion: Text = None
+    invert_quaternion: Annotated[bool, Field(description="true or false")] = False
+    invert_pose: Annotated[bool, Field(description="true or false")] = False
+    euler: Text = None
+    mirror: Text = None
 
     def over(self, other: "Choices") -> "Choices":
         """These choices, and those of `other` where these say nothing. Raises InputError with all faults."""
         made = Choices()
-        for one in fields(self):
-            mine, theirs = getattr(self, one.name), getattr(other, one.name)
+        for field, mine in self:
+            theirs = getattr(other, field)
             if isinstance(mine, dict):
-                wider = {name for name in theirs if one.name == "units" and group_of(name) in mine}
+                wider = {name for name in theirs if field == "units" and group_of(name) in mine}
                 value = {name: said for name, said in theirs.items() if name not in wider} | mine
             elif isinstance(mine, list) and isinstance(theirs, list):
-                value = [*theirs, *(item for item in mine if item not in theirs)] if one.name != "home_mm" else mine
+                value = [*theirs, *(item for item in mine if item not in theirs)] if field != "home_mm" else mine
             else:
                 value = mine if mine is not None and mine is not False else theirs
-            setattr(made, one.name, value)
+            setattr(made, field, value)
         made.check("")
         return made
 
@@ -131,81 +150,26 @@ def grouped(units: dict[str, str]) -> dict[str, str]:
 def load(path: str | Path) -> Choices:
     """The choices of a file. Raises InputError with all its faults."""
     document = yaml_document.load(path)
-    data, known = document.data, {one.name: one for one in fields(Choices)}
-    if not isinstance(data, dict):
-        raise InputError(Problem(f"does not map columns: its fields are {', '.join(known)}", document.file))
-    faults, made = [], {}
-    for name, value in data.items():
-        if name not in known:
-            hint = suggestion(str(name), known, f"the fields are {', '.join(known)}")
-            faults.append(Problem(f"unknown field: {hint}", document.file, document.line((name,)), str(name)))
-        elif not _fits(value, known[name].type):
-            text = f"{shown(value)} does not fit: needs {_expected(known[name].type)}"
-            faults.append(Problem(text, document.file, document.line((name,)), name))
-        elif value is not None:
-            made[name] = {k: str(v) for k, v in value.items()} if isinstance(value, dict) else value
-    if faults:
-        raise InputError(faults)
-    choices = Choices(**made)
+    if not isinstance(document.data, dict):
+        known = ", ".join(Choices.model_fields)
+        raise InputError(Problem(f"does not map columns: its fields are {known}", document.file))
+    said = {name: value for name, value in document.data.items() if value is not None}
+    choices = validated(Choices, replace(document, data=said))
     choices.check(document.file)
     return choices
 
 
-def _fits(value: Any, kind: Any) -> bool:
-    if value is None:
-        return True
-    kind = next((one for one in get_args(kind) if one is not type(None)), kind) if get_origin(kind) is None else kind
-    text = str(kind)
-    if text.startswith("dict"):
-        simple = (str, int, float)
-        return isinstance(value, dict) and all(isinstance(k, str) and isinstance(v, simple) for k, v in value.items())
-    if text.startswith("list[float]"):
-        return isinstance(value, list) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    if text.startswith("list"):
-        return isinstance(value, list) and all(isinstance(v, str) for v in value)
-    return isinstance(value, bool if kind is bool else str)
-
-
-def _expected(kind: Any) -> str:
-    text = str(kind)
-    words = {
-        "dict": "names with values, indented below it",
-        "list[float]": "a list of numbers",
-        "list": "a list of names",
-    }
-    plain = "true or false" if kind is bool else "text"
-    return next((said for start, said in words.items() if text.startswith(start)), plain)
-
-
 def save(choices: Choices, path: str | Path) -> None:
     """Writes what is said, with units and columns resolved, for `ctcr import --mapping`."""
-    lines = [
-        "# How the columns of these logs become measurements: ctcr import LOG --mapping THIS -o measurements.csv\n"
-    ]
-    for name, value in asdict(choices).items():
-        if value is None or value is False or value == {} or value == []:
-            continue
-        if isinstance(value, dict):
-            lines += [f"{name}:\n", *(f"  {_scalar(key)}: {_scalar(inner)}\n" for key, inner in value.items())]
-        elif isinstance(value, list):
-            lines.append(f"{name}: [{', '.join(map(_scalar, value))}]\n")
-        else:
-            lines.append(f"{name}: {_scalar(value)}\n")
+    said = CommentedMap({name: value for name, value in choices if value not in (None, False, {}, [])})
+    for name in [name for name, value in said.items() if isinstance(value, list)]:
+        said[name] = CommentedSeq(said[name])
+        said[name].fa.set_flow_style()
+    yaml = YAML()
+    yaml.width = LINE_WIDTH
     with atomic_writer(path) as file:
-        file.writelines(lines)
-
-
-def _scalar(value: Any) -> str:
-    """A value of YAML on one line; text that could be read as anything else is quoted."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    other = "y n yes no on off true false null".split()
-    if re.fullmatch(r"[A-Za-z][\w-]*", value) and value.lower() not in other:
-        return value
-    escaped = "".join(c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in value)
-    return f'"{escaped}"'
+        file.write(HEAD)
+        yaml.dump(said, file)
 
 
 def in_order(text: str) -> dict[str, str]:

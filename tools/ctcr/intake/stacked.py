@@ -40,7 +40,7 @@ def unstacked(log: Log, choices: Choices) -> tuple[Log, Choices]:
     rows = np.flatnonzero(tool == found[0])
     values = tuple(one[rows] if isinstance(one, np.ndarray) else [one[i] for i in rows] for one in log.values)
     notes = [*log.notes, f"only the rows of {found[0]}, of {join(tools)}"]
-    return replace(log, values=values, rows=log.rows[rows], notes=notes), replace(choices, sensor=None)
+    return replace(log, values=values, rows=log.rows[rows], notes=notes), choices.model_copy(update={"sensor": None})
 
 
 def _names_tools(log: Log, column: int) -> bool:

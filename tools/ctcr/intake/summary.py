@@ -1,7 +1,7 @@
 """What an import says of itself: what each column was taken for, and the choices for the next log."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from ctcr.intake.bodies import EULER, GRID, SEQUENCE, TRANSLATION
 from ctcr.intake.choices import Choices, grouped
@@ -66,4 +66,4 @@ def resolved(choices: Choices, sources: Sequence[Columns]) -> Choices:
     if len({source.units["t"][0] for source in sources if "t" in source.units}) > 1 and "t" not in choices.units:
         units.pop("t")
     settled = {"order": None, "sensor": None, "relative_to": None}  # the columns say it
-    return replace(choices, columns=columns, units=grouped(units), **settled)
+    return choices.model_copy(update={"columns": columns, "units": grouped(units)} | settled)

@@ -28,9 +28,11 @@ def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices
         counts = "t" in choices.columns and choices.units.get("t", "")[:1].isdigit()
         unused = {"t"} if counts and "t" not in columns else ()
         units = {role: unit for role, unit in choices.units.items() if role not in unused}
-        return replace(choices, columns=columns, units=units, ignore=[name for name in choices.ignore if mine(name)])
+        ignore = [name for name in choices.ignore if mine(name)]
+        return choices.model_copy(update={"columns": columns, "units": units, "ignore": ignore})
 
-    return part(poses, joints, False), replace(part(joints, poses, True), sensor=None, relative_to=None)
+    of_joints = part(joints, poses, True)
+    return part(poses, joints, False), of_joints.model_copy(update={"sensor": None, "relative_to": None})
 
 
 def at(columns: Columns, moving: Columns, moved: Motion, t: Array, zero: float) -> Motion:
