@@ -17,7 +17,16 @@ from pathlib import Path  # noqa: E402
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
-DEMO = Path(__file__).parents[2] / "examples" / "data" / "demo" / "measurements.csv"
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DEMO = EXAMPLES / "data" / "demo" / "measurements.csv"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """That of the paper's Table II, with its bench."""
+    from ctcr.robot import robot_file
+
+    return robot_file.load(EXAMPLES / "robots" / "table2.yaml")
 
 
 @pytest.fixture(scope="module")

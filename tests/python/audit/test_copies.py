@@ -1,7 +1,6 @@
 """Rows that are copies of earlier ones are left out of comparisons and fits, and named."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import ctcr
 import numpy as np
@@ -9,13 +8,6 @@ import pytest
 from ctcr.api.reviewed import to_fit
 from ctcr.audit import copies
 from ctcr.model import simulation
-
-TABLE2 = Path(__file__).parents[3] / "examples" / "robots" / "table2.yaml"
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return ctcr.load(TABLE2)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """Motion that a table leaves out is found where readings return to joints, and only there."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,16 +8,10 @@ from ctcr.audit import missing_motion
 from ctcr.diagnose import add, diagnose
 from ctcr.effects import catalogue
 from ctcr.model import simulation
-from ctcr.robot import robot_file
 from ctcr.table.measurements import Measurements
 
 STOPS, RUNS = 7, 12
 FRICTION = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)}
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(Path(__file__).parents[3] / "examples" / "robots" / "table2.yaml")
 
 
 def sweeps(plan: Measurements) -> tuple[Measurements, np.ndarray]:

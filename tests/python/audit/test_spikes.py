@@ -11,7 +11,6 @@ from ctcr import cli
 from ctcr.audit import spikes
 from ctcr.effects import catalogue
 from ctcr.model import simulation
-from ctcr.robot import robot_file
 from ctcr.table import measurements
 from ctcr.table.measurements import Measurements
 
@@ -24,11 +23,6 @@ EFFECTS = {
     "frame_jump": {"effects.frame_jump.y": 0.02, "effects.frame_jump.when": 0.5},
     "softening": {f"effects.softening.gamma.{i}": 0.01 for i in (1, 2, 3)},
 }
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(TABLE2)
 
 
 @pytest.fixture(scope="module")

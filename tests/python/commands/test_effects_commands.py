@@ -22,11 +22,6 @@ DEMO = ROOT / "examples" / "data" / "demo" / "measurements.csv"
 CALIBRATION = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
 
 
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROBOT)
-
-
 @pytest.fixture
 def table(plan, tmp_path):
     path = tmp_path / "plan.csv"

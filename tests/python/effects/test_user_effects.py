@@ -42,11 +42,6 @@ class Everything(Effect):
 
 
 @pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
-
-
-@pytest.fixture(scope="module")
 def readings(plan):
     return plan
 

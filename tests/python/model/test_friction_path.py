@@ -1,10 +1,8 @@
 """Friction twists the tubes along their path: in predictions, and in fits, which are repeated until the path agrees."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import pytest
 from ctcr import settings
 from ctcr.diagnose import add
 from ctcr.diagnose.candidates import Candidate, forms
@@ -16,17 +14,10 @@ from ctcr.effects import catalogue
 from ctcr.fit import joint
 from ctcr.model import simulation, user_recording
 from ctcr.model.noise import noise_of_readings
-from ctcr.robot import robot_file
 
-ROOT = Path(__file__).parents[3]
 FREE = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.position.*"]
 LAW = "effects.friction.law"
 TRUE = {f"effects.friction.coefficient.{i}": 0.03 for i in (1, 2, 3)} | {"effects.friction.slip_angle": 0.03, LAW: 1.0}
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROOT / "examples" / "robots" / "table2.yaml")
 
 
 def test_stiff_friction_is_found(robot, plan):

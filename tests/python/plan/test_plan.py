@@ -9,15 +9,9 @@ import pytest
 from ctcr import cli
 from ctcr.model import simulation
 from ctcr.plan.proposal import Contest, random_runs, table
-from ctcr.robot import robot_file
 from ctcr.table import measurements
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(EXAMPLES / "robots" / "table2.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ctcr.model import simulation
-from ctcr.robot import robot_file
 from ctcr.table import measurements
 from ctcr.track import scenario
 
@@ -19,11 +18,6 @@ def study():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROOT / "examples/robots/table2.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -20,11 +20,6 @@ HOME = Change(("actuation", "home_rotation_deg", 2), "deg", -1.5, 0.1)
 ENTRY = Entry("ctcr calibrate fit", [TABLE], {"rms_mm": {"before": 1.25, "after": 0.5}}, "by hand: no")
 
 
-@pytest.fixture
-def robot():
-    return robot_file.load(EXAMPLE)
-
-
 def test_changed_lines(robot, tmp_path):
     """Only the changed lines differ, and comments stay."""
     ledger.write(robot, tmp_path / "new.yaml", [LENGTH], ENTRY)

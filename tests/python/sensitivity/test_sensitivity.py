@@ -14,7 +14,6 @@ from ctcr.frames import base_to_tracker
 from ctcr.model import parameters
 from ctcr.model.model import Model
 from ctcr.reproduce.paper import random_rows
-from ctcr.robot import robot_file
 from ctcr.sensitivity import closed_loop, open_loop
 from ctcr.sensitivity.advice import advise, grouped
 from ctcr.sensitivity.ranges import all_varied, together
@@ -25,11 +24,6 @@ ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "examples/robots/table2.yaml"
 S2 = ROOT / "examples/data/scenarios/S2.yaml"
 COUNT = 2500
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROBOT)
 
 
 @pytest.fixture(scope="module")

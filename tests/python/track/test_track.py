@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 from ctcr.cli import cli
 from ctcr.errors import InputError
-from ctcr.robot import robot_file
 from ctcr.track import scenario as scenario_file
 from ctcr.track.reach import Room, least_distance
 from ctcr.track.result import figures
@@ -17,11 +16,6 @@ from ctcr.track.runs import run_all, run_once, system_values
 ROOT = Path(__file__).parents[3]
 ROBOT = ROOT / "examples/robots/table2.yaml"
 SCENARIOS = ROOT / "examples/data/scenarios"
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(ROBOT)
 
 
 def load(name: str, **changes):
