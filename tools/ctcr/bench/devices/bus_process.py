@@ -9,7 +9,7 @@ import gc
 import json
 import signal
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -80,16 +80,13 @@ def run(settings: BusSettings, folder: Path, pipe: Connection) -> None:
         signal.signal(number, signal.SIG_IGN)
     bus = Bus(settings.interface, settings.positions, settings.drive)
     try:
-        with bus_lock(folder), real_time(BUS) as granted:
-            try:
-                _remember(settings, folder)
-                bus.connect()
-                owner = _Owner(settings, folder, pipe, bus, granted)
-                owner.publish(time.monotonic())
-                pipe.send(("ready", bus.names))
-                owner.serve()
-            finally:
-                bus.close()
+        with bus_lock(folder), real_time(BUS) as granted, closing(bus):
+            _remember(settings, folder)
+            bus.connect()
+            owner = _Owner(settings, folder, pipe, bus, granted)
+            owner.publish(time.monotonic())
+            pipe.send(("ready", bus.names))
+            owner.serve()
     except DeviceFault as fault:
         with suppress(OSError):
             pipe.send(("fault", fault))

@@ -1,6 +1,7 @@
 """Whether the devices of a bench answer, with their versions or their faults."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,16 +57,12 @@ def _sight(reading: ToolReading | None) -> str:
 
 
 def _bus(bench: Bench, folder: Path) -> Iterator[Health]:
-    bus = Bus(bench.interface, bench.positions, bench.motors)
-    with bus_lock(folder):
-        try:
-            bus.connect()
-            inputs = bus.exchange()
-            used = {drive.position: (drive, said) for drive, said in zip(bus.drives, inputs or [], strict=False)}
-            for position, name in enumerate(bus.names):
-                drive, said = used.get(position, (None, None))
-                broken = said is not None and said.error
-                text = "answers" if said is None else drive.diagnosis().what if broken else f"counter {said.counter}"
-                yield Health(name, f"{bench.interface}, position {position}", not broken, text)
-        finally:
-            bus.close()
+    with bus_lock(folder), closing(Bus(bench.interface, bench.positions, bench.motors)) as bus:
+        bus.connect()
+        inputs = bus.exchange()
+        used = {drive.position: (drive, said) for drive, said in zip(bus.drives, inputs or [], strict=False)}
+        for position, name in enumerate(bus.names):
+            drive, said = used.get(position, (None, None))
+            broken = said is not None and said.error
+            text = "answers" if said is None else drive.diagnosis().what if broken else f"counter {said.counter}"
+            yield Health(name, f"{bench.interface}, position {position}", not broken, text)

@@ -1,5 +1,6 @@
 """The release of the emergency stop, with which a person says that its cause has been mended."""
 
+from contextlib import closing
 from pathlib import Path
 
 from ctcr.bench.devices import emergency_stop
@@ -24,12 +25,9 @@ def _reset(folder: Path) -> list[str]:
     bus = last_bus(folder)
     if bus is None:
         return []
-    try:
-        with bus_lock(folder):
-            try:
-                bus.connect()
-            except DeviceFault as fault:
-                return [f"terminals were not reset: {fault}"]
-            return [f"terminal {drive.position} ({drive.slave.name}): reset" for drive in bus.reset()]
-    finally:
-        bus.close()
+    with bus_lock(folder), closing(bus):
+        try:
+            bus.connect()
+        except DeviceFault as fault:
+            return [f"terminals were not reset: {fault}"]
+        return [f"terminal {drive.position} ({drive.slave.name}): reset" for drive in bus.reset()]
