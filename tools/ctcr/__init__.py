@@ -76,34 +76,6 @@ _MODULES = {
     "robot_file": "ctcr.robot.robot_file",
 }
 
-__all__ = [
-    "Added",
-    "Calibration",
-    "Comparison",
-    "Diagnosis",
-    "InputError",
-    "Measurements",
-    "Model",
-    "Prediction",
-    "Robot",
-    "Shape",
-    "WrongConventions",
-    "add",
-    "calibrate",
-    "compare",
-    "diagnose",
-    "errors",
-    "frames",
-    "load",
-    "measurements",
-    "model",
-    "output",
-    "pictures",
-    "predict",
-    "read",
-    "robot_file",
-]
-
 
 class _Package(ModuleType):
     """Keeps its functions `compare`, `calibrate` and `diagnose` when the rooms of the same names are imported; `from
@@ -133,6 +105,7 @@ if os.path.isdir(_fast) and _runs_x86_64_v3():
 
 
 if not TYPE_CHECKING:  # a checker knows the names above and no others
+    __all__ = sorted(_NAMES | _MODULES)
 
     def __getattr__(name: str) -> Any:
         if name in _NAMES:
@@ -145,4 +118,4 @@ if not TYPE_CHECKING:  # a checker knows the names above and no others
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_NAMES, *_MODULES})
