@@ -43,12 +43,9 @@ def show(console, c: Calibration) -> None:
     made.columns[-1].justify = "left"
     console.width = max(console.width, NEEDED_WIDTH)
     console.print(made)
-    lists = ("Doubts", c.doubts), ("Undetermined by the data", undetermined(c)), ("To know", c.notices)
-    for title, lines in lists:
-        if lines:
-            console.print(title, style="bold")
-        for line in lines:
-            console.print(f"  • {line}")
+    console.bullets(c.doubts, "Doubts")
+    console.bullets(undetermined(c), "Undetermined by the data")
+    console.bullets(c.notices, "To know")
 
 
 def headline(c: Calibration) -> str:

@@ -77,4 +77,4 @@ def _show(out, robot, added) -> None:
     rows += [[name, f"{value:.3f}", *["" for _ in units[1:]]] for name, value in added.floors.rows()]
     on = f"held-out data ({added.held_out})" if added.held_out else "the rows that were fitted"
     out.table(f"Error on {on}, RMS", ["", *units], rows)
-    out.say(*(f"  • {notice}" for notice in added.notices))
+    out.console.bullets(added.notices)

@@ -24,4 +24,5 @@ def command(robot, names, target, in_place) -> None:
     loaded, out = robot_file.load(robot), options.Output()
     target = outcome.check_target(loaded, target, in_place, needed=True)
     _, notices = add.remove(loaded, list(dict.fromkeys(names)), target, in_place)
-    out.say(*(f"  • {notice}" for notice in notices), f"{', '.join(names)} removed: {target}")
+    out.console.bullets(notices)
+    out.say(f"{', '.join(names)} removed: {target}")

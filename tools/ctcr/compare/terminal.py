@@ -25,10 +25,7 @@ def show(console, c: Comparison) -> None:
     console.print(c.robot, style="bold")
     if c.unexplained:
         console.print(c.unexplained, style="bold")
-    if c.wrong:
-        console.print(c.WRONG, style="bold")
-        for one in c.wrong:
-            console.print(f"  • {one.sentence}")
+    console.bullets([one.sentence for one in c.wrong], c.WRONG)
     console.print(headline(c))
     console.print(table(*errors(c)))
     if len(c.runs) > 1:
@@ -41,10 +38,7 @@ def show(console, c: Comparison) -> None:
         title, columns, rows, texts = dependences(c)
         console.print(table(title, columns, rows[:SHOWN_FORMS], texts))
     for title, lines in [("Findings", [item.text for item in findings(c)]), *remarks(c)]:
-        if lines:
-            console.print(title, style="bold")
-            for line in lines:
-                console.print(f"  • {line}")
+        console.bullets(lines, title)
     for line in left_out(c, SHOWN_ROWS):
         console.print(line)
 

@@ -114,6 +114,13 @@ class Terminal(Console):
     def print(self, *objects: Any, **options: Any) -> None:
         super().print(*objects, crop=False, **options)
 
+    def bullets(self, lines: Iterable[str], title: str = "") -> None:
+        """A list of sentences below its title; nothing without any."""
+        for number, line in enumerate(lines):
+            if title and not number:
+                self.print(title, style="bold")
+            self.print(f"  • {line}")
+
 
 class _Whole(Table):
     """A table that is never narrower than its words and numbers: a terminal may break its lines, nothing cuts them."""
