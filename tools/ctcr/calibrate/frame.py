@@ -10,7 +10,7 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
-from ctcr.calibrate.outcome import Outcome, Row, in_file
+from ctcr.calibrate.outcome import Outcome, Row, frame_rows
 from ctcr.calibrate.procedure_figures import frame_scene
 from ctcr.conventions import tips
 from ctcr.conventions.alignment import aligned
@@ -46,14 +46,8 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
     own = [fit.names.index(name) for name in names]
     found, covariance = fit.apply(robot=start).tracker, considered(start, readings, fit)[np.ix_(own, own)]
     before, after = sensor_pose.placed(robot, readings)[0], robot.model_copy(update={"tracker": found})
-    rows, sd = [], np.sqrt(np.diag(covariance))
-    for field, text, unit, values, widths in (
-        ("position_mm", "origin of the base frame", "mm", found.position_mm, 1e3 * sd[:3]),
-        ("rotation_vector_rad", "rotation vector", "rad", found.rotation_vector_rad, sd[3:]),
-    ):
-        for i, axis in enumerate(AXES):
-            path = ("tracker", field, i)
-            rows.append(Row(f"{text}, {axis}", unit, float(values[i]), float(widths[i]), in_file(robot, path), path))
+    sd = np.sqrt(np.diag(covariance))
+    rows = frame_rows(robot, found.position_mm, found.rotation_vector_rad, [*1e3 * sd[:3], *sd[3:]])
     before_mm, after_mm = (rms_mm(one, readings) for one in (before, after))
     rows.append(Row("error of the tip, RMS", "mm", after_mm, old=before_mm))
     figures = {"rms_mm": {"before": before_mm, "after": after_mm}, "rotation_sd_deg": np.degrees(sd[3:]).tolist()}

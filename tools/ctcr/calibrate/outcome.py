@@ -79,6 +79,20 @@ def in_file(robot, path: FieldPath) -> float:
     return nan if value is None else value
 
 
+def frame_rows(robot, position_mm: Sequence[float], vector_rad: Sequence[float], sd: Sequence[float]) -> list[Row]:
+    """A tracker frame T_ref with its standard deviations (6,) [mm], [rad]."""
+    kinds = (
+        ("position_mm", "origin of the base frame", "mm", position_mm, sd[:3]),
+        ("rotation_vector_rad", "rotation vector", "rad", vector_rad, sd[3:]),
+    )
+    rows = []
+    for key, text, unit, values, widths in kinds:
+        for i, (axis, value, width) in enumerate(zip("xyz", values, widths, strict=True)):
+            path = ("tracker", key, i)
+            rows.append(Row(f"{text}, {axis}", unit, float(value), float(width), in_file(robot, path), path))
+    return rows
+
+
 def check_target(robot, target: str | None, in_place: bool, needed: bool = False) -> str | None:
     """The robot file to write, if any. Raises InputError where that asks for the impossible, before any work."""
     if in_place and target:
@@ -123,8 +137,7 @@ def _correlations(robot, outcome: Outcome) -> list[Change]:
 
 def show(console, outcome: Outcome) -> None:
     console.print(output.table(outcome.title, *cells(outcome), text_columns=2))
-    for notice in outcome.notices:
-        console.print(f"  • {notice}")
+    console.bullets(outcome.notices)
 
 
 def cells(outcome: Outcome) -> tuple[dict[str, str], list[list[str]]]:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ctcr import _core
 from ctcr.arrays import Array
 from ctcr.calibrate import procedure_figures as figures_of
-from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, in_file
+from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, frame_rows, in_file
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.frames import points_to_base
@@ -160,14 +160,7 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
         **tracker_noise(robot, table),
     )
     position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
-    rows = []
-    for field, text, unit, values, sds in (
-        ("position_mm", "origin of the base frame", "mm", position, 1e3 * np.asarray(fit.position_sd)),
-        ("rotation_vector_rad", "rotation vector", "rad", turn, fit.rotation_sd),
-    ):
-        for i, axis in enumerate(AXES):
-            path = ("tracker", field, i)
-            rows.append(Row(f"{text}, {axis}", unit, values[i], sds[i], in_file(robot, path), path))
+    rows = frame_rows(robot, position, turn, [*1e3 * np.asarray(fit.position_sd), *fit.rotation_sd])
     rows.append(Row("error at the points, RMS", "mm", 1e3 * fit.fre))
     expected = zip(targets, fit.tre, strict=True)
     rows += [Row(f"expected error at {names[i]}, RMS", "mm", 1e3 * tre) for i, tre in expected]
