@@ -250,15 +250,10 @@ def _check(log: Log, made: Mapping, n_tubes: int | None, faults: list[Problem]) 
     extra = [role for role in made.used if role[:-1] in ("beta", "alpha") and int(role[-1]) > n]
     if extra:
         say(f"it has {join(sorted(extra))}: the robot has {n} tubes")
-    for group, roles in (
-        ("force", ("fx", "fy", "fz")),
-        ("position", POSITION),
-        ("quaternion", QUATERNION),
-        ("Euler angles", EULER),
-    ):
+    for group, roles in (("position", POSITION), ("quaternion", QUATERNION), ("Euler angles", EULER)):
         for prefix in ("", "ref_"):
             there = [role for role in roles if prefix + role in made.used]
-            if there and len(there) < len(roles) and group != "force":
+            if there and len(there) < len(roles):
                 absent = [prefix + role for role in roles if role not in there]
                 lack = f"{join(absent)} of the {group} {'is' if len(absent) == 1 else 'are'} missing"
                 say(f"{lack}: give --column {absent[0]}=NAME")
