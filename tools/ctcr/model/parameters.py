@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from ctcr import _core, settings
 from ctcr.arrays import Array
 from ctcr.effects import catalogue
-from ctcr.errors import ArgumentError, InputError, Problem, did_you_mean
+from ctcr.errors import ArgumentError, InputError, Problem, suggestion
 from ctcr.robot.description import Robot
 from ctcr.robot.yaml_document import FieldPath
 
@@ -139,9 +139,8 @@ def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
         patterns = _standard(robot) if name == STANDARD else GROUPS.get(name, (name,))
         found = {other for p in patterns for other in known if other == p or ("*" in p and fnmatchcase(other, p))}
         if not found:
-            meant = did_you_mean(name, [*known, *GROUPS, STANDARD])
             names = ", ".join([STANDARD, *GROUPS, known[0]])
-            hint = f"did you mean {meant}?" if meant else f"names are {names} and others"
+            hint = suggestion(name, [*known, *GROUPS, STANDARD], f"names are {names} and others")
             problems.append(Problem(f"no parameter is named {name}: {hint}"))
         chosen |= found
     if not problems and not chosen:
@@ -203,8 +202,7 @@ def correlations(robot: Robot, names: Sequence[str]) -> Array | None:
     for k, pair in enumerate(robot.uncertainty.correlations):
         field = f"uncertainty.correlations[{k}]"
         for name in {pair.first, pair.second}.difference(known):
-            meant = did_you_mean(name, known)
-            hint = f"did you mean {meant}?" if meant else f"names are {known[0]} and others"
+            hint = suggestion(name, known, f"names are {known[0]} and others")
             problems.append(Problem(f"no parameter with an uncertainty is named {name}: {hint}", file, field=field))
         if pair.first == pair.second:
             problems.append(Problem(f"{pair.first} is named twice: name two parameters", file, field=field))

@@ -34,6 +34,7 @@ AT_PLATE = 10e-6  # [m]: a calibration may put a tube that never leaves the plat
 Three = Annotated[list[float], Len(3, 3)]
 TRANSLATIONS = Quantity("mm", usual=(0.1, 2000), count="one number a tube,")
 ROTATIONS = Quantity("deg", usual=(0, 360), count="one number a tube,")
+ROTATION_VECTOR = Quantity("rad", usual=(0, 2 * pi), count="three numbers")
 EACH_TUBE, EACH_AXIS = "a number, or a list of one a tube,", "a number, or a list of one an axis,"
 BELOW = "its fields, indented below it"
 
@@ -206,13 +207,9 @@ class Tracker(Section):
     accuracy_95_mm: Annotated[float | None, Quantity("mm", usual=(1e-3, 20), least=0)]
     accuracy_95_deg: Annotated[float | None, Quantity("deg", usual=(1e-3, 20), least=0)]
     position_mm: Annotated[Three, Quantity("mm", usual=(0, 5000), count="three numbers")]
-    rotation_vector_rad: Annotated[Three, Quantity("rad", usual=(0, 2 * pi), count="three numbers")]
+    rotation_vector_rad: Annotated[Three, ROTATION_VECTOR]
     sensor_position_mm: Annotated[Three | None, Quantity("mm", usual=(0, 200), count="three numbers")] = [0.0, 0.0, 0.0]
-    sensor_rotation_vector_rad: Annotated[Three | None, Quantity("rad", usual=(0, 2 * pi), count="three numbers")] = [
-        0.0,
-        0.0,
-        0.0,
-    ]
+    sensor_rotation_vector_rad: Annotated[Three | None, ROTATION_VECTOR] = [0.0, 0.0, 0.0]
 
     @property
     def position(self) -> Array:

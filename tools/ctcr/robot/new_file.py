@@ -7,6 +7,7 @@ from typing import Any
 
 from ctcr.errors import ArgumentError, Problem, did_you_mean, suggestion
 from ctcr.robot.defaults import TRACKER, UNCERTAINTY
+from ctcr.show.wording import numbers
 
 NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY = 60.0, 0.3, 6450.0
 
@@ -114,7 +115,7 @@ def text(robot: NewRobot) -> str:
     n = len(robot.tubes)
     home = robot.home_mm or [-tube.length_mm for tube in robot.tubes]
     flush = "" if robot.home_mm else ": here all tips flush with the front plate"
-    gravity = "null" if robot.gravity is None else _list(robot.gravity)
+    gravity = "null" if robot.gravity is None else numbers(robot.gravity)
     return (
         f"# A robot for ctcr.{robot.note} null: not known.\n"
         "# docs/formats.md draws frames, angles and signs and lists all fields; `ctcr info` shows what follows.\n"
@@ -129,8 +130,8 @@ def text(robot: NewRobot) -> str:
         "actuation:\n"
         "  translation_mm_per_rev: null  # of a turn of the motor\n"
         "  rotation_rev_per_rev: null\n"
-        f"  home_translation_mm: {_list(home)}  # beta at home{flush}\n"
-        f"  home_rotation_deg: {_list([0.0] * n)}  # alpha at home\n"
+        f"  home_translation_mm: {numbers(home)}  # beta at home{flush}\n"
+        f"  home_rotation_deg: {numbers([0.0] * n)}  # alpha at home\n"
         "\n"
         "# The sensor, and the base frame as the tracker sees it: x_tracker = R x_base + position.\n"
         f"tracker:\n{_section(TRACKER | {'sensor_on_tube': robot.sensor_on_tube}, _TRACKER)}"
@@ -158,15 +159,11 @@ def _tube(tube: NewTube) -> str:
 
 
 def _section(values: dict[str, Any], notes: dict[str, str]) -> str:
-    written = {key: _list(value) if isinstance(value, list) else value for key, value in values.items()}
+    written = {key: numbers(value) if isinstance(value, list) else value for key, value in values.items()}
     return "".join(
         f"  {key}: {'null' if value is None else value}{f'  # {notes[key]}' if key in notes else ''}\n"
         for key, value in written.items()
     )
-
-
-def _list(values: list[float]) -> str:
-    return f"[{', '.join(f'{value:.10g}' for value in values)}]"
 
 
 def _quoted(name: str) -> str:
