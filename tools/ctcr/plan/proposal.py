@@ -66,16 +66,14 @@ def rivals_of(diagnosis: Diagnosis) -> list[Rival]:
     return []
 
 
-def propose(
-    diagnosis: Diagnosis, runs: int = 4, masses: tuple[float, ...] = (0.0, 0.01, 0.02), seed: int = 1
-) -> Proposal:
+def propose(diagnosis: Diagnosis, runs: int = 4, masses: tuple[float, ...] = (0.0, 0.01, 0.02)) -> Proposal:
     """The next `runs` runs; `masses` [kg] can be hung at the tip. Raises InputError where the model has no solution."""
     rivals = rivals_of(diagnosis)
     if len(rivals) < 2:
         return Proposal(rivals, np.inf, [], [], None)
     robot, measurements = diagnosis.robot, diagnosis.measurements
     offered = np.array(masses if robot.gravity is not None else (0.0,))
-    pool = random_runs(robot, measurements, settings.PLAN_POOL, offered, np.random.default_rng(seed))
+    pool = random_runs(robot, measurements, settings.PLAN_POOL, offered, np.random.default_rng(1))
     if not pool:
         return Proposal(rivals, _margin(rivals), [], [], None)
     plan = table(robot, pool)

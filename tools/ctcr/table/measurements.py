@@ -179,7 +179,7 @@ def read(source: Source, n_tubes: int | None = None) -> Measurements:
     A table that only another convention makes possible, such as angles in degrees, comes with the error that refuses it
     as `refusal`: a comparison then tells the convention. Raises InputError with row, column, value and unit.
     """
-    table = _opened(source)
+    table = open_table(source) if isinstance(source, str | PathLike) else FrameTable(source)
     tubes = n_tubes or _tubes_of(table.columns)
     try:
         return _read(table, tubes)
@@ -191,19 +191,9 @@ def read(source: Source, n_tubes: int | None = None) -> Measurements:
         raise refusal from None
 
 
-def load(path: str | Path, n_tubes: int, *, plausible: bool = True) -> Measurements:
-    """Reads a table for a robot of `n_tubes` tubes. Raises InputError with row, column, value and unit.
-
-    plausible    whether values must be those of such a robot in the right units: else any finite numbers will do, from
-                 which a wrong convention may be found
-    """
-    return _read(open_table(path), n_tubes, plausible)
-
-
-def _opened(source: Source) -> Table:
-    if isinstance(source, str | PathLike):
-        return open_table(source)
-    return FrameTable(source)
+def load(path: str | Path, n_tubes: int) -> Measurements:
+    """Reads a table for a robot of `n_tubes` tubes. Raises InputError with row, column, value and unit."""
+    return _read(open_table(path), n_tubes)
 
 
 def _tubes_of(columns: tuple[str, ...]) -> int:
@@ -213,6 +203,7 @@ def _tubes_of(columns: tuple[str, ...]) -> int:
 
 
 def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
+    """`plausible`: whether values must be those of such a robot in the right units: else any finite numbers will do."""
     groups = _groups(table, n_tubes)
     faults = Faults(str(table.path))
     data = {name: np.empty((table.n_rows, len(columns))) for name, columns in groups.items()}

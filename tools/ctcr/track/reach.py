@@ -13,7 +13,7 @@ from ctcr.track.scenario import Limits, Scenario
 REACHED = 1e-6  # [m]
 
 
-def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int = 20, seed: int = 1) -> float:
+def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int = 20) -> float:
     """The largest distance [m] of a corner of the path from the nearest tip that any posture within the limits has.
 
     `starts` random postures are moved towards each corner by sequential quadratic programming with the Jacobian,
@@ -22,7 +22,7 @@ def least_distance(robot: Robot, scenario: Scenario, mass_g: float, starts: int 
     model, force = Model(robot), scenario.force(mass_g)[None]
     room = Room.of(robot, scenario.limits)
     corners = np.unique(scenario.trajectory.points, axis=0)
-    return max(_nearest(model, force, room, corner, starts, np.random.default_rng(seed)) for corner in corners)
+    return max(_nearest(model, force, room, corner, starts, np.random.default_rng(1)) for corner in corners)
 
 
 @dataclass(frozen=True)

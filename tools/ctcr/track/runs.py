@@ -36,9 +36,9 @@ class Device(Protocol):
         """Velocities (2N,) of the motors [rad/s] for one period [s]."""
 
 
-def system_values(robot: Robot, steps: int = 1) -> _core.SystemValues:
+def system_values(robot: Robot) -> _core.SystemValues:
     """The robot with its effects as the compiled library takes it."""
-    return _core.SystemValues(parameters=parameters.values(robot), effects=catalogue.values(robot), steps=steps)
+    return _core.SystemValues(parameters=parameters.values(robot), effects=catalogue.values(robot))
 
 
 def run_once(

@@ -14,7 +14,7 @@ GAIN = 20.0  # [1/s] of the position loop, closed on the encoders
 STOP_RAMPS = 4.0  # a stop brakes so much harder than a move
 SETTLED, SETTLE_S = 0.01, 0.5  # a move ends within this fraction of the following error allowed, or after so long
 SLACK_M, SLACK_RAD = 0.5e-3, 5e-3  # overshoot of the position loop: encoders this far beyond a limit are no fault
-JOG_M, JOG_RAD = 25e-3, 0.6  # longest move without limits, before homing
+JOG_M, JOG_RAD, JOG_SPEED = 25e-3, 0.6, 0.5  # longest move without limits, before homing; fraction of the highest speed
 # An encoder has jumped where it moves so many times faster than its motor can, and also further than this fraction of
 # the following error allowed: readings come at uneven times.
 JUMP_FACTOR, JUMP_ERROR = 4.0, 0.5
@@ -69,18 +69,18 @@ class AxisControl:
             raise _fault(problem, "choose other joints; nothing has moved")
         self._start(target, speed)
 
-    def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
+    def jog(self, way: ArrayLike) -> None:
         """A short move by `way` (2N,) without limits, for homing. Raises DeviceFault where it is too long.
 
         From now on the joints are not known: limits of a wrong homing must not hinder the next one.
         """
         self._require(homed=False)
-        _finite(way, speed)
+        _finite(way)
         longest = np.repeat([JOG_M, JOG_RAD], len(self.setpoint) // 2)
         if (np.abs(way) > longest + 1e-9).any():
             text = f"a jog is at most {1e3 * JOG_M:g} mm and {np.rad2deg(JOG_RAD):.0f} deg long"
             raise _fault(text, "jog in several steps")
-        self._start(self.setpoint + way, speed)
+        self._start(self.setpoint + way, JOG_SPEED)
         self.homed = False
 
     def velocity(self, speeds: ArrayLike, valid_s: float) -> None:

@@ -57,9 +57,9 @@ class Motors(ProcessClient):
         """Starts a straight move of all joints (2N,) at a fraction of the highest speed."""
         self._ask("motion", "move", np.array(joints, float), speed)
 
-    def jog(self, way: ArrayLike, speed: float = 0.5) -> None:
+    def jog(self, way: ArrayLike) -> None:
         """Starts a short move without limits, for homing."""
-        self._ask("motion", "jog", np.array(way, float), speed)
+        self._ask("motion", "jog", np.array(way, float))
 
     def velocity(self, speeds: ArrayLike, valid_s: float = 0.1) -> None:
         """Joint speeds (2N,) for `valid_s`, or until the next request."""
