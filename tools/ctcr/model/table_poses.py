@@ -1,7 +1,6 @@
 """The poses that a model predicts for the rows of a table, in their order, which effects may remember."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -34,27 +33,19 @@ def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "
 
 
 def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple[slice, Prediction]]:
-    """Yields (rows, their predicted poses) in chunks, so that a long table shows its progress and takes no memory.
-
-    Effects may have a history: they are predicted for all rows at once, in their order.
-    """
+    """Yields (rows, their predicted poses) in chunks, so that a long table shows its progress and takes no memory; with
+    effects, which may have a history, all rows at once."""
     check_of(robot, table)
     if table.refusal:
         raise table.refusal
-    beta, alpha = robot.joints_of_table(table.beta, table.alpha)
-    model = None if robot.effects else Model(robot, steps=steps)
-    found = _with_history(robot, table, steps) if robot.effects else None
+    if robot.effects:
+        found, unknown = effect_model.readings(robot, table, steps), np.full(len(table), np.nan)
+        everything = slice(0, len(table))
+        yield everything, Prediction(found.position, found.quaternion, found.status, unknown, None, None)
+        return
+    model, (beta, alpha) = Model(robot, steps=steps), robot.joints_of_table(table.beta, table.alpha)
     with Progress("predicting", len(table)) as progress:
         for start in range(0, len(table), CHUNK_ROWS):
             rows = slice(start, min(start + CHUNK_ROWS, len(table)))
-            if model:
-                yield rows, model.predict(beta[rows], alpha[rows], table.force[rows])
-            else:
-                yield rows, replace(found, **{name: getattr(found, name)[rows] for name in PER_ROW})
+            yield rows, model.predict(beta[rows], alpha[rows], table.force[rows])
             progress.advance(rows.stop - start)
-
-
-def _with_history(robot: Robot, table: Measurements, steps: int) -> Prediction:
-    found = effect_model.readings(robot, table, steps)
-    unknown = np.full(len(table), np.nan)
-    return Prediction(found.position, found.quaternion, found.status, unknown, jacobian=None, compliance=None)
