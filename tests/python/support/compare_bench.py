@@ -14,7 +14,7 @@ def robot(jitter_mm=JITTER_MM, roll="known", turn=(0.3, -0.2, 0.9)):
     """Two tubes, and a tracker frame that is turned by the rotation vector `turn` and shifted."""
     return SimpleNamespace(
         name="surrogate",
-        tubes=[SimpleNamespace(length=length) for length in LENGTHS],
+        lengths=np.array(LENGTHS),
         actuation=SimpleNamespace(screw_pitch=0.0),
         tracker=SimpleNamespace(
             rotation_vector_rad=list(turn),

@@ -87,7 +87,7 @@ def random_joints(robot, rows: int, random):
     """Joints (rows, N), (rows, N) that the robot can reach, uniform in what the neighbours leave free [m], [rad]."""
     import numpy as np
 
-    lengths = np.array([tube.length for tube in robot.tubes])
+    lengths = robot.lengths
     ends = np.empty((rows, robot.n_tubes))  # arc lengths of the tips; beta = end - length
     inner_end = np.zeros(rows)
     for i in reversed(range(robot.n_tubes)):

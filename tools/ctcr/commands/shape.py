@@ -44,7 +44,7 @@ def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> Non
         raise InputError(Problem(f"no shape at these joints: {status_text(int(tip.status[0]))}", robot))
     here = {"beta": beta, "alpha": alpha, "force": force, "points": SAMPLES}
     shape, *others = shapes = model.all_shapes(**here) if every else [model.shape(**here)]
-    ends = np.array([tube.length for tube in loaded.tubes]) + beta
+    ends = loaded.lengths + beta
     rotation = matrix_from_quaternion(shape.quaternion)
     if picture:
         from ctcr.show.pictures import draw_robot

@@ -72,7 +72,6 @@ def take_sample(robot, measurements, prediction) -> Sample:
     Motion is read from all rows, also the ones left out, since they too are part of the joint path.
     """
     m, tracker = measurements, robot.tracker
-    lengths = np.array([tube.length for tube in robot.tubes])
     position = np.asarray(prediction.position, float)
     known = np.isfinite(m.positions).all(axis=1)
     status = np.asarray(prediction.status)
@@ -88,14 +87,14 @@ def take_sample(robot, measurements, prediction) -> Sample:
     arrays = {name: np.asarray(getattr(m, name)) for name in ("row", "t", "run", "beta", "alpha", "force")}
     arrays |= {"measured": m.positions, "predicted": predicted, "base_position": position}
     arrays |= {"tip_velocity": velocity, "tip_step": step}
-    arrays["deployed"] = (lengths + m.beta)[:, tracker.sensor_on_tube - 1]
+    arrays["deployed"] = (robot.lengths + m.beta)[:, tracker.sensor_on_tube - 1]
     return Sample(
         **{name: values[keep] for name, values in arrays.items()},
         tip_rotation=matrix_from_quaternion(prediction.quaternion[keep]),
         rotation=np.asarray(tracker.rotation),
         rotation_error=rotation_error,
         rotation_known=tracker.sensor_rotation_known,
-        tube_lengths=lengths,
+        tube_lengths=robot.lengths,
         screw_pitch=robot.actuation.screw_pitch,
         lever=lever,
         motion=follow(m.t, m.run, m.beta, m.alpha, lever).rows(keep),
@@ -112,16 +111,13 @@ def _rotation_error(measured: Array, predicted: Array, known: bool) -> Array:
     """
     if known:
         turn = product(measured, conjugate(predicted))
-        turn = turn * np.where(turn[:, :1] < 0, -1.0, 1.0)
-        axis = turn[:, 1:]
-        sine = np.linalg.norm(axis, axis=1)
-        angle = 2 * np.arctan2(sine, turn[:, 0])
+        turn *= np.where(turn[:, :1] < 0, -1.0, 1.0)
     else:
         p, m = matrix_from_quaternion(predicted)[..., 2], matrix_from_quaternion(measured)[..., 2]
-        axis = np.cross(p, m)
-        sine = np.linalg.norm(axis, axis=1)
-        angle = np.arctan2(sine, np.sum(p * m, axis=1))
-    return axis * (angle / np.maximum(sine, 1e-300))[:, None]
+        turn = np.column_stack([1 + np.sum(p * m, axis=1), np.cross(p, m)])  # its length does not matter
+    sine = np.linalg.norm(turn[:, 1:], axis=1)
+    angle = 2 * np.arctan2(sine, turn[:, 0])
+    return turn[:, 1:] * (angle / np.maximum(sine, 1e-300))[:, None]
 
 
 def _tip_motion(position: Array, t: Array, run: Array, solved: Array) -> tuple[Array, Array]:

@@ -65,7 +65,7 @@ def _jumps(columns: Columns, run: Array, alpha: Array) -> Iterator[Problem]:
 
 def _impossible(columns: Columns, robot: Robot, beta: Array) -> Iterator[Problem]:
     """The doubt where tubes end where the model allows no tip, or hardly move; a fault where that is so in all rows."""
-    file, length = str(columns.log.path), np.array([tube.length for tube in robot.tubes])
+    file, length = str(columns.log.path), robot.lengths
     known = np.isfinite(beta).all(axis=1)
     beta, rows, faulty = beta[known], columns.log.rows[known], Faults(file)
     measurements.check("beta", beta, rows, ["beta"] * len(length), faulty)
@@ -184,7 +184,7 @@ def _home(choices: Choices, robot: Robot | None, n: int) -> Array:
         raise InputError(Problem(text, field=f"--translation {choices.translation}"))
     if choices.translation == "from-home":
         return 1e-3 * np.array(robot.actuation.home_translation_mm)
-    return -np.array([tube.length for tube in robot.tubes])  # all tips at the plate
+    return -robot.lengths  # all tips at the plate
 
 
 def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None:

@@ -269,7 +269,7 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
     longer curved than it is long. 99 rows in 100 stay possible; where fewer are, none more become impossible.
     """
     beta = beta + robot.actuation.translation_correction
-    tip, last = beta + [tube.length for tube in robot.tubes], robot.n_tubes
+    tip, last = beta + robot.lengths, robot.n_tubes
     home, length, curved = "actuation.home_translation.{}", "tubes.{}.length", "tubes.{}.curved_length"
     found = [
         (f"tube {last} is grasped at the plate", {home: {last: -1}}, -beta[:, -1]),

@@ -172,8 +172,7 @@ def random_runs(
 
 def _orders(beta: Array, robot: Robot) -> Array:
     """How far each grasped point is behind the next tube's, and each tip beyond it (rows, 2 N - 2) [m]."""
-    tips = beta + np.array([tube.length for tube in robot.tubes])
-    return np.hstack([np.diff(beta, axis=1), -np.diff(tips, axis=1)])
+    return np.hstack([np.diff(beta, axis=1), -np.diff(beta + robot.lengths, axis=1)])
 
 
 def table(robot: Robot, runs: list[Run], first_run: int = 0) -> Measurements:

@@ -76,12 +76,11 @@ def random_design(random: np.random.Generator) -> Robot:
 
 def random_rows(robot: Robot, count: int, random: np.random.Generator, most_force: float):
     """Joints beta, alpha (count, N), uniform over what the order of the tubes allows, and tip forces (count, 3)."""
-    lengths, kept = np.array([tube.length for tube in robot.tubes]), np.empty((0, robot.n_tubes))
+    kept = np.empty((0, robot.n_tubes))
     while len(kept) < count:
-        beta = -lengths * random.uniform(size=(20 * count, robot.n_tubes))
-        bases = np.hstack([beta, np.zeros((len(beta), 1))])
-        tips = np.hstack([lengths + beta, np.zeros((len(beta), 1))])
-        kept = np.vstack([kept, beta[(np.diff(bases) >= 0).all(axis=1) & (np.diff(tips) <= 0).all(axis=1)]])
+        beta = -robot.lengths * random.uniform(size=(20 * count, robot.n_tubes))
+        behind, beyond = np.diff(beta, append=0), -np.diff(robot.lengths + beta, append=0)
+        kept = np.vstack([kept, beta[(behind >= 0).all(axis=1) & (beyond >= 0).all(axis=1)]])
     force = random.standard_normal((count, 3))
     force *= most_force * random.uniform(size=(count, 1)) / np.linalg.norm(force, axis=1, keepdims=True)
     return kept[:count], random.uniform(-np.pi, np.pi, (count, robot.n_tubes)), force

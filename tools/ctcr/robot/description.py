@@ -296,6 +296,11 @@ class Robot(Shown, Section):
         return len(self.tubes)
 
     @property
+    def lengths(self) -> Array:
+        """Of the tubes (N,) [m]."""
+        return np.array([tube.length for tube in self.tubes])
+
+    @property
     def files(self) -> list[str]:
         """For a ledger or a page: the file that it was loaded from, or none."""
         return [self.file] if self.file else []

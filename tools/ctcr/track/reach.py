@@ -34,11 +34,12 @@ class Room:
 
     @classmethod
     def of(cls, robot: Robot, limits: Limits) -> "Room":
-        n, lengths, free = robot.n_tubes, [tube.length for tube in robot.tubes], np.full(robot.n_tubes, np.inf)
+        n, free = robot.n_tubes, np.full(robot.n_tubes, np.inf)
         low = -free if limits.beta_low_mm is None else 1e-3 * np.array(limits.beta_low_mm)
         high = free if limits.beta_high_mm is None else 1e-3 * np.array(limits.beta_high_mm)
         gaps = np.hstack([np.eye(n) - np.eye(n, k=1), np.zeros((n, n))])
-        tips, bases = 1e-3 * limits.tip_gap_mm + np.diff(lengths, append=0), np.full(n, -1e-3 * limits.base_gap_mm)
+        tips = 1e-3 * limits.tip_gap_mm + np.diff(robot.lengths, append=0)
+        bases = np.full(n, -1e-3 * limits.base_gap_mm)
         return cls(LinearConstraint(gaps, tips, bases), Bounds(np.append(low, -free), np.append(high, free)))
 
     def drawn(self, random: np.random.Generator) -> Array:

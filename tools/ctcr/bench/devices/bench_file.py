@@ -119,7 +119,7 @@ class Bench(Section):
             ramp_s=motors.ramp_s,
             following_error=np.repeat([1e-3 * motors.lag_mm, np.deg2rad(motors.lag_deg)], n),
             limits=JointLimits(
-                length=np.array([tube.length for tube in robot.tubes]),
+                length=robot.lengths,
                 travel=1e-3 * np.array(limits.translation_mm),
                 rotation=np.deg2rad(limits.rotation_deg),
                 clearance=1e-3 * limits.clearance_mm,

@@ -43,5 +43,5 @@ def home(motors: Motors, robot: Robot, person: Person, say: Callable[[str], None
             raise DeviceFault("homing", text, "does its motor move the tube that the bench file says?")
         flush[tube] = moved[tube]
     joints = home_joints(robot)
-    joints[:n] = moved - flush - np.array([tube.length for tube in robot.tubes])
+    joints[:n] = moved - flush - robot.lengths
     motors.set_joints(joints)

@@ -113,4 +113,4 @@ class SimulatedRobot:
         """How far each tube's tip stands out of the front plate (N,) [m], as a person sees it."""
         n = self.robot.n_tubes
         beta, _ = self.robot.joints_of_table(self._joints[None, :n], self._joints[None, n:])
-        return beta[0] + np.array([tube.length for tube in self.robot.tubes])
+        return beta[0] + self.robot.lengths
