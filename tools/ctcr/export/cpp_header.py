@@ -18,6 +18,7 @@ from ctcr.model import parameters
 from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
+from ctcr.robot.ledger import section
 from ctcr.show.wording import deviation, number, visible
 
 RATIOS = ("translation_mm_per_rev", "rotation_rev_per_rev")
@@ -236,10 +237,7 @@ def _in_ledger(robot: Robot, name: str) -> str:
 def _of_effect(robot: Robot, name: str, value: float) -> str:
     """The same of a parameter of an effect, which is in SI there."""
     for entry in reversed(robot.history):
-        figures = entry.get("figures")
-        found = figures.get("parameters") if isinstance(figures, dict) else None
-        one = found.get(name) if isinstance(found, dict) else None
-        if isinstance(one, dict):
+        if one := section(entry, "figures", "parameters", name):
             said = _said(entry, value, one.get("sd"), "") if _is_same(one.get("value"), value) else ""
             return f", {said}" if said else ""
     return ""

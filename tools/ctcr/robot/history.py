@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from ctcr.robot.description import Robot
+from ctcr.robot.ledger import section
 from ctcr.show import html_page
 from ctcr.show.output import table
 from ctcr.show.style import ERROR, NOISE, OUT
@@ -116,14 +117,9 @@ def _change(before: Stage | None, stage: Stage) -> str:
     return f"  {100 * (stage.rms_mm / before.rms_mm - 1):+.0f} %"
 
 
-def _section(entry: dict, name: str) -> dict:
-    """A section of an entry; empty where it is none, as a file may be edited by hand."""
-    return entry[name] if isinstance(entry.get(name), dict) else {}
-
-
 def _figures(entry: dict) -> dict[str, float]:
     """The errors of an entry by stage, in order."""
-    found = _section(_section(entry, "figures"), "rms_mm")
+    found = section(entry, "figures", "rms_mm")
     return {str(key): float(value) for key, value in found.items() if isinstance(value, int | float) and value > 0}
 
 
@@ -132,7 +128,7 @@ def _source(entry: dict) -> str:
 
 
 def _changes(entry: dict) -> str:
-    figures = _section(entry, "figures")
+    figures = section(entry, "figures")
     texts = [f"{verb} {', '.join(map(str, figures[verb]))}" for verb in ("added", "removed") if figures.get(verb)]
     changed = [f"{len(entry['changes'])} values changed"] if entry.get("changes") else []
     return "; ".join(texts + changed)

@@ -100,6 +100,13 @@ def changed(
         raise InputError(found, error.omitted) from None
 
 
+def section(entry: dict, *names: str) -> dict:
+    """A section of an entry, or one within it; empty where it is none, as a file may be edited by hand."""
+    for name in names:
+        entry = entry[name] if isinstance(entry.get(name), dict) else {}
+    return entry
+
+
 @contextmanager
 def _unchanged(source: YamlDocument) -> Iterator[None]:
     """Holds the file of a robot, so that of two commands that change it neither loses what the other wrote.
