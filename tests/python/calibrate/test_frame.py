@@ -82,13 +82,13 @@ def test_command(run, tmp_path):
     readings = session(robot, random)
     wrong, table, new = (tmp_path / name for name in ("robot.yaml", "measurements.csv", "new.yaml"))
     robot_file.save(somewhere(robot, random), wrong)
-    simulation.write(readings, table, 2)
+    simulation.write(readings, table)
     code, out, error = run("calibrate", "frame", wrong, table, "-o", new, "--json", "-")
     assert code == 0, error
     found = json.loads(out)
     assert robot_file.load(new).tracker.position_mm == pytest.approx([row["value"] for row in found["values"][:3]])
     assert json.loads(run("compare", new, table, "--json", "-")[1])["conventions"] == []
-    simulation.write(replace(readings, alpha=readings.alpha * [1, -1]), table, 2)
+    simulation.write(replace(readings, alpha=readings.alpha * [1, -1]), table)
     code, _, error = run("calibrate", "frame", new, table)
     assert code != 0
     assert "alpha2 counts the other way" in error

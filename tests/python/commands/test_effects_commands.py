@@ -25,7 +25,7 @@ CALIBRATION = ["tubes.*.curvature", "actuation.home_rotation.*", "tracker.positi
 @pytest.fixture
 def table(plan, tmp_path):
     path = tmp_path / "plan.csv"
-    simulation.write(replace(plan, position=None, quaternion=None), path, 3)
+    simulation.write(replace(plan, position=None, quaternion=None), path)
     return path
 
 
@@ -134,7 +134,7 @@ def test_refusals_of_a_model(robot, hidden):
 
 def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):
     data, first, second, third, last = (tmp_path / name for name in ("m.csv", "1.yaml", "2.yaml", "3.yaml", "4.yaml"))
-    simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data, 3)
+    simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data)
     free = ("--free", ",".join(CALIBRATION))
     assert run("add", ROBOT, "sensor_offset", "--fit", data, "-o", first, *free)[0] == 0
     assert run("add", first, "tip_load", "--fit", data, "-o", second, *free)[0] == 0
@@ -185,7 +185,7 @@ def test_add_diagnosis(run, tmp_path, robot):
 def test_fit_of_a_diagnosis(run, tmp_path, robot, plan, hidden):
     """Only parameters of the answer are fitted: two constitutive laws of friction would share the error of one."""
     data, answer, target = tmp_path / "m.csv", tmp_path / "diagnosis.json", tmp_path / "new.yaml"
-    simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data, 3)
+    simulation.write(simulation.simulate(hidden(robot, friction__coefficient="0.02"), plan), data)
     parameters = {"law": 1.0, **{f"coefficient.{i}": 0.01 for i in (1, 2, 3)}}
     answer.write_text(json.dumps({"effects": [{"class": ["friction"], "parameters": parameters}]}))
     fit = ("--fit", data, "--free", ",".join(CALIBRATION), "--json", tmp_path / "added.json")
@@ -322,7 +322,7 @@ def test_history_of_a_new_robot(run):
 
 def test_history_report(run, tmp_path, robot, plan, hidden):
     data, new, page = tmp_path / "m.csv", tmp_path / "new.yaml", tmp_path / "page.html"
-    simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data, 3)
+    simulation.write(simulation.simulate(hidden(robot, sensor_offset__x="0.001"), plan), data)
     assert run("add", ROBOT, "sensor_offset", "--fit", data, "-o", new, "--free", "tracker.position.*")[0] == 0
     code, out, _ = run("history", new, "--report", page)
     assert code == 0 and "sensor offset" in out and "m.csv" in out and "expected error" in out

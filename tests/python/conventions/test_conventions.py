@@ -380,7 +380,7 @@ def files(tmp_path):
 
     def write(robot, readings):
         robot_file.save(robot, tmp_path / "robot.yaml")
-        simulation.write(readings, tmp_path / "measurements.csv", robot.n_tubes)
+        simulation.write(readings, tmp_path / "measurements.csv")
         return tmp_path / "robot.yaml", tmp_path / "measurements.csv"
 
     return write

@@ -197,7 +197,7 @@ def test_commands(robot, readings, file, tmp_path, capsys):
     """Every command that uses effects takes `--effects FILE`."""
     path = file(GOOD)
     plan, made, new, poses, old = (tmp_path / name for name in ("p.csv", "m.csv", "n.yaml", "q.csv", "o.yaml"))
-    simulation.write(replace(readings, position=None, quaternion=None), plan, 3)
+    simulation.write(replace(readings, position=None, quaternion=None), plan)
     table2 = ROOT / "examples" / "robots" / "table2.yaml"
 
     def run(*words) -> str:
@@ -308,7 +308,7 @@ def test_endings_of_a_command(ending, when, file, readings, tmp_path, capsys):
     path, made, new = file(GOOD), tmp_path / "m.csv", tmp_path / "new.yaml"
     path.write_text(path.read_text().replace("        return", f"        if {when}: {ending}\n        return"))
     table2 = ROOT / "examples" / "robots" / "table2.yaml"
-    simulation.write(simulation.simulate(robot_file.load(table2), readings, "jitter"), made, 3)
+    simulation.write(simulation.simulate(robot_file.load(table2), readings, "jitter"), made)
     fit = ["--fit", made, "--free", "tubes.1.curvature", "--json", "-", "-o", new, "--effects", path]
     assert cli.run([str(word) for word in ("add", table2, "mine", *fit)]) == 1
     printed = capsys.readouterr()

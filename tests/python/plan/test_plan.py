@@ -59,7 +59,7 @@ def test_table(robot, demo, tmp_path):
     """A plan is a table that can be read again."""
     runs = random_runs(robot, demo, 3, np.array([0.02]), np.random.default_rng(4))
     plan = table(robot, runs, first_run=7)
-    simulation.write(plan, tmp_path / "plan.csv", robot.n_tubes)
+    simulation.write(plan, tmp_path / "plan.csv")
     again = measurements.load(tmp_path / "plan.csv", robot.n_tubes)
     np.testing.assert_allclose(again.alpha, plan.alpha, rtol=1e-11)
     np.testing.assert_allclose(again.force, np.tile(0.02 * np.array(robot.gravity), (len(plan), 1)), atol=1e-12)
@@ -79,7 +79,7 @@ def test_proposed_runs(robot, tmp_path):
     random, source = np.random.default_rng(5), tmp_path / "robot.yaml"
     source.write_text((EXAMPLES / "robots" / "table2.yaml").read_text(), encoding="utf-8")
     demo = measurements.load(EXAMPLES / "data" / "demo" / "measurements.csv", robot.n_tubes)
-    simulation.write(table(robot, random_runs(robot, demo, 24, np.zeros(1), random)), tmp_path / "first.csv", 3)
+    simulation.write(table(robot, random_runs(robot, demo, 24, np.zeros(1), random)), tmp_path / "first.csv")
 
     def simulate(plan: str, target: str) -> None:
         assert cli.run(["simulate", str(source), str(tmp_path / plan), *hidden, "-o", str(tmp_path / target)]) == 0

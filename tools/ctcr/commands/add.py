@@ -52,7 +52,7 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
         out.write_json({"effects": after.effects})
         out.say(f"{', '.join(ids)} added, not fitted (--fit MEASUREMENTS fits): {target}")
         return
-    loaded, readings = options.load_any(robot, measurements)
+    loaded, readings = options.load(robot, measurements, any_convention=True)
     given = {"fixed": fixed, "start": start, "free": free, "anyway": anyway, "frame_per_run": frame_per_run}
     added = add(loaded, ids, readings, **given)
     added.save(target, in_place=in_place)

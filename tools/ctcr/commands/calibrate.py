@@ -163,7 +163,7 @@ def frame(robot, measurements, anyway, target, in_place, out) -> None:
     from ctcr.calibrate import outcome
     from ctcr.calibrate.frame import tracker_frame
 
-    loaded, table = options.load_any(robot, measurements)
+    loaded, table = options.load(robot, measurements, any_convention=True)
     finds = ("frame_inverse", "frame_wrong")
     readings, said, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=False, finds=finds)
     target = outcome.check_target(loaded, target, in_place)
@@ -273,7 +273,7 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anywa
     from ctcr.api.calibrate import calibrate
     from ctcr.calibrate import outcome, report
 
-    loaded, readings = options.load_any(robot, measurements)
+    loaded, readings = options.load(robot, measurements, any_convention=True)
     target = outcome.check_target(loaded, target, in_place)
     chosen = {"free": free, "hold_out": hold_out, "noise": noise, "sd": _widths(widths), "anyway": anyway}
     calibration = calibrate(loaded, readings, halves=out.report is not None, frame_per_run=frame_per_run, **chosen)

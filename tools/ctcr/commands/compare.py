@@ -27,7 +27,7 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     from ctcr.api.compare import compare
     from ctcr.compare import terminal
 
-    loaded, readings = options.load_any(robot, measurements)
+    loaded, readings = options.load(robot, measurements, any_convention=True)
     result = compare(loaded, readings, steps=steps)
     out.write_page(result)
     out.write_json(result.as_dict())

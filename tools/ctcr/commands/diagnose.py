@@ -28,7 +28,7 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
     from ctcr.conventions import report
     from ctcr.diagnose import terminal
 
-    loaded, readings = options.load_any(robot, measurements)
+    loaded, readings = options.load(robot, measurements, any_convention=True)
     try:
         with terminal.progress() as say:
             result = diagnose(

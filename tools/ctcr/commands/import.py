@@ -91,12 +91,12 @@ def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, *
     for source in found.sources:
         _show(out, source, summary.rows(source))
     out.say(*(f"Note: {note}" for note in found.notes), *(f"Doubt: {doubt}" for doubt in found.table.warnings))
-    simulation.write(found.table, target, found.n_tubes)
+    simulation.write(found.table, target)
     if save_mapping:
         intake_choices.save(summary.resolved(choices, found.sources), save_mapping)
     out.write_json(_as_data(found, [summary.rows(source) for source in found.sources]))
     runs, poses = len(set(found.table.run.tolist())), int(found.table.measured.sum())
-    counts = f"{len(found.table)} rows, {poses} with a pose, {runs} run{'s' * (runs != 1)}, {found.n_tubes} tubes"
+    counts = f"{len(found.table)} rows, {poses} with a pose, {runs} run{'s' * (runs != 1)}, {found.table.n_tubes} tubes"
     out.say(f"{counts}: {target}")
     if save_mapping:
         out.say(f"The next log of this kind: ctcr import LOG -o TABLE --mapping {save_mapping}")
@@ -115,7 +115,7 @@ def _as_data(found, shown) -> dict:
     return {
         "rows": len(found.table),
         "with_pose": int(found.table.measured.sum()),
-        "tubes": found.n_tubes,
+        "tubes": found.table.n_tubes,
         "logs": [
             {"file": str(source.log.path), "kind": source.log.kind, "columns": rows, "not_used": source.unused}
             for source, rows in zip(found.sources, shown, strict=True)

@@ -25,5 +25,5 @@ def command(robot, tables, target) -> None:
 
     n = robot_file.load(robot).n_tubes
     whole = joined([measurements.load(table, n) for table in tables], [start_of(table) for table in tables])
-    simulation.write(whole, target, n)
+    simulation.write(whole, target)
     options.Output().say(f"{len(whole)} rows of {len(tables)} tables: {target}")

@@ -32,7 +32,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
     from ctcr.model import simulation
 
     kilograms = _masses(masses)
-    loaded, table = options.load_any(robot, measurements)
+    loaded, table = options.load(robot, measurements, any_convention=True)
     readings, _, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=frame_per_run)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
@@ -40,7 +40,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
         proposal = plan.propose(diagnosis, runs, kilograms)
     writes = proposal.plan is not None and target
     if writes:
-        simulation.write(proposal.plan, target, loaded.n_tubes)
+        simulation.write(proposal.plan, target)
     out.write_json(
         {
             "rivals": [rival.id for rival in proposal.rivals],

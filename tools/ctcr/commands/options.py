@@ -175,22 +175,14 @@ effects = repeated(
 )
 
 
-def load(robot: str, table: str):
-    """The robot of a file, and a table of measurements or a plan for it."""
+def load(robot: str, table: str, any_convention: bool = False):
+    """The robot of a file, and a table of measurements or a plan for it; with `any_convention` also a table that may
+    follow another convention: a comparison or a fit tells."""
     from ctcr.robot import robot_file
     from ctcr.table import measurements
 
-    loaded = robot_file.load(robot)
-    return loaded, measurements.load(table, loaded.n_tubes)
-
-
-def load_any(robot: str, table: str):
-    """The same of a table that may follow another convention: a comparison or a fit tells."""
-    from ctcr.robot import robot_file
-    from ctcr.table import measurements
-
-    loaded = robot_file.load(robot)
-    return loaded, measurements.read(table, loaded.n_tubes)
+    loaded, read = robot_file.load(robot), measurements.read if any_convention else measurements.load
+    return loaded, read(table, loaded.n_tubes)
 
 
 def doubtful(loaded, path: str, in_full: bool = False) -> list[str]:

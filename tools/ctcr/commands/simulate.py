@@ -29,7 +29,7 @@ def command(robot, plan, hidden, noise, seed, target) -> None:
 
     loaded, table = options.load(robot, plan)
     made = simulation.simulate(options.with_effects(loaded, hidden), table, noise, seed)
-    simulation.write(made, target, loaded.n_tubes)
+    simulation.write(made, target)
     out, unsolved = options.Output(), int(np.isnan(made.position).any(axis=1).sum())
     out.say(f"{len(made) - unsolved} readings, noise: {noise}, seed {seed}: {target}")
     if unsolved:

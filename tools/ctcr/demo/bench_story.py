@@ -102,7 +102,7 @@ def _track(story: Story) -> None:
     for robot, name in ROBOTS.items():
         blind = f"blind_{robot}"
         loaded = robot_file.load(story.folder / f"{robot}.yaml")
-        simulation.write(blind_drive.drive(loaded, joints, corners), story.folder / f"{blind}.csv", loaded.n_tubes)
+        simulation.write(blind_drive.drive(loaded, joints, corners), story.folder / f"{blind}.csv")
 
         off = partial(_off_the_cube, story.folder / blind / TABLE, corners, loaded.n_tubes)
         story.do(f"Drive along a cube blindly, by the model {name}", _record(f"{robot}.yaml", blind), off, blind)

@@ -27,7 +27,6 @@ class Imported:
     """The table, and the columns that it came from; those of a log of joints apart."""
 
     table: Measurements
-    n_tubes: int
     sources: list[Columns]
 
     @property
@@ -81,7 +80,7 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     ]
     if not columns.has("t"):
         columns.notes.append("no column of times: effects of speed and delay cannot be found")
-    return Imported(table, moved.beta.shape[1], [columns] if joints is None else [columns, moving])
+    return Imported(table, [columns] if joints is None else [columns, moving])
 
 
 def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tuple[str, str]]:

@@ -40,9 +40,9 @@ def simulate(robot: Robot, plan: Measurements, noise: str = "jitter", seed: int 
     return replace(plan, position=position, quaternion=quaternion)
 
 
-def write(readings: Measurements, target: str | Path, n_tubes: int) -> None:
+def write(readings: Measurements, target: str | Path) -> None:
     """The table in the format of measurements; columns without any value are left out."""
-    columns = group_columns(n_tubes)
+    columns = group_columns(readings.n_tubes)
     present = {name: getattr(readings, name) for name in columns if getattr(readings, name) is not None}
     kept = {name: values.reshape(len(readings), -1) for name, values in present.items() if np.isfinite(values).any()}
     header = ",".join(column for name in kept for column in columns[name])
