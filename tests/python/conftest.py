@@ -23,10 +23,10 @@ DEMO = EXAMPLES / "data" / "demo" / "measurements.csv"
 
 @pytest.fixture(scope="module")
 def robot():
-    """That of the paper's Table II, with its bench."""
+    """That of the paper's Table II; in tests that run_on_bench runs, the one on the bench."""
     from ctcr.robot import robot_file
 
-    return robot_file.load(EXAMPLES / "robots" / "table2.yaml")
+    return robot_file.load(os.environ.get("ROBOT_FILE", EXAMPLES / "robots" / "table2.yaml"))
 
 
 @pytest.fixture(scope="module")

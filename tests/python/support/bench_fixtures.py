@@ -4,13 +4,7 @@ import os
 
 import pytest
 from ctcr.bench.devices import bench_file
-from ctcr.robot import robot_file
 from simulated_bench import mended_bench
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return robot_file.load(os.environ["ROBOT_FILE"])
 
 
 @pytest.fixture(scope="module")
