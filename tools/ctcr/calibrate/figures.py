@@ -145,7 +145,6 @@ def half_difference(figure, c: Calibration) -> bool | None:
     axes.plot(line, 2 * line, color=INK, lw=0.8, ls="--")
     axes.set(xlabel="expected from noise, mm RMS", ylabel="difference, mm", xlim=(0, None), ylim=(0, 1.1 * size.max()))
     axes.legend(fontsize=8, loc="upper right")
-    return None
 
 
 def scene(c: Calibration) -> str:

@@ -73,7 +73,7 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
             made.used[role] = picker.best(role, same)
     if poses:
         _poses(made, candidates, choices, picker)
-    _check(log, made, n_tubes, faults)
+    _check(log, made, faults)
     _check_units(log, made, choices, faults)
     if faults:
         raise InputError(faults)
@@ -240,7 +240,7 @@ def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _P
             picker.say(f"{text}Joints: name them, such as --column beta1={name}", name)
 
 
-def _check(log: Log, made: Mapping, n_tubes: int | None, faults: list[Problem]) -> None:
+def _check(log: Log, made: Mapping, faults: list[Problem]) -> None:
     """Faults where columns are missing."""
 
     def say(text: str) -> None:

@@ -49,9 +49,9 @@ def draw_robot(
     lamp = _stage(axes, np.concatenate([centre, *dashed]), 0.24 * reach)
     _draw_plate(axes, 0.09 * reach)
     _draw_shadow(axes, centre)
-    _draw_triad(axes, np.eye(4), 0.16 * reach, zorder=3, labels=True)
+    _draw_triad(axes, np.eye(4), 0.16 * reach, labels=True)
     _draw_tubes(axes, robot, 1e3 * arc_length, frames, 1e3 * tube_ends, lamp)
-    _draw_triad(axes, frames[-1], 0.09 * reach, zorder=5)
+    _draw_triad(axes, frames[-1], 0.09 * reach)
     for number, line in enumerate(dashed, start=2):
         _draw_shadow(axes, line)
         axes.plot(*line.T, color=OTHER_COLOUR, linestyle=(0, (4, 2)), linewidth=1.6, zorder=6)
@@ -154,7 +154,7 @@ def _draw_plate(axes, radius: float) -> None:
     axes.add_collection3d(Poly3DCollection([rim], facecolors="#aab4c255", edgecolors="#8792a2", linewidths=0.8))
 
 
-def _draw_triad(axes, frame: Array, size: float, zorder: int, labels: bool = False) -> None:
+def _draw_triad(axes, frame: Array, size: float, labels: bool = False) -> None:
     for k, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         tip = frame[:3, 3] + size * frame[:3, k]
         axes.quiver(*frame[:3, 3], *(size * frame[:3, k]), color=colour, linewidth=1.6, arrow_length_ratio=0.16)

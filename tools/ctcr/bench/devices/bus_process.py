@@ -175,9 +175,8 @@ class _Owner:
             elif self._enabled_at and not said.ready and now - self._enabled_at > READY_S:
                 off = drive.fault("does not enable its motor", "check the motor's cable and supply")
                 control.stop(bus.check_states() or off)
-        if self._cycles % STATE_CYCLES == 0:
-            if fault := bus.check_states(silence=False):
-                control.stop(fault)
+        if self._cycles % STATE_CYCLES == 0 and (fault := bus.check_states(silence=False)):
+            control.stop(fault)
 
     # ---- requests
 
