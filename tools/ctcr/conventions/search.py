@@ -33,9 +33,9 @@ class Case:
     changes: tuple[Change, ...] = ()  # that made these readings of those of the table
 
     def share_of(self, error: float) -> float:
-        """An error [m] over the mean deployed length; infinite where nothing is deployed."""
+        """An error [m] over the usual deployed length; infinite where nothing is deployed."""
         beta, _ = self.robot.joints_of_table(self.readings.beta, self.readings.alpha)
-        deployed = np.mean(np.max(beta + [tube.length for tube in self.robot.tubes], axis=1))
+        deployed = np.median(np.max(beta + self.robot.lengths, axis=1))
         return error / deployed if deployed > 0 else np.inf
 
 
