@@ -7,9 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ctcr.calibrate.outcome import frame_rows
+from ctcr.calibrate.procedures import radius_of_circle
 from ctcr.errors import InputError
 from ctcr.fit.result import Priors
+from ctcr.frames import of_sensor
 from ctcr.model import parameters
+from ctcr.model.model import Model
 from ctcr.robot import robot_file
 from ctcr.robot.description import Correlation
 
@@ -256,6 +260,136 @@ def test_faults(run, tmp_path, name, lines, options, message):
     assert code == (2 if "give --" in err else 1)
     assert err.startswith("Error: ") and "this should not happen" not in err
     assert [path.name for path in tmp_path.iterdir()] == ["circles.csv"]
+
+
+def exchanged(lines: list[str], first: str, second: str) -> list[str]:
+    """The rows of two tubes under the number of the other one."""
+    other = {first: second, second: first}
+    return [lines[0], *(other.get(line[0], line[0]) + line[1:] for line in lines[1:])]
+
+
+def flush_times(factor: float) -> list[str]:
+    """home.csv with its flush angles times a factor."""
+    header, *lines = rows("home.csv")
+    parts = [line.rsplit(",", 1) for line in lines]
+    return [header, *(f"{rest},{factor * float(angle)}" for rest, angle in parts)]
+
+
+WRONG = [
+    ("curvature", rows("picture.csv"), ["--tube", 1, "--mm-per-px", 1 / 12], "curvature", 4.5),
+    ("rotation-offset", exchanged(rows("circles.csv"), "1", "2"), [], "tube 1: radius of the circle", 3.0),
+    ("rotation-offset", exchanged(rows("circles.csv"), "1", "2"), ["--deployed-mm", 20], "tube 2: radius", 3.0),
+    ("cantilever", rows("cantilever.csv"), ["--tube", 1, "--outer-mm", 3], "Young's modulus", 4.0),
+    ("home", flush_times(1.02), [], "tube 1: length", 2.0),
+]
+
+
+@pytest.mark.parametrize(("command", "lines", "options", "name", "least"), WRONG)
+def test_contradiction(run, tmp_path, command, lines, options, name, least):
+    """What can hardly be true together with the robot file is said before all else, to people and to programs."""
+    table = tmp_path / "table.csv"
+    table.write_text("\n".join(lines) + "\n")
+    code, out, err = run(command, table, "--robot", ROBOT, *options, "--json", "-")
+    assert code == 0, err
+    found = json.loads(out)
+    first = next(text for text in found["notices"] if text.startswith(name))
+    assert found["notices"].index(first) < 4 and "standard deviations" in first
+    far = [row for row in found["values"] if row["shift"] and abs(row["shift"]) > 2]
+    assert max(abs(row["shift"]) for row in far) > least
+    for row in far:
+        assert abs(row["value"] - row["old"]) / np.hypot(row["sd"], row["old_sd"]) == pytest.approx(abs(row["shift"]))
+    code, out, err = run(command, table, "--robot", ROBOT, *options, "-o", tmp_path / "new.yaml")
+    assert code == 0 and out.startswith("Doubt: "), err
+    assert first in robot_file.load(tmp_path / "new.yaml").history[-1]["note"]
+
+
+@pytest.mark.parametrize(("name", "table", "options", "_"), STEPS)
+def test_agreement(run, name, table, options, _):
+    """Right measurements of a robot within its uncertainty bring no doubt."""
+    code, out, err = run(name, DATA / table, "--robot", ROBOT, *options)
+    assert code == 0 and "Doubt" not in out, err
+
+
+@pytest.mark.parametrize(
+    ("command", "lines", "options", "words"),
+    [
+        ("home", flush_times(-1), [], ["tube 1", "behind the front plate", "sign of flush_angle"]),
+        ("home", flush_times(360), [], ["tube 1", "m: has flush_angle another unit"]),
+        ("home", exchanged(rows("home.csv"), "1", "2"), ["--robot", ROBOT], ["longer than tube 1"]),
+    ],
+)
+def test_impossible(run, tmp_path, command, lines, options, words):
+    """What no robot can have is an error, with and without a robot file."""
+    table = tmp_path / "table.csv"
+    table.write_text("\n".join(lines) + "\n")
+    for chosen in (options or ["--pitch-mm", 2], ["--robot", ROBOT, "-o", tmp_path / "new.yaml"]):
+        code, out, err = run(command, table, *chosen, "--json", tmp_path / "a.json")
+        assert code == 1 and out == "" and all(word in err for word in words), err
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_unit(run, tmp_path):
+    """Without a robot file, a modulus that no tube has is doubted still."""
+    table = tmp_path / "table.csv"
+    table.write_text("load_g,deflection_mm,free_length_mm\n.01,9.3,120\n.02,18.5,120\n.03,27.8,120\n")
+    code, out, err = run("cantilever", table, "--inner-mm", 1.3, "--outer-mm", 1.52)
+    assert code == 0 and out.startswith("Doubt: Young's modulus: 0.0") and "GPa is unusual" in out, err
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "options", "fault"),
+    [
+        ("cantilever", "5,1,80\n\n10,-2,80\n20,4,80", [], "row 4: the tube must deflect along the load"),
+        ("cantilever", "0,1,80\n10,2,80\n20,4,80", ["--fit-zero"], "row 2: no load bends nothing: leave this row out"),
+        ("home", "1,-296.3,82.7\n1,,", ["--pitch-mm", 2], "row 2, distance_mm: '-296.3' does not fit: needs"),
+    ],
+)
+def test_fault_rows(run, tmp_path, command, text, options, fault):
+    """Faults that the computation finds name the row of the file too, and the unit of the column."""
+    header = {"cantilever": "load_g,deflection_mm,free_length_mm", "home": "tube,distance_mm,flush_angle_rev"}[command]
+    table = tmp_path / "table.csv"
+    table.write_text(f"{header}\n{text}\n")
+    sizes = ["--inner-mm", 1.3, "--outer-mm", 1.52] if command == "cantilever" else []
+    code, _, err = run(command, table, *sizes, *options)
+    assert code == 1 and f"table.csv, {fault}" in err
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_radius(seed):
+    """The circle that a robot file predicts is that of the model, and its deviation that of drawn tubes."""
+    random = np.random.default_rng(seed)
+    robot = robot_file.load(ROBOT).model_copy(deep=True)
+    place = random.uniform(-4, 4, 3)
+    tube = robot.tubes[1]
+    tube.curvature_per_m = float(random.uniform(-12, 12))
+    robot.tracker.sensor_position_mm = place.tolist()
+    robot.gravity = None
+    actuation = robot.actuation.model_copy(update={"home_translation_mm": [0.0], "home_rotation_deg": [0.0]})
+    alone = robot.model_copy(update={"tubes": [tube], "actuation": actuation})
+    for deployed in (0.03, tube.curved_length):
+        tip = Model(alone).predict(np.array([[deployed - tube.length]]), np.zeros((1, 1)), np.zeros((1, 3)))
+        seen, _ = of_sensor(robot.tracker, tip.position, tip.quaternion)
+        assert radius_of_circle(robot, 2, 1e3 * deployed)[0] == pytest.approx(np.hypot(*seen[0, :2]), rel=1e-5)
+    spread = []
+    for curvature, curved in random.standard_normal((2000, 2)):
+        other = robot.model_copy(deep=True)
+        other.tubes[1].curvature_per_m *= 1 + 0.05 * curvature
+        other.tubes[1].curved_length_mm += 2.5 * curved
+        spread.append(radius_of_circle(other, 2)[0])
+    assert radius_of_circle(robot, 2)[1] == pytest.approx(np.std(spread), rel=0.1)
+
+
+def test_turn_of_frame():
+    """Frames are compared as rotations: another rotation vector of the same turn is no contradiction, a turn is."""
+    robot = robot_file.load(ROBOT)
+    vector = np.array(robot.tracker.rotation_vector_rad)
+    other = vector * (1 - 2 * np.pi / np.linalg.norm(vector))
+    position, sd = np.array(robot.tracker.position_mm), np.full(3, 1e-3)
+    same = frame_rows(robot, position, 1e3 * sd, other, sd)
+    assert max(abs(row.shift) for row in same) < 1e-6
+    turned = frame_rows(robot, position, 1e3 * sd, vector + [0.0, 0.0, np.radians(3)], sd)
+    assert any(row.contradicts for row in turned) and not any(row.contradicts for row in turned[:3])
+    assert not any(row.contradicts for row in frame_rows(robot, position + 100, sd, vector, sd, prior=False))
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,8 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
     found, covariance = fit.apply(robot=start).tracker, considered(start, readings, fit)[np.ix_(own, own)]
     before, after = sensor_pose.placed(robot, readings)[0], robot.model_copy(update={"tracker": found})
     sd = np.sqrt(np.diag(covariance))
-    rows = frame_rows(robot, found.position_mm, found.rotation_vector_rad, [*1e3 * sd[:3], *sd[3:]])
+    vector = np.array(found.rotation_vector_rad)
+    rows = frame_rows(robot, np.array(found.position_mm), 1e3 * sd[:3], vector, sd[3:], prior=False)
     before_mm, after_mm = (rms_mm(one, readings) for one in (before, after))
     rows.append(Row("error of the tip, RMS", "mm", after_mm, old=before_mm))
     figures = {"rms_mm": {"before": before_mm, "after": after_mm}, "rotation_sd_deg": np.degrees(sd[3:]).tolist()}

@@ -1,14 +1,24 @@
-"""The result of a calibration procedure, and how it is given back: table, JSON, report, robot file."""
+"""The result of a calibration procedure, compared with the robot file, and how it is given back: table, JSON, report,
+robot file."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from math import degrees, inf, isfinite, nan
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import degrees, hypot, inf, isfinite, nan
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.calibrate.procedure_figures import WIDTH
+from ctcr.calibrate.tables import Table
 from ctcr.errors import ArgumentError, InputError, Problem
-from ctcr.model.parameters import name_at, uncertainty_of, value_at
-from ctcr.robot import ledger
+from ctcr.model import parameters
+from ctcr.model.parameters import field_of, name_at, stated_sd, uncertainty_of, value_at
+from ctcr.robot import checks, ledger
+from ctcr.robot.description import Robot
 from ctcr.robot.ledger import Change, Entry
 from ctcr.robot.yaml_document import FieldPath
 from ctcr.show import html_page, output
@@ -18,9 +28,10 @@ from ctcr.show.wording import deviation, number
 
 @dataclass(frozen=True)
 class Row:
-    """A value with its unit and standard deviation (NaN: not known); `old`: in the robot file (NaN: no file).
+    """A value with its unit and standard deviation (NaN: not known), and both by the robot file (NaN: it says nothing).
 
-    `path`: the field of the robot file that holds it, where it is to be updated.
+    `path`: the field of the robot file that holds it, where it is to be updated. `apart`: value less `old`, where that
+    is no plain difference.
     """
 
     name: str
@@ -29,6 +40,20 @@ class Row:
     sd: float = nan
     old: float = nan
     path: FieldPath | None = None
+    old_sd: float = nan
+    apart: float = nan
+
+    @property
+    def shift(self) -> float:
+        """Value less that of the robot file, in standard deviations of this difference; NaN where one is not known."""
+        sd = hypot(self.old_sd, self.sd)
+        apart = self.apart if isfinite(self.apart) else self.value - self.old
+        return apart / sd if isfinite(sd) and sd > 0 else nan
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether value and robot file can hardly both be right."""
+        return isfinite(self.shift) and abs(self.shift) > settings.MOVED_FAR
 
 
 @dataclass(frozen=True)
@@ -43,7 +68,11 @@ class Picture:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The rows to show and notices about them. `correlations`: pairs of the rows' paths, and r of their errors."""
+    """The rows to show and notices about them. `correlations`: pairs of the rows' paths, and r of their errors.
+
+    `suspects`: what of the measurement may be wrong where it contradicts the robot file. `doubts`: what speaks against
+    the values, see `judged`.
+    """
 
     title: str
     rows: list[Row]
@@ -53,6 +82,8 @@ class Outcome:
     picture: Picture | None = None
     correlations: list[tuple[FieldPath, FieldPath, float]] = field(default_factory=list)
     view: tuple[str, str] | None = None  # JSON of a 3-D view of the report, and its caption
+    suspects: str = ""
+    doubts: list[str] = field(default_factory=list)
 
     @property
     def changes(self) -> list[Change]:
@@ -61,16 +92,22 @@ class Outcome:
         return [Change(row.path, row.unit, row.value, None if row.unit == "rad" else row.sd) for row in updating]
 
     def as_dict(self) -> dict[str, Any]:
-        values = [{name: value for name, value in vars(row).items() if name != "path"} for row in self.rows]
-        return {"values": values, "figures": self.figures, "notices": self.notices, **self.details}
+        shown = ("name", "unit", "value", "sd", "old", "old_sd", "shift")
+        values = [{name: getattr(row, name) for name in shown} for row in self.rows]
+        return {"values": values, "figures": self.figures, "notices": [*self.doubts, *self.notices], **self.details}
 
 
-def computed(procedure: Callable, file: str, **arguments):
-    """Calls a procedure of the compiled core; its ValueError becomes a fault of the file."""
+def computed(procedure: Callable, table: Table, **arguments):
+    """Calls a procedure of the compiled core; its ValueError becomes a fault of the table, in its row of the file."""
     try:
         return procedure(**arguments)
     except ValueError as error:
-        raise InputError(Problem(str(error), file)) from None
+        row, text = re.fullmatch(r"(?:row (\d+): )?(.*)", str(error), re.DOTALL).groups()
+        line = int(table.row[int(row) - 1]) if row else None
+        raise InputError(Problem(text, table.file, line, line_name="row")) from None
+
+
+# ---- against the robot file
 
 
 def in_file(robot, path: FieldPath) -> float:
@@ -79,18 +116,85 @@ def in_file(robot, path: FieldPath) -> float:
     return nan if value is None else value
 
 
-def frame_rows(robot, position_mm: Sequence[float], vector_rad: Sequence[float], sd: Sequence[float]) -> list[Row]:
-    """A tracker frame T_ref with its standard deviations (6,) [mm], [rad]."""
-    kinds = (
-        ("position_mm", "origin of the base frame", "mm", position_mm, sd[:3]),
-        ("rotation_vector_rad", "rotation vector", "rad", vector_rad, sd[3:]),
-    )
+def row_of(robot: Robot | None, name: str, unit: str, value: float, sd: float, path: FieldPath) -> Row:
+    """The row of a value that the robot file holds, with what that says of it."""
+    return Row(name, unit, value, sd, in_file(robot, path), path, _sd_in_file(robot, path))
+
+
+def _sd_in_file(robot: Robot | None, path: FieldPath) -> float:
+    """The standard deviation of a number of the file by its `uncertainty`, in the unit of that number."""
+    name = name_at(path) if robot else None
+    sd = stated_sd(robot, name) if name else None
+    factor = field_of(name).factor if name and field_of(name).path else 1.0  # numbers of a rotation vector are in rad
+    return nan if sd is None else factor * sd
+
+
+def by_robot(robot: Robot, function: Callable[[Array], float], *names: str) -> tuple[float, float]:
+    """What a function of parameters (SI) is by the robot file, and its standard deviation (linearised)."""
+    values, step = parameters.values(robot, names), 1e-3
+    parts = []  # of the standard deviation
+    for change in np.diag([step * (stated_sd(robot, name) or 0.0) for name in names]):
+        parts.append((function(values + change) - function(values - change)) / (2 * step))
+    correlations = parameters.correlations(robot, names)
+    part = np.array(parts)
+    return function(values), float(np.sqrt(part @ (part if correlations is None else correlations @ part)))
+
+
+def frame_rows(
+    robot: Robot | None, position_mm: Array, position_sd_mm: Array, vector: Array, sd: Array, prior: bool = True
+) -> list[Row]:
+    """The rows of a tracker frame: its origin, and its rotation vector [rad] with the standard deviations (3,) of turns
+    about the axes. `prior`: whether the file's frame counts as known with its uncertainty."""
+    turn = np.full(3, nan)
+    if robot is not None:
+        turn = (Rotation.from_rotvec(vector) * Rotation.from_matrix(robot.tracker.rotation).inv()).as_rotvec()
     rows = []
-    for key, text, unit, values, widths in kinds:
-        for i, (axis, value, width) in enumerate(zip("xyz", values, widths, strict=True)):
+    for key, text, unit, values, widths, apart in (
+        ("position_mm", "origin of the base frame", "mm", position_mm, position_sd_mm, np.full(3, nan)),
+        ("rotation_vector_rad", "rotation vector", "rad", vector, sd, turn),
+    ):
+        for i, axis in enumerate("xyz"):
             path = ("tracker", key, i)
-            rows.append(Row(f"{text}, {axis}", unit, float(value), float(width), in_file(robot, path), path))
+            row = row_of(robot, f"{text}, {axis}", unit, float(values[i]), float(widths[i]), path)
+            rows.append(replace(row, apart=float(apart[i]), old_sd=row.old_sd if prior else nan))
     return rows
+
+
+def judged(outcome: Outcome, robot: Robot | None, command: str, source: str) -> Outcome:
+    """The outcome with its doubts: values that contradict the robot file, or that look wrong by themselves.
+
+    Raises InputError where no robot can have the values.
+    """
+    said, heading, names = [], "", {}
+    for row in outcome.rows:  # an indented one belongs to the last that is not
+        heading = heading if row.name.startswith(" ") else row.name.partition(": ")[0]
+        name = f"{heading}: {row.name.strip()}" if row.name.startswith(" ") else row.name
+        names[row.path] = name
+        said += [f"{name}: {_contradiction(row)}"] if row.contradicts else []
+    for path, text in _odd(outcome, robot, command, source):
+        said.append(f"{names.get(path) or checks.path_text(path)}: {text}")
+    if said and outcome.suspects:
+        said.append(f"what may be wrong: {outcome.suspects}{', or the robot file' if robot else ''}")
+    return replace(outcome, doubts=said)
+
+
+def _contradiction(row: Row) -> str:
+    found = f"{number(row.value, row.sd)} ± {deviation(row.sd)} {row.unit} measured"
+    stated = f"{number(row.old, row.old_sd)} ± {deviation(row.old_sd)}" if row.old_sd else f"exactly {row.old:.4g}"
+    apart = float(f"{abs(row.shift):.2g}")
+    return f"{found}, {stated} by the robot file: {apart:g} standard deviations apart"
+
+
+def _odd(outcome: Outcome, robot: Robot | None, command: str, source: str) -> Iterator[checks.Fault]:
+    """What looks wrong of the values by themselves: without a robot by their units, else in the robot with them."""
+    if robot is None:
+        known = [(row, *Robot.owner(row.path)) for row in outcome.rows if row.path]
+        quantities = [(row, section.quantity(key)) for row, section, key in known]
+        yield from ((row.path, unit.doubt(row.value)) for row, unit in quantities if not unit.is_usual(row.value))
+        return
+    before = set(checks.doubts(robot))
+    after = ledger.changed(robot, *_changes(outcome, robot, command, source))
+    yield from (fault for fault in checks.doubts(after) if fault not in before and fault[0][0] != "uncertainty")
 
 
 def check_target(robot, target: str | None, in_place: bool, needed: bool = False) -> str | None:
@@ -106,9 +210,12 @@ def check_target(robot, target: str | None, in_place: bool, needed: bool = False
 
 def write_robot(outcome: Outcome, robot, target: str, command: str, source: str, in_place: bool) -> None:
     """Writes the robot file with the changes, and an entry of its ledger."""
-    entry = Entry(command, [source], outcome.figures, " ".join(outcome.notices))
+    ledger.write(robot, target, *_changes(outcome, robot, command, source), in_place=in_place)
+
+
+def _changes(outcome: Outcome, robot, command: str, source: str) -> tuple[list[Change], Entry]:
     changes = [*outcome.changes, *_uncertainties(robot, outcome.rows), *_correlations(robot, outcome)]
-    ledger.write(robot, target, changes, entry, in_place=in_place)
+    return changes, Entry(command, [source], outcome.figures, " ".join([*outcome.doubts, *outcome.notices]))
 
 
 def _uncertainties(robot, rows: list[Row]) -> list[Change]:
@@ -136,6 +243,8 @@ def _correlations(robot, outcome: Outcome) -> list[Change]:
 
 
 def show(console, outcome: Outcome) -> None:
+    for doubt in outcome.doubts:
+        console.print(f"Doubt: {doubt}", style="bold")
     console.print(output.table(outcome.title, *cells(outcome), text_columns=2))
     console.bullets(outcome.notices)
 
@@ -143,7 +252,7 @@ def show(console, outcome: Outcome) -> None:
 def cells(outcome: Outcome) -> tuple[dict[str, str], list[list[str]]]:
     """Columns and rows of the table; the first two columns are text."""
     with_old = any(isfinite(row.old) for row in outcome.rows)
-    columns = {"": "", "unit": ""} | ({"robot file": "the value before"} if with_old else {})
+    columns = {"": "", "unit": ""} | ({"robot file": "the value before, or predicted"} if with_old else {})
     columns |= {"found": "the value measured", "sd": "its standard deviation"}
     rows = []
     for row in outcome.rows:
@@ -156,7 +265,8 @@ def cells(outcome: Outcome) -> tuple[dict[str, str], list[list[str]]]:
 def page(outcome: Outcome, files: Sequence[str], robot=None) -> str:
     """The whole HTML text; `files`: the input files."""
     title = f"{outcome.title}: {robot.name}" if robot else outcome.title
-    sections = ["<h2>To know</h2>" + bullets(outcome.notices)] if outcome.notices else []
+    lists = ("Doubts", outcome.doubts), ("To know", outcome.notices)
+    sections = [f"<h2>{heading}</h2>" + bullets(lines) for heading, lines in lists if lines]
     if outcome.picture:
         p = outcome.picture
         sections.append(figure(p.plot, p.subject, WIDTH, p.height, p.caption, wide=True))

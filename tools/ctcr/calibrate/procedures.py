@@ -4,15 +4,15 @@ The numbers come from the core.
 """
 
 from collections.abc import Sequence
-from math import degrees, isfinite
+from math import cos, degrees, hypot, inf, isfinite, nan, sin
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ctcr import _core
+from ctcr import _core, settings
 from ctcr.arrays import Array
 from ctcr.calibrate import procedure_figures as figures_of
-from ctcr.calibrate.outcome import Outcome, Picture, Row, computed, frame_rows, in_file
+from ctcr.calibrate.outcome import Outcome, Picture, Row, by_robot, computed, frame_rows, in_file, row_of
 from ctcr.calibrate.tables import Column, Table
 from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.frames import points_to_base
@@ -22,6 +22,7 @@ from ctcr.show.wording import listed
 
 SIGMAS_AT_95 = 2.80  # the norm of a 3-D Gaussian is below 2.80 standard deviations of an axis in 95 % of cases
 AXES = "xyz"
+LONGEST_MM = 10e3  # of a tube, as the core demands of lengths that are measured by hand
 
 SCATTER = (  # where a row is a mean: the standard deviation of one reading per axis, and their number
     Column("scatter", "length", needed=False, filled=False),
@@ -39,14 +40,14 @@ REGISTRATION = (*CAD_POINTS, *(Column(axis, "length", filled=False) for axis in 
 HOME = (
     Column("tube", "count"),
     Column("home_angle", "angle", needed=False, filled=False),
-    Column("distance", "length", needed=False, filled=False),
+    Column("distance", "length", needed=False, filled=False, positive=True),
     Column("flush_angle", "angle", needed=False, filled=False),
-    Column("length", "length", needed=False, filled=False),
+    Column("length", "length", needed=False, filled=False, positive=True),
 )
 CANTILEVER = (
     Column("load", "load"),
     Column("deflection", "length"),
-    Column("free_length", "length"),
+    Column("free_length", "length", positive=True),
     Column("load_distance", "length", needed=False),
 )
 CURVATURE = (Column("x", "picture"), Column("y", "picture"))
@@ -69,8 +70,13 @@ def tracker_noise(robot: Robot | None, table: Table | None = None) -> dict[str, 
     return noise
 
 
-def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> Outcome:
-    """Home rotations from circles of the tip, one tube alone at a time. Ref: Boyer et al., eq. (5)."""
+def rotation_offsets(
+    table: Table, robot: Robot | None, ratio: float | None, deployed_mm: float | None = None
+) -> Outcome:
+    """Home rotations from circles of the tip, one tube alone at a time. Ref: Boyer et al., eq. (5).
+
+    `deployed_mm`: how far the tube stands out; None: all that is curved of it.
+    """
     tubes = table["tube"] if "tube" in table else np.ones(len(table), np.int64)
     if ratio is None and robot is not None:
         ratio = robot.actuation.rotation_rev_per_rev
@@ -87,7 +93,7 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         direction = table["direction"][mine].astype(np.int8) if "direction" in table else None
         fit = computed(
             _core.fit_rotation_offset,
-            table.file,
+            table,
             motor_angle=angle,
             position=position,
             direction=direction,
@@ -97,15 +103,18 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
             **tracker_noise(robot, table),
         )
         path = ("actuation", "home_rotation_deg", tube - 1)
-        offset, old = degrees(fit.offset), in_file(robot, path)
+        offset = degrees(fit.offset)
         if robot:
-            offset = _nearest_turn(offset, old)
-        rows.append(Row(f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), old, path))
+            offset = _nearest_turn(offset, in_file(robot, path))
+        rows.append(row_of(robot, f"{name}: rotation offset", "deg", offset, degrees(fit.offset_sd), path))
         for way in ("forward", "backward"):
             value, sd = getattr(fit, f"offset_{way}"), getattr(fit, f"offset_{way}_sd")
             if isfinite(value):
                 rows.append(Row(f"    turning {way}", "deg", _nearest_turn(degrees(value), offset), degrees(sd)))
-        rows.append(Row("    radius of the circle", "mm", 1e3 * fit.radius, 1e3 * fit.radius_sd))
+        radius, radius_sd = (1e3 * size for size in radius_of_circle(robot, tube, deployed_mm))
+        rows.append(
+            Row("    radius of the circle", "mm", 1e3 * fit.radius, 1e3 * fit.radius_sd, radius, old_sd=radius_sd)
+        )
         rows.append(Row("    distance from the circle, RMS", "mm", 1e3 * fit.rms))
         notices += [f"{name}: {notice.text}" for notice in fit.notices]
         notices += outliers(name, table.row[mine[list(fit.outliers)]])
@@ -130,7 +139,25 @@ def rotation_offsets(table: Table, robot: Robot | None, ratio: float | None) -> 
         "the two directions differ, friction or backlash holds the tip back."
     )
     picture = Picture(figures_of.circles, circles, caption, figures_of.ROW_HEIGHT * len(circles))
-    return Outcome("Rotation offsets", rows, notices, figures, {"tubes": details}, picture)
+    suspects = "the order of the tubes, how far each stood out (--deployed-mm), the unit of x, y, z, the tracker frame"
+    return Outcome("Rotation offsets", rows, notices, figures, {"tubes": details}, picture, suspects=suspects)
+
+
+def radius_of_circle(robot: Robot | None, tube: int, deployed_mm: float | None = None) -> tuple[float, float]:
+    """That of the sensor on a tube that turns alone [m], by the robot file, with its standard deviation; NaN where the
+    file does not say it."""
+    if robot is None or robot.tracker.sensor_position_mm is None:
+        return nan, nan
+    out = inf if deployed_mm is None else 1e-3 * deployed_mm
+
+    def radius(values: Array) -> float:
+        curvature, curved, x, y, z = values
+        bend = curvature * min(curved, out)
+        away = (1 - cos(bend)) / curvature if curvature else 0.0
+        return hypot(x, y * cos(bend) - z * sin(bend) - away)
+
+    names = [f"tubes.{tube}.{kind}" for kind in ("curvature", "curved_length")]
+    return by_robot(robot, radius, *names, *(f"tracker.sensor_position.{axis}" for axis in AXES))
 
 
 def _nearest_turn(angle: float, other: float) -> float:
@@ -150,7 +177,7 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
     fiducials = [i for i, name in enumerate(names) if name in read]
     fit = computed(
         _core.register_points,
-        table.file,
+        table,
         names=[names[i] for i in fiducials],
         cad=np.ascontiguousarray(point[fiducials]),
         reading_names=read,
@@ -160,7 +187,7 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
         **tracker_noise(robot, table),
     )
     position, turn = 1e3 * fit.T_ref[:3, 3], Rotation.from_matrix(fit.T_ref[:3, :3]).as_rotvec()
-    rows = frame_rows(robot, position, turn, [*1e3 * np.asarray(fit.position_sd), *fit.rotation_sd])
+    rows = frame_rows(robot, position, 1e3 * np.asarray(fit.position_sd), turn, np.asarray(fit.rotation_sd))
     rows.append(Row("error at the points, RMS", "mm", 1e3 * fit.fre))
     expected = zip(targets, fit.tre, strict=True)
     rows += [Row(f"expected error at {names[i]}, RMS", "mm", 1e3 * tre) for i, tre in expected]
@@ -177,7 +204,9 @@ def registration(table: Table, robot: Robot | None, placement_sd_mm: float) -> O
     where = 1e3 * point[[names.index(name) for name in fit.names]]
     caption = "Left: displacement of the readings from the CAD points. Right: its size."
     picture = Picture(figures_of.points, (where, fit), caption, 4.4)
-    return Outcome("Tracker frame", rows, [notice.text for notice in fit.notices], figures, details, picture)
+    said = [notice.text for notice in fit.notices]
+    suspects = "a tracker that has moved, CAD coordinates in another frame, a unit, a sign"
+    return Outcome("Tracker frame", rows, said, figures, details, picture, suspects=suspects)
 
 
 def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict[str, float]) -> Outcome:
@@ -201,28 +230,45 @@ def home(table: Table, robot: Robot | None, pitch_mm: float | None, sds_mm: dict
         for tube in tubes
     ]
     sds, ratio = {name: 1e-3 * sd for name, sd in sds_mm.items()}, 1e-3 * pitch / (2 * np.pi)
-    fit = computed(_core.home_offsets, table.file, translation_ratio=ratio, tubes=measured, **sds)
+    fit = computed(_core.home_offsets, table, translation_ratio=ratio, tubes=measured, **sds)
     offset, offset_sd, length, length_sd, deployed, deployed_sd = (
         1e3 * np.asarray(getattr(fit, name))
         for name in ("offset", "offset_sd", "length", "length_sd", "deployed", "deployed_sd")
     )
+    _check_home(table.file, tubes, length, deployed, deployed_sd)
     rows, old, correlations = [], [], []
     for i, tube in enumerate(tubes):
-        before = []
-        correlations.append((("actuation", "home_translation_mm", i), ("tubes", i, "length_mm"), fit.correlation[i]))
-        for name, path, value, sd in (
-            ("home translation", ("actuation", "home_translation_mm", i), offset[i], offset_sd[i]),
-            ("length", ("tubes", i, "length_mm"), length[i], length_sd[i]),
-        ):
-            before.append(in_file(robot, path))
-            rows.append(Row(f"tube {tube}: {name}", "mm", value, sd, before[-1], path))
-        rows.append(Row("    deployed at home", "mm", deployed[i], deployed_sd[i]))
-        old.append(np.cumsum(before))  # grasped point and tip
+        paths = ("actuation", "home_translation_mm", i), ("tubes", i, "length_mm")
+        correlations.append((*paths, fit.correlation[i]))
+        rows.append(row_of(robot, f"tube {tube}: home translation", "mm", offset[i], offset_sd[i], paths[0]))
+        rows.append(row_of(robot, f"tube {tube}: length", "mm", length[i], length_sd[i], paths[1]))
+        before, before_sd = nan, nan
+        if robot:
+            names = f"actuation.home_translation.{tube}", f"tubes.{tube}.length"
+            before, before_sd = (1e3 * size for size in by_robot(robot, np.sum, *names))
+        rows.append(Row("    deployed at home", "mm", deployed[i], deployed_sd[i], before, old_sd=before_sd))
+        old.append((in_file(robot, paths[0]), before))  # grasped point and tip
     sd = np.column_stack([offset_sd, deployed_sd])
     caption = "The tubes at home, two standard deviations at the grasped point and at the tip; grey: the robot file."
     picture = Picture(figures_of.homes, (tubes, offset, deployed, sd, np.array(old)), caption, 1.6 + 0.5 * len(tubes))
     notices, details = [notice.text for notice in fit.notices], {"correlation": fit.correlation}
-    return Outcome("Home", rows, notices, {}, details, picture, correlations)
+    suspects = "the sign or the unit of distance or flush_angle, the order of the tubes"
+    return Outcome("Home", rows, notices, {}, details, picture, correlations, suspects=suspects)
+
+
+def _check_home(file: str, tubes: list[int], length: Array, deployed: Array, deployed_sd: Array) -> None:
+    """Raises InputError for lengths and tips [mm] that no robot has at home."""
+    problems = []
+    for tube, long, out, sd in zip(tubes, length, deployed, deployed_sd, strict=True):
+        text = ""
+        if out < -settings.MOVED_FAR * sd:
+            text = f"at home its tip is {-out:.4g} mm behind the front plate: is the sign of flush_angle reversed?"
+        elif long > LONGEST_MM:
+            text = f"its length comes out as {1e-3 * long:.4g} m: has flush_angle another unit?"
+        if text:
+            problems.append(Problem(f"tube {tube}: {text}", file))
+    if problems:
+        raise InputError(problems)
 
 
 def check_tube(tube: int, robot: Robot | None, file: str, row: int | None = None) -> None:
@@ -278,9 +324,12 @@ def cantilever(
     outer = outer_mm if outer_mm is not None else getattr(described, "outer_diameter_mm", None)
     if inner is None or outer is None:
         raise ArgumentError(Problem("needs the tube's diameters: give --inner-mm and --outer-mm, or --robot, --tube"))
+    if idle := table.row[table["load"] == 0].tolist():
+        text = "no load bends nothing: leave this row out; --fit-zero finds a reading without load that is not 0"
+        raise InputError(Problem(text, table.file, row, line_name="row") for row in idle)
     fit = computed(
         _core.fit_cantilever,
-        table.file,
+        table,
         load=table["load"],
         deflection=table["deflection"],
         free_length=table["free_length"],
@@ -292,11 +341,12 @@ def cantilever(
     )
     given_EI = described is not None and described.bending_stiffness_Nm2 is not None
     gpa = [1e-9 * x for x in (fit.youngs_modulus, fit.youngs_modulus_sd)]
-    ei, old_ei = (fit.bending_stiffness, fit.bending_stiffness_sd), in_file(robot, _path(tube, "bending_stiffness"))
+    ei = fit.bending_stiffness, fit.bending_stiffness_sd
     modulus, stiffness = _path(tube, "youngs_modulus_GPa"), _path(tube, "bending_stiffness_Nm2")
+    name, of_EI = "bending stiffness EI", in_file(robot, _path(tube, "bending_stiffness"))
     rows = [  # the file holds one of the two
-        Row("Young's modulus", "GPa", *gpa, in_file(robot, modulus), None if given_EI else modulus),
-        Row("bending stiffness EI", "N m^2", *ei, old_ei, stiffness if given_EI else None),
+        Row("Young's modulus", "GPa", *gpa) if given_EI else row_of(robot, "Young's modulus", "GPa", *gpa, modulus),
+        row_of(robot, name, "N m^2", *ei, stiffness) if given_EI else Row(name, "N m^2", *ei, of_EI),
         Row("distance from the readings, RMS", "mm", 1e3 * fit.rms),
     ]
     if fit_zero:
@@ -312,7 +362,8 @@ def cantilever(
     caption = "What was read and what the fitted modulus gives; right, the difference."
     picture = Picture(figures_of.deflections, (table["load"], read, read - 1e3 * np.asarray(fit.residuals)), caption)
     notices, figures = [notice.text for notice in fit.notices], {"deflection_rms_mm": 1e3 * fit.rms}
-    return Outcome("Cantilever", rows, notices, figures, details, picture)
+    suspects = "another tube, its diameters, the unit of the load, the deflection or the length"
+    return Outcome("Cantilever", rows, notices, figures, details, picture, suspects=suspects)
 
 
 def curvature(
@@ -340,18 +391,18 @@ def curvature(
         scale = {"scale": 1.0 if scale_mm is None else 1e-3 * scale_mm}
     fit = computed(
         _core.fit_tube_shape,
-        table.file,
+        table,
         points=np.ascontiguousarray(table.stacked("x", "y")),
         scale_sd=1e-2 * scale_sd_percent,
         point_sd=point_sd if unit == "px" else 1e-3 * point_sd,
         **scale,
     )
     sign = -1.0 if described is not None and described.curvature < 0 else 1.0  # a picture does not tell it
-    curve = (sign * fit.curvature, fit.curvature_sd, in_file(robot, _path(tube, "curvature")))
-    bent = (1e3 * fit.curved_length, 1e3 * fit.curved_length_sd, in_file(robot, _path(tube, "curved_length_mm")))
+    curve, bent = (fit.curvature, fit.curvature_sd), (1e3 * fit.curved_length, 1e3 * fit.curved_length_sd)
+    paths = _path(tube, "curvature_per_m"), _path(tube, "curved_length_mm")
     rows = [
-        Row("curvature", "1/m", *curve, _path(tube, "curvature_per_m")),
-        Row("curved length", "mm", *bent, _path(tube, "curved_length_mm")),
+        row_of(robot, "curvature", "1/m", sign * curve[0], curve[1], paths[0]),
+        row_of(robot, "curved length", "mm", *bent, paths[1]),
         Row("radius", "mm", 1e3 * fit.radius),
         Row("straight length seen", "mm", 1e3 * fit.straight_length),
         Row("distance from the points, RMS", "mm", 1e3 * fit.rms),
@@ -361,8 +412,9 @@ def curvature(
     ends, bend = (np.asarray(fit.junction), np.asarray(fit.tip)), fit.curved_length / abs(fit.radius)
     caption = "The points on the fitted tube; the mark is where its curve starts."
     picture = Picture(figures_of.outline, (table.stacked("x", "y"), *ends, bend, list(fit.outliers)), caption, 5.0)
-    pair = (_path(tube, "curvature_per_m"), _path(tube, "curved_length_mm"), sign * fit.correlation)
-    return Outcome("Shape of the tube", rows, notices, {"shape_rms_mm": 1e3 * fit.rms}, details, picture, [pair])
+    suspects = "a picture of another tube, its scale"
+    pair, figures = [(*paths, sign * fit.correlation)], {"shape_rms_mm": 1e3 * fit.rms}
+    return Outcome("Shape of the tube", rows, notices, figures, details, picture, pair, suspects=suspects)
 
 
 def _path(tube: int | None, field: str) -> FieldPath:

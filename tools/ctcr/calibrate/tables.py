@@ -30,13 +30,14 @@ UNITS = {
 class Column:
     """A column of a table. `kind`: one of UNITS; or, without unit, "text", "count" (1, 2, ..) or "sign" (1 or -1).
 
-    `needed`: the column must be there. `filled`: no field of it may be empty.
+    `needed`: the column must be there. `filled`: no field of it may be empty. `positive`: all its numbers are above 0.
     """
 
     name: str
     kind: str
     needed: bool = True
     filled: bool = True
+    positive: bool = False
 
     @property
     def headings(self) -> dict[str, str]:
@@ -135,20 +136,20 @@ def _find(header: list[str], columns: Sequence[Column], file: str) -> dict[Colum
 def _values(column: Column, heading: str, texts: list[str], rows: Sequence[int], faults: Faults):
     """The fields in SI units (M,), or as text."""
     unit, needs = column.headings[heading], {"text": "a name", "count": "a whole number from 1", "sign": "1 or -1"}
-    needed = f": needs {f'a number in {unit}' if unit else needs[column.kind]}"
+    needed = f": needs {f'a number in {unit}' if unit else needs[column.kind]}{' above 0' if column.positive else ''}"
     values = np.full(len(texts), np.nan)
     for i, (row, text) in enumerate(zip(rows, texts, strict=True)):
         if not text:
             if column.filled:
                 faults.add(row, heading, f"is empty{needed}", "empty")
         elif column.kind != "text":
-            values[i] = _number(column.kind, text, needed, lambda *fault, row=row: faults.add(row, heading, *fault))
+            values[i] = _number(column, text, needed, lambda *fault, row=row: faults.add(row, heading, *fault))
     if column.kind == "text":
         return texts
     return values * UNITS[column.kind][unit] if unit else np.nan_to_num(values).astype(np.int64)
 
 
-def _number(kind: str, text: str, needed: str, fault: Callable[[str, str], None]) -> float:
+def _number(column: Column, text: str, needed: str, fault: Callable[[str, str], None]) -> float:
     """The number of a field; fault(message, kind) is called where it is none, and where it does not fit."""
     try:
         value = float(text)
@@ -157,6 +158,8 @@ def _number(kind: str, text: str, needed: str, fault: Callable[[str, str], None]
         return np.nan
     if not np.isfinite(value):
         fault(f"is not finite{needed}", "finite")
-    elif (kind == "count" and (value < 1 or value != round(value))) or (kind == "sign" and abs(value) != 1):
+    elif {"count": value < 1 or value != round(value), "sign": abs(value) != 1}.get(
+        column.kind, column.positive and value <= 0
+    ):
         fault(f"{shown(text)} does not fit{needed}", "kind")
     return value

@@ -69,6 +69,7 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
     """Gives an Outcome back: robot file, report, JSON, text."""
     from ctcr.calibrate import outcome
 
+    found = outcome.judged(found, robot, called, table)
     if target:
         outcome.write_robot(found, robot, target, called, table, in_place)
     out.write_report("calibrate.outcome", found, files=[*(robot.files if robot else []), table], robot=robot)
@@ -83,7 +84,7 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
 @click.option("--ratio", type=float, help="Turns of a tube per turn of its motor; default: as in ROBOT.")
 @_live
 @options.setting("--step-deg", options.Finite(1, 90), 20.0, "With --live: angle between rows.")
-@_length("--deployed-mm", None, "With --live: deployed length; default: the curved length.", least=1)
+@_length("--deployed-mm", None, "How far the tube stands out; default: its curved length.", least=1)
 @_procedure
 def rotation_offset(
     table, robot, ratio, live, bench_path, readings, folder, step_deg, deployed_mm, out, **target
@@ -109,7 +110,7 @@ def rotation_offset(
         deployed = None if deployed_mm is None else 1e-3 * deployed_mm
         circles = Circles(math.radians(step_deg), readings, deployed)
         rotation_table(table, robot_file.load(robot), _desk(bench_path, folder, out), circles)
-    _run("rotation_offsets", table, robot, out=out, ratio=ratio, **target)
+    _run("rotation_offsets", table, robot, out=out, ratio=ratio, deployed_mm=deployed_mm, **target)
 
 
 @command.command(name="registration")

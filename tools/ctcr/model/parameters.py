@@ -304,7 +304,7 @@ def _standard(robot: Robot) -> list[str]:
 
 def of_sensor(robot: Robot) -> list[str]:
     """The parameters of the sensor's pose that the robot file does not know exactly."""
-    return [name for name in names_of(robot.n_tubes) if name.startswith("tracker.sensor_") and _stated_sd(robot, name)]
+    return [name for name in names_of(robot.n_tubes) if name.startswith("tracker.sensor_") and stated_sd(robot, name)]
 
 
 def _value(robot: Robot, name: str) -> float:
@@ -354,8 +354,8 @@ def name_at(path: FieldPath) -> str | None:
     return next((name for name, field in _fields().items() if field.path == path), None)
 
 
-def _stated_sd(robot: Robot, name: str) -> float | None:
-    """What the robot file's `uncertainty` says of a parameter, SI; None: nothing."""
+def stated_sd(robot: Robot, name: str) -> float | None:
+    """The standard deviation of a parameter by the robot file's `uncertainty`, SI; None: it states none."""
     key, index = uncertainty_of(name) or (None, 0)
     if key is None:
         return None
@@ -371,7 +371,7 @@ def _prior(robot: Robot, name: str) -> tuple[float, float | None, float, float]:
     """Mean and stated standard deviation of a parameter, and the bounds of its possible values."""
     field = field_of(name)
     value = _value(robot, name) if field.path else 0.0  # the tracker frame turns from that of the file
-    return value, _stated_sd(robot, name), 1e-3 * value if field.lowest == 0 else field.lowest, field.highest
+    return value, stated_sd(robot, name), 1e-3 * value if field.lowest == 0 else field.lowest, field.highest
 
 
 def _replaced(vector: Iterable[float], index: int, value: float) -> list[float]:
