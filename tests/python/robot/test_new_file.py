@@ -33,6 +33,15 @@ def test_options(run, tmp_path):
     assert robot.tracker.sensor_on_tube == 2 and robot.actuation.home_translation_mm == [-400, -290]
 
 
+@pytest.mark.parametrize(("said", "doubted"), [("", True), (",curved_length_mm=0,curvature_per_m=0", False)])
+def test_straight(run, tmp_path, said, doubted):
+    """A tube that counts as straight because nothing was said of it is named; one that was said to be so is not."""
+    tube = "length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1"
+    code, out, err = run("init", "-o", tmp_path / "robot.yaml", "--tube", CURVED, "--tube", tube + said)
+    assert code == 0 and ("tube 2 counts as straight" in out) == doubted and "tube 1 " not in out, err
+    assert robot_file.load(tmp_path / "robot.yaml").tubes[1].curvature == 0
+
+
 def test_questions(tmp_path):
     """Without options it asks; the answers are in the file, tips are flush at home."""
     path = tmp_path / "robot.yaml"

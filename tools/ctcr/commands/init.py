@@ -36,7 +36,8 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     It needs dimensions and precurvature of the tubes; all else gets a default that a comment in the file explains.
     Without --tube and --example it asks.
 
-    Example: ctcr init -o robot.yaml --tube length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,radius_mm=100
+    Example: ctcr init -o robot.yaml --tube
+    length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,curved_length_mm=60,radius_mm=100
     """
     from ctcr.errors import InputError, Problem
     from ctcr.robot import new_file, robot_file
@@ -68,6 +69,9 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     out.say(
         f"{target}: {loaded.n_tubes} tube{'s' * (loaded.n_tubes > 1)}; comments in it say which values are defaults"
     )
+    for i, tube in enumerate(robot.tubes, start=1):
+        if tube.curvature_per_m is None:
+            out.say(f"Doubt: tube {i} counts as straight, as no curvature was given; radius_mm=inf says that it is")
     out.say(*(f"Doubt: {doubt}" for doubt in robot_file.warnings(loaded) if doubt.field != "gravity"))
     out.say(f"Next: ctcr import LOG -o measurements.csv --robot {target}")
 

@@ -24,13 +24,13 @@ _TRACKER = {
 
 @dataclass
 class NewTube:
-    """Fields as in the file. Either the radius or the curvature of the precurved part; a straight tube has neither."""
+    """Fields as in the file. A tube of which no curvature was said counts as straight."""
 
     length_mm: float
     outer_diameter_mm: float
     inner_diameter_mm: float
     curved_length_mm: float = 0.0
-    curvature_per_m: float = 0.0
+    curvature_per_m: float | None = None
     youngs_modulus_GPa: float = NITINOL_GPA
     poisson_ratio: float = NITINOL_POISSON
     density_kg_m3: float = NITINOL_DENSITY
@@ -52,7 +52,7 @@ _EXAMPLES = (  # innermost first; the fourth is a straight sheath
     NewTube(420.0, 0.88, 0.65, 60.0, 12.0),
     NewTube(300.0, 1.30, 1.00, 60.0, 8.0),
     NewTube(200.0, 1.80, 1.45, 50.0, 5.0),
-    NewTube(110.0, 2.40, 2.00),
+    NewTube(110.0, 2.40, 2.00, curvature_per_m=0.0),
 )
 
 
@@ -144,12 +144,13 @@ def text(robot: NewRobot) -> str:
 
 def _tube(tube: NewTube) -> str:
     radius = f"radius {1e3 / abs(tube.curvature_per_m):.4g} mm" if tube.curvature_per_m else "straight"
+    radius += ", as no curvature was given" if tube.curvature_per_m is None else ""
     material = (tube.youngs_modulus_GPa, tube.poisson_ratio, tube.density_kg_m3)
     default = "  # nitinol" if material == (NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY) else ""
     return (
         f"  - length_mm: {tube.length_mm:.10g}\n"
         f"    curved_length_mm: {tube.curved_length_mm:.10g}\n"
-        f"    curvature_per_m: {tube.curvature_per_m:.8g}  # {radius}\n"
+        f"    curvature_per_m: {tube.curvature_per_m or 0.0:.8g}  # {radius}\n"
         f"    inner_diameter_mm: {tube.inner_diameter_mm:.10g}\n"
         f"    outer_diameter_mm: {tube.outer_diameter_mm:.10g}\n"
         f"    youngs_modulus_GPa: {tube.youngs_modulus_GPa:.10g}{default}\n"
