@@ -558,6 +558,18 @@ def test_checked_faults():
     assert checked({"missing": 0.5, "hang": None}, FAULTS) == {"missing": 0.5, "hang": False}
 
 
+def test_most(tmp_path):
+    """A motor that the device does not have cannot fail, at once or later."""
+    most = {"stall": 6}
+    assert checked({"stall": 6}, {"stall": 0}, most) == {"stall": 6}
+    with pytest.raises(InputError, match="0 to 6"):
+        checked({"stall": 7}, {"stall": 0}, most)
+    path = tmp_path / "scenario.yaml"
+    path.write_text("- {at_s: 1, stall: 17}\n")
+    with pytest.raises(InputError, match="0 to 6"):
+        load_scenario(path, {"stall": 0}, most)
+
+
 def test_scenario(tmp_path):
     """Changes in order of time; errors name their lines."""
     path = tmp_path / "scenario.yaml"
@@ -576,6 +588,9 @@ def test_wrong_messages(port, folder):
     with tracker(port) as aurora:
         aurora.connect()
         assert len(aurora.read().readings) == 3
+    with pytest.raises(InputError, match="weight"):  # what it does not know has no effect, and so is refused
+        request(folder, "aurora", {"force": [0, 0, 0], "weight": 1})
+    assert request(folder, "aurora", {})["force"] == [999, -999, 999]
     request(folder, "aurora", {"force": [0, 0, 0]})
 
 

@@ -39,6 +39,8 @@ FAULTS = {
 class AuroraSimulator(Simulator):
     """Serves `folder/aurora`, a link to the pseudo-terminal."""
 
+    ASKS = ("force", "probe", "fasten", "break")
+
     def __init__(self, robot: SimulatedRobot, folder: Path, scenario: str | Path | None = None, seed: int = 1):
         super().__init__(folder, AURORA, FAULTS, SIMULATED_TRACKER, scenario)
         self.robot = robot

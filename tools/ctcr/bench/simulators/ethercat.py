@@ -35,6 +35,7 @@ FAULTS = {  # those of a motor: its number from 1; 0: none
     "encoder_jump": 0,  # the encoder of the motor jumps, once
     "internal_error": 0,  # the terminal of the motor fails, once, and keeps its error until its power was off
 }
+OF_MOTORS = ("stall", "missed_steps", "over_current", "under_voltage", "encoder_jump", "internal_error")
 
 
 class EthercatSimulator(Simulator):
@@ -54,7 +55,8 @@ class EthercatSimulator(Simulator):
         self.terminals = [StepperTerminal(i, variant) for i in range(motors)]
         self.segment = Segment([SlaveController(device) for device in (coupler(), *self.terminals)])
         self._socket = raw_socket(interface)
-        super().__init__(folder, ETHERCAT, FAULTS, SIMULATED_BUS, scenario)
+        most = dict.fromkeys(OF_MOTORS, motors) | {"lost_after": len(self.segment.slaves)}
+        super().__init__(folder, ETHERCAT, FAULTS, SIMULATED_BUS, scenario, most)
         self._record = shared_motors(folder, writer=True)
         self._random, self._late = random.Random(seed), []
         self._ticked, self._recorded = time.monotonic(), 0.0

@@ -2,10 +2,11 @@
 
 import select
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, ClassVar
 
 from ctcr.bench.shared.control import ControlSocket
 from ctcr.bench.shared.real_time import Duty, real_time
@@ -17,15 +18,26 @@ MOST_DEVICES, MOST_MS = 255, 60_000  # a bus is shorter, and a program that wait
 
 
 class Simulator:
-    """One device. `faults` holds the present value of each fault of `none`, which maps names to the value without it.
+    """One device. `faults` holds the present value of each fault of `none`, which maps names to the value without it;
+    `most` the largest value of those that number a part of the device.
 
     Its control socket is `folder/name.sock`.
     """
 
-    def __init__(self, folder: Path, name: str, none: Settings, duty: Duty, scenario: str | Path | None):
-        self._none, self._duty = none, duty
+    ASKS: ClassVar[tuple[str, ...]] = ()  # what the control socket may ask beyond faults
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        none: Settings,
+        duty: Duty,
+        scenario: str | Path | None,
+        most: Mapping[str, int] = MappingProxyType({}),
+    ):
+        self._none, self._duty, self._most = none, duty, most
         self.faults = SimpleNamespace(**none)
-        self._scenario = load_scenario(scenario, none) if scenario else []
+        self._scenario = load_scenario(scenario, none, most) if scenario else []
         self._control = ControlSocket(folder, name, self._reply)
         self._start = time.monotonic()
 
@@ -57,7 +69,7 @@ class Simulator:
 
     def set_faults(self, changes: Settings) -> None:
         """Changes some faults; null ends one. Raises InputError and changes nothing where one cannot be."""
-        vars(self.faults).update(checked(changes, self._none))
+        vars(self.faults).update(checked(changes, self._none, self._most))
 
     def request(self, message: Settings) -> Settings:
         """Does what the control socket asks beyond faults; returns the state."""
@@ -66,13 +78,19 @@ class Simulator:
     def _reply(self, message: Settings) -> Settings:
         if not isinstance(message, dict) or not isinstance(faults := message.get("faults", {}), dict):
             raise InputError(Problem("needs an object, and so do its `faults`"))
+        if unknown := [str(key) for key in message if key not in ("faults", *self.ASKS)]:
+            known = ", ".join(["faults", *self.ASKS])
+            raise InputError(Problem(f"is nothing that this device has ({known})", field=key) for key in unknown)
         if "faults" in message:
             self.set_faults(faults)
         return {"faults": dict(vars(self.faults))} | self.request(message)
 
 
-def checked(changes: Settings, none: Settings) -> Settings:
-    """Changes of faults with null replaced by the value without the fault. Raises InputError with all that is wrong."""
+def checked(changes: Settings, none: Settings, most: Mapping[str, int] = MappingProxyType({})) -> Settings:
+    """Changes of faults with null replaced by the value without the fault. Raises InputError with all that is wrong.
+
+    `most`: the largest value of faults that number something.
+    """
     problems, values = [], {}
     for name, value in changes.items():
         if name not in none:
@@ -80,25 +98,27 @@ def checked(changes: Settings, none: Settings) -> Settings:
             problems.append(Problem(f"unknown fault: {hint}", field=name))
             continue
         values[name] = none[name] if value is None else value
-        kinds, most, needed = _possible(name, none[name])
-        if type(values[name]) not in kinds or not 0 <= values[name] <= most:
+        kinds, largest, needed = _possible(name, none[name], most.get(name, MOST_DEVICES))
+        if type(values[name]) not in kinds or not 0 <= values[name] <= largest:
             problems.append(Problem(f"{shown(value)}: needs {needed}", field=name))
     if problems:
         raise InputError(problems)
     return values
 
 
-def _possible(name: str, none: Any) -> tuple[tuple[type, ...], float, str]:
+def _possible(name: str, none: Any, most_devices: int) -> tuple[tuple[type, ...], float, str]:
     """Types and largest value of a fault, and both in words."""
     if isinstance(none, bool):
         return (bool,), 1, "true or false"
     if isinstance(none, int):
-        return (int,), MOST_DEVICES, f"a whole number, 0 to {MOST_DEVICES}"
+        return (int,), most_devices, f"a whole number, 0 to {most_devices}"
     most, unit = (MOST_MS, " ms") if name.endswith("_ms") else (1, "")
     return (int, float), most, f"a number, 0 to {most}{unit}"
 
 
-def load_scenario(path: str | Path, none: Settings) -> list[tuple[float, Settings]]:
+def load_scenario(
+    path: str | Path, none: Settings, most: Mapping[str, int] = MappingProxyType({})
+) -> list[tuple[float, Settings]]:
     """Times [s] with the faults that change then, in order. Raises InputError with everything wrong in the file."""
     document = yaml_document.load(path)
     steps, problems = [], []
@@ -109,7 +129,7 @@ def load_scenario(path: str | Path, none: Settings) -> list[tuple[float, Setting
             continue
         changes = {name: value for name, value in entry.items() if name != "at_s"}
         try:
-            checked(changes, none)
+            checked(changes, none, most)
         except InputError as error:
             problems += [replace(p, file=str(path), line=document.line((i, p.field))) for p in error.problems]
         steps.append((float(entry["at_s"]), changes))
