@@ -133,6 +133,10 @@ def test_kinds_of_columns(table):
             wrong[name] = pandas.Series([True] * len(frame))
         with pytest.raises(ctcr.InputError, match=rf"DataFrame, row {2 if value is True else 5}, {name}: "):
             ctcr.read(wrong)
+    text = frame.astype(object).assign(run="first")
+    with pytest.raises(ctcr.InputError) as caught:  # one fault a row, not that it were empty too
+        ctcr.read(text)
+    assert len(caught.value.problems) + caught.value.omitted == len(frame) and "empty" not in str(caught.value)
     dates = frame.assign(t_s=pandas.to_datetime(frame.t_s, unit="s"))
     with pytest.raises(ctcr.InputError, match="row 2, t_s"):
         ctcr.read(dates)

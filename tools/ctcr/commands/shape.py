@@ -112,12 +112,15 @@ def _samples(shape) -> dict:
 
 
 def _joints(name: str, option: str, joints):
-    """The joints (N,) [m] or [rad] of an option. Raises InputError where one is far from usual."""
+    """The joints (N,) [m] or [rad] of an option. Raises InputError where one is far from usual, or beta is positive."""
     from ctcr.table.measurements import QUANTITIES
 
     for value in joints:
         if abs(value) > QUANTITIES[name].usual[1]:
             raise ArgumentError(Problem(QUANTITIES[name].doubt(value), field=option))
+        if name == "beta" and value > 0:
+            text = f"{1e3 * value:g} mm is in front of the plate: tubes are grasped behind it, at beta <= 0 mm"
+            raise ArgumentError(Problem(text, field=option))
     return joints
 
 

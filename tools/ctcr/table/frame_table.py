@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Array, Integers, Mask
 from ctcr.errors import InputError, Problem, shown
 from ctcr.table.csv_table import Faults
 
@@ -29,18 +29,19 @@ class FrameTable:
             raise InputError(Problem("has no rows", NAME))
 
     def blocks(self, faults: Faults) -> Iterator[tuple[Integers, Array, int]]:
-        """All rows as one block: (row numbers, numbers (rows, columns), rows)."""
+        """The readable rows as one block: (row numbers, numbers (rows, columns), rows). Others go to `faults`."""
         rows = np.arange(2, self.n_rows + 2)
-        block = np.column_stack([_numbers(self._frame[name], str(name), rows, faults) for name in self._frame.columns])
-        yield rows, block, self.n_rows
+        columns = [_numbers(self._frame[name], str(name), rows, faults) for name in self._frame.columns]
+        readable = ~np.any([wrong for _, wrong in columns], axis=0)
+        yield rows[readable], np.column_stack([numbers[readable] for numbers, _ in columns]), self.n_rows
 
 
-def _numbers(column: Any, name: str, rows: Integers, faults: Faults) -> Array:
-    """The numbers (M,) of a column, NaN where one is missing. What is no number goes to `faults`."""
+def _numbers(column: Any, name: str, rows: Integers, faults: Faults) -> tuple[Array, Mask]:
+    """The numbers (M,) of a column, NaN where one is missing, and where there is none (M,), which goes to `faults`."""
     values = np.asarray(column)
-    if values.dtype.kind in "iuf":
-        return values.astype(float)
     numbers, wrong = np.full(len(values), np.nan), np.zeros(len(values), bool)
+    if values.dtype.kind in "iuf":
+        return values.astype(float), wrong
     for i, value in enumerate(values.tolist() if values.dtype.kind in "mM" else values):
         if value is None or type(value).__name__ in ("NAType", "NaTType"):
             continue
@@ -50,4 +51,4 @@ def _numbers(column: Any, name: str, rows: Integers, faults: Faults) -> Array:
             wrong[i] = True
         wrong[i] |= values.dtype.kind in "bmM"
     faults.where(wrong, rows, name, "number", lambda i: f"{shown(values[i])} is not a number")
-    return numbers
+    return numbers, wrong
