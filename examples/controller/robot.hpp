@@ -30,7 +30,7 @@ inline constexpr std::array<ctcr::Tube, tube_count> tubes{{
         .youngs_modulus = 58000000000.0,
         .poisson_ratio = 0.3,
         .density = 6450.0,
-        .inner_diameter = 0.0016200000000000001,
+        .inner_diameter = 0.00162,
         .outer_diameter = 0.0018,
         .length = 0.3305,
         .curved_length = 0.05,
@@ -41,7 +41,7 @@ inline constexpr std::array<ctcr::Tube, tube_count> tubes{{
         .youngs_modulus = 58000000000.0,
         .poisson_ratio = 0.3,
         .density = 6450.0,
-        .inner_diameter = 0.0020299999999999997,
+        .inner_diameter = 0.00203,
         .outer_diameter = 0.00235,
         .length = 0.199,
         .curved_length = 0.05,
@@ -55,7 +55,7 @@ inline constexpr std::array<double, 3> gravity{  // base frame [m/s^2]
     -9.80665,
     0.0,
 };
-inline constexpr double translation_ratio = 0.0003183098861837907;  // beta by motor angle [m/rad]
+inline constexpr double translation_ratio = 0.000318309886183791;  // beta by motor angle [m/rad]
 inline constexpr double rotation_ratio = -1.0;  // alpha by motor angle [rad/rad]
 inline constexpr std::array<double, 3> home_translation{  // beta where the motors are at 0 [m]
     -0.298,

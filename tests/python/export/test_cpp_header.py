@@ -131,7 +131,9 @@ def test_program(tmp_path):
         assert np.max(np.abs(found[:, columns] - np.array(wanted)[:, columns]) / size) < 1e-12
     values = [line.split()[1:] for line in said if line.startswith("value ")]
     assert [name for name, _ in values] == list(recording.names_of(3))
-    np.testing.assert_array_equal([float(value) for _, value in values], recording.values(everything()))
+    np.testing.assert_allclose(
+        [float(value) for _, value in values], recording.values(everything()), rtol=1e-14, atol=0
+    )
     for what in ("late by", "a step"):
         assert re.search(rf"^{what} +min +[\d.]+, median +[\d.]+, p99 +[\d.]+, max +[\d.]+ us$", "\n".join(said), re.M)
 

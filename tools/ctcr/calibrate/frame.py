@@ -127,5 +127,5 @@ def unknown(covariance: Array) -> list[str]:
         variance, axes = np.linalg.eigh(covariance[part, part])
         for axis in axes.T[np.sqrt(variance) > settings.SAYS_NOTHING * SD[kind]]:
             words = ", ".join(f"{x + 0.0:.2f}" for x in axis)
-            said.append(f"the readings do not tell {what} ({words}) in the tracker's axes: any value is as good")
+            said.append(f"the readings do not determine {what} ({words}) in the tracker's axes: any value is as good")
     return said

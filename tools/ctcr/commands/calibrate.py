@@ -155,8 +155,8 @@ def frame(robot, measurements, anyway, target, in_place, out) -> None:
 
     A registration in closed form of the predicted tips on those of MEASUREMENTS gives a start; then a fit finds
     position_mm and rotation_vector_rad. Homes and tubes keep their values, and their uncertainty in the robot file
-    counts in that of the frame. Says what the readings do not tell. Stops where another convention is wrong, as
-    `ctcr compare` says.
+    counts in that of the frame. Names shifts and turns that the readings do not determine. Stops where another
+    convention is wrong, as `ctcr compare` says.
 
     Example: ctcr calibrate frame robot.yaml measurements.csv -o new.yaml
     """

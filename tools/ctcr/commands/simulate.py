@@ -26,11 +26,12 @@ def command(robot, plan, hidden, noise, seed, target) -> None:
     import numpy as np
 
     from ctcr.model import simulation
+    from ctcr.show.wording import counted
 
     loaded, table = options.load(robot, plan)
     made = simulation.simulate(options.with_effects(loaded, hidden), table, noise, seed)
     simulation.write(made, target)
     out, unsolved = options.Output(), int(np.isnan(made.position).any(axis=1).sum())
-    out.say(f"{len(made) - unsolved} readings, noise: {noise}, seed {seed}: {target}")
+    out.say(f"{counted(len(made) - unsolved, 'reading')}, noise: {noise}, seed {seed}: {target}")
     if unsolved:
-        out.say(f"{unsolved} rows have no pose: the model has no solution there")
+        out.say(f"{counted(unsolved, 'row')} without pose: the model has no solution there")

@@ -10,11 +10,11 @@ from ctcr.diagnose import figures
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
-from ctcr.model import parameters
+from ctcr.model import fields
 from ctcr.show import html_page
 from ctcr.show import scene as show
 from ctcr.show.html_page import as_html, cards, figure, paragraph, table
-from ctcr.show.wording import sentence, short
+from ctcr.show.wording import deviation, number, sentence, short
 
 MOST_ARROWS = 800
 ARROW_SHARE = 0.12  # of the workspace that a large error (95 %) may fill on the page
@@ -138,18 +138,17 @@ def _typed(d: Diagnosis, command: str) -> str:
 
 def _parameters(d: Diagnosis) -> str:
     known, rows = catalogue.parameter_of(d.robot.n_tubes), []
-    units = parameters.units_with_effects(d.robot)
-    for name, value, sd, shift in zip(d.final.names, d.final.values, d.final.sd, d.final.shift, strict=True):
-        p = known.get(name)
-        unit, meaning = (p.unit, p.meaning) if p else (units[name], "")
-        rows.append([name, meaning, f"{value:.5g}", f"{sd:.2g}", unit, f"{shift:+.1f}"])
+    for one in fields.fitted(d.final):
+        meaning = known[one.name].meaning if one.name in known else ""
+        values = number(one.value, one.sd), deviation(one.sd)
+        rows.append([one.name, meaning, *values, one.unit, f"{one.shift:+.1f}"])
     rows.sort(key=lambda row: not row[0].startswith("effects."))
     columns = {
         "parameter": "",
         "meaning": "",
         "value": "as fitted",
         "sd": "its standard deviation",
-        "unit": "of both",
+        "unit": "of both, as in the robot file",
         "shift, prior sd": "fitted less robot file, in standard deviations that the robot file gives the value",
     }
     fitted = "<h2>Fitted values</h2>" + table("Effects first, then calibration", columns, rows, 2)

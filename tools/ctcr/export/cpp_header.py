@@ -264,8 +264,8 @@ def _array(name: str, values: Iterable[float]) -> str:
 
 
 def _double(value: float) -> str:
-    """The number exactly."""
-    return repr(float(value))
+    """The number to the 15 digits that any double has: a change of units leaves no others."""
+    return repr(float(f"{value:.15g}"))
 
 
 def _quoted(text: str) -> str:

@@ -29,7 +29,7 @@ from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.model.sessions import told
 from ctcr.robot.description import Robot
-from ctcr.show.wording import listed
+from ctcr.show.wording import counted, listed
 from ctcr.table.measurements import Measurements
 
 
@@ -350,4 +350,4 @@ def _exclusion_warnings(rows: Sequence[int], how: FitOptions) -> list[str]:
 def _named(rows: Sequence[int], how: FitOptions) -> str:
     """Rows counted from 0 by their numbers in the table."""
     named = [row + 1 if how.row is None else int(how.row[row]) for row in rows]
-    return f"{len(rows)} readings, rows {listed(named, 8)}"
+    return f"{counted(len(rows), 'reading')}, row{'s' * (len(rows) > 1)} {listed(named, 8)}"

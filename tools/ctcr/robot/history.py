@@ -14,7 +14,7 @@ COLUMNS = {
     "command": "that changed the file",
     "from": "the measurements",
     "changes": "",
-    "error": "RMS before and after, and the expected error of a right model (floor)",
+    "error": "RMS before and after, and that expected of a right model",
 }
 FLOOR = "expected error"
 _BAR = 44  # characters of the longest bar
@@ -92,7 +92,7 @@ def page(robot: Robot) -> str:
 
 def _lead(stages: list[Stage]) -> str:
     steps = [stage for stage in stages if stage.name != FLOOR]
-    floor = f"; noise alone would leave {stages[-1].rms_mm:.3g} mm" if stages[-1].name == FLOOR else ""
+    floor = f"; a right model would err by {stages[-1].rms_mm:.3g} mm" if stages[-1].name == FLOOR else ""
     return f"The error fell from {steps[0].rms_mm:.3g} to {steps[-1].rms_mm:.3g} mm RMS{floor}."
 
 
@@ -140,4 +140,4 @@ def _error(entry: dict) -> str:
     steps = [f"{value:.3g}" for value in figures.values()]
     if not steps:
         return ""
-    return " → ".join(dict.fromkeys([steps[0], steps[-1]])) + " mm" + (f" (floor {floor:.2g})" if floor else "")
+    return " → ".join(dict.fromkeys([steps[0], steps[-1]])) + " mm" + (f" (expected {floor:.2g})" if floor else "")
