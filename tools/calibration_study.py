@@ -148,7 +148,7 @@ def within(answers: list[Answer], noise: str) -> tuple[int, int]:
 
 
 def errors_mm(answers: list[Answer], noise: str) -> tuple[float, float]:
-    """Held-out error and noise floor, RMS of all robots with this noise."""
+    """Held-out and expected error, RMS of all robots with this noise."""
     chosen = [a for a in answers if a.noise == noise]
     held, floor = (
         float(np.sqrt(np.mean(np.square([getattr(a, n) for a in chosen])))) for n in ("held_out_mm", "floor_mm")
@@ -164,11 +164,11 @@ def summary(answers: list[Answer]) -> str:
         "Each robot has its own data sheet and differs from it by normal draws of the uncertainty that its file",
         f"states; 336 poses, 12 runs, three weights. Share of true values within {WIDTH:g} standard deviations of",
         "those that `ctcr calibrate fit` finds (95.4 % of a normal distribution), with the 95 % Wilson interval, and",
-        "the error on runs that a fit has not seen over its noise floor. `jitter`: noise of single readings;",
+        "the error on held-out runs over that expected of a right model. `jitter`: noise of single readings;",
         "`realistic`: with the tracker's smooth field error and outliers too. Written by",
         "`tools/calibration_study.py --keep`.",
         "",
-        "| noise | robots | within | mean square error / variance | held out, mm RMS | noise floor | ratio |",
+        "| noise | robots | within | mean square error / variance | held out, mm RMS | expected | ratio |",
         "|---|---|---|---|---|---|---|",
     ]
     for noise in NOISES:

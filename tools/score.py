@@ -119,7 +119,7 @@ def judged(said: dict | None, truth: dict, group: str) -> list[tuple[str, bool]]
     if said and hidden and group != "fuller_model":
         limit = 1.1 if truth["noise"] == "jitter" else 1.25
         within = said["rms_mm"].get("with_effects", math.inf) <= limit * floor_mm(truth)
-        scores["locked error within its limit of the floor"] = within
+        scores["held-out error within its limit of the noise"] = within
     return [*scores.items()]
 
 
@@ -128,8 +128,8 @@ def floor_mm(truth: dict) -> float:
     return math.hypot(*(truth["rms_mm"][part] for part in ("jitter", "field", "chance")))
 
 
-def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict]) -> list[str]:
-    """Table of how far above the floor the locked errors of sets with effects of the catalogue are."""
+def held_out_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[str, dict]) -> list[str]:
+    """Table of how far above the noise the held-out errors of sets with effects of the catalogue are."""
     rows = []
     for noise in sorted({truths[name]["noise"] for name in chosen}):
         sets = [n for n in chosen if said[n] and truths[n]["classes"] and truths[n]["noise"] == noise]
@@ -139,7 +139,7 @@ def locked_errors(chosen: list[str], said: dict[str, dict | None], truths: dict[
             if len(values) > 1:
                 parts = [f"{p:.2f}" for p in quantiles(values, n=20, method="inclusive")]
                 rows.append(f"| {key} | {noise} | {parts[9]} | {parts[14]} | {parts[17]} |")
-    head = ["| locked error over the floor | noise | half of the sets | three quarters | nine tenths |"]
+    head = ["| held-out error over the noise | noise | half of the sets | three quarters | nine tenths |"]
     return [*head, "|---|---|---|---|---|", *rows]
 
 
@@ -218,7 +218,7 @@ def report(chosen: list[str], said: dict[str, dict | None], truths: dict[str, di
         for (score, noise), count in sorted(counts.items())
     ]
     lines += ["", *reliability([claim for name in chosen if said[name] for claim in claims(said[name], truths[name])])]
-    lines += ["", *locked_errors(chosen, said, truths)]
+    lines += ["", *held_out_errors(chosen, said, truths)]
     lines += ["", "| sets | hidden | named |", "|---|---|---|"]
     lines += [f"| {count} | {hidden} | {named} |" for (hidden, named), count in sorted(confusion.items())]
     return "\n".join(lines)

@@ -232,6 +232,7 @@ def test_errors(run, arguments, message):
         (["calibrate", "fit", ROBOT, TABLE, "--free", "nonsense"], "no parameter is named nonsense"),
         (["calibrate", "fit", ROBOT, TABLE, "--hold-out", "1000"], "--hold-out 1000 needs more than 1000 runs"),
         (["next", ROBOT, TABLE, "--masses", "a"], "--masses a"),
+        (["shape", ROBOT, "--beta-mm", "-300,-200,5", "--alpha-deg", "0,0,0"], "5 mm is in front of the plate"),
     ],
 )
 def test_usage(run, arguments, message):

@@ -1,5 +1,6 @@
 """The varying-coefficient model: which parameter would have to change with which quantity."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,10 @@ from ctcr.compare.sample import take_sample
 from ctcr.diagnose import diagnose, held_out, report, terminal, varying_coefficients
 from ctcr.diagnose.engine import Engine
 from ctcr.fit.folds import held_out_rows
-from ctcr.model import effect_model, simulation
+from ctcr.model import effect_model, fields, simulation
 from ctcr.model.noise import noise_of_readings
 from ctcr.show import output
+from ctcr.show.wording import number
 
 GAIN, AMPLITUDE, SLIP = 1.5, 0.015, 0.05  # rad/m, rad, rad
 TEETH = 9
@@ -130,6 +132,9 @@ def test_diagnosis(robot, plan, capsys):
     assert "length1" in found.as_dict()["leftover"]["depends_on"]
     terminal.show(output.console(), found)
     page = report.page(found)
+    length = next(one for one in fields.fitted(found.final) if one.name == "tubes.1.length")
+    said = re.findall(r">tubes\.1\.length</td>(.*?)</tr>", page)[-1]
+    assert number(length.value, length.sd) in said and ">mm<" in said and 100 < length.value < 1000
     for text in (capsys.readouterr().out, page):
         assert "home rotation of tube 1" in text
     assert "Parameters that vary" in page and "identified" not in page.split("</p>")[0]

@@ -154,6 +154,7 @@ def test_provenance(tmp_path):
         Change(("tubes", 0, "length_mm"), "mm", 463.25, 0.5),
         Change(("actuation", "home_rotation_deg", 1), "deg", 2.5, 0.25),
         Change(("tubes", 1, "curvature_per_m"), "1/m", 5.25, 0.125),
+        Change(("tubes", 2, "youngs_modulus_GPa"), "GPa", 57.543448, 0.01),  # 57543447999.99999 Pa by division
     ]
     path = tmp_path / "fitted.yaml"
     figures = {"parameters": {"effects.delay.delay": {"value": 0.03, "sd": 0.002}}}
@@ -163,6 +164,7 @@ def test_provenance(tmp_path):
     assert sha256(path) in text and '"fitted.yaml"' in text
     today = robot_file.load(path).history[0]["date"]
     assert f".length = 0.46325,  // 463.25 mm, sd 0.50 (ctcr calibrate fit, {today})" in text
+    assert ".youngs_modulus = 57543448000.0,  // 57.543 GPa, sd 0.010" in text
     assert re.search(r"0\.0436\d+,  // 2\.50 deg, sd 0\.25 ", text)
     assert re.search(r"\.curvature = 5\.5,$", text, re.M)
     assert re.search(r" 0\.03,  // delay\.delay \[s\], 0\.0300, sd 0\.0020 ", text)
