@@ -19,6 +19,7 @@ from ctcr.bench.devices.release import release
 from ctcr.bench.shared.control import request
 from ctcr.bench.shared.folder import MASTER, private_folder
 from ctcr.bench.simulators import ethercat
+from ctcr.errors import InputError
 from simulated_bench import ctcr, survives_messages
 
 ROBOT = os.environ["ROBOT_FILE"]
@@ -100,6 +101,10 @@ def test_bus_lock(robot, bench, folder, monkeypatch):
 def test_wrong_messages(folder):
     """As those to the tracker."""
     survives_messages(folder, "ethercat")
+    motors = len(request(folder, "ethercat", {})["turns"])
+    for message in ({"faults": {"stall": motors + 1}}, {"faults": {"lost_after": motors + 2}}, {"force": [0, -0.1, 0]}):
+        with pytest.raises(InputError):
+            request(folder, "ethercat", message)
 
 
 def test_wrong_terminal(bench, folder):

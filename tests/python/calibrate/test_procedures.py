@@ -298,8 +298,9 @@ def test_contradiction(run, tmp_path, command, lines, options, name, least):
     assert max(abs(row["shift"]) for row in far) > least
     for row in far:
         assert abs(row["value"] - row["old"]) / np.hypot(row["sd"], row["old_sd"]) == pytest.approx(abs(row["shift"]))
-    code, out, err = run(command, table, "--robot", ROBOT, *options, "-o", tmp_path / "new.yaml")
-    assert code == 0 and out.startswith("Doubt: "), err
+    page = tmp_path / "page.html"
+    code, out, err = run(command, table, "--robot", ROBOT, *options, "-o", tmp_path / "new.yaml", "--report", page)
+    assert code == 0 and out.startswith("Doubt: ") and "<h2>Doubts</h2>" in page.read_text(), err
     assert first in robot_file.load(tmp_path / "new.yaml").history[-1]["note"]
 
 
@@ -313,7 +314,7 @@ def test_agreement(run, name, table, options, _):
 @pytest.mark.parametrize(
     ("command", "lines", "options", "words"),
     [
-        ("home", flush_times(-1), [], ["tube 1", "behind the front plate", "sign of flush_angle"]),
+        ("home", flush_times(-1), [], ["tube 1", "behind the front plate", "flush_angle"]),
         ("home", flush_times(360), [], ["tube 1", "m: has flush_angle another unit"]),
         ("home", exchanged(rows("home.csv"), "1", "2"), ["--robot", ROBOT], ["longer than tube 1"]),
     ],

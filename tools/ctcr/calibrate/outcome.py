@@ -131,13 +131,12 @@ def _sd_in_file(robot: Robot | None, path: FieldPath) -> float:
 
 def by_robot(robot: Robot, function: Callable[[Array], float], *names: str) -> tuple[float, float]:
     """What a function of parameters (SI) is by the robot file, and its standard deviation (linearised)."""
-    values, step = parameters.values(robot, names), 1e-3
-    parts = []  # of the standard deviation
-    for change in np.diag([step * (stated_sd(robot, name) or 0.0) for name in names]):
-        parts.append((function(values + change) - function(values - change)) / (2 * step))
+    values, step = parameters.values(robot, names), 1e-3  # standard deviations
+    changes = np.diag([step * (stated_sd(robot, name) or 0.0) for name in names])
+    part = np.array([function(values + change) - function(values - change) for change in changes]) / (2 * step)
     correlations = parameters.correlations(robot, names)
-    part = np.array(parts)
-    return function(values), float(np.sqrt(part @ (part if correlations is None else correlations @ part)))
+    variance = part @ (part if correlations is None else correlations @ part)
+    return function(values), float(np.sqrt(max(variance, 0.0)))
 
 
 def frame_rows(

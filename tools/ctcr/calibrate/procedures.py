@@ -262,7 +262,9 @@ def _check_home(file: str, tubes: list[int], length: Array, deployed: Array, dep
     for tube, long, out, sd in zip(tubes, length, deployed, deployed_sd, strict=True):
         text = ""
         if out < -settings.MOVED_FAR * sd:
-            text = f"at home its tip is {-out:.4g} mm behind the front plate: is the sign of flush_angle reversed?"
+            text = (
+                f"at home its tip is {-out:.4g} mm behind the front plate: is the sign of flush_angle or pitch wrong?"
+            )
         elif long > LONGEST_MM:
             text = f"its length comes out as {1e-3 * long:.4g} m: has flush_angle another unit?"
         if text:
