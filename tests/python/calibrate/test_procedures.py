@@ -206,6 +206,18 @@ def test_bad_correlations(pairs, words):
     assert words in str(error.value) and "uncertainty.correlations" in str(error.value)
 
 
+def test_defaults(run, tmp_path):
+    """A section that the file leaves to its defaults is written once a procedure measures a part of it."""
+    robot = tmp_path / "robot.yaml"
+    text = ROBOT.read_text()
+    robot.write_text(text[: text.index("actuation:")] + text[text.index("tracker:") :])
+    new = tmp_path / "new.yaml"
+    code, out, err = run("home", DATA / "home.csv", "--robot", robot, "--pitch-mm", 2, "-o", new)
+    assert code == 0 and "-463.0 ± 1.0 by the robot file" in out, err
+    found = robot_file.load(new).actuation
+    assert found.recorded_home_translation_mm == [-463, -330.5, -199] and -298 < found.home_translation_mm[0] < -296
+
+
 def test_in_place(run, tmp_path):
     """The input is changed with --in-place alone."""
     robot = tmp_path / "robot.yaml"
@@ -228,7 +240,7 @@ def doubled_first_point() -> list[str]:
 @pytest.mark.parametrize(
     "name, lines, options, message",
     [
-        ("rotation-offset", rows("circles.csv")[:4], ["--robot", ROBOT], "circles"),
+        ("rotation-offset", rows("circles.csv")[:4], ["--robot", ROBOT], "circles.csv, tube 1: "),
         ("rotation-offset", rows("circles.csv"), [], "give --ratio, turns of a tube in one turn of its motor"),
         (
             "rotation-offset",

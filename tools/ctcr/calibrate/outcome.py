@@ -97,14 +97,17 @@ class Outcome:
         return {"values": values, "figures": self.figures, "notices": [*self.doubts, *self.notices], **self.details}
 
 
-def computed(procedure: Callable, table: Table, **arguments):
-    """Calls a procedure of the compiled core; its ValueError becomes a fault of the table, in its row of the file."""
+def computed(procedure: Callable, table: Table, about: str = "", **arguments):
+    """Calls a procedure of the compiled core; its ValueError becomes a fault of the table, in its row of the file.
+
+    `about`: what the fault is of, where the table holds more.
+    """
     try:
         return procedure(**arguments)
     except ValueError as error:
         row, text = re.fullmatch(r"(?:row (\d+): )?(.*)", str(error), re.DOTALL).groups()
         line = int(table.row[int(row) - 1]) if row else None
-        raise InputError(Problem(text, table.file, line, line_name="row")) from None
+        raise InputError(Problem(text, table.file, line, about or None, "row")) from None
 
 
 # ---- against the robot file

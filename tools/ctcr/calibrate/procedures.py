@@ -94,6 +94,7 @@ def rotation_offsets(
         fit = computed(
             _core.fit_rotation_offset,
             table,
+            name,
             motor_angle=angle,
             position=position,
             direction=direction,

@@ -344,7 +344,7 @@ def _exclusion_warnings(rows: Sequence[int], how: FitOptions) -> list[str]:
     """Names rows without a solution, counted from 0."""
     if not rows:
         return []
-    return [f"the model has no solution for {_named(rows, how)}, which are left out: check their joints and loads"]
+    return [f"the model has no solution for {_named(rows, how)}: left out, check joints and loads"]
 
 
 def _named(rows: Sequence[int], how: FitOptions) -> str:
