@@ -254,6 +254,14 @@ def test_bad_line(port, folder):
         assert aurora.damaged_answers > 0
 
 
+@pytest.mark.parametrize("fault", ["garbage", "wrong_crc"])
+def test_all_damaged(port, folder, fault):
+    """Where each answer is damaged already at the first connection, that is the fault, and the cable its remedy."""
+    set_faults(folder, **{fault: 1.0})
+    with tracker(port) as aurora, pytest.raises(DeviceFault, match="came damaged .*: check the cable"):
+        aurora.connect()
+
+
 def test_exclusive_port(port):
     """A second program cannot open the port."""
     with tracker(port) as aurora:
@@ -463,9 +471,17 @@ def test_endless_tools(on_line):
         aurora.connect()
 
 
-@pytest.mark.parametrize(("noise", "says"), [(b"", "no answer at any"), (b"\xff\x00", "something answers")])
+@pytest.mark.parametrize(
+    ("noise", "says"),
+    [
+        (b"", "no answer at any"),
+        (b"\xff\x00", r"came damaged \(cut short\)"),
+        (b"OKAY0000\r", r"came damaged \(wrong CRC\)"),
+        (b"OK\x50YA896\r", r"came damaged \(wrong CRC\)"),
+    ],
+)
 def test_no_rate(on_line, monkeypatch, noise, says):
-    """Noise at every baud rate is told from silence, also instead of the message after a reset."""
+    """Damaged answers at every baud rate are told from silence, also instead of the message after a reset."""
     monkeypatch.setattr(Line, "send_break", lambda line, seconds: setattr(line, "reply", noise))
     aurora, _ = on_line(lambda name, arguments: noise)
     with pytest.raises(DeviceFault, match=says):

@@ -15,6 +15,8 @@ from ctcr.bench.shared.ndi import Garbled, ToolReading
 
 RESET_S = 5.0  # from the break to the device's message
 PROBES_S = (0.2, 0.6)  # timeouts of the two rounds in which the baud rate is searched
+CHECK_CABLE = "check the cable and its plugs, keep it away from the motors' cables"
+OTHER_PORT = "is this the tracker's port"
 
 T = TypeVar("T")
 
@@ -123,15 +125,16 @@ class Aurora(AbstractContextManager):
             if message == ndi.RESET_MESSAGE[:-1]:
                 self._ask("INIT", "")
                 return
-        what = "no answer at any baud rate"
+        fault = self._fault("no answer at any baud rate", f"switch it off and on; {OTHER_PORT}, and the cable whole?")
         for timeout in PROBES_S:
             for baud in dict.fromkeys((ndi.RESET_BAUD, self.baud, *ndi.BAUD_CODES)):
                 try:
                     if self._answers_at(baud, timeout):
                         return
-                except Garbled:
-                    what = "something answers, but no baud rate makes it readable"
-        raise self._fault(what, "switch it off and on; is this the tracker's port, and the cable whole?")
+                except Garbled as reason:
+                    what = f"its answers came damaged ({reason}), and no baud rate makes them readable"
+                    fault = self._fault(what, f"{CHECK_CABLE}; {OTHER_PORT}?")
+        raise fault
 
     def _answers_at(self, baud: int, timeout: float) -> bool:
         self._line.baudrate, self._line.timeout = baud, timeout
@@ -139,8 +142,10 @@ class Aurora(AbstractContextManager):
         try:
             for name in ("TSTOP", "INIT"):  # a device left tracking would refuse the commands that follow
                 self._send(name, "")
-                reply = self._until_return() + b"\r"
-            return reply == ndi.framed(b"OKAY")
+                line = self._until_return()
+            if line and not _is_whole(line):
+                raise Garbled("wrong CRC")
+            return line[:-4] == b"OKAY"
         finally:
             self._line.timeout = self._answer_s
 
@@ -199,8 +204,7 @@ class Aurora(AbstractContextManager):
             except Garbled:
                 self.damaged_answers += 1
                 self._drain()
-        remedy = "check the cable and its plugs, keep it away from the motors' cables, or lower the baud rate"
-        raise self._fault(f"{self._tries} answers in a row came damaged", remedy)
+        raise self._fault(f"{self._tries} answers in a row came damaged", f"{CHECK_CABLE}, or lower the baud rate")
 
     def _send(self, name: str, arguments: str) -> None:
         self._line.write(ndi.framed(f"{name}:{arguments}".encode()))
@@ -231,7 +235,7 @@ class Aurora(AbstractContextManager):
     def _checked(self, line: bytes) -> bytes:
         """The text of a line without its CRC. Raises Garbled where that is wrong, DeviceFault for a refusal."""
         text = line[:-4]
-        if b"%04X" % ndi.crc16(text) != line[-4:]:
+        if not _is_whole(line):
             raise Garbled("wrong CRC")
         if text.startswith(b"ERROR"):
             try:
@@ -278,3 +282,8 @@ class Aurora(AbstractContextManager):
     def _silence(self) -> DeviceFault:
         remedy = "wait, or switch it off and on; after a change of its baud rate connect again"
         return self._fault(f"no answer within {self._answer_s:g} s", remedy)
+
+
+def _is_whole(line: bytes) -> bool:
+    """Whether the CRC at the end of a line is that of its text."""
+    return line[-4:] == b"%04X" % ndi.crc16(line[:-4])
