@@ -13,7 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from ctcr import cli
+from ctcr import cli, compare
 from ctcr.bench.devices import bench_file
 from ctcr.bench.devices.person import Person
 from ctcr.bench.devices.tracker import Tracker
@@ -22,7 +22,10 @@ from ctcr.bench.record.folder import Folder
 from ctcr.bench.record.live_page import LivePage
 from ctcr.bench.record.row_file import RowFile
 from ctcr.bench.record.session import Approach, Progress, Session, steps_of
+from ctcr.commands.options import with_effects
+from ctcr.compare import summary
 from ctcr.errors import InputError
+from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.table import measurements
 from ctcr.table.measurements import column_names
@@ -35,6 +38,16 @@ COLUMNS = 2 + 2 * 2 + 3 + 7  # of two tubes
 def rows_of(number, group):
     """The rows of one group: t_s counts, the last field is not measured."""
     return [np.array([number * group + i, number, *range(COLUMNS - 3), np.nan]) for i in range(group)]
+
+
+@pytest.mark.parametrize("hidden", [["friction.coefficient=0.02"], []])
+def test_first_plan(hidden):
+    """The plan of the first session shows friction as hysteresis, as docs/hardware.md says, and none else."""
+    robot = robot_file.load(DATA / "demo" / "robot.yaml")
+    plan = measurements.load(DATA / "bench" / "plan.csv", robot.n_tubes)
+    readings = simulation.simulate(with_effects(robot, hidden), plan)
+    found = [one.text for one in summary.findings(compare(robot, readings))]
+    assert any("There is hysteresis" in text and "friction" in text for text in found) == bool(hidden)
 
 
 def _append_for_ever(path, group, pipe):
