@@ -25,8 +25,8 @@ from ctcr.bench.devices.release import release
 from ctcr.bench.shared.control import request
 from ctcr.bench.simulators import aurora, ethercat
 from ctcr.robot import robot_file
+from origin import ROOT, written_by
 
-ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "bench_faults.md"
 HOME_MM = [-449.0, -320.5, -193.0]  # tips near the plate, so that homing is short
 BENCH = """tracker: {port: simulated}
@@ -306,7 +306,8 @@ Each fault struck a recording of `ctcr record` on the simulated bench, through t
 rows were on the disk. Then it was mended, and the same command was run again until the plan was done. *Lost* counts
 rows that were on the disk and are missing in the final table, and rows of the plan that are missing there. Where the
 recording stopped, the motors were at rest 0.2 s later; after a kill of the recorder they brake first, for 0.2 s more.
-Half of the kills struck its start, half its measuring. Written by `tools/bench_faults.py`.
+Half of the kills struck its start, half its measuring.
+%s
 
 | fault | the recording | message | rows when it struck | rows when it ended | lost |
 |---|---|---|---|---|---|
@@ -317,7 +318,7 @@ def written(outcomes: list[Outcome], folder: Path) -> str:
     def cell(text: str) -> str:
         return text.replace(str(folder) + "/", "").replace("|", "/")
 
-    return HEAD + "".join(
+    return HEAD % written_by("tools/bench_faults.py") + "".join(
         f"| {o.fault} | {o.ended} | {cell(o.message)} | {o.before} | {o.after} | {o.lost} |\n" for o in outcomes
     )
 

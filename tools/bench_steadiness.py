@@ -13,8 +13,8 @@ import tempfile
 from pathlib import Path
 
 from ctcr.demo.bench_story import FILES
+from origin import ROOT, written_by
 
-ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "bench_steadiness.md"
 ROUND_S = 21.5  # of one tour of the cube, about
 HEAD = """# How steady the bench is
@@ -22,7 +22,8 @@ HEAD = """# How steady the bench is
 {minutes:.0f} minutes of `ctcr track --live` at 40 Hz on the simulated bench, with everything on {cores} cores: both
 simulators, the bus process, the reader of the tracker, and the controller that records. Real-time priority:
 {real_time}. Load of the computer at the start and at the end: {load}; the bench itself makes
-about 1 of it. {beside} Written by `tools/bench_steadiness.py`.
+about 1 of it. {beside}
+{written}
 
 | | |
 |---|---|
@@ -76,6 +77,7 @@ def main() -> int:
     head = HEAD.format(
         minutes=sitting["tracker"]["frames"] / 40 / 60,
         beside=given.beside,
+        written=written_by("tools/bench_steadiness.py"),
         cores=os.cpu_count(),
         load=" and ".join(f"{value:.1f}" for value in load),
         real_time="granted" if sitting["bus"]["real_time_priority"] else "not granted",

@@ -21,8 +21,9 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are
 
 import numpy as np  # noqa: E402
 from coverage import truth_of  # noqa: E402
+from origin import ROOT, written_by  # noqa: E402
 from scipy.spatial.transform import Rotation  # noqa: E402
-from score import ROOT, wilson  # noqa: E402
+from score import wilson  # noqa: E402
 
 sys.path.insert(0, str(ROOT / "tools" / "oracle"))
 
@@ -165,8 +166,8 @@ def summary(answers: list[Answer]) -> str:
         f"states; 336 poses, 12 runs, three weights. Share of true values within {WIDTH:g} standard deviations of",
         "those that `ctcr calibrate fit` finds (95.4 % of a normal distribution), with the 95 % Wilson interval, and",
         "the error on held-out runs over that expected of a right model. `jitter`: noise of single readings;",
-        "`realistic`: with the tracker's smooth field error and outliers too. Written by",
-        "`tools/calibration_study.py --keep`.",
+        "`realistic`: with the tracker's smooth field error and outliers too.",
+        written_by("tools/calibration_study.py --keep"),
         "",
         "| noise | robots | within | mean square error / variance | held out, mm RMS | expected | ratio |",
         "|---|---|---|---|---|---|---|",

@@ -5,8 +5,6 @@ It is measured (examples/data/plan.csv, realistic noise), calibrated and diagnos
 the calibration and with the effects that the diagnosis found drive it along the path of scenario S2.
 """
 
-from pathlib import Path
-
 import numpy as np
 from ctcr import add, diagnose
 from ctcr.effects import catalogue
@@ -18,8 +16,8 @@ from ctcr.robot.description import Robot
 from ctcr.table import measurements
 from ctcr.table.measurements import Measurements
 from ctcr.track import runs, scenario
+from origin import ROOT, written_by
 
-ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "docs" / "control_effects.md"
 # The strength that is hidden, in standard deviations of its prior.
 HIDDEN = {"friction": ("coefficient", 2.0), "softening": ("gamma", 2.0), "clearance": ("tilt", 2.0)}
@@ -31,8 +29,7 @@ clearance. It was measured along `examples/data/plan.csv` with realistic noise, 
 then driven along the path of scenario S2. *Open loop*: the robot replays the joints that the controller planned on
 what it knows. *Closed loop*: the tracker corrects at 40 Hz, in ten runs that differ in its noise; behind the mean, in
 brackets, that of the best and of the worst run. Distances of the tip from the path; what lies near the obstacle is left
-out. All robots begin at rest at the start of the path: friction remembers nothing before. Written by
-`tools/control_study.py`."""
+out. All robots begin at rest at the start of the path: friction remembers nothing before."""
 
 
 def hidden_robot(robot: Robot, identity: str, rng: np.random.Generator) -> Robot:
@@ -115,7 +112,8 @@ def main() -> None:
         for name, controller in known.items():
             lines.append(row(name, open_loop(plan, controller, plant), closed_loop(plan, controller, plant)))
             print(identity, lines[-1], flush=True)
-    TARGET.write_text(f"# Control with a missing effect\n\n{ABOUT}\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    head = ["# Control with a missing effect", "", ABOUT, written_by("tools/control_study.py")]
+    TARGET.write_text("\n".join([*head, *lines]) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are
     os.environ.setdefault(_threads, "1")
 
 import numpy as np  # noqa: E402
-from score import ROOT, wilson  # noqa: E402
+from origin import ROOT, written_by  # noqa: E402
+from score import wilson  # noqa: E402
 
 sys.path[:0] = [str(ROOT / "tests" / "python" / "support"), str(ROOT / "tools" / "oracle")]
 
@@ -124,7 +125,8 @@ def summary(answers: list[Answer]) -> str:
         "Robots of one to four tubes; with and without the tracker's smooth field error and outliers, hidden effects,",
         "loads, wrong data sheets and orientations; 1 to 12 runs of 14 or 28 rows. Named: what is wrong and nothing",
         "else, by kind, columns and runs. Corrected: and the corrected table has the error of the right one. With the",
-        "95 % Wilson interval. Written by `tools/convention_study.py --keep`.",
+        "95 % Wilson interval.",
+        written_by("tools/convention_study.py --keep"),
     ]
     for part, half in enumerate(HALVES):
         mine = [one for one in answers if one.seed % 2 == part]

@@ -14,8 +14,9 @@ import numpy as np
 from ctcr import diagnose
 from ctcr.robot import robot_file
 from ctcr.table import measurements
+from origin import ROOT, written_by
 from ruamel.yaml import YAML
-from score import ROOT, wilson
+from score import wilson
 
 SUITE = ROOT / "build" / "suite"
 KEPT = ROOT / "docs" / "interval_coverage.md"
@@ -114,7 +115,8 @@ def main() -> None:
         "",
         "Share of true values within 1.645 posterior standard deviations, by parameter: of the robot, or of an effect",
         "that the independent oracle has in the same form. Sets whose cause lies outside the tubes, or without one,",
-        "where the right effects were named. Written by `tools/coverage.py --keep`.",
+        "where the right effects were named.",
+        written_by("tools/coverage.py --keep"),
         "",
         "| parameters | noise | within, 95 % Wilson interval | mean square error / variance |",
         "|---|---|---|---|",

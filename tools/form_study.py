@@ -20,7 +20,7 @@ for _threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # the matrices are
     os.environ.setdefault(_threads, "1")
 
 import numpy as np  # noqa: E402
-from score import ROOT  # noqa: E402
+from origin import ROOT, written_by  # noqa: E402
 
 sys.path.insert(0, str(ROOT / "tools" / "oracle"))
 
@@ -51,8 +51,8 @@ ABOUT = f"""# How well the forms of the effects follow fuller models
 file is exact and the readings are free of noise, so all that is left is the error of the form. Explained: the part of
 the variance of the signal at the tip that the fitted effect takes away; 99 % leave a tenth of the amplitude, 90 % a
 third. A calibration absorbs a large part of the signal, but less of the error of the form: of what it leaves, the
-effect may explain less. Written by `tools/form_study.py --keep`.
-
+effect may explain less."""
+EXPLAINED = """
 | effect | the fuller model | signal [mm RMS] | explained [%], median | least [%] \
 | after calibration [mm RMS] | explained [%], median | least [%] | laws chosen |
 |---|---|---|---|---|---|---|---|---|"""
@@ -185,7 +185,7 @@ def friction_limits(robot: str, scale: float) -> Iterator[tuple[int, float, floa
 def page(found: list[Explained], limits: list[tuple[str, float, int, float, float]]) -> str:
     """As Markdown."""
     by_form = {form[0]: [one for one in found if one.form == form[0]] for form in FORMS}
-    lines = [ABOUT]
+    lines = [ABOUT, written_by("tools/form_study.py --keep"), EXPLAINED]
     for name, identity, physics in FORMS:
         mine = by_form[name]
         if not mine:

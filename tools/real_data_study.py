@@ -25,7 +25,7 @@ from ctcr.conventions import Review  # noqa: E402
 from ctcr.show.output import atomic_writer, write_json  # noqa: E402
 from ctcr.show.style import ERROR, FAINT, GOOD, NOISE, picture  # noqa: E402
 from ctcr.show.wording import most, short  # noqa: E402
-from score import ROOT  # noqa: E402
+from origin import ROOT  # noqa: E402
 
 ANSWERS = ROOT / "build" / "real_data_study"
 PAGE = ROOT / "docs" / "real_data.md"

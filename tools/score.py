@@ -13,20 +13,18 @@ import subprocess
 import sys
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from datetime import date
 from itertools import pairwise
 from pathlib import Path
 from statistics import quantiles
 
+from origin import ROOT, written_by
 from ruamel.yaml import YAML
 
-ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "diagnosis_scores.md"
 ABOUT = """Sets with hidden effects from the independent oracle (`tools/oracle`), diagnosed by the command line from
 robot file and measurements alone. %s `jitter`: noise of single readings;
 `realistic`: with the tracker's smooth field error and outliers too. The floor is that of the true noise, to which
-the unequal lags of single readings belong where a delay is hidden. Written by `tools/dev score --keep` on %s, commit
-%s."""
+the unequal lags of single readings belong where a delay is hidden. %s"""
 TUNED = "Thresholds were set on the tuning half."
 UNSEEN = """Other seeds than those by which thresholds were set, scored once
 (`python tools/oracle/make_suite.py --shift K --out FOLDER`)."""
@@ -196,8 +194,7 @@ def main() -> None:
     if options.keep:
         of = "unseen seeds" if options.unseen else f"the {options.half} half"
         title = f"Scores of `ctcr diagnose`: {len(chosen)} sets of {of}"
-        commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
-        about = ABOUT % (UNSEEN if options.unseen else TUNED, date.today(), commit.stdout.strip())
+        about = ABOUT % (UNSEEN if options.unseen else TUNED, written_by("tools/dev score --keep"))
         target = KEPT.with_stem(f"{KEPT.stem}_unseen") if options.unseen else KEPT
         target.write_text(f"# {title}\n\n{about}\n\n{text}\n", encoding="utf-8")
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import ctcr
 import numpy as np
+import origin
 import pytest
 
 ROOT = Path(__file__).parents[3]
@@ -216,6 +217,20 @@ def test_coverage_told(document):
     robots, within, values = (sum(int(count) for count in column) for column in zip(*counts, strict=True))
     told = " ".join((ROOT / document).read_text().replace("[", "").split())
     assert f"on {robots} random robots" in told.lower() and f"in {100 * within / values:.0f} % of the cases" in told
+
+
+def test_origins():
+    """Each page that a tool writes says by which, on which day and at which commit, as the shared sentence does."""
+    form = re.compile(r"Written by `(\S+) ?[^`]*` on \d{4}-\d\d-\d\d, commit ([0-9a-f]{7,}( and changes)?|unknown)\b")
+    assert form.fullmatch(origin.written_by("tools/score.py --keep").rstrip("."))
+    pages = {path.stem: " ".join(path.read_text().split()) for path in (ROOT / "docs").glob("*.md")}
+    written = {name: page for name, page in pages.items() if "Written by `tools/" in page}
+    assert len(written) >= 9
+    for name, page in written.items():
+        assert (said := form.search(page)), name
+        assert "unknown" not in said[0] and (ROOT / said[1]).exists(), name
+    tools = [path for path in (ROOT / "tools").glob("*.py") if 'ROOT / "docs" / ' in path.read_text()]
+    assert [path.name for path in tools if "written_by(" not in path.read_text()] == ["real_data_study.py"]
 
 
 def test_demonstration_told():
