@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError
 from ctcr.export import cpp_header
 from ctcr.inputs import sha256
-from ctcr.model import recording
+from ctcr.model import fields, parameters, recording
 from ctcr.model.model import Model
 from ctcr.robot import ledger, robot_file
 from ctcr.robot.ledger import Change, Entry
@@ -168,6 +169,34 @@ def test_provenance(tmp_path):
     assert re.search(r"0\.0436\d+,  // 2\.50 deg, sd 0\.25 ", text)
     assert re.search(r"\.curvature = 5\.5,$", text, re.M)
     assert re.search(r" 0\.03,  // delay\.delay \[s\], 0\.0300, sd 0\.0020 ", text)
+
+
+@pytest.mark.parametrize("in_file", [True, False])
+def test_fitted_frame(tmp_path, in_file):
+    """Fitted numbers of the tracker frame have the deviations of draws from the fit, also where the file had none."""
+    robot = robot_file.load(TABLE2)
+    if not in_file:
+        path = tmp_path / "bare.yaml"
+        path.write_text(re.sub(r"^tracker:\n(?:  .*\n)+", "", TABLE2.read_text(), flags=re.M))
+        robot = robot_file.load(path)
+    rng = np.random.default_rng(3)
+    names = [f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"]
+    mixing = 1e-3 * rng.standard_normal((6, 6))
+    values = np.append(rng.uniform(-0.3, 0.3, 3), rng.uniform(-0.2, 0.2, 3))
+    fit = SimpleNamespace(names=names, values=values, covariance=mixing @ mixing.T)
+    fit.sd = np.sqrt(np.diag(fit.covariance))
+    after = parameters.applied(robot, names, values)
+    ledger.write(robot, tmp_path / "fitted.yaml", fields.changes(fit, robot, after), Entry("ctcr calibrate fit"))
+    header = cpp_header(robot_file.load(tmp_path / "fitted.yaml"))
+    drawn = rng.multivariate_normal(values, fit.covariance, 4000)
+    spread = {
+        "position": 1e3 * np.std(drawn[:, :3], axis=0),
+        "rotation": np.std(parameters.turned(robot.tracker.rotation_vector_rad, drawn[:, 3:]), axis=0),
+    }
+    for kind, expected in spread.items():
+        block = re.search(rf"tracker_{kind}\{{.*?\n}};", header, re.S)[0]
+        said = re.findall(r", sd ([\d.]+) \(ctcr calibrate fit, \d{4}-\d\d-\d\d\)", block)
+        np.testing.assert_allclose([float(sd) for sd in said], expected, rtol=0.1)
 
 
 def test_hostile_names(tmp_path):

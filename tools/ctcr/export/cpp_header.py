@@ -222,15 +222,16 @@ def _fitted(robot: Robot, name: str) -> str:
 
 def _in_ledger(robot: Robot, name: str) -> str:
     """How the ledger came to the value that a parameter has; empty where it does not say."""
-    field = parameters.field_of(name)
-    if field.path is None:
+    path, unit = parameters.written_at(name)
+    if path is None:
         return ""
-    value = parameters.value_at(robot, field.path)
+    value = parameters.value_at(robot, path)
     for entry in reversed(robot.history):
         for row in _rows(entry.get("changes")):
-            if row.get("field") == path_text(field.path):
-                same = isinstance(value, float) and _is_same(row.get("new"), value)
-                return _said(entry, value, row.get("sd"), field.unit) if same else ""
+            if row.get("field") in (path_text(path), path_text(path[:-1])):  # a list may have been written as one
+                new, sd = (_item(row.get(key), path[-1]) for key in ("new", "sd"))
+                same = isinstance(value, int | float) and _is_same(new, value)
+                return _said(entry, value, sd, unit) if same else ""
     return ""
 
 
@@ -244,15 +245,20 @@ def _of_effect(robot: Robot, name: str, value: float) -> str:
 
 
 def _said(entry: dict, value: float, sd: object, unit: str) -> str:
-    if not isinstance(sd, int | float):
-        return ""
-    text = f"{number(value, sd)}{f' {unit}' if unit else ''}, sd {deviation(sd)}"
+    known = isinstance(sd, int | float)
+    text = f"{number(value, sd) if known else f'{value:.6g}'}{f' {unit}' if unit else ''}"
+    text += f", sd {deviation(sd)}" if known else ""
     return _comment(f"{text} ({entry.get('command', '')}, {entry.get('date', '')})")
 
 
 def _rows(changes: object) -> Iterable[dict]:
     """Entries of a ledger, which may have been edited by hand."""
     return [row for row in changes if isinstance(row, dict)] if isinstance(changes, list) else []
+
+
+def _item(value: object, index: object) -> object:
+    """The number of a list; a number alone is that of a row for each."""
+    return value[index] if isinstance(value, list) and isinstance(index, int) and index < len(value) else value
 
 
 def _is_same(noted: object, value: float) -> bool:

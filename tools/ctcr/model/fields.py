@@ -118,19 +118,38 @@ def changes(fit: Any, before: Robot, after: Robot) -> list[Change]:
         if field.path and _is_list(before, field.path):
             made.append(Change(field.path, field.unit, value_at(after, field.path), field.factor * float(sd)))
     said = {change.path for change in made}
+    sds = {key: _sds(fit, key, getattr(before.tracker, key) or [0.0] * 3) for key in _POSES}
     for key, unit in _POSES.items():
         new = getattr(after.tracker, key)
         if not _is_list(before, ("tracker", key, 0)):
-            made += [Change(("tracker", key), unit, new)] if new != getattr(before.tracker, key) else []
+            made += (
+                [Change(("tracker", key), unit, new, sds[key] or None)] if new != getattr(before.tracker, key) else []
+            )
             continue
         for i, (old, value) in enumerate(zip(getattr(before.tracker, key), new, strict=True)):
             if old != value and ("tracker", key, i) not in said:
-                made.append(Change(("tracker", key, i), unit, value))
+                made.append(Change(("tracker", key, i), unit, value, sds[key][i] if sds[key] else None))
     for key, unit in (("sensor_position_mm", "mm"), ("sensor_rotation_deg", "deg")):  # of what was not known
         stated = getattr(after.uncertainty, key)
         if stated != getattr(before.uncertainty, key):
             made.append(Change(("uncertainty", key), unit, stated))
     return made
+
+
+def _sds(fit: Any, key: str, before: list[float]) -> list[float]:
+    """Standard deviations of the three numbers of a pose, in the unit of the file, of which a rotation vector was
+    turned from the one before; [] where the fit does not tell them."""
+    kind = next((kind for kind, of in parameters.TURNS.items() if of == key), f"tracker.{key.removesuffix('_mm')}")
+    names = [f"{kind}.{axis}" for axis in "xyz"]
+    free = [i for i, name in enumerate(names) if name in fit.names]
+    at = [fit.names.index(names[i]) for i in free]
+    slopes = 1e3 * np.eye(3)[:, free]
+    if kind in parameters.TURNS:
+        turn, steps = np.zeros(3), 1e-5 * np.eye(3)[free]
+        turn[free] = fit.values[at]
+        slopes = (parameters.turned(before, turn + steps) - parameters.turned(before, turn - steps)).T / 2e-5
+    sds = np.sqrt(np.diag(slopes @ fit.covariance[np.ix_(at, at)] @ slopes.T))
+    return sds.tolist() if free and np.isfinite(sds).all() else []
 
 
 def _is_list(robot: Robot, path: FieldPath) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ctcr import _core, settings
-from ctcr.arrays import Array
+from ctcr.arrays import Array, ArrayLike
 from ctcr.effects import catalogue
 from ctcr.errors import ArgumentError, InputError, Problem, suggestion
 from ctcr.robot.description import Robot
@@ -50,7 +50,7 @@ _FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), u
     "tracker.rotation.*": (None, "deg", 180 / pi),  # a turn of the rotation vector, not one of its numbers
     "tracker.sensor_rotation.*": (None, "deg", 180 / pi),
 }
-_TURNS = {"tracker.rotation": "rotation_vector_rad", "tracker.sensor_rotation": "sensor_rotation_vector_rad"}
+TURNS = {"tracker.rotation": "rotation_vector_rad", "tracker.sensor_rotation": "sensor_rotation_vector_rad"}
 _UNCERTAINTY = {  # section and kind of a parameter: the field of `uncertainty`
     ("tracker", "position"): "tracker_frame_mm",
     ("tracker", "rotation"): "tracker_frame_deg",
@@ -227,12 +227,16 @@ def applied(robot: Robot, names: Iterable[str], fitted: Iterable[float]) -> Robo
         field = field_of(name)
         if field.path:
             _set(changed, field.path, value * field.factor)
-    for kind, key in _TURNS.items():
-        turn = Rotation.from_rotvec([values.get(f"{kind}.{axis}", 0.0) for axis in "xyz"])
-        if turn.magnitude():
-            old = Rotation.from_rotvec(getattr(robot.tracker, key) or np.zeros(3))
-            setattr(changed.tracker, key, (turn * old).as_rotvec().tolist())
+    for kind, key in TURNS.items():
+        turn = np.array([values.get(f"{kind}.{axis}", 0.0) for axis in "xyz"])
+        if turn.any():
+            setattr(changed.tracker, key, turned(getattr(robot.tracker, key) or np.zeros(3), turn).tolist())
     return changed
+
+
+def turned(vector: ArrayLike, turn: ArrayLike) -> Array:
+    """The rotation vector (..., 3) of a file, turned by others (..., 3), which are values of tracker.rotation."""
+    return (Rotation.from_rotvec(turn) * Rotation.from_rotvec(vector)).as_rotvec()
 
 
 def known_directions(robot: Robot, names: list[str]) -> list[tuple[str, Array]]:
@@ -311,7 +315,7 @@ def _value(robot: Robot, name: str) -> float:
     """The value of a parameter of the robot in SI; what the file leaves out is 0, and a ratio 1."""
     field = field_of(name)
     if field.path is None:
-        vector = getattr(robot.tracker, _TURNS[name[:-2]])
+        vector = getattr(robot.tracker, TURNS[name[:-2]])
         return float(vector["xyz".index(name[-1])]) if vector else 0.0
     value = value_at(robot, field.path)
     return float(name.endswith("_ratio")) if value is None else float(value) / field.factor
@@ -346,9 +350,17 @@ def group_of(robot: Robot, name: str) -> str | None:
     return f"{key}[{index}]" if key and isinstance(getattr(robot.uncertainty, key), list) else key
 
 
+def written_at(name: str) -> tuple[FieldPath | None, str]:
+    """Where the file holds a parameter, and its unit there; of a turn, the number of the same axis of the vector."""
+    kind, _, axis = name.rpartition(".")
+    if kind in TURNS:
+        return ("tracker", TURNS[kind], "xyz".index(axis)), "rad"
+    return field_of(name).path, field_of(name).unit
+
+
 def name_at(path: FieldPath) -> str | None:
     """The parameter of a field; that of a rotation vector is the turn about the same axis."""
-    for kind, key in _TURNS.items():
+    for kind, key in TURNS.items():
         if path[:2] == ("tracker", key) and len(path) > 2:
             return f"{kind}.{'xyz'[path[2]]}"
     return next((name for name, field in _fields().items() if field.path == path), None)

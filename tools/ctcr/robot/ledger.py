@@ -32,12 +32,12 @@ _RECORDED_NOTE = "of the controller that recorded the tables; remove once it use
 @dataclass(frozen=True)
 class Change:
     """A number of the file, at a path such as ("tubes", 0, "length_mm") or ("tracker", "position_mm", 2), or a list,
-    and its new value in the unit of that field; `deviation` is the standard deviation of the new value, where known."""
+    and its new value in the unit of that field; `deviation` is its standard deviation, or a list, where known."""
 
     path: FieldPath
     unit: str
     new: float | list
-    deviation: float | None = None
+    deviation: float | list[float] | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,8 @@ def _apply(document: CommentedMap, change: Change) -> CommentedMap:
     parent[last] = _tidy(change.new)
     row = {"field": path_text(change.path), "unit": change.unit, "old": _plain(old), "new": _tidy(change.new)}
     if change.deviation is not None:
-        row["sd"] = _shortest(change.deviation, 3)
+        each = change.deviation
+        row["sd"] = [_shortest(sd, 3) for sd in each] if isinstance(each, list) else _shortest(each, 3)
     return _one_line(row)
 
 
