@@ -1,6 +1,7 @@
 """What is tolerated, what is said, what is refused."""
 
 import json
+import re
 from dataclasses import replace
 
 import lab_logs
@@ -484,6 +485,39 @@ def test_names(name, role, tube, unit):
 )
 def test_names_of_nothing(name):
     assert meaning(name) is None
+
+
+@pytest.mark.parametrize(("slip", "there"), [("x", "y and z"), ("y", "x and z"), ("qx", "qw, qy and qz")])
+def test_slip_in_a_name(truth, log, refused, imported, same, slip, there):
+    """A position or a quaternion that lacks one column is a fault that names the others, and what it may be."""
+    names = [*NAMES, "qw", "qx", "qy", "qz"]
+    content = text(names, [truth.t, truth.beta, truth.alpha, truth.position, truth.quaternion])
+    path = log(re.sub(rf"\b{slip}\b", "[red]nonsense", content, count=1))
+    words = f"{there} look like a {'quaternion' if 'q' in slip else 'position'} without {slip}: give --column {slip}="
+    said = refused(path)
+    assert words in said and "not used: [red]nonsense" in said
+    same(imported(path, "--column", f"{slip}=[red]nonsense")[0])
+    others = there.replace(" and ", ", ").split(", ")
+    assert "left out" not in imported(path, *(part for name in others for part in ("--ignore", name)))[1]
+
+
+def test_decimal_commas_between_commas(truth, log, refused):
+    """Are named as what they are, also where some numbers are whole."""
+    content = text(["run", *NAMES], [0 * truth.t, truth.t, truth.beta, truth.alpha, truth.position], decimal=",")
+    said = refused(log(content))
+    assert "17 fields a row and 9 names" in said and "decimal commas cannot be told" in said
+
+
+def test_name_without_its_unit(truth, log, imported, same, refused):
+    """A column is found by its name in the file, though the unit below is appended; not where two have that name."""
+    names, units = ["Zeit", "V1", "V2", "Winkel A", "Winkel B", "x", "y", "z"], "[s],[mm],[m],[rad],[rad],[m],[m],[m]"
+    values = [truth.t, truth.beta * [1e3, 1], truth.alpha, truth.position]
+    lines = text(names, values).split("\n")
+    path = log("\n".join([lines[0], units, *lines[1:]]))
+    roles = ["beta1=V1", "beta2=v2", "alpha1=Winkel A", "alpha2=Winkel B [rad]"]
+    same(imported(path, *(part for role in roles for part in ("--column", role)))[0], orientation=False)
+    path = log("\n".join([lines[0].replace("V2", "V1"), units, *lines[1:]]))
+    assert "the log has no column V1" in refused(path, "--column", "beta1=V1")
 
 
 def test_zero_based(log, imported, same, truth):

@@ -1,11 +1,14 @@
 """A log as its file holds it: named columns of text or numbers, with the row of the file that each value came from."""
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ctcr.arrays import Array, Integers
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.intake.names import Meaning
+
+_WITH_UNIT = re.compile(r" \[[^][]*\]$")  # as the reader appends the unit of a row below the header
 
 
 @dataclass(frozen=True)
@@ -30,14 +33,21 @@ class Log:
         """Whether the format says what each column holds."""
         return self.names == tuple(self.meanings)
 
-    def index(self, name: str, where: str) -> int:
-        """The position of a column, by its name or as #3. Raises InputError that names the option `where`."""
+    def find(self, name: str) -> int | None:
+        """The position of a column, by its name or as #3; None where it has none, or several."""
         if name in self.names:
             return self.names.index(name)
         if name.startswith("#") and name[1:].isdigit() and 1 <= int(name[1:]) <= len(self.names):
             return int(name[1:]) - 1
-        loose = [i for i, known in enumerate(self.names) if known.strip().lower() == name.strip().lower()]
-        if len(loose) == 1:
-            return loose[0]
+        for spelled in (self.names, [_WITH_UNIT.sub("", known) for known in self.names]):
+            loose = [i for i, known in enumerate(spelled) if known.strip().lower() == name.strip().lower()]
+            if len(loose) == 1:
+                return loose[0]
+        return None
+
+    def index(self, name: str, where: str) -> int:
+        """find(), or an InputError that names the option `where`."""
+        if (found := self.find(name)) is not None:
+            return found
         hint = suggestion(name, self.names, f"it has {', '.join(self.names[:12])}{' ...' * (len(self.names) > 12)}")
         raise InputError(Problem(f"the log has no column {name}: {hint}", str(self.path), field=where))

@@ -73,6 +73,7 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
             made.used[role] = picker.best(role, same)
     if poses:
         _poses(made, candidates, choices, picker)
+        _check_whole(log, made, candidates, ignored, faults)
     _check(log, made, faults)
     _check_units(log, made, choices, faults)
     if faults:
@@ -222,7 +223,7 @@ def _named(placed, asked: str, option: str, picker: _Picker) -> str | None:
 def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _Picker) -> None:
     """Gives one body's columns their roles; one orientation is enough."""
     matrix = [role for role in roles if role[0] == "m"]
-    quaternion = set(roles) >= set(QUATERNION)
+    quaternion = all(role in roles or prefix + role in made.used for role in QUATERNION)
     kept = [*POSITION, "seen"]
     kept += QUATERNION if quaternion else matrix if matrix else EULER
     if set(matrix) & {"m1", "m14"}:
@@ -257,6 +258,28 @@ def _check(log: Log, made: Mapping, faults: list[Problem]) -> None:
                 absent = [prefix + role for role in roles if role not in there]
                 lack = f"{join(absent)} of the {group} {'is' if len(absent) == 1 else 'are'} missing"
                 say(f"{lack}: give --column {absent[0]}=NAME")
+
+
+def _check_whole(
+    log: Log, made: Mapping, candidates: list[Candidate], ignored: set[int], faults: list[Problem]
+) -> None:
+    """A fault where all columns of a position or of a quaternion but one are there: its name may have a slip."""
+    known = {one.column for one in (*made.used.values(), *candidates)} | ignored
+    others = [name for i, name in enumerate(log.names) if i not in known]
+    bodies = _bodies([one for one in candidates if not one.meaning.is_given])
+    for what, whole, instead in (
+        ("position", POSITION, (*TRANSLATION, *SEQUENCE)),
+        ("quaternion", QUATERNION, (*EULER, *GRID, *SEQUENCE)),
+    ):
+        if {*whole, *instead} & {*made.used}:
+            continue
+        for roles in map(settled, bodies.values()):
+            absent = [role for role in whole if role not in roles]
+            if len(absent) == 1:
+                there = join([roles[role][0].name for role in whole if role in roles])
+                text = f"{there} look like a {what} without {absent[0]}: give --column {absent[0]}=NAME"
+                text += f", or --ignore them (not used: {listed(others, 30) or 'none'})"
+                faults.append(Problem(text, str(log.path)))
 
 
 def _check_units(log: Log, made: Mapping, choices: Choices, faults: list[Problem]) -> None:

@@ -21,8 +21,8 @@ _SHARED = (*MOVING, "t", "nsec")  # roles of columns that are the same for all t
 def unstacked(log: Log, choices: Choices) -> tuple[Log, Choices]:
     """The log with one row a time, and the choices that are left to make. Where tools have times of their own, or the
     user counts columns, only the rows of the sensor stay. Raises InputError where none is chosen."""
-    taken = {*choices.ignore, *choices.columns.values()}
-    column = next((i for i, name in enumerate(log.names) if name not in taken and _names_tools(log, i)), None)
+    taken = {log.find(name) for name in (*choices.ignore, *choices.columns.values())}
+    column = next((i for i, name in enumerate(log.names) if i not in taken and _names_tools(log, i)), None)
     if column is None:
         return log, choices
     tool, name = _texts(log, column), log.names[column]

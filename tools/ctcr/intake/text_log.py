@@ -50,6 +50,11 @@ def read(path: Path, content: bytes) -> Log:
         raise InputError(Problem("holds no rows of numbers: is this a log?", str(path)))
     count = _usual_count(head, start)
     names = _names(head, start, count)
+    if delimiter == "," and (halves := _halves(head, start, count)):
+        text = f"has {count} fields a row and {halves} names: between commas, decimal commas cannot be told"
+        raise InputError(
+            Problem(f"{text}: export it with decimal points, or separated by semicolons or tabs", str(path))
+        )
     notes += [f"line 1 to {head[start][0] - 1}: no table; passed over"] * (names[0] == "#1" and head[start][0] > 1)
     first, sample = head[start][0], [fields for _, fields in head[start : start + SAMPLE_LINES]]
     regular = _regular(lines, first, delimiter, len(names))
@@ -188,6 +193,14 @@ def _names(rows: Rows, start: int, count: int) -> list[str]:
     units = [""] * (len(names) - len(units)) + units
     names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=False)]
     return names[: max(count, len([n for n in names if n]))]
+
+
+def _halves(rows: Rows, start: int, count: int) -> int:
+    """How many names stand above rows of `count` fields, if decimal commas made two fields of most numbers; else 0."""
+    above = next((fields for _, fields in reversed(rows[:start]) if any(field.strip() for field in fields)), [])
+    named = len(above) + 1 < count <= 2 * len(above) and not any(map(_is_number, above))
+    fields = [field.strip() for _, fields in rows[start : start + SAMPLE_LINES] for field in fields]
+    return len(above) if named and not any(map(_POINT_NUMBER.fullmatch, fields)) else 0
 
 
 def _joined(upper: list[str], lower: list[str]) -> list[str]:

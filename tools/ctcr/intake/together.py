@@ -20,7 +20,7 @@ def divided(choices: Choices, poses: Log, joints: Log) -> tuple[Choices, Choices
 
     def part(log: Log, other: Log, wanted: bool) -> Choices:
         def mine(name: str) -> bool:
-            return name in log.names or log is poses and name not in other.names
+            return log.find(name) is not None or log is poses and other.find(name) is None
 
         times = ("t", "nsec")
         named = choices.columns.items()
