@@ -264,8 +264,7 @@ def _check_whole(
     log: Log, made: Mapping, candidates: list[Candidate], ignored: set[int], faults: list[Problem]
 ) -> None:
     """A fault where all columns of a position or of a quaternion but one are there: its name may have a slip."""
-    known = {one.column for one in (*made.used.values(), *candidates)} | ignored
-    others = [name for i, name in enumerate(log.names) if i not in known]
+    used = {one.column for one in made.used.values()} | ignored
     bodies = _bodies([one for one in candidates if not one.meaning.is_given])
     for what, whole, instead in (
         ("position", POSITION, (*TRANSLATION, *SEQUENCE)),
@@ -276,9 +275,11 @@ def _check_whole(
         for roles in map(settled, bodies.values()):
             absent = [role for role in whole if role not in roles]
             if len(absent) == 1:
-                there = join([roles[role][0].name for role in whole if role in roles])
-                text = f"{there} look like a {what} without {absent[0]}: give --column {absent[0]}=NAME"
-                text += f", or --ignore them (not used: {listed(others, 30) or 'none'})"
+                there = [one for role in whole for one in roles.get(role, [])]
+                known = used | {one.column for one in there}
+                others = listed([name for i, name in enumerate(log.names) if i not in known], 30)
+                text = f"{join([one.name for one in there])} look like a {what} without {absent[0]}"
+                text += f": give --column {absent[0]}=NAME, or --ignore them (not used: {others or 'none'})"
                 faults.append(Problem(text, str(log.path)))
 
 
