@@ -1,13 +1,14 @@
 """`ctcr compare` names wrong conventions of random robots, with what corrects them, and none where there is none."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from conventions_bench import RUNS, design, session
 from ctcr.conventions import review, runs
-from ctcr.conventions.hypotheses import with_frame
+from ctcr.conventions.hypotheses import hypotheses, with_frame
 from ctcr.conventions.orientation import mirror
 from ctcr.fit.floors import floors
 from ctcr.frames import conjugate, product
@@ -401,6 +402,65 @@ def test_commands(files, run):
     assert code != 0
     assert "alpha2 counts the other way" in error
     assert "--anyway" in error
+
+
+IMPORT = re.compile(r"ctcr import((?: --[a-z-]+ [^\s,;]+)+)")
+
+
+def undone(hypothesis, readings):
+    """The table that a hypothesis makes right: its changes of joints, forces and positions are affine."""
+    made = {}
+    for group in ("beta", "alpha", "force", "position"):
+        values = getattr(readings, group)
+        probe = np.vstack([np.zeros(values.shape[1]), np.eye(values.shape[1])])
+        few = replace(readings.rows(np.arange(len(probe))), **{group: probe})
+        at = getattr(hypothesis.change(few), group)
+        made[group] = np.linalg.solve((at[1:] - at[0]).T, (values - at[0]).T).T
+    return replace(readings, **made)
+
+
+@pytest.mark.parametrize("n_tubes", [2, 3])
+def test_fixes(n_tubes, files, run, tmp_path):
+    """Each command that mends a table does what its hypothesis does: of joints, forces and positions."""
+    robot, readings = bench(37, n_tubes, runs=2)
+    robot.actuation.home_rotation_deg = [20.0, -35.0, 50.0][:n_tubes]
+    tested = set()
+    for one in hypotheses(robot, readings):
+        if not (found := IMPORT.search(one.fix)):
+            assert one.kind not in ("joint_sign", "joint_order", "joint_unit", "mirrored"), one.text
+            continue
+        paths = files(robot, undone(one, readings))
+        options = found[1].replace("ROBOT", str(paths[0])).split()
+        code, _, error = run("import", paths[1], *options, "-o", tmp_path / "mended.csv")
+        assert code == 0, (one.text, error)
+        mended = measurements.load(tmp_path / "mended.csv", n_tubes)
+        for group in ("t", "beta", "alpha", "force", "position", "quaternion"):
+            np.testing.assert_allclose(
+                getattr(mended, group), getattr(readings, group), atol=1e-6, rtol=1e-6, err_msg=f"{one.text}: {group}"
+            )
+        tested.add(one.text)
+    assert {"all betas count from home", "the tracker frame of the table is left-handed: x is mirrored"} <= tested
+
+
+@pytest.mark.parametrize(
+    ("kind", "spoil"),
+    [
+        ("joint_order", lambda robot, m: replace(m, alpha=m.alpha[:, ::-1])),
+        ("joint_offset", lambda robot, m: replace(m, beta=m.beta + [1e-3 * tube.length_mm for tube in robot.tubes])),
+        ("mirrored", lambda robot, m: scaled(m, "position", [1, -1, 1])),
+    ],
+)
+def test_followed(kind, spoil, files, run, tmp_path):
+    """What `compare` says to do makes the table right."""
+    robot, readings = bench(41)
+    paths = files(robot, spoil(robot, readings))
+    [one] = json.loads(run("compare", *paths, "--json", "-")[1])["conventions"]
+    assert one["kind"] == kind
+    options = IMPORT.search(one["fix"])[1].replace("ROBOT", str(paths[0])).split()
+    assert run("import", paths[1], *options, "-o", tmp_path / "mended.csv")[0] == 0
+    mended = measurements.load(tmp_path / "mended.csv", robot.n_tubes)
+    for group in ("beta", "alpha", "force", "position", "quaternion"):
+        np.testing.assert_allclose(getattr(mended, group), getattr(readings, group), atol=1e-6)
 
 
 def test_refused_table(files, run):

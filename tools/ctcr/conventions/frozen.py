@@ -45,7 +45,7 @@ def stood_still(robot: Robot, readings: Measurements) -> tuple[Finding, Mask] | 
     frozen = same & np.isin(first, first[rows[visible]])
     where = readings.row[frozen]
     text = f"the tracker repeated its last pose while the joints moved, in {_spans(where)}"
-    fix = "leave the pose fields of these rows empty"
+    fix = "comparisons and fits leave these rows out; for other programs, empty their pose fields"
     columns = (*POSE, *QUATERNION) if readings.quaternion is not None else POSE
     runs = np.unique(readings.run[frozen]).tolist()
     return Finding("frozen", text, columns, fix, runs=runs, rows=where.tolist()), frozen

@@ -139,7 +139,9 @@ def _signs(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
             yield Hypothesis("joint_sign", text, names, fix, changed(kind, lambda q, s=sign: q * s), doubts=doubts)
             if (home := homes[kind] * (sign < 0)).any():
                 what = f"{text}, from home on"
-                fix = f"correct the sign of the motor and count from home: {join(names)} -> 2 home - {join(names)}"
+                twice, unit = (2 * np.rad2deg(home), "deg") if kind == "alpha" else (2e3 * home, "mm")
+                moves = " ".join(f"--offset {kind}{i + 1}={twice[i]:.6g}{unit}" for i in np.flatnonzero(home))
+                fix = f"ctcr import {flip} {moves}, or correct the sign of the motor"
                 change = changed(kind, lambda q, s=sign, h=home: 2 * h + q * s)
                 yield Hypothesis("joint_sign", what, names, fix, change, doubts=doubts + 1)
 
@@ -149,11 +151,13 @@ def _zeros(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     length = np.array([tube.length for tube in robot.tubes])
     home = 1e-3 * np.array(robot.actuation.home_translation_mm)
     names = joints("beta", tuple(range(robot.n_tubes)))
-    for where, zero in (("where the tips are flush with the plate", -length), ("home", home)):
+    for where, zero, kind in (
+        ("where the tips are flush with the plate", -length, "from-flush"),
+        ("home", home, "from-home"),
+    ):
         for way, sign in (("", 1.0), (", outwards negative", -1.0)):
             text = f"all betas count from {where}{way}"
-            sizes = ", ".join(f"{1e3 * value:+g}" for value in zero)
-            fix = f"beta = {'-' if sign < 0 else ''}(the column) + ({sizes}) mm of tubes 1 to {robot.n_tubes}"
+            fix = f"ctcr import --translation {kind} --robot ROBOT{' --flip beta' if sign < 0 else ''}"
             change = changed("beta", lambda q, z=zero, s=sign: z + s * q)
             yield Hypothesis("joint_offset", text, names, fix, change, doubts=2)
 
@@ -239,14 +243,14 @@ def _orders(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
     own = tuple(range(n))
     exchanged = {tuple(b if i == a else a if i == b else i for i in own) for a, b in combinations(own, 2)}
     for order in sorted(exchanged | {own[::-1]} - {own}):
-        reverse = order == own[::-1]
-        numbers = ", ".join(str(i + 1) for i in order)
+        reverse, moved = order == own[::-1], [i for i in own if order[i] != i]
         for groups in (("beta", "alpha"), ("alpha",), ("beta",)):
-            names = tuple(name for kind in groups for name in joints(kind, tuple(i for i in own if order[i] != i)))
+            names = tuple(name for kind in groups for name in joints(kind, tuple(moved)))
             of = "joints" if len(groups) == 2 else f"{groups[0]}s"
             text = f"the {of} stand {'outermost tube first' if reverse else 'in another order'}"
-            fix = f"the columns of tubes 1 to {n} are those called {numbers}"
-            fix = "ctcr import --order outermost-first" if reverse and len(groups) == 2 else fix
+            columns = [(kind, group_columns(n)[kind]) for kind in groups]
+            swap = (f"--column {kind}{i + 1}={called[order[i]]}" for kind, called in columns for i in moved)
+            fix = f"ctcr import {'--order outermost-first' if reverse and len(groups) == 2 else ' '.join(swap)}"
 
             def change(m: Measurements, order=order, groups=groups) -> Measurements:
                 return replace(m, **{kind: getattr(m, kind)[:, order] for kind in groups})
@@ -287,7 +291,8 @@ def _positions(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
         sign = np.ones(3)
         sign[axis] = -1.0
         text = f"the tracker frame of the table is left-handed: {name} is mirrored"
-        yield Hypothesis("mirrored", text, (POSE[axis],), "", changed("position", lambda p, s=sign: p * s))
+        fix = f"ctcr import --unit {name}=-1m"  # of the position alone
+        yield Hypothesis("mirrored", text, (POSE[axis],), fix, changed("position", lambda p, s=sign: p * s))
 
 
 def _poses(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:

@@ -102,7 +102,7 @@ def _with_quaternion(finding: Finding, readings: Measurements, axis: int | None)
         return finding
     [column] = finding.columns
     alone = axis is None and readings.oriented.any()
-    fix = f"negate {column}" if alone else f"ctcr import --mirror {column[0]}"
+    fix = finding.fix if alone else f"ctcr import --mirror {column[0]}"
     return replace(finding, fix=f"{fix}, or set the tracker to a right-handed frame")
 
 
