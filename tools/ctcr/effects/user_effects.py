@@ -72,7 +72,8 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*")
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect, SI. `sigma`: prior standard deviation; values beyond `bounds` are impossible.
+    """A parameter of an effect, SI. `name`: small letters, digits and _, a letter first; `sigma`: prior standard
+    deviation; values beyond `bounds` are impossible.
 
     A `shape` parameter changes nothing by itself: it is fitted once the effect has been accepted.
     """
