@@ -4,7 +4,9 @@ import ast
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, get_type_hints
 
 import ctcr
 import matplotlib.figure
@@ -179,6 +181,70 @@ def test_wrong_convention(robot, table):
         ctcr.predict(robot, degrees)
 
 
+@pytest.fixture(scope="module")
+def shuffled(table):
+    """The same rows in another order than their times."""
+    order = np.random.default_rng(1).permutation(len(table))
+    return ctcr.read(pytest.importorskip("pandas") and table.to_frame().iloc[order])
+
+
+def test_doubts_of_a_table(robot, shuffled, tmp_path):
+    """What a table was warned of stands in every result made from it, once: printed, in a notebook and on its page."""
+    (late, again), page = shuffled.doubts, tmp_path / "page.html"
+    assert "does not come after" in late and "a run continues" in again
+    assert late in str(shuffled)
+    results = [
+        ctcr.compare(robot, shuffled),
+        ctcr.calibrate(robot, shuffled, free=FEW, hold_out=0, halves=False),
+        ctcr.diagnose(robot, shuffled),
+        ctcr.add(robot, "tip_load", shuffled, free=FEW),
+    ]
+    for result in results:
+        for text in (str(result), result._repr_html_()):
+            assert text.count("does not come after") == text.count("a run continues") == 1
+        if hasattr(result, "report"):
+            result.report(page)
+            assert page.read_text().count("does not come after") == 1
+    with pytest.raises(ctcr.WrongConventions, match="does not come after"):
+        ctcr.calibrate(robot, replace(shuffled, alpha=shuffled.alpha * [1, -1, 1]))
+
+
+def test_doubts_in_commands(run, robot, shuffled, tmp_path):
+    """The commands show them as the functions do: once on the terminal, once on the page."""
+    path, page = tmp_path / "shuffled.csv", tmp_path / "page.html"
+    shuffled.to_frame().to_csv(path, index=False)
+    for words in (["compare"], ["calibrate", "fit", "--free", FEW, "--hold-out", 0]):
+        code, out, err = run(*words, DATA / "robot.yaml", path, "--report", page)
+        assert code == 0 and out.count("does not come after") == 1, err
+        assert page.read_text().count("does not come after") == 1
+
+
+def test_printed_comparison(robot, table):
+    """A comparison says on its face that its error is that of a corrected table, or of some rows alone."""
+    flipped = ctcr.compare(robot, replace(table, alpha=table.alpha * [1, -1, 1]))
+    beta = table.beta.copy()
+    beta[:20, 0] = -0.464  # behind the plate
+    some = ctcr.compare(robot, replace(table, beta=beta))
+    for report, said in ((flipped, "alpha2 counts the other way"), (some, "no solution for 20 of 80 readings")):
+        assert said in str(report) and said in report._repr_html_()
+        assert all(line.isprintable() for line in str(report).splitlines())
+
+
+def test_few_rows(robot, table):
+    """A table without rows, or with too few for a diagnosis, is refused with the reason, and so is no robot file."""
+    for function in (ctcr.compare, ctcr.calibrate, ctcr.diagnose, ctcr.predict):
+        with pytest.raises(ctcr.InputError, match=r"few\.csv: holds no rows"):
+            function(robot, table.rows(slice(0, 0)))
+    three = table.rows(slice(0, 3))
+    for fit in (ctcr.diagnose, lambda *given: ctcr.add(given[0], "friction", given[1])):
+        with pytest.raises(ctcr.InputError, match="3 measured poses: .* takes 12 or more"):
+            fit(robot, three)
+    assert "3 readings" in str(ctcr.compare(robot, three))
+    for wrong in ({}, None, 3):
+        with pytest.raises(ctcr.InputError, match="is no path of a robot file"):
+            ctcr.load(wrong)
+
+
 def test_why(robot):
     """A pose that is NaN has its reason in its row."""
     beta = [[-0.3, -0.22, -0.13], [-0.3, -0.1, -0.13]]
@@ -264,6 +330,12 @@ def test_names():
         assert getattr(ctcr, name) is not None
     with pytest.raises(AttributeError):
         ctcr.nothing  # noqa: B018
+
+
+def test_types_of_answers():
+    """What `as_dict` returns has known types: a program under strict checks may call it."""
+    for result in (ctcr.Comparison, ctcr.Calibration, ctcr.Diagnosis, ctcr.Added):
+        assert get_type_hints(result.as_dict)["return"] == dict[str, Any]
 
 
 def test_types(tmp_path):

@@ -41,7 +41,7 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
     if robot.effects:  # their state may depend on motions that the table leaves out
         readings, added = missing_motion.completed(robot, readings)
         prediction = predict(robot, readings, steps=steps)
-    notices = [*map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
+    notices = [*table.doubts, *map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
     snapped: list[int] = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
     known = (notices, found.findings, own, floor, files, snapped, found.unexplained)
     try:

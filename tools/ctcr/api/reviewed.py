@@ -25,7 +25,7 @@ class WrongConventions(InputError):
         doubts, said = robot_file.warnings(robot), [Problem(one.sentence, table.source) for one in wrong]
         first = [*doubts, Problem(LOOK_FIRST)] if doubts else []
         advice = "a fit would take that for physics: correct it first, or go on with --anyway (anyway=True)"
-        super().__init__([*first, *said, Problem(advice)])
+        super().__init__([*first, *table.warnings, *said, Problem(advice)])
         self.review = found
 
 
@@ -68,7 +68,8 @@ def to_fit(
     frame_per_run: bool | None = None,
     finds: Container[str] = (),
 ) -> tuple[Measurements, list[str], Review]:
-    """The readings as a fit takes them, sentences on what was left out, and the review of the conventions.
+    """The readings as a fit takes them, sentences on their table and on what was left out, and the review of the
+    conventions.
 
     Left out are copies of rows, poses that the tracker repeated, spikes, and where the runs are sessions, what each has
     of its own.
@@ -87,4 +88,4 @@ def to_fit(
     readings, said = without_false_poses(robot, table, found)
     said = [*filter(None, [found.unexplained]), *said, *without_pose(table)]
     readings, more = sessions.of_runs(robot, readings, frame_per_run)
-    return readings, [*map(sentence, copied), *said, *more], found
+    return readings, [*table.doubts, *map(sentence, copied), *said, *more], found

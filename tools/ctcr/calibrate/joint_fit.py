@@ -106,7 +106,7 @@ class Calibration(Result):
         first, last = self.stages[0].rms_mm, stages[-1].rms_mm
         held = " on held-out readings" if self.held_out else ""
         line = f"Calibration {self.before.name}: {len(self.fitted)} parameters, {first:.3g} to {last:.3g} mm RMS{held}"
-        return Glance(line, ["error", "mm RMS"], rows, [*self.doubts, *self.notices])
+        return Glance(line, ["error", "mm RMS"], rows, [*self.doubts, *self.notices], warnings=self.readings.doubts)
 
     @property
     def doubts(self) -> list[str]:

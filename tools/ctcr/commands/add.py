@@ -58,7 +58,7 @@ def command(robot, names, diagnosis, measurements, given, free, anyway, frame_pe
     added.save(target, in_place=in_place)
     out.write_json(added.as_dict())
     _show(out, loaded, added)
-    out.say(*readings.warnings, f"Robot file: {target}")
+    out.say(f"Robot file: {target}")
 
 
 def _show(out, robot, added) -> None:

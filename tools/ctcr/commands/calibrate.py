@@ -283,7 +283,6 @@ def fit(robot, measurements, free, widths, frame_per_run, hold_out, noise, anywa
     out.write_page(calibration)
     out.write_json(calibration.as_dict())
     report.show(out.console, calibration)
-    out.say(*readings.warnings)
     if target:
         out.say(f"Robot file: {target}")
 

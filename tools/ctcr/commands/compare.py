@@ -33,4 +33,3 @@ def command(robot: str, measurements: str, steps: int, out) -> None:
     out.write_json(result.as_dict())
     out.say(*options.doubtful(loaded, robot, in_full=bool(result.conventions)))
     terminal.show(out.console, result)
-    out.say(*readings.warnings)

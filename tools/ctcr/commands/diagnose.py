@@ -40,12 +40,12 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
         out.write_json(report.as_diagnosis(found))
         out.say(*options.doubtful(loaded, robot, in_full=True))
         report.show(out.console, found)
+        out.say(*readings.doubts)
         return
     out.write_page(result)
     out.write_json(result.as_dict())
     out.say(*options.doubtful(loaded, robot))
     terminal.show(out.console, result)
-    out.say(*readings.warnings)
     if result.accepted and not result.verdict.names_no_cause:
         known = out.json_target not in (None, "-")
         way = f"ctcr add {robot} --diagnosis {out.json_target if known else 'FILE'} --fit {measurements} -o NEW.yaml"

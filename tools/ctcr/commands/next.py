@@ -33,7 +33,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
 
     kilograms = _masses(masses)
     loaded, table = options.load(robot, measurements, any_convention=True)
-    readings, _, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=frame_per_run)
+    readings, said, _ = to_fit(loaded, table, anyway=anyway, frame_per_run=frame_per_run)
     with terminal.progress() as say:
         diagnosis = diagnose(loaded, readings, progress=say, threads=threads)
         say("looking for the runs that decide")
@@ -49,6 +49,7 @@ def command(robot, measurements, runs, masses, target, threads, anyway, frame_pe
             "runs": [{"beta_m": r.beta, "alpha_rad": r.alpha, "mass_kg": r.mass} for r in proposal.runs],
         }
     )
+    out.say(*said)
     _show(out, loaded.n_tubes, diagnosis.verdict.word.replace("_", " "), proposal)
     if writes:
         out.say(f"Plan: {target}")

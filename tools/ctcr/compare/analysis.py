@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -98,9 +98,9 @@ class Comparison(Result):
         """Conventions to correct; poses that the tracker repeated are only left out."""
         return [one for one in self.conventions if one.kind != "frozen"]
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """The numbers for JSON, without the readings themselves."""
-        data: dict = {name: getattr(self, name) for name in NUMBERS}
+        data: dict[str, Any] = {name: getattr(self, name) for name in NUMBERS}
         data["rows"] = {
             "compared": self.position_mm.count,
             "not_measured": self.sample.not_measured.tolist(),
@@ -128,7 +128,7 @@ class Comparison(Result):
         """A row a compared reading: row of the table, run, time, measured and predicted position in the tracker frame,
         size of the error."""
         sample = self.headline
-        columns: dict = {"row": sample.row, "run": sample.run, "t_s": sample.t}
+        columns: dict[str, Any] = {"row": sample.row, "run": sample.run, "t_s": sample.t}
         for prefix, positions in (("", sample.measured), ("pred_", sample.predicted)):
             columns |= {f"{prefix}{axis}_m": values for axis, values in zip("xyz", positions.T, strict=True)}
         columns["error_mm"] = 1e3 * np.linalg.norm(sample.error, axis=1)
@@ -147,11 +147,9 @@ class Comparison(Result):
         rows += [[name, "mm", "", f"{value:.2g}", "", ""] for name, value in small.items() if isfinite(value)]
         count, rms = self.position_mm.count, self.position_mm.rms
         line = f"Comparison {self.robot}: {rms:.3g} mm RMS over {count} readings"
-        notes = [
-            *filter(None, [self.unexplained, self.WRONG if self.wrong else ""]),
-            *(one.sentence for one in self.wrong),
-        ]
-        return Glance(line, ["error", "unit", "mean", "RMS", "95 %", "max"], rows, notes, 2)
+        wrong = [f"{self.WRONG}:", *(one.sentence for one in self.wrong)] if self.wrong else []
+        warnings = [*filter(None, [self.unexplained]), *wrong, *self.sample.unsolved, *self.notices]
+        return Glance(line, ["error", "unit", "mean", "RMS", "95 %", "max"], rows, (), 2, warnings)
 
 
 def compare(

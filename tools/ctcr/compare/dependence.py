@@ -7,6 +7,7 @@ for the number of forms tried.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -86,7 +87,7 @@ class Dependence:
         """Name for people."""
         return self.form.label
 
-    def as_dict(self) -> dict:
+    def as_dict(self) -> dict[str, Any]:
         """The numbers for JSON."""
         names = "name label share p_value size_mm indistinct".split()
         return {name: getattr(self, name) for name in names} | {"frame": self.form.frame}

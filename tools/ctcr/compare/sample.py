@@ -3,15 +3,17 @@
 The model predicts poses of the tip in the base frame; T_ref and T_tip_sensor make them readings in the tracker frame.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ctcr import settings
+from ctcr import _core, settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.frames import base_to_tracker, conjugate, matrix_from_quaternion, product
 from ctcr.model.model import status_text
+from ctcr.show.wording import counted, join
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,18 @@ class Sample:
     def base_error(self) -> Array:
         """Position error (K, 3), base frame."""
         return self.error @ self.rotation
+
+    @property
+    def unsolved(self) -> list[str]:
+        """How many readings the errors are not of, as the model has no solution there, and what may be wrong."""
+        if not self.why:
+            return []
+        kinds, every = Counter(self.why), len(self.why) + len(self.row)
+        reasons = join([f"{why}: {count}" for why, count in kinds.items()])
+        said = [f"The model has no solution for {len(self.why)} of {counted(every, 'reading')} ({reasons})."]
+        if _core.status_text(_core.Status.joints_out_of_order) in kinds:
+            said.append("Where joints are out of order, length_mm of a tube, its home, or its betas may be wrong.")
+        return said
 
 
 def take_sample(robot, measurements, prediction) -> Sample:

@@ -3,13 +3,12 @@
 Findings describe the error and name possible causes, never the cause.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ctcr import _core, settings
+from ctcr import settings
 from ctcr.compare.analysis import Comparison
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.noise import DirectionDifference
@@ -46,7 +45,7 @@ class Finding:
 def headline(c: Comparison) -> str:
     """The size of the error in one sentence, and how much of it is noise in another."""
     p, length, noise = c.position_mm, c.percent_of_length, c.noise
-    text = _unsolved(c.sample) + (
+    text = "".join(f"{said} " for said in c.sample.unsolved) + (
         f"The model is wrong by {mm(p.rms)} RMS (mean {mm(p.mean)}, 95 % below {mm(p.p95)}, at most {mm(p.maximum)}) "
         f"or {percent(length.rms / 100)} of the deployed length, over {counted(p.count, 'reading')}. "
     )
@@ -66,18 +65,6 @@ def headline(c: Comparison) -> str:
             f"error exceeds even that."
         )
     return text + f"Readings repeat to {size}, so {left} of the squared error is not their scatter."
-
-
-def _unsolved(sample: Sample) -> str:
-    """How many readings the errors are not of, as the model has no solution there, and what may be wrong."""
-    if not sample.why:
-        return ""
-    kinds, every = Counter(sample.why), len(sample.why) + len(sample.row)
-    reasons = join([f"{why}: {count}" for why, count in kinds.items()])
-    text = f"The model has no solution for {len(sample.why)} of {counted(every, 'reading')} ({reasons}). "
-    if _core.status_text(_core.Status.joints_out_of_order) in kinds:
-        text += "Where joints are out of order, length_mm of a tube, its home, or its betas may be wrong. "
-    return text
 
 
 def is_noise(c: Comparison) -> bool:

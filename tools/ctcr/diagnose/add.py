@@ -16,7 +16,7 @@ from ctcr.calibrate.joint_fit import Stage
 from ctcr.diagnose import lags, outliers, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
-from ctcr.diagnose.held_out import fit_to_predict
+from ctcr.diagnose.held_out import check_size, fit_to_predict
 from ctcr.diagnose.round import linearised_end, screen
 from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
@@ -48,14 +48,23 @@ class Added(Shown):
 
     before: Robot  # as it was given
     after: Robot  # with them
-    files: list[str]  # of the measurements
+    readings: Measurements  # as they were fitted
     ids: list[str]
     fit: joint.Fit  # of all rows
     stages: list[Stage]  # nominal, calibrated, each effect, noise floor, at the judged rows
     held_out: str  # judged runs or blocks of time; empty: the fitted rows were judged
     notices: list[str]
-    sessions: Sessions | None  # what each run has of its own
     floors: Floors
+
+    @property
+    def files(self) -> list[str]:
+        """Of the measurements."""
+        return self.readings.files
+
+    @property
+    def sessions(self) -> Sessions | None:
+        """What each run has of its own."""
+        return self.readings.sessions
 
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation of every fitted parameter of an effect, SI."""
@@ -123,7 +132,8 @@ class Added(Shown):
         steps = self.rms("rms_mm")
         fall = f"{steps['calibrated']:.3g} to {steps[self.ids[-1]]:.3g} mm RMS"
         line = f"Added {', '.join(self.ids)} to {self.before.name}: {fall}"
-        return Glance(line, ["fitted (SI)", "unit", "value", "sd"], rows, [*errors, *self.notices], 2)
+        notes = [*errors, *self.notices]
+        return Glance(line, ["fitted (SI)", "unit", "value", "sd"], rows, notes, 2, self.readings.doubts)
 
     def _errors(self) -> list[tuple[str, float]]:
         """The RMS error [mm] of each step, the expected error last."""
@@ -147,6 +157,7 @@ def add(
     blocks of time, where there are few runs) is held out of the fits that give the errors; the values are those of a
     fit to all rows. Raises InputError where no fit is possible.
     """
+    check_size(readings)
     given, unchanged, (robot, readings, said) = readings, robot, prepared(robot, readings)
     fixed = dict(fixed or {})
     robot = catalogue.with_values(robot, [*robot.effects, *ids], dict(start or {}) | fixed)
@@ -186,8 +197,9 @@ def add(
     stages.append(Stage("noise_floor", *joint.tracker_error(fit, fit.noise)))
     notices = [*said, *about_outliers, *_notices(robot, fit, ids, explained), *nuisances]
     after, name = fit.apply(stage.robot), folds.named(readings, held_out)
-    floor, own = floors(robot.with_effects(after.effects), given), readings.sessions
-    return Added(unchanged, placed(after, own), given.files, list(ids), fit, stages, name, notices, own, floor)
+    floor = floors(robot.with_effects(after.effects), given)
+    after = placed(after, readings.sessions)
+    return Added(unchanged, after, readings, list(ids), fit, stages, name, notices, floor)
 
 
 def _change(added: Added) -> tuple[list[Change], Entry]:
@@ -266,8 +278,6 @@ class _Fitter:
 
     def __init__(self, robot: Robot, readings: Measurements, free: str | Sequence[str], fixed: Mapping[str, float]):
         self.robot, self.fixed = robot, fixed
-        if not readings.measured.any():
-            raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
         self.engine = Engine(robot, readings, noise_of_readings(robot, readings), readings.measured, free=free)
 
     def shapes(self, identity: str) -> list[str]:

@@ -8,8 +8,21 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.diagnose.engine import Engine, effects_in, values_of
+from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, joint
 from ctcr.model.noise import with_field
+from ctcr.show.wording import counted
+from ctcr.table.measurements import Measurements
+
+
+def check_size(measurements: Measurements) -> None:
+    """Raises InputError where too little was measured to fit a part of it and to judge on the rest."""
+    count = int(measurements.measured.sum())
+    if not count:
+        raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
+    if count < settings.TIME_BLOCKS:
+        text = f"{counted(count, 'measured pose')}: effects are fitted to a part and judged on the rest, which takes"
+        raise InputError(Problem(f"{text} {settings.TIME_BLOCKS} or more", measurements.source))
 
 
 def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:

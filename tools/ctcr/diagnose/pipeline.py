@@ -15,7 +15,7 @@ from ctcr.diagnose import lags, outliers, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, Progress, values_of
 from ctcr.diagnose.explanations import probability
-from ctcr.diagnose.held_out import explained_by_run, fit_to_predict
+from ctcr.diagnose.held_out import check_size, explained_by_run, fit_to_predict
 from ctcr.diagnose.residual import Residual, residual_of
 from ctcr.diagnose.round import Round, implausible_values, outlier_fraction, parameters_of
 from ctcr.diagnose.selection import Accepted, select_effects
@@ -91,7 +91,7 @@ class Diagnosis(Result):
         rows = [[name.replace("_", " "), f"{size:.3f}"] for name, size in self.rms_mm.items() if name != "noise_floor"]
         rows += [[name, f"{size:.3f}"] for name, size in self.floors.rows()]
         notes = [*self.verdict.sentences, *map(sentence, self.notices)]
-        return Glance(line, ["error on held-out readings", "mm RMS"], rows, notes)
+        return Glance(line, ["error on held-out readings", "mm RMS"], rows, notes, warnings=self.measurements.doubts)
 
     @property
     def mistakes_effect_for_outliers(self) -> bool:
@@ -191,6 +191,7 @@ def diagnose(
     without those held-out runs that the others turn out not to determine.
     """
     began = perf_counter()
+    check_size(measurements)
     options = {"progress": progress, "threads": threads}
     robot, measurements, notices = prepared(robot, measurements)
     for turn in range(settings.TURNS):

@@ -6,6 +6,7 @@ comments and the layout of the file that the robot came from.
 
 import io
 from math import degrees, radians
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,8 @@ user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot 
 
 def load(path: str | Path) -> Robot:
     """The robot described by a file. Raises InputError with all faults of the file."""
+    if not isinstance(path, str | PathLike):
+        raise InputError(Problem(f"a value of type {type(path).__name__} is no path of a robot file"))
     return _robot(yaml_document.load(path))
 
 

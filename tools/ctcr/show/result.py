@@ -30,17 +30,19 @@ class Glance:
     rows: Sequence[Sequence[str]] = ()
     notes: Sequence[str] = ()
     text_columns: int = 1
+    warnings: Sequence[str] = ()  # without which the line would mislead: below it everywhere, a line each
 
 
 class Shown:
-    """Base of what has a line as its repr, and a small table in notebooks."""
+    """Base of what has a line as its repr, with its warnings below it, and a small table in notebooks."""
 
     def glance(self) -> Glance:
         """The line and the table that stand for it."""
         raise NotImplementedError
 
     def __repr__(self) -> str:
-        return f"<{visible(self.glance().line)}>"
+        shown = self.glance()
+        return "\n".join([f"<{visible(shown.line)}>", *map(visible, shown.warnings)])
 
     __str__ = __repr__
 
@@ -49,7 +51,7 @@ class Shown:
         head = _row("th", shown.columns, shown.text_columns)
         body = "".join(_row("td", row, shown.text_columns) for row in shown.rows)
         table = f'<table style="border-collapse:collapse">{head}{body}</table>' if shown.rows else ""
-        notes = "".join(f"<div>{as_html(note)}</div>" for note in shown.notes)
+        notes = "".join(f"<div>{as_html(note)}</div>" for note in dict.fromkeys([*shown.warnings, *shown.notes]))
         return f"<div>{as_html('', bold=shown.line)}{table}{notes}</div>"
 
 

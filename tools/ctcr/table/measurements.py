@@ -135,6 +135,11 @@ class Measurements(Shown):
         return frame(columns)
 
     @property
+    def doubts(self) -> list[str]:
+        """Its warnings as sentences, which every result made from it repeats."""
+        return [f"{warning}." for warning in self.warnings]
+
+    @property
     def source(self) -> str:
         """Where it comes from, in words."""
         return self.file or "a table"
@@ -158,8 +163,9 @@ class Measurements(Shown):
         rows += [row(f"alpha{i + 1}", "deg", np.degrees(values)) for i, values in enumerate(self.alpha.T)]
         rows += [row("force", "N", np.linalg.norm(self.force, axis=1)), row("time", "s", self.t)]
         rows += [row(axis, "mm", 1e3 * values) for axis, values in zip("xyz", self.positions.T, strict=True)]
-        doubts = [*map(str, self.warnings), *(["Not possible as it is:", *self.refusal.lines] if self.refusal else [])]
-        return Glance(line, ["", "unit", "least", "most"], sum(rows, []), doubts, 2)
+        first, *others = self.refusal.lines if self.refusal else [""]
+        warnings = [*self.doubts, *([f"Not possible as it is: {first}"] if first else [])]
+        return Glance(line, ["", "unit", "least", "most"], sum(rows, []), others, 2, warnings)
 
     @property
     def joint_space(self) -> Array:
@@ -218,7 +224,7 @@ def _read(table: Table, n_tubes: int, plausible: bool = True) -> Measurements:
 
 
 def check_of(robot: Robot, table: Measurements) -> None:
-    """Raises InputError where these are not a robot and a table of one with as many tubes."""
+    """Raises InputError where these are not a robot and a table of one with as many tubes and at least one row."""
     kinds = (robot, Robot, "robot: ctcr.load(path)"), (table, Measurements, "table: ctcr.read(path or DataFrame)")
     for value, kind, wanted in kinds:
         if not isinstance(value, kind):
@@ -226,6 +232,8 @@ def check_of(robot: Robot, table: Measurements) -> None:
     if table.n_tubes != robot.n_tubes:
         text = f"holds the joints of {counted(table.n_tubes, 'tube')}: the robot has {robot.n_tubes}"
         raise InputError(Problem(text, table.source))
+    if not len(table):
+        raise InputError(Problem("holds no rows", table.source))
 
 
 def column_names(n_tubes: int) -> list[str]:
