@@ -12,6 +12,7 @@ from ctcr.errors import InputError, Problem, file_faults
 
 MAX_BYTES = 64 << 20  # of an input that is parsed as a whole: that takes many times its size in memory
 
+shared: dict[str, None] = {}  # files that every later result depends on, in the order read: users' effects
 _fingerprints: dict[str, str] = {}
 
 

@@ -337,6 +337,16 @@ def test_options_meet_the_function(command):
     inspect.signature(function).bind(**dict.fromkeys(given))
 
 
+COMPILED = {("bench",), ("sensitivity",), ("track",), ("sim", "aurora"), ("sim", "bench")}  # cannot call Python
+
+
+def test_own_effects():
+    """Every command that loads a robot file takes effects of the user's own, but for those of compiled code alone."""
+    for path, command in commands():
+        names = {parameter.name for parameter in command.params}
+        assert ("effects" in names) == (path not in COMPILED and ("robot" in names or path == ("effects",))), path
+
+
 FILES = {"ROBOT", "ROBOT2", "MEASUREMENTS", "SCENARIO", "LOG", "TABLE", "NEW", "FILE"}
 
 

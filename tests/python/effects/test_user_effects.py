@@ -1,12 +1,17 @@
 """Effects that users write in Python: neutral values, derivatives, fits, and messages on faults of their files."""
 
+import hashlib
+import html
 import json
+import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
+import ctcr
 import numpy as np
 import pytest
-from ctcr import cli, settings
+from ctcr import cli, inputs, settings
 from ctcr.diagnose import add
 from ctcr.effects import catalogue, user_effects
 from ctcr.effects.user_effects import Effect, Parameter
@@ -15,9 +20,11 @@ from ctcr.frames import matrix_from_rotation_vector
 from ctcr.model import effect_model, recording, simulation
 from ctcr.model.user_recording import UserRecording
 from ctcr.robot import robot_file
+from ctcr.track import runs, scenario
 
 ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "05_own_effect.py"
+JOINTS = ["--beta-mm", "-330,-240,-165", "--alpha-deg", "50,-40,-60"]
 NAMES = ["tubes.2.curvature", "tubes.1.length", "actuation.home_rotation.1", "tracker.position.x", "tracker.rotation.y"]
 
 
@@ -55,6 +62,7 @@ def file(tmp_path):
 
     yield write
     robot_file.user_effects.clear()
+    inputs.shared.clear()
 
 
 def own_names(effect):
@@ -194,7 +202,7 @@ def test_fit(robot, readings, file):
 
 
 def test_commands(robot, readings, file, tmp_path, capsys):
-    """Every command that uses effects takes `--effects FILE`."""
+    """Every command that loads a robot file takes `--effects FILE`, and without it says what is missing."""
     path = file(GOOD)
     plan, made, new, poses, old = (tmp_path / name for name in ("p.csv", "m.csv", "n.yaml", "q.csv", "o.yaml"))
     simulation.write(replace(readings, position=None, quaternion=None), plan)
@@ -217,9 +225,73 @@ def test_commands(robot, readings, file, tmp_path, capsys):
     assert "added mine" in run("history", new, *own)
     run("remove", new, "mine", "-o", old, *own)
     assert robot_file.load(old).effects == {}
+    run("info", new, *own)
+    assert "your own: mine" in run("shape", new, *JOINTS, *own)
+    run("calibrate", "fit", new, made, "--free", "tubes.1.curvature", "--hold-out", 0, *own)
+    run("calibrate", "home", ROOT / "examples/data/calibration/home.csv", "--robot", new, *own)
+    run("import", made, "-o", tmp_path / "imported.csv", "--robot", new, *own)
+    run("join", new, made, "-o", tmp_path / "joined.csv", *own)
     robot_file.user_effects.clear()
-    assert cli.run(["predict", str(new), str(made), "-o", str(poses)]) == 1
-    assert "unknown effect" in capsys.readouterr().err
+    for words in (["predict", new, made, "-o", poses], ["info", new], ["effects", "mine"]):
+        assert cli.run(list(map(str, words))) == 1
+        assert "give its file: --effects FILE.py" in capsys.readouterr().err
+
+
+def test_compiled_code(robot, file, tmp_path, capsys):
+    """Where compiled code alone runs, commands and functions say that an effect in Python cannot act there."""
+    (effect,), new = user_effects.load(file(GOOD)), tmp_path / "new.yaml"
+    mine = catalogue.with_values(robot, [effect.id], {})
+    robot_file.save(mine, new)
+    path = ROOT / "examples" / "data" / "scenarios" / "S1.yaml"
+    plain = ROOT / "examples" / "robots" / "table2.yaml"
+    for words in (
+        ["export", new, "--cpp", tmp_path / "x.hpp"],
+        ["track", new, path],
+        ["track", plain, path, "--plant", new],
+        ["sensitivity", new, "--open-loop", 1],
+        ["bench", new],
+        ["sim", "aurora", new, "--folder", tmp_path / "wires"],
+    ):
+        assert cli.run([str(word) for word in words]) == 1
+        said = capsys.readouterr().err
+        assert "effects.mine: is no effect of the library: effects written in Python cannot act here" in said
+        assert "did you mean" not in said
+    wanted = scenario.load(path, 3)
+    for given in ((mine, robot), (robot, mine)):
+        with pytest.raises(InputError, match="mine is written in Python"):
+            runs.run_all(wanted, *given)
+
+
+def test_next_command(robot, readings, file, tmp_path, capsys):
+    """The command that a diagnosis proposes on the terminal and on its page does what it says when it is copied."""
+    folder = tmp_path / "a b"
+    folder.mkdir()
+    mine = file(GOOD).rename(folder / "mine.py")
+    table2, made, page = (folder / name for name in ("robot.yaml", "made.csv", "page.html"))
+    table2.write_text((ROOT / "examples" / "robots" / "table2.yaml").read_text())
+    (effect,) = user_effects.load(mine)
+    hidden = catalogue.with_values(robot, [effect.id], {"effects.mine.gain": 0.02})
+    simulation.write(simulation.simulate(hidden, readings, "jitter", seed=3), made, 3)
+    words = ["diagnose", table2, made, "--effects", mine, "--report", page]
+    assert cli.run([str(word) for word in words]) == 0
+    (typed,) = re.findall("^To add: (.*)$", capsys.readouterr().out, re.MULTILINE)
+    (shown,) = re.findall(r"To add to the robot file what was found:</p>.*?<code>(.*?)</code>", page.read_text())
+    assert html.unescape(shown) == typed
+    robot_file.user_effects.clear()
+    inputs.shared.clear()
+    new = tmp_path / "new.yaml"
+    command = shlex.split(typed.replace("new.yaml", str(new)))
+    assert command[:2] == ["ctcr", "add"] and cli.run(command[1:]) == 0
+    assert robot_file.load(new).effects["mine"]["gain"] == pytest.approx(0.02, abs=0.005)
+
+
+def test_footer(robot, readings, file, tmp_path):
+    """A page ends with the file of the user's effects, which decide its result, and its fingerprint."""
+    path, page = file(GOOD), tmp_path / "page.html"
+    (effect,) = user_effects.load(path)
+    ctcr.compare(catalogue.with_values(robot, [effect.id], {}), readings).report(page)
+    footer = page.read_text().partition("<footer>")[2]
+    assert str(path) in footer and hashlib.sha256(path.read_bytes()).hexdigest()[:12] in footer
 
 
 GOOD = """

@@ -17,7 +17,6 @@ from ctcr.errors import InputError, Problem
 @options.free
 @options.anyway
 @options.frames
-@options.effects
 @options.new_robot
 @options.json
 def command(robot, names, diagnosis, measurements, given, free, anyway, frame_per_run, target, in_place, out) -> None:

@@ -31,7 +31,7 @@ def command(robot: str | None, out) -> None:
     from ctcr.robot import robot_file
     from ctcr.robot.table_ii import table_ii
 
-    loaded = robot_file.load(robot) if robot else table_ii()
+    loaded = robot_file.load(robot, compiled=True) if robot else table_ii()
     model = Model(loaded)
     results = [
         _timed(model, loaded, loads, derivatives, threads)

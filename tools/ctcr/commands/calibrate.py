@@ -18,7 +18,7 @@ def command() -> None:
 
 def _procedure(function):
     """The options that all procedures share: `robot`, `target`, `in_place` and `out`."""
-    robot = options.reads("--robot", "ROBOT", "The robot file: its values are used, and updated with -o.")
+    robot = options.robot_option("The robot file: its values are used, and updated with -o.")
     return robot(options.new_robot(options.outputs(function)))
 
 

@@ -10,7 +10,6 @@ from ctcr.commands import options
 @options.measurements
 @options.outputs
 @options.steps
-@options.effects
 def command(robot: str, measurements: str, steps: int, out) -> None:
     """Compare predicted poses with measured ones.
 

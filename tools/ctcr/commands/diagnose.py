@@ -9,7 +9,6 @@ from ctcr.commands import options
 @options.robot
 @options.measurements
 @options.outputs
-@options.effects
 @options.threads
 @options.anyway
 @options.frames
@@ -26,7 +25,7 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
     from ctcr.api.diagnose import diagnose
     from ctcr.api.reviewed import WrongConventions
     from ctcr.conventions import report
-    from ctcr.diagnose import terminal
+    from ctcr.diagnose import terminal, typed
 
     loaded, readings = options.load(robot, measurements, any_convention=True)
     try:
@@ -47,6 +46,5 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
     out.say(*options.doubtful(loaded, robot))
     terminal.show(out.console, result)
     if result.accepted and not result.verdict.names_no_cause:
-        known = out.json_target not in (None, "-")
-        way = f"ctcr add {robot} --diagnosis {out.json_target if known else 'FILE'} --fit {measurements} -o NEW.yaml"
-        out.console.print(f"To add: {way}{'' if known else ' (FILE: that of --json)'}")
+        way = typed.to_add(result, out.json_target if out.json_target != "-" else None)
+        out.console.print(f"To add: {way}", soft_wrap=True)  # one line, to be copied

@@ -33,7 +33,7 @@ def command(source, cpp, bench_path, namespace, target) -> None:
         from ctcr.robot import robot_file
         from ctcr.show.output import write_text
 
-        robot = robot_file.load(source)
+        robot = robot_file.load(source, compiled=True)
         write_text(cpp_header(robot, namespace, bench_file.load(bench_path) if bench_path else None), cpp)
         out.say(f"{namespace}::system(): {cpp}")
         return

@@ -7,7 +7,6 @@ from ctcr.commands import options
 
 @click.command(name="history")
 @options.robot
-@options.effects
 @options.outputs
 def command(robot: str, out) -> None:
     """Show the ledger of a robot file.

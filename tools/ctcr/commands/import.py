@@ -1,5 +1,6 @@
 """`ctcr import`: a log of another program as a table of measurements."""
 
+import shlex
 from functools import partial
 
 import click
@@ -32,7 +33,7 @@ _list_option = partial(options.repeated, callback=_names)
 @click.command(name="import")
 @click.argument("log", type=options.read)
 @options.output("TABLE", "The table to write.", required=True)
-@options.reads("--robot", "ROBOT", "Robot file: number of tubes, their lengths and homes.")
+@options.robot_option("Robot file: number of tubes, their lengths and homes.")
 @options.reads("--joints", "LOG", "Another log with the joints, where LOG holds poses alone.", "joint_log")
 @options.reads("--mapping", "FILE.yaml", "Answers kept by --save-mapping; options take precedence.")
 @options.writes("--save-mapping", "FILE.yaml", "Keep what is said and guessed, for the next log.")
@@ -99,7 +100,8 @@ def command(log, target, robot, joint_log, mapping, save_mapping, listed, out, *
     counts = f"{len(found.table)} rows, {poses} with a pose, {runs} run{'s' * (runs != 1)}, {found.table.n_tubes} tubes"
     out.say(f"{counts}: {target}")
     if save_mapping:
-        out.say(f"The next log of this kind: ctcr import LOG -o TABLE --mapping {save_mapping}")
+        way = shlex.join(["ctcr", "import", "LOG", "-o", "TABLE", "--mapping", save_mapping])
+        out.say(f"The next log of this kind: {way}")
 
 
 def _show(out, source, rows) -> None:

@@ -1,6 +1,7 @@
 """`ctcr init`: a new robot file."""
 
 import os
+import shlex
 
 import click
 
@@ -73,7 +74,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
         if tube.curvature_per_m is None:
             out.say(f"Doubt: tube {i} counts as straight, as no curvature was given; radius_mm=inf says that it is")
     out.say(*(f"Doubt: {doubt}" for doubt in robot_file.warnings(loaded) if doubt.field != "gravity"))
-    out.say(f"Next: ctcr import LOG -o measurements.csv --robot {target}")
+    out.say(f"Next: {shlex.join(['ctcr', 'import', 'LOG', '-o', 'measurements.csv', '--robot', target])}")
 
 
 def _asked(new_file, gravity):

@@ -12,7 +12,6 @@ from ctcr.commands import options
 @options.setting("--masses", str, "0,10,20", "Masses that can be hung at the tip [g].", metavar="GRAMS")
 @options.output("PLAN", "Write the runs as a table that the robot can run.")
 @options.json
-@options.effects
 @options.threads
 @options.anyway
 @options.frames

@@ -95,7 +95,7 @@ def repeated(name: str, field: str, metavar: str, text: str, **more):
     return click.option(name, field, multiple=True, metavar=metavar, help=f"{text} May be repeated.", **more)
 
 
-robot = click.argument("robot", type=read)
+compiled_robot = click.argument("robot", type=read)  # which `robot_file.load` takes with `compiled`
 measurements = click.argument("measurements", type=read)
 folder_name = click.option(
     "--folder", metavar="FOLDER", help="Where the processes of one bench meet (mode 0700); default: one of this user's."
@@ -162,7 +162,8 @@ def _load_effects(context, parameter, files) -> None:
         user_effects.load(file)
 
 
-# Eager: the robot file may name these effects.
+# Eager: the robot file may name these effects. Every command has it whose results these may change, or that only shows
+# or changes the file; compiled code alone cannot call Python.
 effects = repeated(
     "--effects",
     "effects",
@@ -173,6 +174,17 @@ effects = repeated(
     expose_value=False,
     callback=_load_effects,
 )
+
+
+def robot(function):
+    """ROBOT, and --effects, as its file may hold effects of the user's own."""
+    return compiled_robot(effects(function))
+
+
+def robot_option(text: str):
+    """The same as an option --robot."""
+    option = reads("--robot", "ROBOT", text)
+    return lambda function: option(effects(function))
 
 
 def load(robot: str, table: str, any_convention: bool = False):
@@ -188,6 +200,7 @@ def load(robot: str, table: str, any_convention: bool = False):
 def doubtful(loaded, path: str, in_full: bool = False) -> list[str]:
     """A line on the values of a robot file that look wrong; none where none do. In full: a line for each."""
     from ctcr.api.reviewed import LOOK_FIRST
+    from ctcr.effects.user_effects import command
     from ctcr.robot import robot_file
     from ctcr.show.wording import counted, sentence
 
@@ -197,7 +210,7 @@ def doubtful(loaded, path: str, in_full: bool = False) -> list[str]:
     if in_full:
         return [sentence(LOOK_FIRST), *(f"Doubt: {doubt}" for doubt in doubts)]
     look = "looks" if len(doubts) == 1 else "look"
-    return [f"{counted(len(doubts), 'value')} {look} wrong in the robot file: ctcr info {path}"]
+    return [f"{counted(len(doubts), 'value')} {look} wrong in the robot file: {command('info', path)}"]
 
 
 def with_effects(robot, given):

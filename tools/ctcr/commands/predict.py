@@ -20,7 +20,6 @@ LISTED_ROWS = 20
 )
 @options.steps
 @options.json
-@options.effects
 def command(robot: str, table: str, target: str, frame: str, steps: int, out) -> None:
     """Add predicted poses to a table.
 

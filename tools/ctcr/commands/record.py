@@ -22,7 +22,6 @@ from ctcr.commands import options
 @options.setting("--approach-mm", options.Finite(0), 2.0, "Length of the approach [mm].")
 @options.setting("--approach-deg", options.Finite(0), 5.0, "Length of the approach [deg].")
 @options.setting("--patience", options.Finite(0.1), 30.0, "How long the tracker may lose the sensor [s].")
-@options.effects
 @options.writes("--page", "FILE.html", "Show progress and error on a page that the browser reloads.")
 @options.folder
 @options.json

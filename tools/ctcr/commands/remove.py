@@ -8,7 +8,6 @@ from ctcr.commands import options
 @click.command(name="remove")
 @options.robot
 @click.argument("names", nargs=-1, required=True, metavar="EFFECT..")
-@options.effects
 @options.new_robot
 def command(robot, names, target, in_place) -> None:
     """Take physical effects out of the file ROBOT.

@@ -6,7 +6,7 @@ from ctcr.commands import options
 
 
 @click.command(name="sensitivity")
-@options.robot
+@options.compiled_robot
 @click.option("--open-loop", type=click.IntRange(min=1), metavar="N", help="Predict tips at N random configurations.")
 @options.reads("--closed-loop", "SCENARIO", "Track the path of this scenario file.")
 @options.setting(
@@ -38,7 +38,7 @@ def command(robot, open_loop, closed_loop, accuracy, force, points, seed, resume
 
     if not open_loop and not closed_loop:
         raise ArgumentError(Problem("nothing to do: give --open-loop N, --closed-loop SCENARIO, or both"))
-    loaded = robot_file.load(robot)
+    loaded = robot_file.load(robot, compiled=True)
     wanted = scenario_file.load(closed_loop, loaded.n_tubes) if closed_loop else None
     both, varied, found = open_loop and wanted, all_varied(loaded), {}
     if open_loop:

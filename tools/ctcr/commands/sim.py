@@ -26,7 +26,7 @@ def command() -> None:
 
 
 @command.command(name="aurora")
-@options.robot
+@options.compiled_robot
 @options.folder
 @robot_options
 @scenario_option
@@ -71,7 +71,7 @@ def ethercat(interface, motors, variant, folder, seed, scenario) -> None:
 
 
 @command.command(name="bench", context_settings={"ignore_unknown_options": True})
-@options.robot
+@options.compiled_robot
 @click.argument("program", nargs=-1, type=click.UNPROCESSED, metavar="[-- COMMAND...]")
 @options.folder
 @robot_options
@@ -135,7 +135,7 @@ def _robot(robot, seed, hidden, oracle, noise):
 
     if oracle and hidden:
         raise click.UsageError("--hide is for the model: let the --oracle hide it itself")
-    loaded = robot_file.load(robot)
+    loaded = robot_file.load(robot, compiled=True)
     try:
         words = shlex.split(oracle or "")
     except ValueError as error:

@@ -11,7 +11,6 @@ from ctcr.commands import options
 @options.hide
 @options.noise
 @options.seed
-@options.effects
 @options.output("MEASUREMENTS", "The table to write.", required=True)
 def command(robot, plan, hidden, noise, seed, target) -> None:
     """Simulate the measurements of a plan.

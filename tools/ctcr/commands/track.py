@@ -6,7 +6,7 @@ from ctcr.commands import options
 
 
 @click.command(name="track")
-@options.robot
+@options.compiled_robot
 @click.argument("scenario", type=options.read)
 @options.reads("--plant", "ROBOT2", "The robot that is controlled, where it differs from ROBOT.")
 @click.option("--live", is_flag=True, help="Track on the bench instead of on a simulated robot; needs --bench and -o.")
@@ -35,7 +35,7 @@ def command(robot, scenario, plant, live, bench_path, target, patience, most_err
     from ctcr.track.result import COLUMNS, rows, summary
     from ctcr.track.runs import run_all
 
-    loaded = robot_file.load(robot)
+    loaded = robot_file.load(robot, compiled=True)
     if not live and (bench_path or target):
         raise click.UsageError("--bench and -o go with --live")
     if live and (plant or not bench_path or not target):
@@ -46,7 +46,7 @@ def command(robot, scenario, plant, live, bench_path, target, patience, most_err
         stops = {"patience_s": patience, "most_error_mm": most_error_mm}
         runs, wanted = bench.track(target, robot, scenario, bench_path, place=folder, said=out.say, **stops)
     else:
-        real = robot_file.load(plant) if plant else loaded
+        real = robot_file.load(plant, compiled=True) if plant else loaded
         wanted = scenario_file.load(scenario, loaded.n_tubes)
         with Progress("tracking", len(wanted.load.mass_g) * wanted.repetitions) as progress:
             runs = run_all(wanted, loaded, real, progress.advance)

@@ -1,12 +1,11 @@
 """The diagnosis as one HTML page that needs nothing else: verdict first."""
 
-import shlex
 from collections.abc import Iterable
 
 import numpy as np
 
 from ctcr.arrays import evenly
-from ctcr.diagnose import figures
+from ctcr.diagnose import figures, typed
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
@@ -56,9 +55,7 @@ def _found(d: Diagnosis) -> str:
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
     listed = _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
-    ids = " ".join(e.id for e in effects)
-    line = _typed(d, f"ctcr add {{robot}} {ids} --fit {{table}} -o new.yaml")
-    add = paragraph("To add to the robot file what was found:") + html_page.command(line)
+    add = paragraph("To add to the robot file what was found:") + html_page.command(typed.to_add(d))
     return f"<h2>{heading}</h2>{listed}{'' if d.verdict.names_no_cause else add}"
 
 
@@ -124,16 +121,8 @@ def _next(d: Diagnosis) -> str:
     advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:
         return ""
-    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(
-        _typed(d, "ctcr next {robot} {table}")
-    )
+    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(typed.to_plan(d))
     return f"<h2>What to measure next</h2>{_listed(advice)}{runs if ids else ''}"
-
-
-def _typed(d: Diagnosis, command: str) -> str:
-    """A command line on the files of the diagnosis: `{robot}` and `{table}` stand for them."""
-    files = {"{robot}": d.robot.file or "ROBOT", "{table}": d.measurements.file or "MEASUREMENTS"}
-    return shlex.join(files.get(word, word) for word in command.split())
 
 
 def _parameters(d: Diagnosis) -> str:

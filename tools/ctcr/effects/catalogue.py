@@ -142,11 +142,17 @@ def parameter_of(n_tubes: int) -> dict[str, EffectParameter]:
 
 
 def get(name: str, n_tubes: int = _core.TUBES[0]) -> Effect:
-    """An effect by its id; raises InputError that suggests the nearest."""
+    """An effect by its id; raises InputError that says what may be meant."""
     effects = all_effects(n_tubes)
     if name not in effects:
-        raise InputError(Problem(f"no effect is named {name}: {suggestion(name, effects, 'see `ctcr effects`')}"))
+        raise InputError(Problem(f"no effect is named {name}: {robot_file.unknown_effect(name, effects)}"))
     return effects[name]
+
+
+def in_python(robot: Robot) -> list[Problem]:
+    """A fault of each effect of the robot that a user wrote in Python, where only the compiled library runs."""
+    own = [identity for identity in robot.effects if identity in robot_file.user_effects]
+    return [Problem(f"{one} is written in Python: {robot_file.NO_PYTHON}", robot.file or None) for one in own]
 
 
 def neutral(robot: Robot) -> dict[str, float]:

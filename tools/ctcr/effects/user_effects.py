@@ -40,6 +40,7 @@ Standard output carries the results of a command: neither the file nor a hook pr
 import importlib.util
 import io
 import re
+import shlex
 import signal
 import sys
 import threading
@@ -188,7 +189,13 @@ def load(path: str | Path) -> list[Effect]:
     with _users_code(str(path)):
         made = [found() for found in classes]
     robot_file.user_effects.update((effect.id, effect) for effect in made)
+    inputs.shared[str(path)] = None
     return made
+
+
+def command(*words: str) -> str:
+    """A command line to copy, which knows the effects of the files that were loaded."""
+    return shlex.join(["ctcr", *words, *(word for file in inputs.shared for word in ("--effects", file))])
 
 
 def used_by(robot: Robot, names: Sequence[str] = ()) -> list[Effect]:

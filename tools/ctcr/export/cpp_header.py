@@ -15,7 +15,6 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem
 from ctcr.inputs import sha256
 from ctcr.model import parameters
-from ctcr.robot import robot_file
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
 from ctcr.robot.ledger import section
@@ -103,11 +102,7 @@ def _check(robot: Robot, namespace: str) -> None:
         for field in RATIOS
         if getattr(robot.actuation, field) is None
     ]
-    own = [identity for identity in robot.effects if identity in robot_file.user_effects]
-    problems += [
-        Problem(f"{identity} is written in Python: write it in C++ first (docs/effects.md)", robot.file or None)
-        for identity in own
-    ]
+    problems += catalogue.in_python(robot)
     names = namespace.split("::")
     possible = all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) and name not in TAKEN for name in names)
     if not possible or names[0] in ("std", "ctcr"):

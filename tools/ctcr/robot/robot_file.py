@@ -5,6 +5,7 @@ comments and the layout of the file that the robot came from.
 """
 
 import io
+from collections.abc import Iterable
 from math import degrees, radians
 from os import PathLike
 from pathlib import Path
@@ -24,14 +25,22 @@ from ctcr.show.output import atomic_writer
 
 LINE_WIDTH = 1000  # a row of the ledger stays one line
 
+NO_PYTHON = (
+    "effects written in Python cannot act here, where compiled code runs: write it in C++ (docs/effects.md), or take it"
+    " out (ctcr remove)"
+)
+
 user_effects: dict[str, Any] = {}  # effects of users' files by id, which robot files may hold; see `ctcr.user_effects`
 
 
-def load(path: str | Path) -> Robot:
-    """The robot described by a file. Raises InputError with all faults of the file."""
+def load(path: str | Path, *, compiled: bool = False) -> Robot:
+    """The robot described by a file. Raises InputError with all faults of the file.
+
+    compiled    whether only the compiled library runs it: effects that users wrote in Python are faults
+    """
     if not isinstance(path, str | PathLike):
         raise InputError(Problem(f"a value of type {type(path).__name__} is no path of a robot file"))
-    return _robot(yaml_document.load(path))
+    return _robot(yaml_document.load(path), compiled)
 
 
 def parse(content: bytes, file: str = "robot.yaml") -> Robot:
@@ -39,7 +48,7 @@ def parse(content: bytes, file: str = "robot.yaml") -> Robot:
     return _robot(yaml_document.parse(content, file))
 
 
-def _robot(document: YamlDocument) -> Robot:
+def _robot(document: YamlDocument, compiled: bool = False) -> Robot:
     if not isinstance(document.data, dict):
         hint = " (is this the table of measurements?)" if "," in document.text.partition("\n")[0] else ""
         text = f"does not describe a robot: no fields such as name, tubes, tracker{hint}"
@@ -48,7 +57,7 @@ def _robot(document: YamlDocument) -> Robot:
         robot, errors = Robot.model_validate(_filled(document.data)), []
     except ValidationError as error:
         robot, errors = None, error.errors(include_url=False)
-    faults = checks.faults(document.data, errors) + _unknown_effects(document.data)
+    faults = checks.faults(document.data, errors) + _unknown_effects(document.data, compiled)
     if robot is None or faults:
         raise InputError(checks.problems(faults, document))
     if robot.n_tubes not in _core.TUBES:
@@ -116,17 +125,24 @@ def _without_roll(data: dict[str, Any]) -> dict[str, Any]:
     return data | {"tracker": kept, "uncertainty": uncertainty}
 
 
-def _unknown_effects(data: dict[str, Any]) -> list[checks.Fault]:
+def unknown_effect(name: str, known: Iterable[str]) -> str:
+    """The end of a message on an effect that is not there: what was meant, or how one of the user's own is named."""
+    meant = suggestion(name, known, "`ctcr effects` lists those there are.")
+    return f"{meant} If it is your own, give its file: --effects FILE.py (in Python: ctcr.user_effects.load)"
+
+
+def _unknown_effects(data: dict[str, Any], compiled: bool) -> list[checks.Fault]:
     effects = data.get("effects")
     if not isinstance(effects, dict):
         return []
-    known = [*(effect.id for effect in _core.effect_catalogue()), *user_effects]
-    hint = "`ctcr effects` lists those there are"
-    return [
-        (("effects", name), f"unknown effect: {suggestion(str(name), known, hint)}")
-        for name in effects
-        if name not in known
-    ]
+    known = [*(effect.id for effect in _core.effect_catalogue()), *([] if compiled else user_effects)]
+
+    def text(name: str) -> str:
+        if compiled:
+            return f"is no effect of the library: {NO_PYTHON}"
+        return f"unknown effect: {unknown_effect(name, known)}"
+
+    return [(("effects", name), text(str(name))) for name in effects if name not in known]
 
 
 def _updated(old: Any, new: Any) -> Any:

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
+from ctcr import inputs
 from ctcr.errors import InputError
-from ctcr.inputs import fingerprint
 from ctcr.show.style import colours, draw
 from ctcr.show.wording import as_html
 
@@ -25,7 +25,7 @@ def page(title: str, sections: Iterable[str], files: Sequence[str] = (), reload_
 
     title     plain text, the heading of the page
     sections  HTML by the functions below; empty ones are left out
-    files     input files that it is made from, whose fingerprints it ends with
+    files     input files that it is made from, whose fingerprints it ends with, as with those of users' effects
     reload_s  interval at which the browser reloads the page; 0: never
     """
     title = as_html(title)
@@ -54,14 +54,14 @@ def _footer(files: Sequence[str]) -> str:
     given = context and context.find_root().obj
     made = f"Made by ctcr {version('ctcr')} on {date.today().isoformat()}"
     way = paragraph(f"{made}:") + command(shlex.join(["ctcr", *given])) if given else paragraph(f"{made} in Python.")
-    rows = [[file, _digits(file)] for file in files]
+    rows = [[file, _digits(file)] for file in dict.fromkeys([*files, *inputs.shared])]
     read = table("Input files", {"file": "", "SHA-256": f"its first {SHORT} digits: sha256sum FILE gives all"}, rows, 2)
     return f"<footer>{way}{read if rows else ''}</footer>"
 
 
 def _digits(file: str) -> str:
     try:
-        return fingerprint(file)[:SHORT]
+        return inputs.fingerprint(file)[:SHORT]
     except InputError:  # a robot of a program may bear the name of a file that was never written
         return "not read"
 

@@ -55,7 +55,7 @@ def track(
     stop; the runs until then are in the folder, and the same call resumes after the last whole run.
     """
     place, sources = private_folder(place), {"robot": robot, "scenario": scenario, "bench": bench}
-    loaded, devices = robot_file.load(robot), bench_file.load(bench)
+    loaded, devices = robot_file.load(robot, compiled=True), bench_file.load(bench)
     wanted = within(scenario_file.load(scenario, loaded.n_tubes), devices, loaded)
     check(wanted, loaded, loaded)
     with Tracker(devices, place, patience_s) as tracker, Motors(devices, loaded, place) as motors:

@@ -150,7 +150,7 @@ def _remedy(scenario: Scenario) -> str:
 
 def check(scenario: Scenario, robot: Robot, plant: Robot) -> None:
     """Raises InputError where robot, plant and scenario do not fit together, or limits exclude the start."""
-    problems = []
+    problems = catalogue.in_python(robot) or catalogue.in_python(plant)
     for kind, one in (("robot", robot), ("plant", plant)):
         if one.n_tubes != len(scenario.start.beta_mm):
             text = f"the {kind} has {one.n_tubes} tubes, the scenario starts with {len(scenario.start.beta_mm)}"
