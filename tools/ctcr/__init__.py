@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ctcr import errors as errors
     from ctcr import frames as frames
     from ctcr import model as model
+    from ctcr import user_effects as user_effects
     from ctcr.api.add import add as add
     from ctcr.api.calibrate import calibrate as calibrate
     from ctcr.api.compare import compare as compare
@@ -74,6 +75,7 @@ _MODULES = {
     "output": "ctcr.show.output",
     "pictures": "ctcr.show.pictures",
     "robot_file": "ctcr.robot.robot_file",
+    "user_effects": "ctcr.user_effects",
 }
 
 

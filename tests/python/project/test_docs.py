@@ -104,6 +104,23 @@ def test_excerpt():
     assert missing_lines("560 readings\nerror 1.45 mm\nerror 1.44 mm", printed) == ["error 1.45 mm", "error 1.44 mm"]
 
 
+def names(text: str) -> set[str]:
+    """What a document says that `import ctcr` offers, such as `ctcr.load(path)`; an import statement names modules."""
+    spans = re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
+    code = " ".join(span for span in spans if "import" not in span)
+    return set(re.findall(r"(?<![/\w])ctcr(?!\.hpp)(?:\.[^\W\d]\w*)+", code))
+
+
+def test_names_exist():
+    """Names that documents write as `ctcr.name` are there after `import ctcr` alone."""
+    said = names("`ctcr.load(x)` and `a =\nctcr.frames.product(b)`, ctcr.no, `from ctcr.track import a`")
+    assert said == {"ctcr.load", "ctcr.frames.product"}
+    said = {each for document in DOCUMENTS for each in names(document.read_text())}
+    assert {"ctcr.load", "ctcr.user_effects.load"} <= said
+    look_up = "import operator, sys, ctcr\nfor name in sys.argv[1:]: operator.attrgetter(name[5:])(ctcr)"
+    subprocess.run([sys.executable, "-c", look_up, *sorted(said)], check=True)
+
+
 @pytest.mark.parametrize("document", [path for path in DOCUMENTS if blocks(path, "sh")], ids=name)
 def test_commands(document, project):
     """They run, and print what the document shows behind them."""
