@@ -49,7 +49,10 @@ def _version(ctx: click.Context, _: click.Parameter, asked: bool) -> None:
     "--version", is_flag=True, is_eager=True, expose_value=False, callback=_version, help="Print the version."
 )
 def cli() -> None:
-    """Concentric tube continuum robots: what the model predicts, and how wrong it is."""
+    """Concentric tube continuum robots: what the model predicts, and how wrong it is.
+
+    Example: ctcr compare robot.yaml measurements.csv --report error.html
+    """
 
 
 def main(arguments: list[str] | None = None) -> None:

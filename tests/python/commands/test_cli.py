@@ -13,6 +13,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from command_line import commands
 from ctcr import cli, frames
 from ctcr.commands import options
 from ctcr.model import model, table_poses
@@ -320,13 +321,6 @@ def test_help():
     assert out.splitlines()[-1] == "[]"
 
 
-def commands(group=cli.cli, path=()):
-    context = click.Context(group)
-    for name in group.list_commands(context):
-        found = group.get_command(context, name)
-        yield from commands(found, (*path, name)) if isinstance(found, click.Group) else [((*path, name), found)]
-
-
 @pytest.mark.parametrize("command", [pytest.param(found, id=" ".join(path)) for path, found in commands()])
 def test_options_meet_the_function(command):
     """Every option and argument of a command is a parameter of its function; shared ones arrive as `out`."""
@@ -383,14 +377,3 @@ def test_help_points_to_the_formats(run):
     for words in (["compare"], ["import"], ["init"], ["calibrate", "fit"]):
         assert "docs/formats.md" in run(*words, "--help")[1]
     assert (ROOT / "docs" / "formats.md").exists()
-
-
-@pytest.mark.parametrize(
-    ("path", "command"), [pytest.param(path, found, id=" ".join(path)) for path, found in commands()]
-)
-def test_help_has_an_example(path, command):
-    """The help of every command ends with an example that the command accepts."""
-    _, found, example = " ".join(command.help.split()).partition("Example: ctcr ")
-    words = shlex.split(example)
-    assert found and tuple(words[: len(path)]) == path
-    command.make_context(" ".join(path), words[len(path) :]).close()

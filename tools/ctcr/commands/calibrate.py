@@ -13,6 +13,8 @@ def command() -> None:
     keeps the old ones, their source and the date under `history`. Columns of the tables carry their unit in the
     name and may come in another one of the same kind: x_mm or x_m, motor_angle_deg, _rad or _rev, load_N, _mN or
     _g.
+
+    Example: ctcr calibrate fit robot.yaml measurements.csv -o calibrated.yaml
     """
 
 

@@ -37,6 +37,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     It needs dimensions and precurvature of the tubes; all else gets a default that a comment in the file explains.
     Without --tube and --example it asks.
 
+    \b
     Example: ctcr init -o robot.yaml --tube
     length_mm=300,outer_diameter_mm=1.3,inner_diameter_mm=1,curved_length_mm=60,radius_mm=100
     """

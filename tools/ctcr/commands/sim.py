@@ -22,6 +22,8 @@ def command() -> None:
 
     A tracker on a serial line, stepper motors on EtherCAT, and the robot between them. They speak the devices' own
     protocols, so that programs take them for the real ones.
+
+    Example: ctcr sim bench robot.yaml -- ctcr devices --bench bench.yaml
     """
 
 
@@ -82,7 +84,7 @@ def bench(robot, program, folder, tracker_scenario, bus_scenario, seed, **physic
 
     Needs no rights: bus and COMMAND get a network of their own.
 
-    Example: ctcr sim bench robot.yaml --hide friction.coefficient=0.02 -- ctcr devices
+    Example: ctcr sim bench robot.yaml --hide friction.coefficient=0.02 -- ctcr devices --bench bench.yaml
     """
     from ctcr.bench.simulators import bench as simulated
 
