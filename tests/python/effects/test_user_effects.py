@@ -226,7 +226,7 @@ def test_commands(robot, readings, file, tmp_path, capsys):
     run("remove", new, "mine", "-o", old, *own)
     assert robot_file.load(old).effects == {}
     run("info", new, *own)
-    assert "your own: mine" in run("shape", new, *JOINTS, *own)
+    assert "rows of tables alone: mine" in run("shape", new, *JOINTS, *own)
     run("calibrate", "fit", new, made, "--free", "tubes.1.curvature", "--hold-out", 0, *own)
     run("calibrate", "home", ROOT / "examples/data/calibration/home.csv", "--robot", new, *own)
     run("import", made, "-o", tmp_path / "imported.csv", "--robot", new, *own)

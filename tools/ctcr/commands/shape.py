@@ -82,8 +82,12 @@ def command(robot, beta_mm, alpha_deg, force, every, picture, steps, out) -> Non
         out.say(f"picture: {picture}")
     if acting := effect_model.of_the_poses(used):
         out.say(f"With the effects {', '.join(acting)}")
-    if left_out := [name for name in loaded.effects if name not in used.effects]:
-        out.say(f"Left out, as it depends on how the joints were reached or is your own: {', '.join(left_out)}")
+    left_out = [name for name in loaded.effects if name not in used.effects]
+    own = [name for name in left_out if name in robot_file.user_effects]
+    if with_history := [name for name in left_out if name not in own]:
+        out.say(f"Left out, as it depends on how the joints were reached: {', '.join(with_history)}")
+    if own:
+        out.say(f"Left out, as effects written in Python act on the rows of tables alone: {', '.join(own)}")
 
 
 def _list(shapes, out) -> None:
