@@ -7,9 +7,10 @@ effects. Four likelihoods weigh them:
   smaller than what an error of the form makes decide nothing: they are divided by 1 + form_error^2 times the evidence;
 - the amplitude that effects leave of the unexplained signal of held-out runs: half-normal with a standard deviation of
   the form error of the effects if nothing else acts, uniform if something does;
-- the share that an effect explains of what was left before it: likely large for a cause (density 2 s), likely small
-  for an imitation (2 (1 - s)), and exponential for one that only mends the forms of the others. Their form error is
-  its scale: the less exact they are, the more of what they leave may follow the form of another effect;
+- the share that an effect explains of what was left before it: likely large for a cause that stands alone (density
+  2 s), any for one beside others, likely small for an imitation (2 (1 - s)), and exponential for one that only mends
+  the forms of the others. Their form error is its scale: the less exact they are, the more of what they leave may
+  follow the form of another effect;
 - the test of the residual against the noise as stated.
 """
 
@@ -102,7 +103,7 @@ def weighed(
         if accepted:  # then the forms of all of them together have to account for what is left
             leaves = log_density_of_errors(left * left_by([further]), form_error([*accepted, further]))
             mend = log_density_of_mend(further.explained, form_error(accepted))
-            gain = min(gain, leaves - complete + log_density_of_cause(further.explained) - mend)
+            gain = min(gain, leaves - complete - mend)
         weigh(found | {further.id}, weights[found, False] + rejects + gain + _plausible(further))
 
     outside = math.log(settings.OUTSIDE_CATALOGUE) + rejects

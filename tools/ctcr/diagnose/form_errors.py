@@ -51,10 +51,9 @@ def log_density_of_mend(share: float, error: float) -> float:
 
 def log_odds_of_mend(share: float, before: Sequence[Explaining]) -> float:
     """Log Bayes factor of an effect that only mends the forms of those before it over a cause, by the share that it
-    explains of what these left: their errors leave little."""
+    explains of what these left: their errors leave little. A cause explains any share, as others may act beside it."""
     error = form_error(before)
-    mends = log_density_of_errors(left_by(before), error) + log_density_of_mend(share, error)
-    return mends - log_density_of_cause(share)
+    return log_density_of_errors(left_by(before), error) + log_density_of_mend(share, error)
 
 
 def log_odds_of_imitation(shares: Sequence[float]) -> float:
