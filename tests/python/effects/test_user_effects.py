@@ -271,7 +271,7 @@ def test_next_command(robot, readings, file, tmp_path, capsys):
     table2.write_text((ROOT / "examples" / "robots" / "table2.yaml").read_text())
     (effect,) = user_effects.load(mine)
     hidden = catalogue.with_values(robot, [effect.id], {"effects.mine.gain": 0.02})
-    simulation.write(simulation.simulate(hidden, readings, "jitter", seed=3), made, 3)
+    simulation.write(simulation.simulate(hidden, readings, "jitter", seed=3), made)
     words = ["diagnose", table2, made, "--effects", mine, "--report", page]
     assert cli.run([str(word) for word in words]) == 0
     (typed,) = re.findall("^To add: (.*)$", capsys.readouterr().out, re.MULTILINE)

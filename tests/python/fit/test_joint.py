@@ -295,7 +295,7 @@ def test_missing_rows():
     readings.quaternion[4] = np.nan
     readings.beta[5] = [0.01, 0.02]
     fit = joint.fit(bench, readings, "tracker.frame", noise=NOISE)
-    assert fit.excluded == [5] and any(f"rows {readings.row[5]}," in text for text in fit.warnings)
+    assert fit.excluded == [5] and any(f"row {readings.row[5]}:" in text for text in fit.warnings)
     assert (fit.weights[3] == [0, fit.weights[3, 1]]).all() and fit.weights[3, 1] > 0
     assert np.isnan(fit.residual[5]).all() and np.isnan(fit.residual[3, :3]).all()
     only_positions = joint.fit(bench, replace(readings, quaternion=None), "tracker.frame", noise=NOISE)

@@ -1,16 +1,25 @@
-"""Copies: rows of a table that repeat an earlier row in every column, and so hold nothing that was measured anew."""
+"""What a table only repeats, and nobody measured anew: rows that are copies of earlier ones, and an orientation that is
+the same in every row."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from ctcr.show.wording import counted, listed
-from ctcr.table.measurements import Measurements
+from ctcr.table.measurements import Measurements, never_turns
 
 
 def left_out(measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """The table without copies, and a notice if there are any.
+    """The table without copies, and without an orientation that never changes; a notice of each."""
+    table, said = _without_copies(measurements)
+    if never_turns(table.quaternions):
+        said += ["the orientation never changes, so the tracker measures none: it is left out"]
+        table = replace(table, quaternion=None)
+    return table, said
 
-    A pose never repeats to the last digit by chance; a row without one may be a motion that was made again.
-    """
+
+def _without_copies(measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """A pose never repeats to the last digit by chance; a row without one may be a motion that was made again."""
     columns = [getattr(measurements, name) for name in measurements.COLUMNS if name != "row"]
     numbers = np.column_stack([values.astype(float) for values in columns if values is not None])
     rows = np.ascontiguousarray(numbers).view(f"V{numbers.itemsize * numbers.shape[1]}")[:, 0]

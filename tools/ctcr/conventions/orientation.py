@@ -36,10 +36,10 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None)
     before, after = errors[0, 0], errors[best]
     turn = _turn_between(predicted, measured[0, 0])
     turned = _error_deg(predicted, measured[0, 0], False)
-    # A physical effect may ask for a turn, too, but hardly for a large one, and it leaves more than noise.
+    # A physical effect may ask for a turn, too, but hardly for a large one, and it leaves more than a turn does.
     is_noise = turned < settings.CONVENTION_AT_FLOOR * (fit.robot.tracker.jitter_deg or 0.0)
     jump = settings.SENSOR_JUMP[1] if is_noise else np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)
-    if known and turned < min(after, settings.CONVENTION_CLEAR * before) and turn.magnitude() > jump:
+    if known and turned < min(after, settings.CONVENTION_CONSTANT * before) and turn.magnitude() > jump:
         return [_turned(fit, turn, (before, turned))], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))
     if not any(best) or after > settings.CONVENTION_CLEAR * before:
         return [], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))

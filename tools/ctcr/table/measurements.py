@@ -342,13 +342,9 @@ def _measurements(data: dict[str, Array], table: Table) -> Measurements:
     absent = {name: np.repeat(row, table.n_rows, axis=0) for name, row in absent.items()}
     data = absent | {"position": None, "quaternion": None} | data
     data["t"], data["run"] = data["t"][:, 0], data["run"][:, 0].astype(np.int64)
-    warnings = list(_warnings(data["t"], data["run"], str(table.path)))
     if data["quaternion"] is not None:
         data["quaternion"] /= np.linalg.norm(data["quaternion"], axis=1, keepdims=True)
-        if never_turns(data["quaternion"]):
-            data["quaternion"] = None
-            text = "the orientation never changes: the tracker measures none, and it is left out"
-            warnings.append(Problem(text, str(table.path), field="qw..qz"))
+    warnings = list(_warnings(data["t"], data["run"], str(table.path)))
     file = str(table.path) if isinstance(table, NumberTable) else ""
     return Measurements(**data, row=np.arange(2, table.n_rows + 2), warnings=warnings, file=file)
 
