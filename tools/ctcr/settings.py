@@ -124,7 +124,7 @@ SESSION_ROWS = 600  # rows on which runs are compared, spread over all runs
 
 FEWEST_RUNS = 4  # from which runs are kept together: fewer cannot be split into a fitted and a judged part
 FOLDS = 4  # of a cross-validation: three quarters are fitted, one is judged
-TIME_BLOCKS = 12  # into which a single run is divided: three for each fold; a diagnosis needs as many readings
+TIME_BLOCKS = 12  # into which a single run is divided: three for each fold
 HELD_OUT_ORDER = (2, 3, 1, 0)  # which of every four groups is held out: runs often alternate in direction or load
 MOST_UNDETERMINED = 0.1  # mean square error that the fitted groups may leave in a held-out one, over that of the jitter
 EXCHANGES = 12  # exchanges of held-out groups, at most

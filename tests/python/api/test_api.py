@@ -237,7 +237,7 @@ def test_few_rows(robot, table):
             function(robot, table.rows(slice(0, 0)))
     three = table.rows(slice(0, 3))
     for fit in (ctcr.diagnose, lambda *given: ctcr.add(given[0], "friction", given[1])):
-        with pytest.raises(ctcr.InputError, match="3 measured poses: .* takes 12 or more"):
+        with pytest.raises(ctcr.InputError, match="3 measured poses: .* takes 4 or more"):
             fit(robot, three)
     assert "3 readings" in str(ctcr.compare(robot, three))
     for wrong in ({}, None, 3):

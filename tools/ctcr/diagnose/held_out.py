@@ -20,9 +20,9 @@ def check_size(measurements: Measurements) -> None:
     count = int(measurements.measured.sum())
     if not count:
         raise InputError(Problem("the table holds no measured poses: nothing can be fitted"))
-    if count < settings.TIME_BLOCKS:
+    if count < settings.FOLDS:
         text = f"{counted(count, 'measured pose')}: effects are fitted to a part and judged on the rest, which takes"
-        raise InputError(Problem(f"{text} {settings.TIME_BLOCKS} or more", measurements.source))
+        raise InputError(Problem(f"{text} {settings.FOLDS} or more", measurements.source))
 
 
 def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
