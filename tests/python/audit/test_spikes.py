@@ -113,11 +113,10 @@ def test_diagnosis(robot, paths):
     """A diagnosis finds the hidden effect in spite of spikes, and reports them."""
     table = measured(robot, paths, "softening")
     rows = interior(np.random.default_rng(5), 10)
-    plain, result = (ctcr.diagnose(robot, readings) for readings in (table, struck(table, rows)))
-    assert result.verdict.word == plain.verdict.word
-    assert [a.ids for a in result.accepted] == [a.ids for a in plain.accepted] == [["softening"]]
-    assert result.rms_mm["with_effects"] == pytest.approx(plain.rms_mm["with_effects"], rel=0.1)
-    assert result.judged.sum() < plain.judged.sum() and not result.judged[rows].any()
+    result = ctcr.diagnose(robot, struck(table, rows))
+    assert result.verdict.word == "identified" and [a.ids for a in result.accepted] == [["softening"]]
+    assert result.rms_mm["with_effects"] < 1.2 * result.rms_mm["noise_floor"]
+    assert not result.judged[rows].any()
     assert any("spikes of the tracker" in said for said in result.verdict.sentences)
 
 

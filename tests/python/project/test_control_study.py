@@ -32,6 +32,7 @@ def test_open_loop(study, robot, path, hidden):
     assert study.open_loop(path, known, known).mean() < 0.05
 
 
+@pytest.mark.slow
 def test_known_friction(study, robot, path):
     """A controller whose model has friction follows the path more closely."""
     plant = study.hidden_robot(robot, "friction", np.random.default_rng(study.SEED))
