@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,9 @@ from ctcr.model import simulation
 from ctcr.robot import defaults, robot_file
 from ctcr.table import measurements
 from scipy.spatial.transform import Rotation
-from wrong_conventions import with_other_tube
+from wrong_conventions import DRAWN, OF_RUNS, with_other_tube
+
+ROOT = Path(__file__).parents[3]
 
 
 def bench(seed, n_tubes=2, **options):
@@ -478,3 +481,10 @@ def test_refused_table(files, run):
     code, _, error = run("compare", *paths)
     assert code != 0
     assert "behind the plate" in error
+
+
+def test_documented():
+    """Every kind of wrong convention stands in the page on formats."""
+    page = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
+    for kind in {*DRAWN, *OF_RUNS, *(kind for kind, _, _ in FAULTS.values()), "stale", "sensor_tube", "file_unit"}:
+        assert f"`{kind}`" in page, kind
