@@ -88,6 +88,12 @@ def rotated(quaternion: ArrayLike, vector: ArrayLike) -> Array:
     return matrix_from_quaternion(quaternion) @ np.asarray(vector, dtype=float)
 
 
+def inverse_pose(position: Array, quaternion: Array) -> tuple[Array, Array]:
+    """The frame in which poses (M, 3), (M, 4) are given, seen from each of them."""
+    back = conjugate(quaternion)
+    return -np.einsum("mij,mj->mi", matrix_from_quaternion(back), position), back
+
+
 def rigid_motion(source: Array, target: Array, weight: Array | None = None) -> tuple[Array, Array]:
     """Rotation (3, 3) and translation (3,) that carry source (K, 3) to target (K, 3) with least squares (Kabsch 1976),
     of weights (K,).

@@ -1,5 +1,5 @@
-"""What a table only repeats, and nobody measured anew: rows that are copies of earlier ones, and an orientation that is
-the same in every row."""
+"""Repetitions in a table that are no measurements: copies of earlier rows, and an orientation that is the same in every
+row."""
 
 from dataclasses import replace
 

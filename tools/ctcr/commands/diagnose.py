@@ -25,7 +25,7 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
     from ctcr.api.diagnose import diagnose
     from ctcr.api.reviewed import WrongConventions
     from ctcr.conventions import report
-    from ctcr.diagnose import terminal, typed
+    from ctcr.diagnose import next_commands, terminal
 
     loaded, readings = options.load(robot, measurements, any_convention=True)
     try:
@@ -46,5 +46,5 @@ def command(robot: str, measurements: str, threads: int, anyway: bool, frame_per
     out.say(*options.doubtful(loaded, robot))
     terminal.show(out.console, result)
     if result.accepted and not result.verdict.names_no_cause:
-        way = typed.to_add(result, out.json_target if out.json_target != "-" else None)
+        way = next_commands.to_add(result, out.json_target if out.json_target != "-" else None)
         out.console.print(f"To add: {way}", soft_wrap=True)  # one line, to be copied

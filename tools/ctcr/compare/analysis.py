@@ -95,8 +95,8 @@ class Comparison(Result):
 
     @property
     def wrong(self) -> list[Convention]:
-        """Conventions to correct; poses that the tracker repeated are only left out."""
-        return [one for one in self.conventions if one.kind != "frozen"]
+        """Conventions to correct."""
+        return [one for one in self.conventions if one.is_wrong]
 
     def as_dict(self) -> dict[str, Any]:
         """The numbers for JSON, without the readings themselves."""
@@ -185,7 +185,7 @@ def compare(
         sample = _in_one_frame(sample)
     rows, label, _ = split(sample.run, sample.motion.scaled)
     folds, shift, turn = make_folds(label, settings.SIGN_TRIALS), None, None
-    is_right = all(one.kind == "frozen" for one in conventions)
+    is_right = not any(one.is_wrong for one in conventions)
     if is_right and folds.count >= settings.FEWEST_BLOCKS:
         shift = find_shift(sample.error[rows], folds)
         turn = find_turn(sample.predicted[rows], sample.measured[rows], folds)
@@ -204,7 +204,8 @@ def compare(
     run_offsets = find_run_offsets(as_taken, visits, pairs, noise)
     _, group = np.unique(sample.run if run_offsets.found else np.zeros_like(sample.run), return_inverse=True)
     error = sample.base_error - group_means(sample.base_error, group)[group]
-    ranking = rank(sample, error if is_right else 0 * error, settings.LEVEL)
+    # The errors of a wrong table are no errors of the model: none of them is ranked.
+    ranking = rank(sample, error if is_right else np.zeros_like(error), settings.LEVEL)
     length = np.linalg.norm(headline.error, axis=1) * 1e3
     rotation = headline.rotation_error
     angle = np.full(len(length), np.nan) if rotation is None else np.degrees(np.linalg.norm(rotation, axis=1))

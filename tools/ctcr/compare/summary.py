@@ -95,8 +95,8 @@ def _all(c: Comparison) -> Iterator[Finding]:
         axis = ", ".join(f"{value:+.2f}" for value in c.turn.axis)
         yield Finding(
             f"Another tracker frame, rotated by {c.turn.turn_deg:.0f} degrees about ({axis}) and shifted, leaves "
-            f"{mm(c.turn.rms_after_mm)} RMS instead of {mm(c.turn.rms_before_mm)} (held out): that of the robot file "
-            f"is wrong, or homes and tubes are, which turn the tip too. All that follows is in the other frame.",
+            f"{mm(c.turn.rms_after_mm)} RMS instead of {mm(c.turn.rms_before_mm)} (held out). The frame in the robot "
+            f"file is wrong, or homes and tubes are, which turn the tip too. All that follows is in the fitted frame.",
             1.0,
         )
     elif shifted and shifted.share > 0:

@@ -184,7 +184,7 @@ def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Arra
     names = [name for name, *_ in found]
     mean, sd, low, high = np.array([numbers for _, *numbers in found]).reshape(-1, 4).T
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
-    # What is positive is off by a factor, either way; so is a curvature: of another sign it is a home half a turn off.
+    # Positive values err by a factor, either way. So do curvatures: one of opposite sign is a home half a turn off.
     bent = np.array([".curvature" in name for name in names], dtype=bool) & (mean > 0)
     by_factor = (low >= 0) | bent
     least = np.divide(mean**2, mean + far, out=mean - far, where=by_factor)

@@ -23,6 +23,11 @@ class Finding:
     rivals: Sequence["Finding"] = ()  # of another kind, which explain the readings as well
 
     @property
+    def is_wrong(self) -> bool:
+        """Whether it must be corrected; poses that the tracker repeated are only left out."""
+        return self.kind != "frozen"
+
+    @property
     def clarity(self) -> float:
         """Factor by which the error falls."""
         before, after = self.rms_deg or self.rms_mm

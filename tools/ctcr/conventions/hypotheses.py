@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from ctcr import settings
 from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
-from ctcr.frames import conjugate, matrix_from_quaternion
+from ctcr.frames import inverse_pose
 from ctcr.model import parameters
 from ctcr.robot.checks import path_text
 from ctcr.robot.description import Robot
@@ -301,10 +301,8 @@ def _poses(robot: Robot, readings: Measurements) -> Iterator[Hypothesis]:
         text = "the poses are the inverse ones, of the tracker in the frame of the sensor"
 
         def change(m: Measurements) -> Measurements:
-            back = conjugate(m.quaternions)
-            return replace(
-                m, position=-np.einsum("mij,mj->mi", matrix_from_quaternion(back), m.positions), quaternion=back
-            )
+            position, quaternion = inverse_pose(m.positions, m.quaternions)
+            return replace(m, position=position, quaternion=quaternion)
 
         yield Hypothesis("pose_inverse", text, (*POSE, *QUATERNION), "ctcr import --invert-pose", change)
 

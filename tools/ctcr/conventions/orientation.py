@@ -53,27 +53,23 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None)
 
 def mirrored(fit: Calibrated, readings: Measurements, axis: int) -> bool:
     """Whether quaternions are mirrored along an axis of the tracker as the positions were."""
-    use = fit.solved & readings.oriented
-    if not use.any():
-        return False
-    predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
-    known = _is_known(fit.robot)
-    options = [
-        min(_error_deg(predicted, _in_form(given, *form, along), known) for form in np.ndindex(2, 2))
-        for along in (None, axis)
-    ]
-    return options[1] < options[0]
+    return _in_best_form(fit, readings, axis) < _in_best_form(fit, readings, None)
 
 
 def least_error_deg(fit: Calibrated, readings: Measurements, axis: int | None) -> float:
     """RMS error of the orientations in the form that suits them best, mirrored along an axis of the tracker or not; 0
     where none was measured."""
+    return min(_in_best_form(fit, readings, along) for along in {None, axis})
+
+
+def _in_best_form(fit: Calibrated, readings: Measurements, axis: int | None) -> float:
+    """The same with all of them mirrored along an axis, or none."""
     use = fit.solved & readings.oriented
     if not use.any():
         return 0.0
     predicted, given = _predicted(fit.robot, readings.rows(use)), readings.quaternions[use]
-    forms = ((*form, along) for form in np.ndindex(2, 2) for along in {None, axis})
-    return min(_error_deg(predicted, _in_form(given, *form), _is_known(fit.robot)) for form in forms)
+    forms = (_in_form(given, *form, axis) for form in np.ndindex(2, 2))
+    return min(_error_deg(predicted, form, _is_known(fit.robot)) for form in forms)
 
 
 def error_deg(robot: Robot, readings: Measurements) -> float:

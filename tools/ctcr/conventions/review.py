@@ -26,12 +26,12 @@ class Review:
     @property
     def frozen(self) -> list[Finding]:
         """Poses that the tracker repeated: readings that are missing."""
-        return [one for one in self.findings if one.kind == "frozen"]
+        return [one for one in self.findings if not one.is_wrong]
 
     @property
     def wrong(self) -> list[Finding]:
         """The others: conventions that must be corrected."""
-        return [one for one in self.findings if one.kind != "frozen"]
+        return [one for one in self.findings if one.is_wrong]
 
 
 def review(robot: Robot, readings: Measurements) -> Review:

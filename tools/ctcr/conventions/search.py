@@ -3,6 +3,7 @@ clearest is applied, and again."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -17,7 +18,7 @@ from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
-from ctcr.show.wording import join, numbers, short
+from ctcr.show.wording import join, numbers, percent, short
 from ctcr.table.measurements import Measurements
 
 Wrong = tuple[Hypothesis, ...]
@@ -51,6 +52,11 @@ class Tried:
     def doubts(self) -> int:
         return sum(one.doubts for one in self.wrong)
 
+    @cached_property
+    def turned_deg(self) -> float:
+        """RMS error of the orientations in the form that suits them best."""
+        return orientation.least_error_deg(self.case.fit, self.case.readings, mirror_of(self.wrong))
+
     @property
     def offset(self) -> Hypothesis | None:
         """The one that says that a home is another."""
@@ -70,8 +76,11 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
             break
         found += _findings(case, better)
         case = better.case
-    # Runs need not share a frame: what each has of its own is told apart later.
-    left = min(case.fit.typical, _with_run_frames(case, of_runs).typical)
+    left = case.fit.typical
+    if (
+        case.share_of(left) >= settings.PHYSICS_LEAVES
+    ):  # runs need not share a frame: what each has of its own comes later
+        left = min(left, _with_run_frames(case, of_runs).typical)
     if case.share_of(left) < settings.PHYSICS_LEAVES:
         return case, found, ""
     return given, [], _unexplained(case, left, found)
@@ -80,12 +89,13 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
 def _unexplained(case: Case, error: float, found: list[Finding]) -> str:
     """That an error [m] is left which is no physics, and what comes nearest."""
     left = f"{short(1e3 * error)} mm remain" if np.isfinite(error) else "the model has no solution"
-    share = f", {case.share_of(error):.0%} of the deployed length" if np.isfinite(case.share_of(error)) else ""
+    part = case.share_of(error)
+    share = f", {percent(part)} of the deployed length" if np.isfinite(part) else ""
     nearest = f" Nearest comes: {join([one.text for one in found])}." if found else ""
     return (
-        f"After calibration and whatever convention is tried {left}{share}: more than effects and data sheets make. So "
-        "the table or the robot file is wrong in another way, and no comparison with physics means anything: look at "
-        "the point and the frame of the poses, the order, the units and the zeros of columns, and the values of the "
+        f"After calibration, and under every known convention, {left}{share}: more than effects and data sheets make. "
+        "So the table or the robot file is wrong in another way, and effects cannot be judged. Check which point the "
+        "poses are of and in which frame; the order, units and zeros of the columns; and the values of the "
         f"tubes.{nearest}"
     )
 
@@ -117,8 +127,8 @@ def _alike(tried: list[Tried]) -> list[Tried]:
     least is wrong."""
     least = min(one.case.fit.typical for one in tried)
     alike = [one for one in tried if one.case.fit.typical < settings.CONVENTION_ALIKE * least]
-    turned = [orientation.least_error_deg(one.case.fit, one.case.readings, mirror_of(one.wrong)) for one in alike]
-    agree = [one for one, error in zip(alike, turned, strict=True) if settings.CONVENTION_CLEAR * error <= min(turned)]
+    turned = min(one.turned_deg for one in alike)
+    agree = [one for one in alike if settings.CONVENTION_CLEAR * one.turned_deg <= turned]
     return sorted(agree, key=lambda one: (one.doubts, one.case.fit.typical))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ctcr.arrays import evenly
-from ctcr.diagnose import figures, typed
+from ctcr.diagnose import figures, next_commands
 from ctcr.diagnose.pipeline import Diagnosis
 from ctcr.diagnose.varying_coefficients import ADVICE
 from ctcr.effects import catalogue
@@ -55,7 +55,7 @@ def _found(d: Diagnosis) -> str:
     effects = [catalogue.get(identity, d.robot.n_tubes) for a in d.accepted for identity in a.ids]
     heading = "Effects that imitate the cause" if d.verdict.names_no_cause else "What is missing"
     listed = _listed(as_html(f" ({e.id}). {e.physics}", bold=e.title) for e in effects)
-    add = paragraph("To add to the robot file what was found:") + html_page.command(typed.to_add(d))
+    add = paragraph("To add to the robot file what was found:") + html_page.command(next_commands.to_add(d))
     return f"<h2>{heading}</h2>{listed}{'' if d.verdict.names_no_cause else add}"
 
 
@@ -121,7 +121,7 @@ def _next(d: Diagnosis) -> str:
     advice += map(as_html, d.varying.measure if d.varying else [])
     if not advice:
         return ""
-    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(typed.to_plan(d))
+    runs = paragraph("Propose the runs that decide between rivals:") + html_page.command(next_commands.to_plan(d))
     return f"<h2>What to measure next</h2>{_listed(advice)}{runs if ids else ''}"
 
 

@@ -93,8 +93,7 @@ def unseen(pose: Pose) -> Mask:
 
 def inverse(pose: Pose) -> Pose:
     """The tracker in the frame of the marker."""
-    count = len(pose.position)
-    return seen_from(pose, Pose(np.zeros((count, 3)), np.tile([1.0, 0, 0, 0], (count, 1))))
+    return Pose(*frames.inverse_pose(pose.position, pose.quaternion))
 
 
 def seen_from(reference: Pose, pose: Pose) -> Pose:

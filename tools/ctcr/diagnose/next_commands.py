@@ -22,4 +22,4 @@ def _files(d: Diagnosis) -> tuple[str, str]:
 
 def _anyway(d: Diagnosis) -> list[str]:
     """The option with which the diagnosis went past wrong conventions."""
-    return ["--anyway"] if any(one.kind != "frozen" for one in d.conventions) else []
+    return ["--anyway"] if any(one.is_wrong for one in d.conventions) else []
