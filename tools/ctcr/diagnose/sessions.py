@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr import settings
+from ctcr.arrays import Array
 from ctcr.audit import sensor_pose
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
@@ -81,8 +82,7 @@ def _may_win(engine: Engine, one: Fit) -> bool:
     recorded = user_recording.recording_of(engine.robot, table)
     columns = recorded.columns(one.residual.ravel()).reshape(*one.residual.shape, -1)
     linear, columns = engine.linear(one), one.whiten(columns)
-    free = np.hstack([linear.jacobian, columns])  # without priors: tables that contradict the robot end here
-    most = free @ np.linalg.lstsq(free, linear.residual, rcond=None)[0]
+    most = _most(np.hstack([linear.jacobian, columns]), linear.residual)  # tables that contradict the robot end here
     if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * Judged.of(engine, one).unexplained:
         return False
     of_one = np.split(columns, len(table.sessions.run), axis=1)
@@ -125,9 +125,19 @@ def _is_likelier(framed: Engine, own: Fit, chosen: Selection) -> bool:
         "weights": np.maximum(own.weights, effects.weights),
         "inflation": np.minimum(own.inflation, effects.inflation),
     }
-    by_effects = chosen.engine.fit_like(own, names, values_of(effects), fixed=fixed, **alike)
     by_frames = framed.fit_like(own, start=values_of(own), **alike)
-    return by_frames.log_evidence + _cost(by_frames) > by_effects.log_evidence + settings.DECISIVE
+    least = by_frames.log_evidence + _cost(by_frames) - settings.DECISIVE
+    options = {"start": values_of(effects), "fixed": fixed, **alike}
+    linear = chosen.engine.linear(start := chosen.engine.fit_like(own, names, max_iterations=0, **options))
+    # Far from what the readings say, a fit takes long to arrive; mostly it is plain where it cannot.
+    if start.log_evidence + 0.5 * np.sum(_most(linear.jacobian, linear.residual) ** 2) < least:
+        return True
+    return chosen.engine.fit_like(own, names, **options).log_evidence < least
+
+
+def _most(jacobian: Array, residual: Array) -> Array:
+    """The part of a residual that parameters could remove, whatever their priors say."""
+    return jacobian @ np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
 def _cost(own: Fit) -> float:
