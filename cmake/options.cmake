@@ -34,7 +34,7 @@ if(NOT MSVC)
     -Wall -Wextra -Wpedantic -Wshadow
     -Wno-psabi  # four lanes are passed differently with and without AVX; they never leave one program
     -ffp-contract=fast  # with -std=c++20 GCC would not use FMA instructions
-    # GCC collects garbage from 128 MB on, although its peak is 2 GB either way: a sixth of the compile time.
+    # GCC starts to collect garbage at 128 MB. Its peak is 2 GB either way, and collecting takes a sixth of its time.
     "$<$<CXX_COMPILER_ID:GNU>:--param=ggc-min-heapsize=500000>"  # [kB]
     "$<$<BOOL:${CTCR_ARCH}>:-march=${CTCR_ARCH}>")
 endif()

@@ -369,7 +369,7 @@ def test_fault_rows(run, tmp_path, command, text, options, fault):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_radius(seed):
-    """The circle that a robot file predicts is that of the model, its deviation that of tubes as uncertain."""
+    """The radius that a robot file predicts is the model's; its deviation is that over the uncertainty of the tube."""
     random = np.random.default_rng(seed)
     robot = robot_file.load(ROBOT).model_copy(deep=True)
     place = random.uniform(-4, 4, 3)

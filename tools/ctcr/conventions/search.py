@@ -77,9 +77,8 @@ def corrected(robot: Robot, readings: Measurements, of_runs: Measurements) -> tu
         found += _findings(case, better)
         case = better.case
     left = case.fit.typical
-    if (
-        case.share_of(left) >= settings.PHYSICS_LEAVES
-    ):  # runs need not share a frame: what each has of its own comes later
+    # Runs need not share a frame: what each has of its own is told apart later.
+    if case.share_of(left) >= settings.PHYSICS_LEAVES:
         left = min(left, _with_run_frames(case, of_runs).typical)
     if case.share_of(left) < settings.PHYSICS_LEAVES:
         return case, found, ""

@@ -82,7 +82,8 @@ def _may_win(engine: Engine, one: Fit) -> bool:
     recorded = user_recording.recording_of(engine.robot, table)
     columns = recorded.columns(one.residual.ravel()).reshape(*one.residual.shape, -1)
     linear, columns = engine.linear(one), one.whiten(columns)
-    most = _most(np.hstack([linear.jacobian, columns]), linear.residual)  # tables that contradict the robot end here
+    # Tables that contradict the robot end here.
+    most = _most(np.hstack([linear.jacobian, columns]), linear.residual)
     if np.sum(most**2) - columns.shape[1] < settings.SESSION_EXPLAINED * Judged.of(engine, one).unexplained:
         return False
     of_one = np.split(columns, len(table.sessions.run), axis=1)
@@ -128,8 +129,9 @@ def _is_likelier(framed: Engine, own: Fit, chosen: Selection) -> bool:
     by_frames = framed.fit_like(own, start=values_of(own), **alike)
     least = by_frames.log_evidence + _cost(by_frames) - settings.DECISIVE
     options = {"start": values_of(effects), "fixed": fixed, **alike}
-    linear = chosen.engine.linear(start := chosen.engine.fit_like(own, names, max_iterations=0, **options))
-    # Far from what the readings say, a fit takes long to arrive; mostly it is plain where it cannot.
+    start = chosen.engine.fit_like(own, names, max_iterations=0, **options)
+    linear = chosen.engine.linear(start)
+    # Far from the readings such a fit converges slowly. Mostly a linear bound on its evidence decides without it.
     if start.log_evidence + 0.5 * np.sum(_most(linear.jacobian, linear.residual) ** 2) < least:
         return True
     return chosen.engine.fit_like(own, names, **options).log_evidence < least
