@@ -7,7 +7,7 @@ before, and only the reading is recorded. By the table it came from the other si
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import wilcoxon
+import scipy  # loads scipy.stats, which takes half a second, when it is asked for
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
@@ -34,7 +34,9 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     size = np.sum(loop**2, axis=1)
     visible = (np.sqrt(size) > settings.VISITS_DIFFER * noise) & np.isfinite(p[here]).all(axis=1)
     nearer = (np.linalg.norm(p[here] - p[same], axis=1) - np.linalg.norm(p[here] - p[other], axis=1))[visible]
-    if not visible.any() or wilcoxon(nearer, alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
+    if not visible.any():
+        return measurements, []
+    if scipy.stats.wilcoxon(nearer, alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     notice = (

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy  # loads scipy.stats, which takes half a second, when it is asked for
+from scipy.special import chdtri, ndtr
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
@@ -96,12 +97,12 @@ def direction_difference(
     known = [axis for axis in (floor.axis_mm, floor.rest_axis_mm, floor.stated_axis_mm) if np.isfinite(axis)]
     quiet = min(known, default=np.nan) * 1e-3
     p_quiet = beyond(scaled, settings.NOTABLE * quiet, blocks) if known else np.nan
-    outliers = int(np.sum(scaled > stats.chi2.isf(settings.OUTLYING_PAIR, 3) * quiet**2))
+    outliers = int(np.sum(scaled > chdtri(3, settings.OUTLYING_PAIR) * quiet**2))
     if len(opposite) > settings.DENSE_STREAM * settings.PATH_SEGMENTS:  # neighbours are not independent
         scaled, reference = _block_quartiles(scaled, blocks), _block_quartiles(reference, same_blocks)
     p_same = np.nan
     if len(same) >= settings.FEWEST_PAIRS:
-        p_same = stats.mannwhitneyu(scaled, reference, alternative="greater").pvalue
+        p_same = scipy.stats.mannwhitneyu(scaled, reference, alternative="greater").pvalue
     rms = float(np.sqrt(square.mean()))
     motion = tip_step[opposite.later]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -113,7 +114,7 @@ def direction_difference(
         rms_mm=rms * 1e3,
         uncertainty_mm=block_error(square, blocks) / (2 * max(rms, 1e-12)) * 1e3,
         maximum_mm=float(np.sqrt(square.max())) * 1e3,
-        typical_rms_mm=float(np.sqrt(np.median(square) * 3 / stats.chi2.median(3))) * 1e3,
+        typical_rms_mm=float(np.sqrt(np.median(square) * 3 / chdtri(3, 0.5))) * 1e3,
         outliers=outliers,
         moved=_moved(stops, opposite),
         floor_mm=rms / 2 * 1e3,
@@ -175,6 +176,6 @@ def beyond(square: Array, axis: float, blocks: Integers) -> float:
 
     axis: the noise of one reading per axis. The fraction beyond is judged by its scatter from block to block.
     """
-    beyond = (square > stats.chi2.ppf(0.75, 3) * axis**2).astype(float)
+    beyond = (square > chdtri(3, 0.25) * axis**2).astype(float)
     error = max(np.nan_to_num(block_error(beyond, blocks)), np.sqrt(0.25 * 0.75 / len(beyond)))
-    return float(stats.norm.sf((beyond.mean() - 0.25) / error))
+    return float(ndtr((0.25 - beyond.mean()) / error))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy  # loads scipy.stats, which takes half a second, when it is asked for
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -97,7 +97,7 @@ def find_run_offsets(sample: Sample, stops: Stops, revisits: Revisits, noise: No
     between, within = square[revisits.between_runs], square[~revisits.between_runs]
     p_value, alike = np.nan, revisits.select((revisits.kind == SAME) & revisits.between_runs)
     if min(len(between), len(within)) >= settings.FEWEST_PAIRS:
-        p_value = float(stats.mannwhitneyu(between, within, alternative="greater").pvalue)
+        p_value = float(scipy.stats.mannwhitneyu(between, within, alternative="greater").pvalue)
     elif len(alike) >= settings.FEWEST_PAIRS and np.isfinite(noise.axis_mm):
         scaled, axis = alike.square / alike.noise_factor, settings.NOTABLE * 1e-3 * noise.axis_mm
         p_value = beyond(scaled, axis, segments(stops.run[alike.later]))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from ctcr import settings
 from ctcr.arrays import Integers, Mask
@@ -104,4 +104,4 @@ def _nearest(measurements: Measurements, read: Integers) -> Integers:
 
 def _beyond_chance(seen: int, far: Mask, chance: float) -> bool:
     """Whether so many of the outliers that agree, each with this probability, are no chance."""
-    return bool(binom.sf(seen - 1, np.sum(far), min(chance, 1.0)) < settings.CLUSTER_SIGNIFICANCE)
+    return bool(bdtrc(seen - 1, np.sum(far), min(chance, 1.0)) < settings.CLUSTER_SIGNIFICANCE)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from ctcr import _core, settings
 from ctcr.arrays import Array, Integers, Mask
@@ -214,7 +214,7 @@ class Fit:
         """Probability of so large a chi-square where model and priors are right, and the stated jitter nearly is."""
         node, weight = np.polynomial.hermite_e.hermegauss(21)
         scale = np.exp(2 * settings.JITTER_KNOWN * node)
-        tail = chi2.sf((self.chi_square + self.shift_square) / scale, self.bulk_observations)
+        tail = chdtrc(self.bulk_observations, (self.chi_square + self.shift_square) / scale)
         return float(weight @ tail / weight.sum())
 
     def rms_mm(self, rows: Mask | None = None) -> float:

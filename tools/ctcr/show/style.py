@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
-from scipy import stats
+from scipy.special import chdtr
 
 from ctcr.arrays import Array
 
@@ -104,7 +104,7 @@ def noise_below(axes, sd: float, label: str) -> None:
     if sd > 0:
         reach = axes.get_xlim()[1]
         size = np.append(np.linspace(0, min(5 * sd, reach), 60), reach)
-        axes.plot(size, 100 * stats.maxwell.cdf(size, scale=sd), color=NOISE, lw=1.4, label=label)
+        axes.plot(size, 100 * chdtr(3, (size / sd) ** 2), color=NOISE, lw=1.4, label=label)
 
 
 def draw(plot: Callable[[Figure, Any], Any], subject: Any, width: float, height: float) -> str | None:
