@@ -38,6 +38,7 @@ FORMS = (
     ("precurvature_profile", "precurvature_profile", "a cubic spline with random knots"),
     ("helical_precurvature", "helical_precurvature", "a plane that turns unevenly"),
     ("straight_curvature", "straight_curvature", "a wavy coil set, out of plane"),
+    ("creep", "creep", "relaxation times from a fiftieth of the session to two and a half of it"),
     ("drive_compliance", "torsional_compliance", "a drive that stiffens with torque"),
     ("shear_stiffness", "torsional_compliance", "another shear modulus"),
     ("backlash_rotation", "backlash_rotation", "play with unequal sides"),

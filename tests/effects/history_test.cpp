@@ -293,5 +293,26 @@ TEST(Delay, VanishesAtRestAndWhereAClockStartsAnew) {
   EXPECT_EQ(lag(walk.to(at(3, 0), std::numeric_limits<double>::quiet_NaN())), none);  // without times there is none
 }
 
+TEST(Creep, IsALessCurvedTube) {
+  Catalogue::On<2> effects;
+  effect<Creep, 2>(effects).values = {0.3, -0.1, 40};
+  const auto pose = [&](std::initializer_list<double> times) {
+    Walk<2> walk(two_tubes(), effects);
+    for (const double time : times) walk.to(at(0.4, -0.2, -0.34), time);
+    return walk.solution().position;
+  };
+  for (const double t : {0.0, 10.0, 40.0, 1000.0}) {
+    Robot<2> robot = two_tubes();
+    robot.tubes[0].curvature *= 1 - 0.3 * t / (t + 40);
+    robot.tubes[1].curvature *= 1 + 0.1 * t / (t + 40);
+    const Vec3 expected = Walk<2>(robot).to(at(0.4, -0.2, -0.34)).solution().position;
+    EXPECT_LE((pose({5, 5 + t}) - expected).norm(), 1e-11) << t;
+    EXPECT_LE((pose({5, 5 + t / 3, 5 + t}) - expected).norm(), 1e-11) << t;  // however the time is divided
+    EXPECT_LE((pose({5, 5 + t, 0}) - expected).norm(), 1e-11) << t;          // a clock that starts anew adds none
+  }
+  const Vec3 fresh = Walk<2>(two_tubes()).to(at(0.4, -0.2, -0.34)).solution().position;
+  EXPECT_LE((pose({0, std::numeric_limits<double>::quiet_NaN()}) - fresh).norm(), 1e-11);  // no times
+}
+
 }  // namespace history_test
 }  // namespace ctcr

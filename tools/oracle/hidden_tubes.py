@@ -102,6 +102,21 @@ def straight_curvature(setup: Setup, size: float, rng: np.random.Generator) -> T
     return {"curvature_per_m": curvature}
 
 
+@cause("creep")
+def creep(setup: Setup, size: float, rng: np.random.Generator) -> Truth:
+    """Polymer tubes with relaxation times from seconds to hours, each of which takes its part of the curvature."""
+    end, first = setup.plan.time[-1], setup.plan.time[0]
+    times = end * np.array([0.02, 0.1, 0.5, 2.5])
+    parts = rng.dirichlet(np.full(4, 2.0), n_tubes(setup))  # (N, 4)
+    loss = 0.02 * size * signed(setup, rng)  # during the session
+
+    def done(time: float) -> np.ndarray:
+        return parts @ (1 - np.exp(-max(0.0, time - first) / times))
+
+    setup.mechanics.ageing = lambda time: -loss * done(time) / done(end)
+    return {"relative_loss": loss, "parts": parts}
+
+
 def fibre_tangent(tube: Tube, yield_strain: float, ratio: float, bending: np.ndarray) -> np.ndarray:
     """Tangent over initial bending stiffness at each bending (n,) [1/m] of a tube whose fibres are bilinear."""
     angle, weight = leggauss(200)

@@ -37,6 +37,7 @@ EFFECTS = tuple(
         "periodic_rotation periodic_translation entry_compliance entry_clearance helical_precurvature contact"
     ).split()
 )
+LATER_EFFECTS = ("creep",)  # their sets are the last, so that the names of the others stay
 # The realistic noise contains a distorted field, so that a further one is no question there.
 REALISTIC_EFFECTS = tuple(name for name in EFFECTS if name != "field_distortion")
 SEPARABLE_PAIRS = (
@@ -161,6 +162,11 @@ def orders(shift: int = 0) -> Iterator[tuple[str, Order]]:
                 yield "fuller_model", order(("loose_bores", share_of_gap), noise=noise)
     for _ in range(VARIED):
         yield "varied", varied(next(seeds))
+    for noise in ("jitter", "realistic"):
+        for name in LATER_EFFECTS:
+            for size in SIZES:
+                for _ in range(2):
+                    yield "single", order((name, size), noise=noise)
 
 
 def varied(seed: int) -> Order:

@@ -57,6 +57,7 @@ class Mechanics:
     friction: FrictionLaw | None = None
     yielding: Yielding | None = None
     warming: Callable[[float], float] = lambda time: 0.0  # relative change of stiffness and curvature at a time [s]
+    ageing: Callable[[float], np.ndarray | float] = lambda time: 0.0  # (N,) that of the curvature alone
 
     def __post_init__(self) -> None:
         self.profile = self.profile or [standard_profile(tube) for tube in self.robot.tubes]
@@ -124,7 +125,8 @@ def configure(
     fields = {
         "stiffness": section,
         "torsion": _torsion(mechanics) * (1 + warmth),
-        "precurvature": np.stack([p(d) for p, d in zip(mechanics.profile, distance, strict=True)]) * (1 + warmth),
+        "precurvature": np.stack([p(d) for p, d in zip(mechanics.profile, distance, strict=True)])
+        * (1 + warmth + np.broadcast_to(mechanics.ageing(time), stiffness.shape))[:, None, None],
         "base": np.stack([alpha, *_base(mechanics, beta, 1 + warmth)], axis=1),
         "joint": joint,
     }

@@ -4,6 +4,7 @@
 #include "ctcr/effects/backlash.hpp"
 #include "ctcr/effects/clearance.hpp"
 #include "ctcr/effects/contact.hpp"
+#include "ctcr/effects/creep.hpp"
 #include "ctcr/effects/delay.hpp"
 #include "ctcr/effects/field_distortion.hpp"
 #include "ctcr/effects/frame_motion.hpp"
@@ -21,6 +22,6 @@ namespace ctcr {
 using Catalogue = EffectList<Friction, BacklashRotation, BacklashTranslation, Delay, TipWeight, PrecurvatureProfile,
                              Softening, Anisotropy, StraightCurvature, Clearance, TorsionalCompliance, SensorOffset,
                              FieldDistortion, FrameDrift, FrameJump, PeriodicRotation, PeriodicTranslation,
-                             EntryCompliance, EntryClearance, HelicalPrecurvature, Contact>;
+                             EntryCompliance, EntryClearance, HelicalPrecurvature, Contact, Creep>;
 
 }  // namespace ctcr

@@ -71,6 +71,7 @@ SIZES = {
     "drive_compliance": (0.07, 3),
     "periodic_translation": (0.014, 3),
     "delay": (0.244, 1),
+    "creep": (0.3, 3),
 }
 
 
@@ -214,7 +215,7 @@ def test_true_bench():
 
 def test_suite():
     """Both halves of the suite hold enough sets for every question."""
-    suite = make_suite.entries()
+    suite, every = make_suite.entries(), {*make_suite.EFFECTS, *make_suite.LATER_EFFECTS}
     other = make_suite.entries(shift=1)
     assert [e.order.seed % 2 for e in other] == [e.order.seed % 2 for e in suite]
     assert not {e.order.seed for e in other} & {e.order.seed for e in suite}
@@ -222,12 +223,11 @@ def test_suite():
     for half in (0, 1):
         own = [entry for entry in suite if entry.order.seed % 2 == half]
         singles = {entry.order.effects for entry in own if entry.group == "single" and entry.order.noise == "jitter"}
-        assert singles == {((name, size),) for name in make_suite.EFFECTS for size in make_suite.SIZES}
+        assert singles == {((name, size),) for name in every for size in make_suite.SIZES}
         assert sum(entry.group == "strange" for entry in own) >= 8
         assert sum(entry.group == "control" for entry in own) >= 10
         assert sum(entry.order.wrong_sheet for entry in own) >= 20
-    ids = {i for name in make_suite.EFFECTS for i in CAUSES[name].ids}
-    assert ids == set(make_suite.EFFECTS)
+    assert {i for name in every for i in CAUSES[name].ids} == every
 
 
 @pytest.mark.parametrize("tubes", range(1, 5))

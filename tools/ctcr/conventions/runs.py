@@ -65,8 +65,9 @@ def _minorities(fit: Calibrated, readings: Measurements) -> Iterator[Integers]:
 def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple[Finding, Change] | None:
     """What is clearly different in some runs."""
     clear, theirs = settings.CONVENTION_CLEAR, np.isin(readings.run, some)
-    like, mine = calibrated(fit.robot, readings.rows(~theirs)), readings.rows(theirs)
-    others = [readings.rows(readings.run == run) for run in np.setdiff1d(readings.run, some)]
+    rest, mine = readings.rows(~theirs), readings.rows(theirs)
+    like = calibrated(fit.robot, rest)
+    others = [rest.rows(rest.run == run) for run in np.unique(rest.run)]
     of_others = [_typical(tips.errors(like.robot, rows), like) for rows in others]
     usual = np.quantile(of_others, settings.CONVENTION_RUNS, method="higher")  # infinite where nothing is solved
     before = replace(like, error=tips.errors(like.robot, mine))
@@ -94,6 +95,8 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     turned, mended = orientation.error_deg(like.robot, mine), orientation.error_deg(best.robot, best.change(mine))
     if mended > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
+    if clear * before.typical < np.quantile([*_left_out(fit.robot, rest)], settings.CONVENTION_RUNS, method="higher"):
+        return None  # the others are predicted no better by each other: a smooth field, or an effect
 
     def change(m: Measurements) -> Measurements:
         rows, right = np.isin(m.run, some), best.change(m)
@@ -163,6 +166,13 @@ def _off(robot: Robot, readings: Measurements, name: str, tube: int, value: floa
     tubes = [t.model_copy(update={"curvature_per_m": np.exp(value) * t.curvature_per_m}) for t in robot.tubes]
     tubes = [new if off else old for new, old, off in zip(tubes, robot.tubes, here, strict=True)]
     return robot.model_copy(update={"tubes": tubes}), readings
+
+
+def _left_out(robot: Robot, readings: Measurements) -> Iterator[float]:
+    """Typical error [m] of each run, predicted by a calibration of the others."""
+    for run in np.unique(readings.run):
+        fit = calibrated(robot, readings.rows(readings.run != run))
+        yield _typical(tips.errors(fit.robot, readings.rows(readings.run == run)), fit)
 
 
 def _typical(error: Array, like: Calibrated) -> float:
