@@ -11,7 +11,8 @@ from ctcr import settings
 from ctcr.arrays import Array, evenly
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector, nearest_rotation, points_to_base
 from ctcr.model import parameters
-from ctcr.model.model import Model, Prediction
+from ctcr.model.model import Prediction
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
@@ -91,8 +92,7 @@ def with_pose(free: str | Iterable[str], robot: Robot) -> list[str]:
 def _predicted(robot: Robot, measurements: Measurements) -> tuple[Measurements, Prediction]:
     """Readings spread over the table, and their tips."""
     few = measurements.rows(evenly(len(measurements), settings.SENSOR_ROWS))
-    beta, alpha = robot.joints_of_table(few.beta, few.alpha)
-    return few, Model(robot.standard).predict(beta, alpha, few.force)
+    return few, standard_tips(robot, few)
 
 
 def _rotation(robot: Robot, turns: Array) -> Array | None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array
-from ctcr.model.model import Model
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show.wording import listed
 from ctcr.table.measurements import Measurements
@@ -41,8 +41,7 @@ def leaps(robot: Robot, measurements: Measurements, predicted: Array | None = No
         return leap
     read = np.flatnonzero(np.isfinite(measurements.position).all(axis=1))
     if predicted is None:
-        beta, alpha = robot.joints_of_table(measurements.beta[read], measurements.alpha[read])
-        predicted = Model(robot.standard).predict(beta, alpha, measurements.force[read]).position
+        predicted = standard_tips(robot, measurements.rows(read)).position
     else:
         predicted = predicted[read]
     measured, run = measurements.position[read], measurements.run[read]

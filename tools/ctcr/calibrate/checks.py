@@ -9,9 +9,9 @@ from ctcr.fit import floors
 from ctcr.fit.result import Fit
 from ctcr.fit.widening import widened
 from ctcr.frames import base_to_tracker
-from ctcr.model.model import Model
 from ctcr.model.noise import noise_of_readings
 from ctcr.model.parameters import field_of
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show import wording
 from ctcr.show.wording import listed, numbers, sentence
@@ -29,8 +29,7 @@ def start(robot: Robot, readings: Measurements) -> float:
     """
     if readings.position is None or not np.isfinite(readings.position).any():
         raise InputError(Problem("no position is measured: columns x_m, y_m, z_m are missing or empty"))
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    answer = Model(robot.standard).predict(beta, alpha, readings.force)
+    answer = standard_tips(robot, readings)
     if not answer.solved.any():
         raise InputError(Problem("the model solves no row of the table: are these the joints of this robot?"))
     tip, _ = base_to_tracker(robot.tracker, answer.position, answer.quaternion)

@@ -21,7 +21,7 @@ from ctcr.fit.result import Fit, Priors
 from ctcr.fit.sessions import uncertain
 from ctcr.frames import matrix_from_quaternion, nearest_rotation, of_sensor
 from ctcr.model import parameters, user_recording
-from ctcr.model.model import Model
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show.wording import sentence
 from ctcr.table.measurements import Measurements
@@ -74,8 +74,7 @@ def considered(robot: Robot, readings: Measurements, fit: Fit) -> Array:
 def registered(robot: Robot, readings: Measurements) -> Robot:
     """The robot in the frame that carries the predicted sensor, and where measured its z axis, to the readings; with a
     pose of the sensor where its file does not know it."""
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    tip = Model(robot.standard).predict(beta, alpha, readings.force)
+    tip = standard_tips(robot, readings)
     place, measured = np.where(tip.solved[:, None], tip.position, np.nan), readings.positions
     count = int(np.isfinite(place + measured).all(axis=1).sum())
     if count < 3:

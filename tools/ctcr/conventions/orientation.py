@@ -9,7 +9,7 @@ from ctcr.conventions.calibrated import Calibrated
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import QUATERNION, Change, changed
 from ctcr.frames import angle_between, base_to_tracker, conjugate, matrix_from_quaternion, nearest_rotation, product
-from ctcr.model.model import Model
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show.wording import numbers
 from ctcr.table.measurements import Measurements
@@ -100,8 +100,7 @@ def _is_known(robot: Robot) -> bool:
 
 
 def _predicted(robot: Robot, readings: Measurements) -> Array:
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    tips = Model(robot.standard).predict(beta, alpha, readings.force)
+    tips = standard_tips(robot, readings)
     return base_to_tracker(robot.tracker, tips.position, tips.quaternion)[1]
 
 

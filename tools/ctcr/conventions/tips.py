@@ -4,15 +4,14 @@ import numpy as np
 
 from ctcr.arrays import Array
 from ctcr.frames import of_sensor, points_to_tracker
-from ctcr.model.model import Model
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
 
 def predicted(robot: Robot, readings: Measurements) -> Array:
     """Positions (K, 3) [m], base frame; NaN where there is no solution."""
-    beta, alpha = robot.joints_of_table(readings.beta, readings.alpha)
-    found = Model(robot.standard).predict(beta, alpha, readings.force)
+    found = standard_tips(robot, readings)
     return np.where(found.solved[:, None], of_sensor(robot.tracker, found.position, found.quaternion)[0], np.nan)
 
 

@@ -24,10 +24,10 @@ from ctcr.fit.result import Fit, Priors, rms
 from ctcr.fit.widening import Likelihood, Scales
 from ctcr.frames import base_to_tracker
 from ctcr.model import recording, user_recording
-from ctcr.model.model import Model
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.protocol import LinearModel, ResidualModel
 from ctcr.model.sessions import told
+from ctcr.model.table_poses import standard_tips
 from ctcr.robot.description import Robot
 from ctcr.show.wording import counted, listed
 from ctcr.table.measurements import Measurements
@@ -317,8 +317,7 @@ def sensor_positions(robot: Robot, measurements: Measurements) -> Array:
     positions = measurements.positions.copy()
     missing = np.isnan(positions).any(axis=1)
     if missing.any():
-        beta, alpha = robot.joints_of_table(measurements.beta[missing], measurements.alpha[missing])
-        tips = Model(robot.standard).predict(beta, alpha, measurements.force[missing])
+        tips = standard_tips(robot, measurements.rows(missing))
         positions[missing] = base_to_tracker(robot.tracker, tips.position, tips.quaternion)[0]
     return positions
 

@@ -32,6 +32,12 @@ def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "
     return Prediction(**columns, jacobian=None, compliance=None)
 
 
+def standard_tips(robot: Robot, table: Measurements) -> Prediction:
+    """The pose of the tip in each row, base frame, by the standard model: without the effects of the robot."""
+    beta, alpha = robot.joints_of_table(table.beta, table.alpha)
+    return Model(robot.standard).predict(beta, alpha, table.force)
+
+
 def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple[slice, Prediction]]:
     """Yields (rows, their predicted poses) in chunks, so that a long table shows its progress and takes no memory; with
     effects, which may have a history, all rows at once."""
