@@ -13,7 +13,7 @@ from ctcr.calibrate import joint_fit, report
 from ctcr.errors import InputError
 from ctcr.fit import folds
 from ctcr.fit.sessions import as_sessions
-from ctcr.model import effect_model, fields
+from ctcr.model import fields, table_poses
 from ctcr.model.model import Model
 from ctcr.robot import robot_file
 from ctcr.table import measurements
@@ -272,7 +272,7 @@ def test_effects(robot, readings, tmp_path):
     """Effects of the robot file act in the fit, with fixed or fitted values."""
     beside = robot.model_copy(update={"effects": {"sensor_offset": {"x": 2e-3}}})
     beside._source = robot._source
-    seen = effect_model.readings(beside, readings)
+    seen = table_poses.readings(beside, readings)
     position, quaternion = frames.base_to_tracker(robot.tracker, seen.position, seen.quaternion)
     noise = np.random.default_rng(1).normal(0, 3.5e-5, position.shape)
     made = replace(readings, position=position + noise, quaternion=quaternion)

@@ -12,7 +12,7 @@ import pytest
 from ctcr.effects import catalogue
 from ctcr.effects.settings import settings
 from ctcr.errors import InputError
-from ctcr.model import effect_model, recording, simulation
+from ctcr.model import recording, simulation, table_poses
 from ctcr.robot import history, robot_file
 from ctcr.table import measurements
 
@@ -109,11 +109,11 @@ def test_neutral_effects_change_nothing(robot, plan):
 def test_model_and_recording(robot, plan, hidden):
     """Without history a model of single poses equals the recording."""
     model = ctcr.Model(robot, steps=4).predict(plan.beta, plan.alpha, plan.force)
-    read = effect_model.readings(robot, plan, steps=4)
+    read = table_poses.readings(robot, plan, steps=4)
     np.testing.assert_allclose(read.position, model.position, atol=1e-9)
     bent = hidden(robot, softening="0.01", tip_load__mass="0.002")
     model = ctcr.Model(bent, steps=4).predict(plan.beta, plan.alpha, plan.force)
-    with_effects = effect_model.readings(bent, plan, steps=4)
+    with_effects = table_poses.readings(bent, plan, steps=4)
     np.testing.assert_allclose(with_effects.position, model.position, atol=1e-9)
     assert np.linalg.norm(with_effects.position - read.position, axis=1).max() > 1e-4
 
@@ -145,7 +145,7 @@ def test_remove_undoes_add(run, robot, plan, table, tmp_path, hidden):
         old, new = robot_file.load(before), robot_file.load(after)
         np.testing.assert_array_equal(recording.values(old), recording.values(new))
         np.testing.assert_allclose(
-            effect_model.readings(old, plan).position, effect_model.readings(new, plan).position, atol=1e-12
+            table_poses.readings(old, plan).position, table_poses.readings(new, plan).position, atol=1e-12
         )
     assert [entry["command"] for entry in robot_file.load(last).history] == [
         "ctcr add sensor_offset",

@@ -9,7 +9,7 @@ import pytest
 from ctcr.diagnose import add, terminal
 from ctcr.effects import catalogue
 from ctcr.fit.folds import held_out_rows
-from ctcr.model import effect_model, recording, simulation
+from ctcr.model import recording, simulation, table_poses
 from ctcr.robot import robot_file
 from ctcr.show import output
 
@@ -46,7 +46,7 @@ def test_hidden_effect(robot, plan, given, hidden):
 def effects_to_find(robot, plan) -> dict[str, dict[str, float]]:
     """Effects whose start a search finds: a moment, a plane, a source of field beside the tracker."""
     tips = ctcr.Model(robot).predict(plan.beta, plan.alpha, plan.force).position
-    read = effect_model.readings(robot, plan).position
+    read = table_poses.readings(robot, plan).position
     normal = np.array([np.cos(0.5) * np.cos(1.2), np.cos(0.5) * np.sin(1.2), np.sin(0.5)])
     metal = read.mean(axis=0) + 1.1 * np.ptp(read, axis=0).max() * np.array([0.6, -0.64, 0.48])
     return {

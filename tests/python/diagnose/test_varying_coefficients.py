@@ -10,7 +10,7 @@ from ctcr.compare.sample import take_sample
 from ctcr.diagnose import diagnose, held_out, report, terminal, varying_coefficients
 from ctcr.diagnose.engine import Engine
 from ctcr.fit.folds import held_out_rows
-from ctcr.model import effect_model, fields, simulation
+from ctcr.model import fields, simulation, table_poses
 from ctcr.model.noise import noise_of_readings
 from ctcr.show import output
 from ctcr.show.wording import number
@@ -43,7 +43,7 @@ def looked_at(robot, readings):
     """An engine for three quarters of the runs, its calibration, and the model of what varies."""
     engine = Engine(robot, readings, noise_of_readings(robot, readings), ~held_out_rows(robot, readings, 0))
     fit = engine.fit_with_field([], {})
-    sample = take_sample(robot, readings, effect_model.readings(robot, readings))
+    sample = take_sample(robot, readings, table_poses.readings(robot, readings))
     return engine, fit, varying_coefficients.varying_model(engine, fit, sample)
 
 

@@ -17,7 +17,7 @@ from ctcr.effects import catalogue, user_effects
 from ctcr.effects.user_effects import Effect, Parameter
 from ctcr.errors import InputError
 from ctcr.frames import matrix_from_rotation_vector
-from ctcr.model import effect_model, recording, simulation
+from ctcr.model import recording, simulation, table_poses
 from ctcr.model.user_recording import UserRecording
 from ctcr.robot import robot_file
 from ctcr.track import runs, scenario
@@ -164,7 +164,7 @@ def test_base(robot, readings):
 
 
 def _tips(robot, readings):
-    found = effect_model.readings(robot, readings, settings.STEPS)
+    found = table_poses.readings(robot, readings, settings.STEPS)
     return found.position, found.quaternion
 
 

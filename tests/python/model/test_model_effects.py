@@ -5,7 +5,7 @@ import pytest
 from ctcr import Model
 from ctcr.effects import catalogue
 from ctcr.errors import InputError
-from ctcr.model import effect_model
+from ctcr.model import table_poses
 from ctcr.robot.description import Actuation, Tracker
 from ctcr.table.measurements import Measurements
 from model_bench import make_robot, pose_of, random_force, random_joints, slope
@@ -63,7 +63,7 @@ def test_poses(identity, sensor):
     robot = with_effects(bench_robot(sensor), identity)
     beta, alpha = random_joints(robot, 20)
     force = random_force(20)
-    seen = effect_model.readings(robot, table_of(beta, alpha, force), steps=4)
+    seen = table_poses.readings(robot, table_of(beta, alpha, force), steps=4)
     answer = Model(robot, steps=4).predict(beta, alpha, force)
     assert answer.solved.all()
     np.testing.assert_allclose(answer.position, seen.position, atol=1e-9)

@@ -12,7 +12,7 @@ from ctcr import settings
 from ctcr.arrays import Array, Integers, evenly
 from ctcr.fit.result import Fit, rms
 from ctcr.frames import base_to_tracker, points_to_base
-from ctcr.model import effect_model
+from ctcr.model import table_poses
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -69,7 +69,7 @@ def compare_halves(robot: Robot, readings: Measurements, first: Fit, second: Fit
 def _tips(robot: Robot, readings: Measurements, rows: Integers) -> Array:
     """Predicted tips (K, 3), tracker frame; NaN where not solved."""
     if robot.effects:  # they may depend on the whole path
-        seen = effect_model.readings(robot, readings)
+        seen = table_poses.readings(robot, readings)
         return base_to_tracker(robot.tracker, seen.position[rows], seen.quaternion[rows])[0]
     beta, alpha = robot.joints_of_table(readings.beta[rows], readings.alpha[rows])
     answer = Model(robot).predict(beta, alpha, readings.force[rows])

@@ -10,7 +10,7 @@ from ctcr.compare.sample import Sample, take_sample
 from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.outliers import beyond_noise, clustered, unexplained_runs
 from ctcr.fit import joint
-from ctcr.model import effect_model
+from ctcr.model.table_poses import readings
 from ctcr.show.wording import listed, percent, runs_named
 
 
@@ -70,7 +70,7 @@ class Residual:
 
 
 def residual_of(engine: Engine, before: joint.Fit, fit: joint.Fit, corrections: list[str]) -> Residual:
-    sample = take_sample(engine.robot, engine.measurements, effect_model.readings(engine.robot, engine.measurements))
+    sample = take_sample(engine.robot, engine.measurements, readings(engine.robot, engine.measurements))
     ranked = _rank(engine, sample, before)
     after = ranked if fit is before else _rank(engine, sample, fit)
     clusters = engine.measurements.row[clustered(engine.measurements, fit)].tolist()

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ctcr.frames import base_to_tracker
-from ctcr.model import effect_model
+from ctcr import _core
+from ctcr.frames import base_to_tracker, tracker_to_base
+from ctcr.model import user_recording
 from ctcr.model.model import Model, Prediction
 from ctcr.robot.description import Robot
 from ctcr.show.output import Progress
@@ -32,6 +33,19 @@ def predict(robot: Robot, table: Measurements, *, steps: int = 4, frame: str = "
     return Prediction(**columns, jacobian=None, compliance=None)
 
 
+def readings(robot: Robot, table: Measurements, steps: int = 4) -> Prediction:
+    """What the tracker would read in all rows in their order, with all effects of the robot, seen from its base frame.
+
+    The stability is not known: NaN.
+    """
+    recorded = user_recording.recording_of(robot, table, (), steps=steps)
+    recorded.residual(np.empty(0))
+    position, quaternion = tracker_to_base(robot.tracker, *recorded.predicted())
+    solved = np.isfinite(position).all(axis=1)
+    status = np.where(solved, _core.Status.ok.value, _core.Status.not_converged.value).astype(np.uint8)
+    return Prediction(position, quaternion, status, np.full(len(table), np.nan), None, None)
+
+
 def standard_tips(robot: Robot, table: Measurements) -> Prediction:
     """The pose of the tip in each row, base frame, by the standard model: without the effects of the robot."""
     beta, alpha = robot.joints_of_table(table.beta, table.alpha)
@@ -45,9 +59,7 @@ def predictions(robot: Robot, table: Measurements, steps: int) -> Iterator[tuple
     if table.refusal:
         raise table.refusal
     if robot.effects:
-        found, unknown = effect_model.readings(robot, table, steps), np.full(len(table), np.nan)
-        everything = slice(0, len(table))
-        yield everything, Prediction(found.position, found.quaternion, found.status, unknown, None, None)
+        yield slice(0, len(table)), readings(robot, table, steps)
         return
     model, (beta, alpha) = Model(robot, steps=steps), robot.joints_of_table(table.beta, table.alpha)
     with Progress("predicting", len(table)) as progress:
