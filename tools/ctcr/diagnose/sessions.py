@@ -22,9 +22,8 @@ from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit, rms
 from ctcr.fit.sessions import as_sessions, part_of_runs, sessions_at, some_runs, uncertain
-from ctcr.model import user_recording
+from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of_readings
-from ctcr.model.sessions import home_names
 from ctcr.robot.description import Robot
 from ctcr.show import wording
 from ctcr.table.measurements import Measurements
@@ -64,7 +63,7 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     if asked is None and not _wins(engine, one, framed):
         return readings, []
     own, shared = framed.fit(), "a frame"
-    homes = tuple(home_names(robot.n_tubes))
+    homes = tuple(parameters.expand("homes", robot))
     explained = _explained_by_run(framed, own) if joint.rejects(own) else {}
     homed = _with_homes(framed) if homes in explained else None
     if homed:
@@ -177,7 +176,7 @@ def _explained_by_run(engine: Engine, fit: Fit) -> dict[tuple[str, ...], float]:
     run = engine.measurements.run[fit.fitted_numbers // 6]
     of_run = (run[:, None] == np.unique(run)) * settings.SESSION_PRIOR_WIDER
     of_tubes = [name for name in fit.names if name.startswith("tubes.")]
-    groups = [home_names(engine.robot.n_tubes), *([name] for name in of_tubes)]
+    groups = [parameters.expand("homes", engine.robot), *([name] for name in of_tubes)]
     groups += [[name for name in of_tubes if f"tubes.{i + 1}." in name] for i in range(engine.robot.n_tubes)]
     found, unexplained = {}, Judged.of(engine, fit).unexplained
     for names in groups:

@@ -20,9 +20,7 @@ from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.held_out import unexplained_of
 from ctcr.diagnose.linearised import Linear, laplace
 from ctcr.fit.joint import Fit
-from ctcr.model import parameters
-
-SHOWN_UNITS = {"rad": ("deg", 180 / np.pi), "m": ("mm", 1e3), "Pa": ("GPa", 1e-9)}  # others are shown in SI
+from ctcr.model.parameters import field_of
 
 ADVICE = "An effect of your own that acts there may be what is missing: see docs/effects.md."
 MEASURE = {  # by how the id of a quantity begins: what shows it best
@@ -223,11 +221,11 @@ def _variations(
 ) -> list[Variation]:
     """How each parameter changes; `moved` are the coefficients of all columns of the pairs, in units of prior sd."""
     rows = np.searchsorted(engine.measurements.row, sample.row)
-    units, found, begin = parameters.units_with_effects(engine.robot), [], 0
+    found, begin = [], 0
     for p, covariate, columns in pairs:
         end = begin + columns.shape[1]
-        unit, scale = SHOWN_UNITS.get(units[fit.names[p]], (units[fit.names[p]], 1.0))
-        change = scale * fit.prior_sd[p] * columns[rows] @ moved[begin:end]
-        found.append(Variation(fit.names[p], covariate, change, unit))
+        field = field_of(fit.names[p])
+        change = field.factor * fit.prior_sd[p] * columns[rows] @ moved[begin:end]
+        found.append(Variation(fit.names[p], covariate, change, field.unit))
         begin = end
     return found

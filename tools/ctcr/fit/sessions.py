@@ -7,7 +7,6 @@ from ctcr.arrays import Mask, evenly
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.model import effect_model, parameters, user_recording
-from ctcr.model.sessions import home_names
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 from ctcr.table.sessions import Sessions
@@ -81,9 +80,9 @@ def placed(robot: Robot, sessions: Sessions | None) -> Robot:
     if sessions is None:
         return robot
     shift, turn, homes = sessions.typical
-    names = [f"tracker.{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"]
+    names = parameters.expand("tracker.frame", robot)
     values = [*(robot.tracker.position + shift), *turn]
     if homes is not None:
-        own = home_names(robot.n_tubes)
+        own = parameters.expand("homes", robot)
         names, values = [*names, *own], [*values, *(parameters.values(robot, own) + homes)]
     return parameters.applied(robot, names, values)

@@ -118,17 +118,17 @@ def changes(fit: Any, before: Robot, after: Robot) -> list[Change]:
         if field.path and _is_list(before, field.path):
             made.append(Change(field.path, field.unit, value_at(after, field.path), field.factor * float(sd)))
     said = {change.path for change in made}
-    sds = {key: _sds(fit, key, getattr(before.tracker, key) or [0.0] * 3) for key in _POSES}
     for key, unit in _POSES.items():
-        new = getattr(after.tracker, key)
-        if not _is_list(before, ("tracker", key, 0)):
-            made += (
-                [Change(("tracker", key), unit, new, sds[key] or None)] if new != getattr(before.tracker, key) else []
-            )
+        old, new = getattr(before.tracker, key), getattr(after.tracker, key)
+        if old == new:
             continue
-        for i, (old, value) in enumerate(zip(getattr(before.tracker, key), new, strict=True)):
-            if old != value and ("tracker", key, i) not in said:
-                made.append(Change(("tracker", key, i), unit, value, sds[key][i] if sds[key] else None))
+        sds = _sds(fit, key, old or [0.0] * 3)
+        if not _is_list(before, ("tracker", key, 0)):
+            made.append(Change(("tracker", key), unit, new, sds or None))
+            continue
+        for i in range(3):
+            if old[i] != new[i] and ("tracker", key, i) not in said:
+                made.append(Change(("tracker", key, i), unit, new[i], sds[i] if sds else None))
     for key, unit in (("sensor_position_mm", "mm"), ("sensor_rotation_deg", "deg")):  # of what was not known
         stated = getattr(after.uncertainty, key)
         if stated != getattr(before.uncertainty, key):

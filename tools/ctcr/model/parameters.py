@@ -29,7 +29,6 @@ GROUPS = {  # short names
     "homes": ("actuation.home_translation.*", "actuation.home_rotation.*"),
 }
 STANDARD = "standard"  # the parameters of the paper's calibration
-_STANDARD_TUBE = ("stiffness", "curvature", "curved_length", "length")
 _FIELDS = {  # kind of a parameter: field of the robot file (#: tube or axis), unit there, that unit per SI unit
     "tubes.#.youngs_modulus": (("tubes", "#", "youngs_modulus_GPa"), "GPa", 1e-9),
     "tubes.#.poisson_ratio": (("tubes", "#", "poisson_ratio"), "", 1.0),
@@ -114,13 +113,6 @@ def value_at(robot: Robot, path: FieldPath) -> Any:
         if value is not None:
             value = value[step] if isinstance(step, int) else getattr(value, step)
     return value
-
-
-def units_with_effects(robot: Robot) -> dict[str, str]:
-    """SI unit by name, those of the robot's effects included."""
-    known = catalogue.parameter_of(robot.n_tubes)
-    own = {p.name: p.unit for p in _core.robot_parameters(robot.n_tubes)}
-    return own | {name: known[name].unit for name in of_effects(robot)}
 
 
 def expand(free: str | Iterable[str], robot: Robot) -> list[str]:
@@ -296,13 +288,12 @@ def admissible(robot: Robot, beta: Array, names: list[str]) -> list[tuple[str, A
 
 
 def _standard(robot: Robot) -> list[str]:
-    found = ["tracker.position.*", "tracker.rotation.*", "actuation.home_translation.*", "actuation.home_rotation.*"]
-    found += of_sensor(robot)
+    found = [*GROUPS["tracker.frame"], *GROUPS["homes"], *of_sensor(robot)]
     for i, tube in enumerate(robot.tubes, start=1):
-        curved = tube.curvature != 0 and tube.curved_length != 0
-        stiffness = "youngs_modulus" if tube.bending_stiffness_Nm2 is None else "bending_stiffness"
-        own = _STANDARD_TUBE if curved else ("stiffness", "length")
-        found += [f"tubes.{i}.{stiffness if name == 'stiffness' else name}" for name in own]
+        own = ["length", "youngs_modulus" if tube.bending_stiffness_Nm2 is None else "bending_stiffness"]
+        if tube.curvature != 0 and tube.curved_length != 0:
+            own += ["curvature", "curved_length"]
+        found += [f"tubes.{i}.{name}" for name in own]
     return found
 
 

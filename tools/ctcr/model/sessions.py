@@ -34,11 +34,6 @@ def as_given(model: Any) -> Any:
     return model.as_given() if isinstance(model, SessionRecording) else model
 
 
-def home_names(n_tubes: int) -> list[str]:
-    """The parameters of the homes, in the order of `Sessions.homes`."""
-    return [f"actuation.home_{kind}.{i + 1}" for kind in ("translation", "rotation") for i in range(n_tubes)]
-
-
 class SessionRecording(ResidualModel):
     """A recording of readings with sessions, beside which each run keeps what little of its own they left in it."""
 
@@ -47,20 +42,16 @@ class SessionRecording(ResidualModel):
         parameters are the homes, where each run has its own."""
         self.table, self.as_given, self.readings = table, as_given, readings
         self.index = np.searchsorted(readings.sessions.run, readings.run)
-        u, n, wider = robot.uncertainty, robot.n_tubes, settings.SESSION_PRIOR_WIDER
-        width = [1e-3 * u.of("tracker_frame_mm", axis) for axis in range(3)]
-        width += [np.radians(u.of("tracker_frame_deg", axis)) for axis in range(3)]
+        own, self.by_homes = parameters.expand("tracker.frame", robot), None
         if homes is not None:
-            width += [1e-3 * u.of("translation_offset_mm", tube) for tube in range(n)]
-            width += [np.radians(u.of("rotation_offset_deg", tube)) for tube in range(n)]
-        self.sd = np.maximum(wider * np.array(width), np.finfo(float).tiny ** 0.5)  # (k,) of what a run has of its own
+            own += parameters.expand("homes", robot)
+            self.by_homes = np.nan_to_num(homes.residual(homes.nominal(), True)[1]).reshape(len(readings), 6, -1)
+        width = settings.SESSION_PRIOR_WIDER * np.array([parameters.stated_sd(robot, name) for name in own])
+        self.sd = np.maximum(width, np.finfo(float).tiny ** 0.5)  # (k,) of what a run has of its own
         noise = noise_of_readings(robot, readings)
         jitter, field = (noise.position_jitter, noise.rotation_jitter), (noise.position_field, noise.rotation_field)
         self.weight = 1 / np.repeat(np.hypot(jitter, field), 3) ** 2
         self.origin = readings.sessions.origin
-        self.by_homes = (
-            None if homes is None else np.nan_to_num(homes.residual(homes.nominal(), True)[1].reshape(-1, 6, 2 * n))
-        )
 
     def nominal(self) -> Array:
         return self.table.nominal()

@@ -15,9 +15,9 @@ from ctcr.effects.user_effects import Effect, Rows
 from ctcr.effects.user_hooks import PROFILES, Hooks
 from ctcr.errors import InputError, Problem
 from ctcr.frames import matrix_from_quaternion, matrix_from_rotation_vector
-from ctcr.model import recording
+from ctcr.model import parameters, recording
 from ctcr.model.protocol import ResidualModel
-from ctcr.model.sessions import SessionRecording, home_names
+from ctcr.model.sessions import SessionRecording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
 
@@ -28,7 +28,7 @@ def recording_of(robot: Robot, measurements: Measurements, names: Sequence[str] 
     if (sessions := measurements.sessions) is not None:
         one, tables = replace(measurements, sessions=None), [names]
         if sessions.homes is not None:
-            tables.append(home_names(robot.n_tubes))
+            tables.append(parameters.expand("homes", robot))
         table, *homes = (recording_of(robot, one, some, **options) for some in tables)
         return SessionRecording(
             robot,
@@ -88,8 +88,7 @@ class UserRecording(ResidualModel):
             "fixed": {name: value for name, value in (fixed or {}).items() if name in known},
         }
         # Joints and forces that the user's functions change act through these parameters of the compiled recording.
-        homes = [f"actuation.home_{kind}.{i + 1}" for kind in ("translation", "rotation") for i in range(robot.n_tubes)]
-        self._joints = homes if hooks.has("joints") else []
+        self._joints = parameters.expand("homes", robot) if hooks.has("joints") else []
         self._forces = catalogue.names_with("tip_force", robot.n_tubes) if hooks.has("force", "base") else []
         given = [name for name in self._names if name in library]
         self._inner = list(dict.fromkeys([*given, *self._joints, *self._forces]))
