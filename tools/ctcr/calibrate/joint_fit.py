@@ -18,8 +18,8 @@ from ctcr.errors import ArgumentError, InputError, Problem
 from ctcr.fit import folds, joint, widening
 from ctcr.fit.floors import Floors, floors
 from ctcr.fit.result import Fit, rms
-from ctcr.fit.sessions import placed
-from ctcr.model import effect_model, fields
+from ctcr.fit.sessions import placed, some_rows
+from ctcr.model import fields
 from ctcr.model.fields import Fitted
 from ctcr.model.noise import Noise, noise_of_readings
 from ctcr.model.sessions import told
@@ -192,7 +192,7 @@ def calibrate(
     frame = [name for name in names if name.startswith("tracker.")]
     few = folds.part_of(usable, settings.CROSS_VALIDATION_ROWS)
     many = np.sum(few) < np.sum(usable)
-    table, rows = _part(robot, readings, few) if many else (readings, usable)
+    table, rows = some_rows(robot, readings, few) if many else (readings, usable)
     split, judged = _held_out_parts(table, lever, hold_out)
     both = folds.parts_of(table, lever, 2) if halves else None
     prior_sd = fields.in_si(sd or {}, robot)
@@ -256,14 +256,6 @@ def _change(c: Calibration) -> tuple[list[ledger.Change], ledger.Entry, dict[str
     return changes, entry, effects
 
 
-def _part(robot: Robot, readings: Measurements, few: Mask) -> tuple[Measurements, Mask]:
-    """A table of the chosen rows (M,) alone, and all its rows; the whole one and those rows, where its other rows are
-    part of the path that effects of the robot remember."""
-    if effect_model.of_the_path(robot):
-        return readings, few
-    return readings.rows(few), np.ones(np.sum(few), bool)
-
-
 def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> tuple[folds.Split | None, list[int]]:
     """How the table is split, and the parts that are held out: each in turn, or `count` runs."""
     if count:
@@ -272,9 +264,7 @@ def _held_out_parts(readings: Measurements, lever: float, count: int | None) -> 
         except InputError as error:
             raise ArgumentError(error.problems) from None
     split = folds.parts_of(readings, lever, settings.FOLDS) if count is None else None
-    if split is None:
-        return None, []
-    return split, list(range(split.parts))
+    return split, list(range(settings.FOLDS)) if split else []
 
 
 def _noises(robot: Robot, readings: Measurements, noise: str) -> list[Noise]:

@@ -24,11 +24,10 @@ from ctcr.table.measurements import Measurements
 
 @dataclass(frozen=True)
 class Split:
-    """`part` (M,) of each row, 0 .. parts - 1; `kind`: what was kept together, runs or places (of joint space)."""
+    """`part` (M,) of each row, from 0; `kind`: what was kept together, runs or places (of joint space)."""
 
     kind: str
     part: Integers
-    parts: int
 
 
 def few_of(rows: Mask, least: int | None = None) -> Mask | None:
@@ -65,9 +64,9 @@ def parts_of(readings: Measurements, lever: float, parts: int) -> Split | None:
     """
     runs, index = np.unique(readings.run, return_inverse=True)
     if len(runs) >= max(settings.FEWEST_RUNS, parts):
-        return Split("runs", index % parts, parts)
+        return Split("runs", index % parts)
     cell = _regions(readings, lever)
-    return Split("places", cell % parts, parts) if cell.max() + 1 >= 2 * parts else None
+    return Split("places", cell % parts) if cell.max() + 1 >= 2 * parts else None
 
 
 def runs_left_out(readings: Measurements, count: int) -> Split:
@@ -78,7 +77,7 @@ def runs_left_out(readings: Measurements, count: int) -> Split:
         hint = "; leave it out, and places in joint space are held out" if len(runs) < settings.FEWEST_RUNS else ""
         raise InputError(Problem(text + hint))
     chosen = ((np.arange(count) + 0.5) * len(runs) / count).astype(int)
-    return Split("runs", np.isin(index, chosen).astype(np.int64), 2)
+    return Split("runs", np.isin(index, chosen).astype(np.int64))
 
 
 def groups(measurements: Measurements) -> Integers:

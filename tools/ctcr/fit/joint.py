@@ -61,18 +61,17 @@ def fit(
     rows: Mask | None = None,
     sd: Mapping[str, float] | None = None,
     noise: Noise | None = None,
-    weights: Array | None = None,
-    inflation: ArrayLike | None = None,
-    scales: Scales | None = None,
     starts: int = settings.STARTS,
-    tolerance: float = settings.TOLERANCE,
+    **options: Any,
 ) -> Fit:
     """Fits the named parameters (see `parameters.expand`) to the readings, given the robot file's priors.
 
     rows     (M,) readings to fit, all by default; the others are judged with the result. Split by run, never by row.
     sd       {name: prior standard deviation in SI, or math.inf} over the file's `uncertainty`
     noise    of the tracker; `noise_of_readings` by default. What is uncertain of the sensor's pose is always free
-    Other options as in `FitOptions`. Raises NoFit where none is possible.
+    starts   that are compared, all but the first drawn from the priors
+    options  weights, inflation, scales and tolerance, as in `FitOptions`
+    Raises NoFit where none is possible.
     """
     began = perf_counter()
     robot, measurements, said = sensor_pose.usable(robot, measurements)
@@ -82,19 +81,19 @@ def fit(
     rows, positions = measurements.measured & chosen, sensor_positions(robot, measurements)
     priors = Priors.of(robot, names, measurements.beta[chosen], sd)
     steps = recording.steps_for(robot, measurements, noise)
-    given = {"weights": weights, "inflation": inflation, "scales": scales}
-    how = {"row": measurements.row, "tolerance": tolerance}
+    options["row"] = measurements.row
 
     def model() -> ResidualModel:
         return user_recording.recording_of(robot, measurements, names, steps=steps)
 
     def fit_from(start: Array, like: Fit | None = None, starts: int = 1) -> Fit:
-        kept, table = like.frozen if like else given, model()
+        table, how = model(), options | {"start": start, "starts": starts}
         if like:
             table.begin_at(like.model)
-        return fit_joint(table, priors, noise, positions, rows, start=start, starts=starts, **kept, **how)
+            how |= like.frozen
+        return fit_joint(table, priors, noise, positions, rows, **how)
 
-    start, priors = _with_frame(model(), priors, noise, positions, rows, **given, **how)
+    start, priors = _with_frame(model(), priors, noise, positions, rows, **options)
     fitted = one_sided.widened(one_sided.restarted(fit_from(start, starts=starts), fit_from))
     warnings = [*said, *_table_warnings(measurements, rows), *fitted.warnings]
     return replace(fitted, warnings=warnings, seconds=perf_counter() - began)
@@ -200,8 +199,12 @@ def _fit_active(model: ResidualModel, priors: Priors, noise: Noise, positions: A
         hint = f"{which}; correct their joints or loads, or leave them out"
         raise NoFit([Problem(line + hint * bool(unsolved)) for line in str(error).splitlines()]) from None
     own = {name: getattr(core, name) for name in ("values", "sd", "covariance", "ratio", "starts")}
-    warnings, seconds = [*core.warnings, *_exclusion_warnings(excluded, how)], perf_counter() - began
-    return Fit(priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=seconds)
+    warnings = [*core.warnings]
+    if excluded:
+        warnings.append(f"the model has no solution for {_named(excluded, how)}: left out, check joints and loads")
+    return Fit(
+        priors, noise, positions, core, model, excluded, **own, warnings=warnings, seconds=perf_counter() - began
+    )
 
 
 def _as_function(model: ResidualModel):
@@ -337,13 +340,6 @@ def _table_warnings(measurements: Measurements, rows: Mask) -> Iterable[str]:
         yield "there is only one run: readings that follow one another cannot check what was learned from them"
     if not np.isfinite(measurements.quaternions[rows]).any():
         yield "no orientation was measured: positions alone tell the parameters apart less well"
-
-
-def _exclusion_warnings(rows: Sequence[int], how: FitOptions) -> list[str]:
-    """Names rows without a solution, counted from 0."""
-    if not rows:
-        return []
-    return [f"the model has no solution for {_named(rows, how)}: left out, check joints and loads"]
 
 
 def _named(rows: Sequence[int], how: FitOptions) -> str:

@@ -62,14 +62,19 @@ def some_runs(readings: Measurements) -> Measurements:
 
 
 def part_of_runs(robot: Robot, readings: Measurements) -> tuple[Measurements, Mask]:
-    """A table of some rows of each run alone, which is cheap, all its rows chosen (M,); the whole one and those rows,
-    where the robot has effects of the path."""
+    """A table of some rows of each run, which is cheap, as `some_rows` gives it."""
     measured, chosen = np.flatnonzero(readings.measured), np.zeros(len(readings), bool)
     order = measured[np.argsort(readings.run[measured], kind="stable")]
     runs = np.split(order, np.flatnonzero(np.diff(readings.run[order])) + 1)
     each = settings.SESSION_ROWS // min(len(runs), settings.CONVENTION_MOST_RUNS)
     for rows in runs:
         chosen[rows[evenly(len(rows), each)]] = True
+    return some_rows(robot, readings, chosen)
+
+
+def some_rows(robot: Robot, readings: Measurements, chosen: Mask) -> tuple[Measurements, Mask]:
+    """A table of the chosen rows (M,) alone, and all its rows; the whole one and those rows, where its other rows are
+    part of the path that effects of the robot remember."""
     if effect_model.of_the_path(robot):
         return readings, chosen
     return readings.rows(chosen), np.ones(np.sum(chosen), bool)
