@@ -43,9 +43,9 @@ def compare(robot: Robot, table: Measurements, *, steps: int = 4) -> Comparison:
         prediction = predict(robot, readings, steps=steps)
     notices = [*table.doubts, *map(sentence, (*copied, *corrected, *placed)), *excluded, *map(sentence, added)]
     snapped: list[int] = [] if found.wrong else readings.row[snaps.snapped(robot, readings, prediction)].tolist()
-    known = (notices, found.findings, own, floor, files, snapped, found.unexplained)
+    known = {"notices": notices, "floors": floor, "files": files, "snapped": snapped, "unexplained": found.unexplained}
     try:
-        return analysis.compare(robot, readings, prediction, *known)
+        return analysis.compare(robot, readings, prediction, conventions=found.findings, sessions=own, **known)
     except InputError as error:  # nothing is left to compare: the robot file may say why
         raise InputError([*error.problems, *robot_file.warnings(robot)]) from None
 

@@ -1,15 +1,15 @@
 """All numbers of a comparison of the model with measurements: how large the error is, and what it depends on."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import isfinite
+from dataclasses import dataclass, field, replace
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Integers
-from ctcr.compare.covariates import fixed_names, has_speed
+from ctcr.compare.covariates import fixed_names
 from ctcr.compare.crossvalidation import group_means, group_quantiles, make_folds, split
 from ctcr.compare.dependence import Ranking, rank
 from ctcr.compare.noise import DirectionDifference, NoiseFloor, direction_difference, noise_floor
@@ -74,19 +74,17 @@ class Comparison(Result):
     run_offsets: RunOffsets  # where found, the dependences are those of the error about each run's mean
     same_joints: list[PairOfRuns]
     ranking: Ranking
-    fixed: list[str]  # joints and loads that never change here
-    has_time: bool
-    has_speed: bool
     accuracy_95_mm: float  # the tracker's stated figure, NaN if not stated
     plate_mm: Array  # (3,) origin of the base frame in the tracker frame, from the robot file
     headline: Sample  # the readings as they are
     sample: Sample  # the same, with the frame fitted where it is grossly wrong
     stops: Stops
     revisits: Revisits
-    notices: Sequence[str]  # what was done before: readings left out, a pose found for the sensor
     conventions: Sequence[Convention]  # that are wrong, the clearest first
-    floors: dict[str, float]  # sensor_jitter_mm and expected_error_mm, as of all commands
     sessions: Sequence[str]  # sentences on what each run has of its own; where any, all but the errors is without it
+    # What is known before a comparison.
+    notices: Sequence[str] = ()  # what was done: readings left out, a pose found for the sensor
+    floors: Mapping[str, float] = field(default_factory=lambda: {"sensor_jitter_mm": nan, "expected_error_mm": nan})
     files: Sequence[str] = ()  # that were compared
     snapped: Sequence[int] = ()  # rows on another stable equilibrium than the one predicted
     unexplained: str = ""  # that something is wrong which no known convention explains
@@ -115,7 +113,7 @@ class Comparison(Result):
             "found": [item.as_dict() for item in self.ranking.chosen],
             "ranked": [item.as_dict() for item in self.ranking.alone],
         }
-        data["never_varied"] = self.fixed
+        data["never_varied"] = fixed_names(self.sample)
         data["notices"] = list(self.notices)
         data["conventions"] = [one.as_dict() for one in self.conventions]
         data["unexplained"] = self.unexplained
@@ -156,21 +154,17 @@ def compare(
     robot: Robot,
     measurements: Measurements,
     prediction: Prediction,
-    notices: Sequence[str] = (),
+    *,
     conventions: Sequence[Convention] = (),
     sessions: Sequence[str] = (),
-    floors: Mapping[str, float] | None = None,
-    files: Sequence[str] = (),
-    snapped: Sequence[int] = (),
-    unexplained: str = "",
+    **known: Any,
 ) -> Comparison:
-    """Compare measured with predicted tip poses; `notices` tell what was done before, `conventions` and `unexplained`
-    what `ctcr.conventions.review` found, `sessions` what `ctcr.diagnose.sessions` found, `floors` those of
-    `ctcr.fit.floors` as_dict(), `files` what is compared, `snapped` the rows that `ctcr.audit.snaps` found.
-    On what the error depends is examined only where no convention is wrong.
+    """Compares measured tip poses with a prediction of all rows.
 
-    robot, measurements and prediction as `ctcr.robot.robot_file.load`, `ctcr.table.measurements.load` and
-    `ctcr.Model.predict` give them. Raises InputError when no row can be compared.
+    conventions    those that `ctcr.conventions.review` found; where none is wrong, the dependences are examined too
+    sessions       what `ctcr.diagnose.sessions` says of the runs
+    known          fields of the comparison that are known before: notices, floors, files, snapped, unexplained
+    Raises InputError where no row can be compared.
     """
     sample = take_sample(robot, measurements, prediction)
     if len(sample.row) == 0:
@@ -223,22 +217,15 @@ def compare(
         run_offsets=run_offsets,
         same_joints=pairs_of_runs(measurements),
         ranking=ranking,
-        fixed=fixed_names(sample),
-        has_time=bool(np.isfinite(sample.t).any()),
-        has_speed=has_speed(sample),
         accuracy_95_mm=_number(tracker.accuracy_95_mm),
         plate_mm=np.asarray(tracker.position) * 1e3,
         headline=headline,
         sample=sample,
         stops=stops,
         revisits=revisits,
-        notices=notices,
         conventions=conventions,
-        floors=floors or {"sensor_jitter_mm": 3**0.5 * _number(tracker.jitter_mm), "expected_error_mm": float("nan")},
         sessions=sessions,
-        files=files,
-        snapped=snapped,
-        unexplained=unexplained,
+        **known,
     )
 
 
@@ -284,4 +271,4 @@ def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:
 
 
 def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
+    return nan if value is None else float(value)

@@ -34,7 +34,7 @@ def course(figure: Figure, c: Comparison) -> None:
     """Error size in the order measured, runs set apart."""
     axes = figure.subplots()
     size = np.linalg.norm(c.headline.error, axis=1) * 1e3
-    timed = len(c.runs) == 1 and c.has_time
+    timed = len(c.runs) == 1 and np.isfinite(c.sample.t).any()
     x = c.headline.t if timed else np.arange(len(size))
     run = c.headline.run
     starts = np.flatnonzero(np.append(True, run[1:] != run[:-1]))

@@ -1,6 +1,5 @@
 """Runs that visit the same joints, without any model: a rigid motion tells other frames from another robot."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -29,20 +28,17 @@ class PairOfRuns:
 
 def pairs_of_runs(table: Measurements) -> list[PairOfRuns]:
     """All pairs of runs that share enough joints for a rigid motion to be tested; of very many runs, of some."""
-    return list(_pairs(table))
-
-
-def _pairs(table: Measurements) -> Iterator[PairOfRuns]:
     located = np.isfinite(table.positions).all(axis=1)
     runs = np.unique(table.run[located])
     located &= np.isin(table.run, runs[evenly(len(runs), settings.CONVENTION_MOST_RUNS)])
     if not located.any():
-        return
+        return []
     _, joint = np.unique(np.round(table.joint_space[located], DECIMALS), axis=0, return_inverse=True)
     visits, label = np.unique(np.column_stack([table.run[located], joint]), axis=0, return_inverse=True)
     tips = 1e3 * group_means(table.positions[located], label)
     again = np.bincount(visits[:, 1])[visits[:, 1]] > 1
     visits, tips = visits[again], tips[again]
+    found = []
     for run, other in combinations(np.unique(visits[:, 0]).tolist(), 2):
         one, two = visits[:, 0] == run, visits[:, 0] == other
         both, mine, theirs = np.intersect1d(visits[one, 1], visits[two, 1], return_indices=True)
@@ -51,4 +47,6 @@ def _pairs(table: Measurements) -> Iterator[PairOfRuns]:
         source, target = tips[one][mine], tips[two][theirs]
         rotation, shift = rigid_motion(source, target)
         apart, left = (np.sum(part**2) for part in (target - source, target - source @ rotation.T - shift))
-        yield PairOfRuns(run, other, len(both), np.sqrt(apart / len(both)), np.sqrt(left / (len(both) - 2)))
+        apart_mm, moved_mm = np.sqrt(apart / len(both)), np.sqrt(left / (len(both) - 2))
+        found.append(PairOfRuns(run, other, len(both), apart_mm, moved_mm))
+    return found

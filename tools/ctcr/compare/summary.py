@@ -10,6 +10,7 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.compare.analysis import Comparison
+from ctcr.compare.covariates import fixed_names, has_speed
 from ctcr.compare.dependence import Dependence
 from ctcr.compare.noise import DirectionDifference
 from ctcr.compare.sample import Sample
@@ -187,7 +188,7 @@ def _hysteresis_text(c: Comparison, d: DirectionDifference) -> str:
         f"{mm(d.floor_mm)} RMS there."
     )
     share = 1 - (d.rms_without_delay_mm / d.rms_mm) ** 2
-    if c.has_speed and abs(d.delay_s) > 3 * d.delay_uncertainty_s and share > settings.CLEAR_DELAY:
+    if has_speed(c.sample) and abs(d.delay_s) > 3 * d.delay_uncertainty_s and share > settings.CLEAR_DELAY:
         return text + (
             f" A delay of {d.delay_s:.3f} ± {d.delay_uncertainty_s:.3f} s between joints and poses explains "
             f"{percent(share)} of this squared difference; without it {mm(d.rms_without_delay_mm)} RMS remain, a floor "
@@ -288,11 +289,11 @@ def limits(c: Comparison) -> Iterator[str]:
     yield from _long_pause(c.headline)
     if len(c.runs) == 1:
         yield "There is one run: the findings are not tested on another run."
-    if c.fixed:
-        yield f"Never varied here, so their influence is unknown: {join(c.fixed)}."
-    if not c.has_time:
+    if fixed := fixed_names(c.sample):
+        yield f"Never varied here, so their influence is unknown: {join(fixed)}."
+    if not np.isfinite(c.sample.t).any():
         yield "There are no times: speeds, delay and drift cannot be examined."
-    elif not c.has_speed:
+    elif not has_speed(c.sample):
         yield "The readings are far apart in time (stops): a delay cannot be seen."
     if c.angle_deg is None:
         yield "No orientation was measured."
