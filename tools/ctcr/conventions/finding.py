@@ -1,7 +1,7 @@
 """A wrong convention that was found: what it is, how much error it makes, and how to correct it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -32,9 +32,6 @@ class Finding:
         """Factor by which the error falls."""
         before, after = self.rms_deg or self.rms_mm
         return before / max(after, 1e-9)
-
-    def with_errors(self, before_mm: float, after_mm: float) -> "Finding":
-        return replace(self, rms_mm=(before_mm, after_mm))
 
     @property
     def what(self) -> str:

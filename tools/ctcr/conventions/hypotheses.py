@@ -61,16 +61,19 @@ class Hypothesis:
         return self.file is not None or self.frame is not None or self.registers or self.sensor is not None
 
     @property
+    def home(self) -> str:
+        """The parameter of the robot that its offset moves."""
+        kind, tube, _ = self.offset
+        return f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}"
+
+    @property
     def frees(self) -> tuple[str, ...]:
         """How the names of the parameters begin of which nothing is known by it."""
         if self.registers:
             return parameters.OF_FRAME
         if self.sensor is not None:
             return ("tracker.sensor_position.",)
-        if self.offset:
-            kind, tube, _ = self.offset
-            return (f"actuation.home_{'rotation' if kind == 'alpha' else 'translation'}.{tube + 1}",)
-        return ()
+        return (self.home,) if self.offset else ()
 
     def robot(self, robot: Robot) -> Robot:
         if self.file is not None:

@@ -77,7 +77,8 @@ def review(robot: Robot, readings: Measurements) -> Review:
 
     if still := frozen.stood_still(fit.robot, right):
         finding, rows = still
-        found.append(finding.with_errors(_with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows), fit.rms_mm))
+        before = _with_rows(fit, tips.errors(fit.robot, right.rows(rows)), rows)
+        found.append(replace(finding, rms_mm=(before, fit.rms_mm)))
         right = right.without_poses(rows)
 
     if slow := clock.wrong_unit(right, fit.rms_mm):

@@ -16,6 +16,7 @@ from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, jump
 from ctcr.conventions.finding import Finding
 from ctcr.conventions.hypotheses import Change, Hypothesis, hypotheses, offset_by, with_frame
+from ctcr.model import parameters
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join, numbers, percent, short
@@ -290,20 +291,18 @@ def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> boo
     A physical effect may look like an offset, but an offset explains it in part only. So an offset is a right angle, or
     leaves hardly any of the error that there is without it.
     """
-    uncertainty = tried.case.robot.uncertainty
+    robot = tried.case.robot
     if one.registers:
         old, new = case.robot.tracker, tried.case.fit.robot.tracker
         turn = Rotation.from_matrix(new.rotation @ old.rotation.T).magnitude()
         shift = np.max(np.abs(new.position - old.position))
-        sd = [max(np.atleast_1d(getattr(uncertainty, f"tracker_frame_{unit}"))) for unit in ("mm", "deg")]
-        return shift > jump("position", 1e-3 * sd[0]) or turn > jump("rotation", np.deg2rad(sd[1]))
-    (kind, tube, _), size = one.offset, offset_of(tried)
-    sd = np.deg2rad(uncertainty.of("rotation_offset_deg", tube))
-    if kind == "beta":
-        sd = 1e-3 * uncertainty.of("translation_offset_mm", tube)
+        names = parameters.expand("tracker.frame", robot)
+        position, rotation = np.max(np.reshape([parameters.stated_sd(robot, name) for name in names], (2, 3)), axis=1)
+        return shift > jump("position", position) or turn > jump("rotation", rotation)
+    kind, size = one.offset[0], offset_of(tried)
     right = kind == "alpha" and size % (np.pi / 2) == 0
     constant = tried.case.fit.left_of(half)[0] < settings.CONVENTION_CONSTANT
-    return abs(size) > jump(one.frees[0], sd) and (right or constant)
+    return abs(size) > jump(one.home, parameters.stated_sd(robot, one.home)) and (right or constant)
 
 
 def offset_of(tried: Tried) -> float:
@@ -311,12 +310,10 @@ def offset_of(tried: Tried) -> float:
 
     A right angle is taken for one, where the fit is as near to it as homes are known.
     """
-    kind, tube, size = tried.offset.offset
-    home, factor = ("home_rotation_deg", np.pi / 180) if kind == "alpha" else ("home_translation_mm", 1e-3)
-    old, new = (getattr(robot.actuation, home)[tube] for robot in (tried.case.robot, tried.case.fit.robot))
-    size += factor * (new - old)
+    (kind, _, size), home, robot = tried.offset.offset, tried.offset.home, tried.case.robot
+    size += float(parameters.values(tried.case.fit.robot, [home])[0] - parameters.values(robot, [home])[0])
     right = np.pi / 2 * round(size / (np.pi / 2))
-    near = 3 * np.deg2rad(tried.case.robot.uncertainty.of("rotation_offset_deg", tube))
+    near = 3 * parameters.stated_sd(robot, home)
     return right if kind == "alpha" and right and abs(size - right) < near else size
 
 
@@ -335,14 +332,12 @@ def _findings(case: Case, tried: Tried) -> Iterator[Finding]:
 
 def _offset_in_words(hypothesis: Hypothesis, robot: Robot) -> tuple[str, str]:
     (kind, tube, size), name = hypothesis.offset, hypothesis.columns[0]
-    key, unit, factor = (
-        ("home_rotation_deg", "deg", 180 / np.pi) if kind == "alpha" else ("home_translation_mm", "mm", 1e3)
-    )
-    size = float(round(factor * size))
+    field = parameters.field_of(hypothesis.home)
+    key, size = field.path[1], float(round(field.factor * size))
     old = list(getattr(robot.actuation, key))
     recorded = getattr(robot.actuation, f"recorded_{key}") or old
     new = [home + size * (i == tube) for i, home in enumerate(old)]
-    text = f"{name} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {unit} are missing"
+    text = f"{name} counts from another {'plane' if kind == 'alpha' else 'place'}: {size:+g} {field.unit} are missing"
     fix = f"set actuation.{key} to {numbers(new)} and actuation.recorded_{key} to {numbers(recorded)}"
     return text, fix
 
