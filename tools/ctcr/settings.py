@@ -7,7 +7,7 @@ from math import pi
 
 # ---- Shared: one meaning, one value
 
-SIGNIFICANCE = 0.01  # p-value below which the noise as stated does not explain a residual
+SIGNIFICANCE = 0.01  # p-value below which noise as stated, or chance, does not explain what readings show
 OUTLIER_WEIGHT = 0.3  # robust weight below which a reading counts as an outlier: 1 plain, 0 not fitted
 SAYS_NOTHING = 0.9  # posterior over prior standard deviation from which the data say nothing of a parameter
 JOINT_LEVER = 0.02  # [m] of insertion that moves the tip about as far as one radian of rotation
@@ -42,7 +42,6 @@ SAME_JOINTS = 0.01  # distance in joint space over the usual step, below which t
 SAME_SIDE = 0.5  # cosine of two steps that arrive from the same side
 STRAIGHT_ON = 0.9  # cosine of two steps that continue straight on
 VISITS_DIFFER = 4.0  # distance of two visits over the noise of their difference, from which they differ
-DETOUR_SIGNIFICANCE = 0.01  # p-value below which missing motion is added to the table
 
 # ---- Comparison of readings with the model
 
@@ -219,7 +218,6 @@ SURE = 0.9  # probability from which effects are called identified
 TURNS = 2  # quarters that are held out in turn where nothing was found and the held-out one has new errors
 MOST_UNCERTAIN = 1.5  # expected square error of a held-out run over that of fitted ones, above which it judges nothing
 RUN_UNEXPLAINED = 1.0  # chi-square beyond noise over that of noise, from which a run says how much effects explain
-DEPENDENCE_SIGNIFICANCE = 0.01  # p-value below which the residual depends on a quantity
 VARYING_ROWS = 400  # rows of the model where there are twice as many or more
 VARYING_MOST = 4  # variations, one found after the other
 VARYING_EXPLAINED = 0.3  # that all variations must explain together

@@ -36,7 +36,7 @@ def completed(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     nearer = (np.linalg.norm(p[here] - p[same], axis=1) - np.linalg.norm(p[here] - p[other], axis=1))[visible]
     if not visible.any():
         return measurements, []
-    if scipy.stats.wilcoxon(nearer, alternative="greater").pvalue > settings.DETOUR_SIGNIFICANCE:
+    if scipy.stats.wilcoxon(nearer, alternative="greater").pvalue > settings.SIGNIFICANCE:
         return measurements, []
     apart = [1e3 * float(np.median(np.linalg.norm(p[here] - p[visit], axis=1)[visible])) for visit in (other, same)]
     notice = (

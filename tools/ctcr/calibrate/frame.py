@@ -18,7 +18,6 @@ from ctcr.conventions.hypotheses import with_frame
 from ctcr.errors import InputError, Problem
 from ctcr.fit import folds, joint
 from ctcr.fit.result import Fit, Priors
-from ctcr.fit.sessions import uncertain
 from ctcr.frames import matrix_from_quaternion, nearest_rotation, of_sensor
 from ctcr.model import parameters, user_recording
 from ctcr.model.table_poses import standard_tips
@@ -59,7 +58,7 @@ def tracker_frame(robot: Robot, readings: Measurements) -> Outcome:
 
 def considered(robot: Robot, readings: Measurements, fit: Fit) -> Array:
     """Covariance (n, n) of a fit to the readings that left homes and tubes as they are, with their uncertainty."""
-    others = [name for name in uncertain(robot) if name not in fit.names]
+    others = [name for name in parameters.uncertain(robot) if name not in fit.names]
     if not others:
         return fit.covariance
     robot, readings, _ = sensor_pose.usable(fit.apply(robot), readings)

@@ -8,7 +8,6 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Array, Mask
-from ctcr.errors import InputError
 from ctcr.model import parameters, recording
 from ctcr.robot.description import Robot
 from ctcr.table.measurements import Measurements
@@ -174,15 +173,11 @@ def _priors(robot: Robot, free: tuple[str, ...]) -> tuple[list[str], Array, Arra
 
     Beyond CONVENTION_JUMP lies no data sheet, but another convention.
     """
-    found, chosen = [], {name for name in parameters.names_of(robot.n_tubes) if name.startswith(free)}
-    for name in parameters.expand([parameters.STANDARD, *chosen], robot):
-        sd = {name: np.inf} if name in chosen else None
-        try:
-            found.append((name, *(float(part[0]) for part in parameters.priors(robot, [name], sd))))
-        except InputError:  # known exactly
-            continue
-    names = [name for name, *_ in found]
-    mean, sd, low, high = np.array([numbers for _, *numbers in found]).reshape(-1, 4).T
+    known = parameters.names_of(robot.n_tubes)
+    chosen = {name: np.inf for name in known if name.startswith(free)}
+    uncertain = {*chosen, *parameters.uncertain(robot)}
+    names = [name for name in known if name in uncertain]
+    mean, sd, low, high = parameters.priors(robot, names, chosen)
     far = np.array([jump(name, width) for name, width in zip(names, sd, strict=True)])
     # Positive values err by a factor, either way. So do curvatures: one of opposite sign is a home half a turn off.
     bent = np.array([".curvature" in name for name in names], dtype=bool) & (mean > 0)

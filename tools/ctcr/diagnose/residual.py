@@ -88,4 +88,4 @@ def _rank(engine: Engine, sample: Sample, fit: joint.Fit) -> Ranking:
     weight = fit.weights[rows, 0]
     left[~np.isfinite(left).all(axis=1) | ((weight > 0) & (weight < settings.OUTLIER_WEIGHT))] = 0.0
     error = left @ sample.rotation
-    return rank(sample, error - error.mean(axis=0), settings.DEPENDENCE_SIGNIFICANCE)
+    return rank(sample, error - error.mean(axis=0), settings.SIGNIFICANCE)

@@ -21,7 +21,7 @@ from ctcr.diagnose.varying_coefficients import label_of
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit, rms
-from ctcr.fit.sessions import as_sessions, part_of_runs, sessions_at, some_runs, uncertain
+from ctcr.fit.sessions import as_sessions, part_of_runs, sessions_at, some_runs
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import noise_of_readings
 from ctcr.robot.description import Robot
@@ -51,7 +51,7 @@ def _of_runs(robot: Robot, readings: Measurements, asked: bool | None) -> tuple[
     if asked is False or len(np.unique(every.run[located])) < 2:
         return readings, []
     table, rows = part_of_runs(robot, some_runs(every))
-    noise, free = noise_of_readings(robot, every), uncertain(robot)
+    noise, free = noise_of_readings(robot, every), parameters.uncertain(robot)
     engine = Engine(robot, table, noise, rows, free=free, tolerance=settings.COARSE)
     one = engine.fit()
     if unexplained_runs(table, one):  # whole runs that the fit takes for outliers

@@ -12,7 +12,7 @@ from ctcr.audit import sensor_pose
 from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.fit.result import Fit
-from ctcr.fit.sessions import part_of_runs, some_runs, uncertain
+from ctcr.fit.sessions import part_of_runs, some_runs
 from ctcr.model import parameters, user_recording
 from ctcr.model.noise import Noise, noise_of_readings, with_field
 from ctcr.model.sessions import told
@@ -56,7 +56,7 @@ def floors(robot: Robot, readings: Measurements) -> Floors:
     readings, chosen = part_of_runs(robot, some_runs(readings))
     try:
         noise = noise_of_readings(robot, readings)
-        names = told(uncertain(robot), readings)
+        names = told(parameters.uncertain(robot), readings)
         _, sd, _, _ = parameters.priors(robot, names)
     except InputError:  # nothing could be fitted
         return Floors(jitter)

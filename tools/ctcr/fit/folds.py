@@ -147,13 +147,11 @@ class Coverage:
     def undetermined(self, held_out: Iterable[int]) -> Array:
         """Mean square error of the position in each held-out group (in ascending order) that a calibration by the
         others leaves, over that of the tracker's jitter."""
-        held_out = sorted(held_out)
-        return np.max([_undetermined(*one, held_out) for one in self._linearisations], axis=0)
-
-
-def _undetermined(total: Array, information: Array, of_position: Array, held_out: list[int]) -> Array:
-    covariance = np.linalg.inv(total - information[held_out].sum(axis=0))
-    return np.einsum("ij,gji->g", covariance, of_position[held_out]) / 3
+        held_out, left = sorted(held_out), []
+        for total, information, of_position in self._linearisations:
+            covariance = np.linalg.inv(total - information[held_out].sum(axis=0))
+            left.append(np.einsum("ij,gji->g", covariance, of_position[held_out]) / 3)
+        return np.max(left, axis=0)
 
 
 def _information(jacobian: Array, group: Integers) -> tuple[Array, Array, Array]:

@@ -4,7 +4,6 @@ import numpy as np
 
 from ctcr import settings
 from ctcr.arrays import Mask, evenly
-from ctcr.errors import InputError
 from ctcr.fit import joint
 from ctcr.model import effect_model, parameters, user_recording
 from ctcr.robot.description import Robot
@@ -21,7 +20,7 @@ def as_sessions(robot: Robot, readings: Measurements, *, homes: bool = False) ->
     part, rows = part_of_runs(robot, some_runs(readings))
     # At the robot file's values first: within a fit, what is left of the frames acts linearly.
     sessions = _aligned(robot, part, Sessions.alike(robot, part, homes), settings.SESSION_ALIGNMENTS)
-    fit = joint.fit(robot, sessions.taken_out(part), uncertain(robot), rows=rows, tolerance=settings.COARSE)
+    fit = joint.fit(robot, sessions.taken_out(part), parameters.uncertain(robot), rows=rows, tolerance=settings.COARSE)
     return sessions_at(fit.apply(robot), readings, homes=homes)
 
 
@@ -39,18 +38,6 @@ def _aligned(robot: Robot, readings: Measurements, sessions: Sessions, steps: in
         recorded = user_recording.recording_of(robot, sessions.taken_out(readings))
         sessions = sessions.moved(recorded.moves(np.empty(0)))
     return sessions
-
-
-def uncertain(robot: Robot) -> list[str]:
-    """The standard parameters that the robot file does not know exactly."""
-    found = []
-    for name in parameters.expand("standard", robot):
-        try:
-            parameters.priors(robot, [name])
-        except InputError:
-            continue
-        found.append(name)
-    return found
 
 
 def some_runs(readings: Measurements) -> Measurements:

@@ -297,6 +297,11 @@ def _standard(robot: Robot) -> list[str]:
     return found
 
 
+def uncertain(robot: Robot) -> list[str]:
+    """The standard parameters that the robot file does not know exactly."""
+    return [name for name in expand(STANDARD, robot) if stated_sd(robot, name)]
+
+
 def of_sensor(robot: Robot) -> list[str]:
     """The parameters of the sensor's pose that the robot file does not know exactly."""
     return [name for name in names_of(robot.n_tubes) if name.startswith("tracker.sensor_") and stated_sd(robot, name)]
