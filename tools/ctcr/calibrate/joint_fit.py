@@ -219,17 +219,17 @@ def calibrate(
         likely = fit
         if many:
             fit = fitted(names, readings, usable, noise=fit.noise)
-        stages = [_stage("nominal", fit.nominal_residual[usable])]
+        stages = [stage_of("nominal", fit.nominal_residual[usable])]
         if frame and len(frame) < len(names):
             alone = fitted(frame, readings, few, noise=fit.noise, starts=1)
-            stages.append(_stage("frame alone", alone.residual[usable]))
+            stages.append(stage_of("frame alone", alone.residual[usable]))
     return Calibration(
         before=given,
         after=placed(fit.apply(robot), readings.sessions),
         readings=readings,
         fit=fit,
         fitted=fields.fitted(fit),
-        stages=[*stages, _stage("calibrated", fit.residual[usable])],
+        stages=[*stages, stage_of("calibrated", fit.residual[usable])],
         held_out=held_out,
         floor=Stage("noise floor", fit.expected_mm(usable), fit.expected_deg(usable)),
         floors=floor,
@@ -285,7 +285,7 @@ def _explaining(fits: Iterable[Fit]) -> list[Fit]:
     return tried[-1:] if nearly else tried
 
 
-def _stage(name: str, residual: Array) -> Stage:
+def stage_of(name: str, residual: Array) -> Stage:
     """Of residuals (K, 6), position [m] and rotation [rad]."""
     size = 1e3 * np.linalg.norm(residual[:, :3], axis=1)
     size = size[np.isfinite(size)]
@@ -300,4 +300,4 @@ def _held_out(judged: list[tuple[Fit, Mask]], kind: str) -> HeldOut:
     known = np.isfinite(residual[:, [0, 3]])
     floor = [rms(np.sqrt(expected[:, [i]]), known[:, i]) for i in range(2)]
     floor = Stage("noise floor", 1e3 * floor[0], float(np.degrees(floor[1])))
-    return HeldOut(kind, len(judged), int(known[:, 0].sum()), _stage("held out", residual), floor)
+    return HeldOut(kind, len(judged), int(known[:, 0].sum()), stage_of("held out", residual), floor)

@@ -12,7 +12,7 @@ import numpy as np
 from ctcr import settings
 from ctcr.arrays import Array, Mask
 from ctcr.audit import prepared
-from ctcr.calibrate.joint_fit import Stage
+from ctcr.calibrate.joint_fit import Stage, stage_of
 from ctcr.diagnose import lags, outliers, smooth_field
 from ctcr.diagnose.candidates import candidates
 from ctcr.diagnose.engine import Engine, values_of
@@ -22,7 +22,6 @@ from ctcr.effects import catalogue
 from ctcr.errors import InputError, Problem, suggestion
 from ctcr.fit import folds, joint, one_sided
 from ctcr.fit.floors import Floors, floors, warnings
-from ctcr.fit.result import rms
 from ctcr.fit.sessions import placed
 from ctcr.fit.widening import widened
 from ctcr.model import fields
@@ -36,7 +35,6 @@ from ctcr.show.result import Glance, Shown, frame
 from ctcr.show.style import Picture, picture
 from ctcr.show.wording import deviation, number, sentence
 from ctcr.table.measurements import Measurements
-from ctcr.table.sessions import Sessions
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -61,11 +59,6 @@ class Added(Shown):
         """Of the measurements."""
         return self.readings.files
 
-    @property
-    def sessions(self) -> Sessions | None:
-        """What each run has of its own."""
-        return self.readings.sessions
-
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation of every fitted parameter of an effect, SI."""
         return {
@@ -88,7 +81,7 @@ class Added(Shown):
             "rms_deg": self.rms("rms_deg"),
             "held_out": self.held_out,
             **self.floors.as_dict(),
-            "frames": self.sessions and self.sessions.as_dict(),
+            "frames": self.readings.sessions and self.readings.sessions.as_dict(),
             "reduced_chi_square": self.fit.reduced_chi_square,
             "converged": self.fit.converged,
             "widened": widened(self.after, self.fit.priors.scales),
@@ -184,7 +177,7 @@ def add(
             errors[identity] = fit.residual
         isolated = outliers.isolated(readings, fit, held_out)
         judged = held_out & ~isolated if held_out.any() else everything
-        stages = [_stage(name, residual, judged) for name, residual in errors.items()]
+        stages = [stage_of(name, residual[judged]) for name, residual in errors.items()]
         about_outliers = [sentence(text) for text in outliers.messages(stage.robot, readings, fit, isolated)]
         if held_out.any():
             fit = stage(fitted, fitted, everything, [now | values_of(fit)])
@@ -345,28 +338,24 @@ class _Fitter:
         return values_of(max(fits, key=lambda tried: tried.log_evidence))
 
 
-def _stage(name: str, residual: Array, rows: Mask) -> Stage:
-    return Stage(name, 1e3 * rms(residual[:, :3], rows), float(np.degrees(rms(residual[:, 3:], rows))))
-
-
 def _notices(robot: Robot, fit: joint.Fit, ids: Sequence[str], explained: bool) -> list[str]:
     """Doubts about the fitted effects; `explained`: whether the noise explains what is left."""
     known = catalogue.parameter_of(robot.n_tubes)
     said = [wider.sentence for wider in widened(robot, fit.priors.scales)]
     said += [*([] if fit.converged else [f"The fit has {fit.status}."]), *map(sentence, warnings(fit, explained))]
-    index = {name: i for i, name in enumerate(fit.names)}
+    values, sds, ratios = (dict(zip(fit.names, of, strict=True)) for of in (fit.values, fit.sd, fit.ratio))
     for identity in ids:
         effect = catalogue.get(identity, robot.n_tubes)
-        mine = [name for name in effect.amplitudes if name in index]
-        if mine and all(fit.ratio[index[name]] > settings.SAYS_NOTHING for name in mine):
+        mine = [name for name in effect.amplitudes if name in values]
+        if mine and all(ratios[name] > settings.SAYS_NOTHING for name in mine):
             said.append(f"The data say nothing of {identity}: {effect.measure}".rstrip())
-        elif mine and all(abs(fit.values[index[name]]) < 2 * fit.sd[index[name]] for name in mine):
+        elif mine and all(abs(values[name]) < 2 * sds[name] for name in mine):
             said.append(f"{identity} is not larger than its uncertainty: these data do not need it.")
         for name in effect.names():
-            if name in index and not known[name].soft[0] <= fit.values[index[name]] <= known[name].soft[1]:
-                low, high = known[name].soft
+            low, high = known[name].soft
+            if name in values and not low <= values[name] <= high:
                 said.append(
-                    f"{name} = {fit.values[index[name]]:.3g} is hardly physical ({low:g} to {high:g} is usual): the "
-                    "effect may imitate another one."
+                    f"{name} = {values[name]:.3g} is hardly physical ({low:g} to {high:g} is usual): the effect may "
+                    "imitate another one."
                 )
     return said

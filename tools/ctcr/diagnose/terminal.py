@@ -39,7 +39,8 @@ def show(console: Any, result: Diagnosis) -> None:
 
     console.print(result.verdict.word.upper().replace("_", " "), style="bold")
     say(*result.verdict.sentences, "")
-    console.print(_explanations(result))
+    columns = ["what acts", "probability"]
+    console.print(output.table("Explanations that were weighed", columns, result.verdict.rows, text=(0,)))
     console.print(_errors(result))
     for number_, round_ in enumerate(result.rounds, start=1):
         if round_.tried:
@@ -56,11 +57,6 @@ def show(console: Any, result: Diagnosis) -> None:
         say(ADVICE, f"What to measure next: {result.varying.measure[0]}")
     say(*map(sentence, result.notices))
     say(*(f"Not tested: {identity}: {reason}." for identity, reason in result.not_testable.items()))
-
-
-def _explanations(result: Diagnosis) -> Any:
-    columns = ["what acts", "probability"]
-    return output.table("Explanations that were weighed", columns, result.verdict.rows, text=(0,))
 
 
 def _errors(result: Diagnosis) -> Any:
