@@ -74,8 +74,6 @@ class Comparison(Result):
     run_offsets: RunOffsets  # where found, the dependences are those of the error about each run's mean
     same_joints: list[PairOfRuns]
     ranking: Ranking
-    accuracy_95_mm: float  # the tracker's stated figure, NaN if not stated
-    plate_mm: Array  # (3,) origin of the base frame in the tracker frame, from the robot file
     headline: Sample  # the readings as they are
     sample: Sample  # the same, with the frame fitted where it is grossly wrong
     stops: Stops
@@ -173,7 +171,6 @@ def compare(
             f"{len(sample.not_solved)} rows that the model does not solve"
         )
         raise InputError(Problem(text))
-    tracker = robot.tracker
     headline = sample
     if sessions:
         sample = _in_one_frame(sample)
@@ -188,7 +185,8 @@ def compare(
         sample = replace(sample, predicted=sample.predicted @ rotation.T + move, rotation=rotation @ sample.rotation)
     stops = find_stops(sample)
     revisits = find_revisits(stops, sample.lever)
-    noise = noise_floor(stops, revisits, _number(tracker.jitter_mm))
+    jitter_mm = robot.tracker.jitter_mm
+    noise = noise_floor(stops, revisits, nan if jitter_mm is None else jitter_mm)
     step, velocity = (motion[stops.first] @ sample.rotation.T for motion in (sample.tip_step, sample.tip_velocity))
     direction = direction_difference(stops, revisits, noise, step, velocity)
     as_taken, visits, pairs = sample, stops, revisits
@@ -208,7 +206,7 @@ def compare(
         position_mm=_spread(length),
         percent_of_length=_spread(length * 0.1 / np.maximum(sample.deployed, 1e-6)),
         angle_deg=_spread(angle),
-        angle_kind="orientation" if sample.rotation_known else "tip direction",
+        angle_kind="orientation" if robot.tracker.sensor_rotation_known else "tip direction",
         runs=_run_errors(headline, length, angle),
         noise=noise,
         direction=direction,
@@ -217,8 +215,6 @@ def compare(
         run_offsets=run_offsets,
         same_joints=pairs_of_runs(measurements),
         ranking=ranking,
-        accuracy_95_mm=_number(tracker.accuracy_95_mm),
-        plate_mm=np.asarray(tracker.position) * 1e3,
         headline=headline,
         sample=sample,
         stops=stops,
@@ -268,7 +264,3 @@ def _run_errors(sample: Sample, length: Array, angle: Array) -> list[RunErrors]:
         RunErrors(int(run), of_length, mean, of_angle)
         for run, of_length, of_angle, mean in zip(runs, *spreads, means, strict=True)
     ]
-
-
-def _number(value: float | None) -> float:
-    return nan if value is None else float(value)

@@ -80,9 +80,9 @@ def _all(sample: Sample) -> Iterator[Covariate]:
     yield from _motions(sample)
     yield from _load(sample)
     yield from _position(sample)
-    if sample.screw_pitch:
+    if pitch := sample.robot.actuation.screw_pitch:
         for i, beta in enumerate(sample.beta.T, 1):
-            phase = 2 * np.pi * beta / sample.screw_pitch
+            phase = 2 * np.pi * beta / pitch
             yield Covariate(f"screw_phase{i}", f"phase of drive screw {i}", f"screw {i}", "deg", phase, "angle", i)
     yield Covariate("time", "time since the start", "t", "s", sample.t)
     yield Covariate("order", "order of measuring", "row", "", sample.row.astype(float))
@@ -91,12 +91,12 @@ def _all(sample: Sample) -> Iterator[Covariate]:
 def _joints(sample: Sample) -> Iterator[Covariate]:
     for i, alpha in enumerate(sample.alpha.T, 1):
         yield _angle(f"alpha{i}", f"base angle α{i}", f"α{i}", alpha, i)
-    for i, length in enumerate((sample.tube_lengths + sample.beta).T, 1):
+    for i, length in enumerate((sample.robot.lengths + sample.beta).T, 1):
         yield Covariate(f"length{i}", f"deployed length of tube {i} (moves with β{i})", f"ℓ{i}", "mm", length, tube=i)
 
 
 def _differences(sample: Sample) -> Iterator[Covariate]:
-    alpha, deployed = sample.alpha.T, (sample.tube_lengths + sample.beta).T
+    alpha, deployed = sample.alpha.T, (sample.robot.lengths + sample.beta).T
     for i, j in combinations(range(1, len(alpha) + 1), 2):
         angle, length = alpha[i - 1] - alpha[j - 1], deployed[i - 1] - deployed[j - 1]
         yield _angle(f"alpha{i}{j}", f"joint difference α{i} − α{j}", f"α{i}−α{j}", angle)

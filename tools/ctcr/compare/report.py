@@ -124,7 +124,7 @@ def scene(c: Comparison) -> str:
     """JSON text for `html_page.view`; positions in mm, tracker frame."""
     rows, factor, sample = shown_rows(c), arrow_factor(c), c.headline
     predicted, measured = sample.predicted[rows] * 1e3, sample.measured[rows] * 1e3
-    error = measured - predicted
+    error, plate = measured - predicted, 1e3 * sample.robot.tracker.position[None]
     size = np.linalg.norm(error, axis=1)
     readings = {"row": sample.row[rows].tolist(), "run": sample.run[rows].tolist(), "error, mm": show.numbers(size)}
     arrows = {"to": predicted + factor * error, "value": show.numbers(size)}
@@ -133,7 +133,7 @@ def scene(c: Comparison) -> str:
             show.layer("points", "predicted", predicted, "noise", 1.8),
             show.layer("points", "measured", measured, "out", 2.2, hover=readings),
             show.layer("arrows", f"error × {factor:g}", predicted, size=1.6, **arrows),
-            show.layer("points", "front plate (robot file)", c.plate_mm[None, :], "ink", 5, hidden=True),
+            show.layer("points", "front plate (robot file)", plate, "ink", 5, hidden=True),
         ],
         most=show.most(size),
     )

@@ -13,6 +13,7 @@ from ctcr import _core, settings
 from ctcr.arrays import Array, Integers, Mask
 from ctcr.frames import base_to_tracker, conjugate, matrix_from_quaternion, product
 from ctcr.model.model import status_text
+from ctcr.robot.description import Robot
 from ctcr.show.wording import counted, join
 
 
@@ -33,6 +34,7 @@ class Motion:
 class Sample:
     """K comparable readings in measured order; lengths in m, angles in rad, time in s (NaN when absent)."""
 
+    robot: Robot  # as its file describes it
     row: Integers  # (K,) line in the measurement file
     t: Array  # (K,)
     run: Integers  # (K,)
@@ -47,10 +49,7 @@ class Sample:
     tip_step: Array  # (K, 3) predicted tip motion since the previous row, base frame
     rotation: Array  # (3, 3) R_tracker_base
     rotation_error: Array | None  # (K, 3) rotation vector in the tracker frame, NaN rows if not measured
-    rotation_known: bool  # of the sensor
     deployed: Array  # (K,) arc length of the sensor's tip in front of the plate
-    tube_lengths: Array  # (N,)
-    screw_pitch: float  # [m] of travel by a turn of a motor; 0: unknown
     lever: float  # typical distance of the tip from the insertion axis [m]
     motion: Motion
     not_measured: Integers  # file lines
@@ -80,7 +79,7 @@ class Sample:
         return said
 
 
-def take_sample(robot, measurements, prediction) -> Sample:
+def take_sample(robot: Robot, measurements, prediction) -> Sample:
     """Pair every reading with its prediction and leave out readings that were not measured or not solved.
 
     Motion is read from all rows, also the ones left out, since they too are part of the joint path.
@@ -103,13 +102,11 @@ def take_sample(robot, measurements, prediction) -> Sample:
     arrays |= {"tip_velocity": velocity, "tip_step": step}
     arrays["deployed"] = (robot.lengths + m.beta)[:, tracker.sensor_on_tube - 1]
     return Sample(
+        robot,
         **{name: values[keep] for name, values in arrays.items()},
         tip_rotation=matrix_from_quaternion(prediction.quaternion[keep]),
         rotation=np.asarray(tracker.rotation),
         rotation_error=rotation_error,
-        rotation_known=tracker.sensor_rotation_known,
-        tube_lengths=robot.lengths,
-        screw_pitch=robot.actuation.screw_pitch,
         lever=lever,
         motion=follow(m.t, m.run, m.beta, m.alpha, lever).rows(keep),
         not_measured=np.setdiff1d(m.row[~known], m.row[known]),

@@ -273,9 +273,9 @@ def limits(c: Comparison) -> Iterator[str]:
             "Too few joints were visited twice from the same direction in one run, and too few readings were taken at "
             "rest: the scatter of a reading is the sensor jitter as stated. It misses repeatability and drift."
         )
-    if c.accuracy_95_mm > 0:
+    if accuracy := c.sample.robot.tracker.accuracy_95_mm:
         yield (
-            f"Repeated readings do not show the tracker's field error (stated: 95 % below {mm(c.accuracy_95_mm)}), "
+            f"Repeated readings do not show the tracker's field error (stated: 95 % below {mm(accuracy)}), "
             f"which is the same at every visit of a position."
         )
     if d is None:

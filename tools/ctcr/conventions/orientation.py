@@ -32,8 +32,8 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None)
     known = _is_known(fit.robot)
     measured = {form: _in_form(given[use], *form, axis) for form in np.ndindex(2, 2)}
     errors = {form: _error_deg(predicted, measured[form], known) for form in measured}
-    last, inverse = best = min(errors, key=lambda form: errors[form])
-    before, after = errors[0, 0], errors[best]
+    last, inverse = min(errors, key=lambda form: errors[form])
+    before, after = errors[0, 0], errors[last, inverse]
     turn = _turn_between(predicted, measured[0, 0])
     turned = _error_deg(predicted, measured[0, 0], False)
     # A physical effect may ask for a turn, too, but hardly for a large one, and it leaves more than a turn does.
@@ -41,8 +41,8 @@ def wrong_form(fit: Calibrated, readings: Measurements, axis: int | None = None)
     jump = settings.SENSOR_JUMP[1] if is_noise else np.deg2rad(settings.CONVENTION_MOST_JUMP_DEG)
     if known and turned < min(after, settings.CONVENTION_CONSTANT * before) and turn.magnitude() > jump:
         return [_turned(fit, turn, (before, turned))], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))
-    if not any(best) or after > settings.CONVENTION_CLEAR * before:
-        return [], changed("quaternion", lambda q: _in_form(q, 0, 0, axis))
+    if after > settings.CONVENTION_CLEAR * before:  # it is not clear that any form is wrong
+        last = inverse = 0
     wrong = [SCALAR_LAST] * last + [INVERSE] * inverse
     found = [
         Finding(kind, text, QUATERNION, fix, rms_mm=(fit.rms_mm, fit.rms_mm), rms_deg=(before, after))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers, Mask, evenly
+from ctcr.arrays import Integers, evenly
 from ctcr.conventions import tips
 from ctcr.conventions.calibrated import Calibrated, calibrated
 from ctcr.conventions.finding import Finding
@@ -73,11 +73,8 @@ def _moved_up(late: list[int]) -> Change:
         rows = np.isin(m.run, late)
         follows = np.append(np.diff(m.run) == 0, False)
         there = np.where(rows & follows, np.arange(len(m)) + 1, np.arange(len(m)))
-        moved = {name: _taken(getattr(m, name), there, rows & ~follows) for name in ("position", "quaternion")}
-        return replace(m, **moved)
+        poses = {"position": m.position, "quaternion": m.quaternion}
+        moved = {name: old[there] for name, old in poses.items() if old is not None}
+        return replace(m, **moved).without_poses(rows & ~follows)
 
     return change
-
-
-def _taken(poses: Array | None, there: Array, missing: Mask) -> Array | None:
-    return None if poses is None else np.where(missing[:, None], np.nan, poses[there])

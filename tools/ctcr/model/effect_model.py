@@ -21,5 +21,5 @@ def of_the_path(robot: Robot) -> list[str]:
 
 def without_the_path(robot: Robot) -> Robot:
     """The robot without those effects: what a `Model` can solve, configuration by configuration."""
-    path = of_the_path(robot) if robot.effects else []
+    path = of_the_path(robot)
     return robot.with_effects({identity: given for identity, given in robot.effects.items() if identity not in path})
