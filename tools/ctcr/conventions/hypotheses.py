@@ -42,7 +42,8 @@ class Hypothesis:
     file: Robot | None = None  # the robot file as it should be
     registers: bool = False  # the tracker frame is taken from the readings
     sensor: Array | None = None  # (3,) [m] of the sensor in the frame of the tip instead of the file's
-    offset: tuple[str, int, float] | None = None  # a home of another size: "alpha" or "beta", tube from 0, SI
+    # A home of another size: "alpha" or "beta", tube from 0, SI; of some runs also "curvature", by the logarithm.
+    offset: tuple[str, int, float] | None = None
     doubts: int = 1  # how much is wrong by it: of two that explain the readings alike, the lesser is named
 
     @property

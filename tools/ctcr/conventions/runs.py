@@ -1,37 +1,23 @@
 """Runs that are unlike the others by one thing: a convention of their own, a joint homed elsewhere, another tube."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ctcr import settings
-from ctcr.arrays import Array, Integers
+from ctcr.arrays import Integers
 from ctcr.conventions import orientation, tips
 from ctcr.conventions.alignment import aligned
 from ctcr.conventions.calibrated import Calibrated, calibrated, dearer, own_values
 from ctcr.conventions.finding import Finding
-from ctcr.conventions.hypotheses import POSE, Change, Hypothesis, changed, hypotheses, joints
+from ctcr.conventions.hypotheses import POSE, Change, Hypothesis, changed, hypotheses, joints, offset_by
 from ctcr.model.sessions import FRAME
 from ctcr.robot.description import Robot
 from ctcr.show.wording import runs_named, short
 from ctcr.table.measurements import Measurements
 
 CHANGED = "beta", "alpha", "force", "position"  # of a table, by what may be different
-
-
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """One thing by which some runs may differ from the others."""
-
-    kind: str
-    columns: tuple[str, ...]
-    text: str
-    fix: str
-    robot: Robot  # theirs
-    change: Change  # that makes their readings like those of the others
-    error: Array  # (K,) [m] that it leaves in them
-    scanned: tuple[str, int, float] | None = None  # what is off in them, of which tube from 0, by how much
 
 
 def unlike(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
@@ -68,39 +54,40 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     rest, mine = readings.rows(~theirs), readings.rows(theirs)
     like = calibrated(fit.robot, rest)
     others = [rest.rows(rest.run == run) for run in np.unique(rest.run)]
-    of_others = [_typical(tips.errors(like.robot, rows), like) for rows in others]
+    of_others = [_judged(like, like.robot, rows).typical for rows in others]
     usual = np.quantile(of_others, settings.CONVENTION_RUNS, method="higher")  # infinite where nothing is solved
-    before = replace(like, error=tips.errors(like.robot, mine))
+    before = _judged(like, like.robot, mine)
     if not np.isfinite(usual) or clear * before.typical < usual:
         return None
-    tried = sorted(_differences(like, mine), key=lambda one: _typical(one.error, like))
-    best, after = tried[0], _typical(tried[0].error, like)
-    alike = (one for one in tried[1:] if _typical(one.error, like) < settings.CONVENTION_ALIKE * after)
-    moved = dearer(FRAME - 1, len(mine)) * _typical(_moved(like.robot, mine), like)  # the whole frame, not a joint
-    then = replace(like, error=best.error)
-    if clear * after > usual or moved < after or np.max(then.left_of(before)) > settings.CONVENTION_CONSTANT:
+    (best, then), *rivals = sorted(_differences(like, mine), key=lambda pair: pair[1].typical)
+    # Where their whole frame moved, and no joint.
+    framed = replace(like, error=aligned(tips.predicted(like.robot, mine), mine.position)[2])
+    if clear * then.typical > usual or dearer(FRAME - 1, len(mine)) * framed.typical < then.typical:
+        return None
+    if np.max(then.left_of(before)) > settings.CONVENTION_CONSTANT:
         return None
     if not then.beats(before):
         return None  # a few readings agree by chance
+    alike = (one for one, left in rivals if left.typical < settings.CONVENTION_ALIKE * then.typical)
     if any((one.kind, one.columns) != (best.kind, best.columns) for one in alike):
         return None
-    if best.scanned:
-        name, tube, value = best.scanned
+    if best.offset:
+        name, tube, value = best.offset
         scanned = [_scan(like, rows, name, tube) for rows in others]
         if abs(value) < settings.OUTLYING_RUN * 1.48 * np.median(np.abs(scanned)):
             return None  # the others would take offsets too: something else acts
         stated = 0.01 * like.robot.uncertainty.of("curvature_percent", tube)
         if name == "curvature" and abs(value) < settings.MOVED_FAR * stated:
             return None  # a tube like the one in the file
-    turned, mended = orientation.error_deg(like.robot, mine), orientation.error_deg(best.robot, best.change(mine))
-    if mended > settings.CONVENTION_ALIKE * turned:
+    turned = orientation.error_deg(like.robot, mine)
+    if orientation.error_deg(best.robot(like.robot), best.change(mine)) > settings.CONVENTION_ALIKE * turned:
         return None  # the orientations deny it
     if clear * before.typical < np.quantile([*_left_out(fit.robot, rest)], settings.CONVENTION_RUNS, method="higher"):
         return None  # the others are predicted no better by each other: a smooth field, or an effect
 
     def change(m: Measurements) -> Measurements:
         rows, right = np.isin(m.run, some), best.change(m)
-        if best.robot is not like.robot:
+        if best.file is not None:
             return m.rows(~rows)
         parts = {name: (getattr(right, name), getattr(m, name)) for name in CHANGED}
         return replace(m, **{name: np.where(rows[:, None], new, old) for name, (new, old) in parts.items()})
@@ -111,15 +98,15 @@ def _explained(fit: Calibrated, readings: Measurements, some: Integers) -> tuple
     return Finding(best.kind, best.text, best.columns, fix, runs=runs, rms_mm=errors), change
 
 
-def _differences(like: Calibrated, mine: Measurements) -> Iterator[Difference]:
-    """All that may be different in these readings, as they would then be."""
+def _differences(like: Calibrated, mine: Measurements) -> Iterator[tuple[Hypothesis, Calibrated]]:
+    """All that may be different in these readings alone, with the error that it leaves in them."""
     runs = runs_named(np.unique(mine.run))
     for one in (*hypotheses(like.robot, mine), *_exchanged()):
         if one.of_robot or one.offset:
             continue
         fix = f"in the log of {runs} alone: {one.fix or f'negate {one.columns[0]}'}"
-        error = tips.errors(like.robot, one.change(mine))
-        yield Difference(one.kind, one.columns, f"{one.text}, in {runs} alone", fix, like.robot, one.change, error)
+        alone = replace(one, text=f"{one.text}, in {runs} alone", fix=fix)
+        yield alone, _judged(like, like.robot, one.change(mine))
     for name in settings.CONVENTION_SCAN:
         for tube in range(like.robot.n_tubes):
             yield _scanned(like, mine, name, tube)
@@ -135,27 +122,23 @@ def _exchanged() -> Iterator[Hypothesis]:
         yield Hypothesis("mirrored", text, columns, f"exchange {POSE[a]} and {POSE[b]}", change)
 
 
-def _scanned(like: Calibrated, mine: Measurements, name: str, tube: int) -> Difference:
+def _scanned(like: Calibrated, mine: Measurements, name: str, tube: int) -> tuple[Hypothesis, Calibrated]:
     """Another size of a home or of a curvature."""
-    value = _scan(like, mine, name, tube)
+    value, runs = _scan(like, mine, name, tube), np.unique(mine.run)
     robot, readings = _off(like.robot, mine, name, tube, value)
-    error, robot = tips.errors(robot, readings), robot if name == "curvature" else like.robot
-
-    def change(m: Measurements) -> Measurements:
-        return _off(like.robot, m, name, tube, value)[1]
-
-    runs = np.unique(mine.run)
+    left = _judged(like, robot, readings)
     if name == "curvature":
         size = f"{robot.tubes[tube].curvature:.4g}"
         text = f"tube {tube + 1} is another one in {runs_named(runs)}: its curvature is {100 * np.expm1(value):+.0f} %"
         fix = f"give {runs_named(runs)} a robot file with curvature_per_m: {size} of tube {tube + 1}"
-        return Difference("tube_changed", (), text, fix, robot, change, error, (name, tube, value))
+        return Hypothesis("tube_changed", text, (), fix, file=robot, offset=(name, tube, value)), left
     unit, size, digits = ("deg", np.degrees(value), 1) if name == "alpha" else ("mm", 1e3 * value, 2)
     [column] = joints(name, (tube,))
     were = "were" if len(runs) > 1 else "was"
     text = f"{runs_named(runs)} {were} homed elsewhere than the others: {column} stands {short(abs(size))} {unit} off"
     fix = " ".join(["ctcr import", *(f"--offset {column}@{run}={size:.{digits}f}{unit}" for run in runs)])
-    return Difference("run_offset", (column,), text, fix, robot, change, error, (name, tube, value))
+    off = Hypothesis("run_offset", text, (column,), fix, offset=(name, tube, 0.0))
+    return offset_by(off, value, robot.n_tubes), left
 
 
 def _off(robot: Robot, readings: Measurements, name: str, tube: int, value: float) -> tuple[Robot, Measurements]:
@@ -172,16 +155,12 @@ def _left_out(robot: Robot, readings: Measurements) -> Iterator[float]:
     """Typical error [m] of each run, predicted by a calibration of the others."""
     for run in np.unique(readings.run):
         fit = calibrated(robot, readings.rows(readings.run != run))
-        yield _typical(tips.errors(fit.robot, readings.rows(readings.run == run)), fit)
+        yield _judged(fit, fit.robot, readings.rows(readings.run == run)).typical
 
 
-def _typical(error: Array, like: Calibrated) -> float:
-    return Calibrated(like.robot, error, like.floor).typical
-
-
-def _moved(robot: Robot, readings: Measurements) -> Array:
-    """Errors (K,) [m] where the whole frame moved in those runs."""
-    return aligned(tips.predicted(robot, readings), readings.position)[2]
+def _judged(like: Calibrated, robot: Robot, readings: Measurements) -> Calibrated:
+    """A calibration with the error that a robot leaves in other readings."""
+    return replace(like, error=tips.errors(robot, readings))
 
 
 def _scan(like: Calibrated, mine: Measurements, name: str, tube: int) -> float:
@@ -189,6 +168,6 @@ def _scan(like: Calibrated, mine: Measurements, name: str, tube: int) -> float:
     half, best, n = settings.CONVENTION_SCAN[name], 0.0, settings.CONVENTION_SCAN_POINTS
     for _ in range(settings.CONVENTION_SCANS):
         grid = best + np.linspace(-half, half, n)
-        errors = [tips.errors(*_off(like.robot, mine, name, tube, value)) for value in grid]
-        best, half = float(grid[np.argmin([_typical(error, like) for error in errors])]), 2 * half / (n - 1)
+        errors = [_judged(like, *_off(like.robot, mine, name, tube, value)).typical for value in grid]
+        best, half = float(grid[np.argmin(errors)]), 2 * half / (n - 1)
     return best
