@@ -13,13 +13,13 @@ from ctcr.table.measurements import Measurements
 
 
 def repeated(readings: Measurements) -> Mask:
-    """Rows (M,) with exactly the pose of a row before, and of all between, at other joints."""
+    """Rows (M,) that repeat a pose exactly, though joints or load have changed since it was first read."""
     q = readings.load_space
     return (q != q[_since(readings)]).any(axis=1)
 
 
 def _since(readings: Measurements) -> Integers:
-    """The row (M,) since which exactly this pose was read; the row itself where it is a new one."""
+    """The row (M,) in which the pose of each row was first read, without another one between; itself if it is new."""
     pose = np.column_stack([readings.positions, np.nan_to_num(readings.quaternions)])
     held, first = np.zeros(len(readings), bool), np.arange(len(readings))
     held[1:] = (pose[1:] == pose[:-1]).all(axis=1)

@@ -21,10 +21,10 @@ CHANGED = "beta", "alpha", "force", "position"  # of a table, by what may be dif
 
 
 def unlike(fit: Calibrated, readings: Measurements) -> tuple[Finding, Change] | None:
-    """The runs that differ from the others by one thing, and the change of the table that corrects them; where their
-    robot is another one, it leaves them out.
+    """The runs that differ from the others by one thing, and the change of the table that corrects them.
 
-    The others alone are calibrated, and predict these.
+    A calibration of the other runs predicts these. Runs of another robot cannot be corrected: the change leaves them
+    out.
     """
     if len(np.unique(readings.run)) < settings.FEWEST_RUNS or not fit.may_be_beaten:
         return None
@@ -143,11 +143,11 @@ def _scanned(like: Calibrated, mine: Measurements, name: str, tube: int) -> tupl
 
 def _off(robot: Robot, readings: Measurements, name: str, tube: int, value: float) -> tuple[Robot, Measurements]:
     """Robot and readings where the home of a joint [rad], [m] or the logarithm of a curvature is off by a value."""
-    here = np.arange(robot.n_tubes) == tube
     if name != "curvature":
-        return robot, changed(name, lambda q: q + value * here)(readings)
-    tubes = [t.model_copy(update={"curvature_per_m": np.exp(value) * t.curvature_per_m}) for t in robot.tubes]
-    tubes = [new if off else old for new, old, off in zip(tubes, robot.tubes, here, strict=True)]
+        move = value * (np.arange(robot.n_tubes) == tube)
+        return robot, changed(name, lambda q: q + move)(readings)
+    tubes = [*robot.tubes]
+    tubes[tube] = tubes[tube].model_copy(update={"curvature_per_m": np.exp(value) * tubes[tube].curvature_per_m})
     return robot.model_copy(update={"tubes": tubes}), readings
 
 

@@ -1,5 +1,8 @@
-"""The search: every hypothesis is predicted, alone and with one of the tracker, the likely ones are calibrated, the
-clearest is applied, and again."""
+"""The search for wrong conventions.
+
+It predicts the readings under every hypothesis, alone and together with one on the tracker, calibrates the likely ones,
+applies the clearest, and begins again.
+"""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -186,10 +189,11 @@ def _halves(case: Case, tried: Tried) -> list[Calibrated]:
 
 
 def _of_one_session(case: Case, better: Tried, of_runs: Measurements) -> bool:
-    """Whether a better case leaves less error than a frame for each run does, or far less where each run has its own.
+    """Whether a better case explains more than that each run has a tracker frame of its own.
 
-    Else the runs are not one session, and what is better is not clear. Frames of runs contain a frame of all:
-    where that is what is better, it leaves hardly anything, or not much more than they do.
+    It must leave less error than a frame for each run does without it, or far less once each run has its frame in both
+    cases. Otherwise the runs are not one session, and the better case is not clear. Frames for each run include one new
+    frame for all, so a better case that is only a new frame must leave hardly any error, or not much more than they do.
     """
     before, after = (_with_run_frames(one, of_runs) for one in (case, better.case))
     if all(one.frame or one.registers for one in better.wrong):
@@ -286,10 +290,10 @@ def _is_far(before: Robot, after: Robot) -> bool:
 
 
 def _is_jump(case: Case, one: Hypothesis, tried: Tried, half: Calibrated) -> bool:
-    """Whether an offset moves a home, or another frame the frame, farther than calibration would.
+    """Whether an offset moves a home, or a new frame moves the frame, farther than calibration would.
 
-    A physical effect may look like an offset, but an offset explains it in part only. So an offset is a right angle, or
-    leaves hardly any of the error that there is without it.
+    A physical effect may look like an offset, but an offset explains only a part of it. So an offset counts if it is a
+    right angle, or if hardly any of the error without it is left.
     """
     robot = tried.case.robot
     if one.registers:

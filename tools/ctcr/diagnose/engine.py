@@ -148,8 +148,8 @@ class Engine:
         return True
 
     def less_widened(self, fit: joint.Fit, candidates: Iterable[Candidate], fixed: dict[str, float]) -> joint.Fit:
-        """The fit with those scales alone that the readings ask for whatever the candidates do: a data sheet must not
-        be blamed for what an effect may have done."""
+        """The fit with only those scales that the readings ask for even if the candidates act: a data sheet must not be
+        blamed for what an effect may have done."""
         if not fit.priors.scales:
             return fit
         names = [name for name in dict.fromkeys(n for c in candidates for n in c.names) if name not in fit.names]

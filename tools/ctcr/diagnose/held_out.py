@@ -44,7 +44,7 @@ def cross_validated(engine: Engine, fit: joint.Fit, noise: Any = None) -> Array:
 
 
 def typical(squares: Array) -> float:
-    """The geometric mean: a run that goes where no other went would dominate the arithmetic one."""
+    """The geometric mean. A run that goes where no other went would dominate the arithmetic mean."""
     return float(np.exp(np.log(squares).mean()))
 
 

@@ -116,7 +116,7 @@ class Round:
 
 @dataclass(frozen=True)
 class Judged:
-    """A fit as the selection judges it: beside a delay, lags that the data ask for are noise."""
+    """A fit as the selection judges it. Where it has a delay, further lags that the data ask for count as noise."""
 
     fit: joint.Fit
     log_evidence: float

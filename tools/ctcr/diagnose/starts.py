@@ -24,7 +24,7 @@ EVERYWHERE = -1.0  # a moment before the session: the effect acts on all rows
 
 
 def options(engine: Engine, candidate: Candidate, columns: Array, by_force: Array, worth: Worth) -> list[list[Option]]:
-    """Ways to begin; of each list the best one enters the round.
+    """Starts of a candidate, in lists: the best start of each list takes part in the round.
 
     columns   (M, 6, k) derivatives by the candidate's parameters, where it has a moment: of an effect on all rows
     by_force  (M, 6, 3) derivatives by a force at the tip [1/N]

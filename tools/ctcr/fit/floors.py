@@ -1,5 +1,5 @@
-"""The two floors of the error, `sensor jitter` and `expected error`: the same figures in every command, and whether the
-noise explains what a fit leaves, by the same test."""
+"""The two floors of the error, `sensor jitter` and `expected error`, and the test whether noise explains what a fit
+leaves. All commands take both from here, so that they show the same figures."""
 
 from dataclasses import dataclass
 from math import nan, sqrt
@@ -44,10 +44,11 @@ class Floors:
 
 
 def floors(robot: Robot, readings: Measurements) -> Floors:
-    """The floors of readings of a robot, of what its file states alone: no fit and no residual changes them.
+    """The floors of the error of these readings. They follow from the robot file: no fit and no residual changes them.
 
-    The expected error is that of the standard calibration, by least squares, to readings of a right model: noise less
-    what parameters, and frames that each run has of its own, take of it, by the same rows in every command.
+    The expected error is what a standard calibration by least squares leaves where the model is right: the noise, less
+    the part that the parameters absorb, and the frames of the runs where each has its own. Every command computes it
+    from the same rows.
     """
     jitter = sqrt(3) * (robot.tracker.jitter_mm or nan)
     robot, readings, _ = sensor_pose.trusted(robot, readings)

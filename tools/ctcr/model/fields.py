@@ -137,8 +137,10 @@ def changes(fit: Any, before: Robot, after: Robot) -> list[Change]:
 
 
 def _sds(fit: Any, key: str, before: list[float]) -> list[float]:
-    """Standard deviations of the three numbers of a pose, in the unit of the file, of which a rotation vector was
-    turned from the one before; [] where the fit does not tell them."""
+    """Standard deviations of the three numbers of a pose, in the unit of the file; [] where the fit does not know them.
+
+    before    the numbers before the fit, from which it turned a rotation vector
+    """
     kind = next((kind for kind, of in parameters.TURNS.items() if of == key), f"tracker.{key.removesuffix('_mm')}")
     names = [f"{kind}.{axis}" for axis in "xyz"]
     free = [i for i, name in enumerate(names) if name in fit.names]

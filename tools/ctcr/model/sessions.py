@@ -21,8 +21,8 @@ FRAME = 6  # numbers of a frame
 
 
 def told(names: Sequence[str], readings: Measurements) -> list[str]:
-    """Names of parameters without those of which readings tell nothing: of a frame that all runs share, where each run
-    has its own, and of the sensor's rotation, where no orientation was measured."""
+    """The names, less those of parameters that the readings cannot determine: of the common tracker frame where each
+    run has its own, and of the sensor's rotation where no orientation was measured."""
     nothing = () if readings.sessions is None else parameters.OF_FRAME
     nothing += () if readings.oriented.any() else ("tracker.sensor_rotation.",)
     return [name for name in names if not name.startswith(nothing)]
