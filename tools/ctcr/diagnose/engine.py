@@ -178,10 +178,6 @@ class Engine:
         thin = self.linear_fit(fit, weights=weights, inflation=fit.inflation, max_iterations=0)
         return replace(self, rows=few), thin
 
-    def as_stated(self, fit: joint.Fit) -> joint.Fit:
-        """The linearised fit under the noise as stated, whatever model error had to be admitted."""
-        return self.linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
-
     def linear(self, fit: joint.Fit) -> Linear:
         residual, jacobian = fit.whitened()
         return Linear(residual, jacobian @ fit.priors.factor)

@@ -17,7 +17,7 @@ from ctcr.diagnose.engine import Engine
 from ctcr.diagnose.linearised import Gain, Linear, laplace
 from ctcr.effects import catalogue
 from ctcr.fit import folds
-from ctcr.fit.joint import Fit, likeliest_field
+from ctcr.fit.joint import Fit, as_stated, likeliest_field
 from ctcr.table.measurements import Measurements
 
 CORRECTED = (
@@ -91,16 +91,16 @@ def corrected(engine: Engine, fit: Fit) -> tuple[Fit, list[str]]:
     more = lags.lag[:, None] * np.nan_to_num(fit.jacobian_all[:, lags.delay].reshape(-1, 6))
     noise = likeliest_field(engine.linear_fit(fit, more=more, noise=engine.noise))
     there = engine.linear_fit(fit, more=more, noise=noise)
-    if _unexplained(engine, there) > settings.LAGS_LEAVE * _unexplained(engine, fit):
+    if _unexplained(there) > settings.LAGS_LEAVE * _unexplained(fit):
         return fit, []
     # Once more with its weights: then rows that were not fitted have a residual, too.
     seen = engine.linear_fit(fit, more=more, noise=noise, **there.frozen)
     return seen, [_message(engine, fit, lags)]
 
 
-def _unexplained(engine: Engine, fit: Fit) -> float:
+def _unexplained(fit: Fit) -> float:
     """Chi-square beyond what the noise as stated explains."""
-    stated = engine.as_stated(fit)
+    stated = as_stated(fit)
     return max(stated.chi_square + stated.shift_square - stated.bulk_observations, 0.0)
 
 

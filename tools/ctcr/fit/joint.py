@@ -280,7 +280,12 @@ def p_value(fit: Fit) -> float:
     residual or a larger one; 0 where the noise had to be inflated much."""
     if np.max(fit.inflation) > settings.INFLATION_EXPLAINED:
         return 0.0
-    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2)).p_value
+    return as_stated(fit).p_value
+
+
+def as_stated(fit: Fit) -> Fit:
+    """The linearised fit under the noise as stated, whatever model error had to be admitted."""
+    return linear_fit(fit, weights=fit.weights, inflation=np.ones(2))
 
 
 def rejects(fit: Fit) -> bool:
