@@ -21,7 +21,7 @@ X_VALUE = Meaning("t", _S)  # LabVIEW's column of times
 _NDI = {"q0": "qw", "qx": "qx", "qy": "qy", "qz": "qz", "tx": "x", "ty": "y", "tz": "z", "rx": "rx", "ry": "ry"}
 _NDI |= {"rz": "rz", "state": "seen"}
 
-Rows = list[tuple[int, list[str]]]
+Rows = list[tuple[int, list[str]]]  # number of the line in the file, from 1; fields
 
 
 def reader_of(rows: Rows) -> Callable[[Path, Rows], Log] | None:
@@ -55,18 +55,15 @@ def _ndi(path: Path, rows: Rows) -> Log:
     """A group of columns a tool: its port and name, Frame, State, rotation, translation; then its single markers."""
     above = next(i for i, (_, fields) in enumerate(rows) if any(fields))
     header = [name.strip() for name in rows[above][1]]
-    names, meanings, marker, single = [], {}, "", False
+    meanings, marker, single = {}, "", False
     for i, name in enumerate(header):
         if name.startswith("Port"):
             marker, single = re.sub(r"\s+", " ", name), False
         label = f"{marker}: {name}" if marker and name != marker else name
         label = f"{label} (#{i + 1})" if label in meanings else label
-        known = None if single else _ndi_meaning(name, marker)
-        names.append(label)
-        meanings[label] = known
+        meanings[label] = None if single else _ndi_meaning(name, marker)
         single = single or name == "Markers"
-    data = [(number, fields) for number, fields in rows[above + 1 :] if any(fields)]
-    return _log(path, "NDI ToolBox", names, data, meanings, "ZYX", [])
+    return _log(path, "NDI ToolBox", meanings, rows[above + 1 :], "ZYX", [])
 
 
 def _ndi_meaning(name: str, marker: str) -> Meaning | None:
@@ -92,16 +89,14 @@ def _motive(path: Path, rows: Rows) -> Log:
     types, bodies, properties = (_wide(fields, len(axes)) for fields in (above[0], above[1], above[-1]))
     wanted = "Rigid Body" if "Rigid Body" in types else "Bone" if "Bone" in types else "Marker"
     euler = about.get("Rotation Type", "Quaternion").strip()
-    names, meanings = [], {}
+    meanings = {}
     for i, axis in enumerate(axis.strip() for axis in axes):
         name = " ".join(part for part in (bodies[i], properties[i], axis) if part) or f"#{i + 1}"
         name = f"{name} (#{i + 1})" if name in meanings else name
-        names.append(name)
-        wanted_here = types[i] == wanted
-        meanings[name] = _motive_meaning(axis, properties[i], bodies[i], length) if i < 2 or wanted_here else None
-    data = [(number, fields) for number, fields in rows[at + 1 :] if any(fields)]
+        is_used = i < 2 or types[i] == wanted
+        meanings[name] = _motive_meaning(axis, properties[i], bodies[i], length) if is_used else None
     notes = [f"recording started at {about['Capture Start Time']}"] if about.get("Capture Start Time") else []
-    return _log(path, "OptiTrack Motive", names, data, meanings, euler if euler != "Quaternion" else None, notes)
+    return _log(path, "OptiTrack Motive", meanings, rows[at + 1 :], None if euler == "Quaternion" else euler, notes)
 
 
 def _motive_meaning(axis: str, kind: str, body: str, length: Unit) -> Meaning | None:
@@ -118,11 +113,12 @@ def _wide(fields: list[str], width: int) -> list[str]:
     return [field.strip() for field in fields] + [""] * (width - len(fields))
 
 
-def _log(path, kind, names, data, meanings, euler, notes) -> Log:
-    count = len(names)
+def _log(path, kind, meanings, rows, euler, notes) -> Log:
+    """The log whose columns have the names and meanings of `meanings`, in their order."""
+    count, data = len(meanings), [(number, fields) for number, fields in rows if any(fields)]
     if not data:
         raise InputError(Problem("has no rows below the header", str(path)))
     padded = [[*fields, *[""] * (count - len(fields))][:count] for _, fields in data]
     numbers = np.array([number for number, _ in data], dtype=np.int64)
     columns = tuple(map(list, zip(*padded, strict=True)))
-    return Log(path, kind, tuple(names), columns, numbers, False, meanings, euler, notes)
+    return Log(path, kind, tuple(meanings), columns, numbers, False, meanings, euler, notes)

@@ -17,6 +17,7 @@ from ctcr.arrays import Integers
 from ctcr.errors import InputError, Problem
 from ctcr.intake import makers
 from ctcr.intake.log import Log
+from ctcr.intake.makers import Rows
 from ctcr.intake.names import RUN, meaning
 from ctcr.intake.units import named
 from ctcr.show.wording import listed
@@ -33,8 +34,6 @@ _COMMA_NUMBER = re.compile(r"[-+−]?\d*,\d+([eEdD][-+]?\d+)?")
 _POINT_NUMBER = re.compile(r"[-+−]?\d*\.\d+([eEdD][-+]?\d+)?")
 
 _RUN_LINE = re.compile(r"\W*([^\W\d_]+)[\W_]*(\d+)\W*")  # Run 2, # trial_3
-
-Rows = list[tuple[int, list[str]]]  # number of the line in the file, from 1; fields
 
 
 def read(path: Path, content: bytes) -> Log:
