@@ -224,12 +224,9 @@ def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _P
     """Gives one body's columns their roles; one orientation is enough."""
     matrix = [role for role in roles if role[0] == "m"]
     quaternion = all(role in roles or prefix + role in made.used for role in QUATERNION)
-    kept = [*POSITION, "seen"]
-    kept += QUATERNION if quaternion else matrix if matrix else EULER
-    if set(matrix) & {"m1", "m14"}:
-        kept = [role for role in kept if role not in POSITION] if not set(roles) >= set(POSITION) else kept
-        kept += [role for role in matrix if role not in kept] if not set(roles) >= set(POSITION) else []
-    for role in kept:
+    orientation = QUATERNION if quaternion else matrix or EULER
+    in_matrix = {"m1", "m14"} & set(matrix) and not set(roles) >= set(POSITION)  # whether the position stands there
+    for role in dict.fromkeys(["seen", *orientation, *matrix] if in_matrix else [*POSITION, "seen", *orientation]):
         if role in roles and prefix + role not in made.used:
             made.used[prefix + role] = picker.best(prefix + role, roles[role])
     if quaternion and "numbered" in roles and choices.quaternion is None:
