@@ -43,35 +43,35 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
     log, choices = unstacked(log, choices)
     of_poses, of_joints = (choices, choices) if joints is None else together.divided(choices, log, joints)
     beside = joints is not None
-    columns = Columns(log, mapping.of(log, of_poses, 0 if beside else n_tubes), of_poses, beside)
-    moving = columns
+    columns = moving = Columns(log, mapping.of(log, of_poses, 0 if beside else n_tubes), of_poses, beside)
     if joints is not None:
         moving = Columns(joints, mapping.of(joints, of_joints, n_tubes, poses=False), of_joints, beside)
     _check_joints(moving)
     moved = motion.of(moving, robot)
     pose = sensor.of(columns)
-    t, zero = motion.times(columns) if joints is not None else (moved.t, moved.zero)
+    t, zero = motion.times(columns) if beside else (moved.t, moved.zero)
     shift = units.parsed(choices.offsets["t"], "time", "--offset t").size if "t" in choices.offsets else 0.0
     columns.faults.raise_any()
     moving.faults.raise_any()
-    if joints is not None:
+    if beside:
         moved = together.at(columns, moving, moved, t, zero + shift)
     else:
         moved.t = moved.t + shift
-    kept = motion.complete(moving if joints is None else columns, moved)
+    kept = motion.complete(columns, moved)
     moved = moved.only(kept)
     if not len(moved.rows):
         raise InputError(Problem("has no row with all joints", str(moving.log.path)))
-    position, quaternion = (None, None) if pose is None else (pose.position, pose.quaternion)
-    _check_values(columns, moving, moved, pose and position[kept], None if quaternion is None else quaternion[kept])
+    poses = (None, None) if pose is None else (pose.position, pose.quaternion)
+    position, quaternion = (None if part is None else part[kept] for part in poses)
+    _check_values(columns, moving, moved, position, quaternion)
     table = Measurements(
         moved.t,
         moved.run.astype(np.int64),
         moved.beta,
         moved.alpha,
         moved.force,
-        None if position is None else position[kept],
-        None if quaternion is None else quaternion[kept],
+        position,
+        quaternion,
         moved.rows,
         warnings=[*_doubts(columns, moved), *moving.doubts],
     )

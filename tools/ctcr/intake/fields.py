@@ -103,11 +103,6 @@ def seen(log: Log, column: int) -> Mask:
     return np.array([_word(text) in SEEN_WORDS for text in raw])
 
 
-def tells_seen(log: Log, column: int) -> bool:
-    """Whether a column of states has a word or number for seen: else its words mean something else."""
-    return bool(seen(log, column).any())
-
-
 def labels(log: Log, column: int, faults: Faults) -> tuple[Array, list[str]]:
     """Numbers of runs (M,); texts are numbered in their order, and returned in it."""
     raw = log.values[column]

@@ -12,6 +12,7 @@ from ctcr.errors import InputError, Problem
 from ctcr.intake import fields, units
 from ctcr.intake.choices import Choices
 from ctcr.intake.columns import DEG_FROM, RAD_UP_TO, STRONGEST_N, Columns, angle_unit, length_unit
+from ctcr.intake.names import quantity
 from ctcr.intake.units import Unit, named
 from ctcr.robot.description import Robot
 from ctcr.show.wording import join, listed
@@ -136,17 +137,16 @@ def _joints(columns: Columns, kind: str, guess) -> Array:
     roles = [f"{kind}{i}" for i in range(1, columns.mapping.n_tubes + 1)]
     logged = [role for role in roles if columns.has(role)]
     values = dict(zip(logged, columns.si(kind, logged, guess).T, strict=True)) if logged else {}
-    quantity = "length" if kind == "beta" else "angle"
     for role in roles:
         if role not in values:
-            constant = units.value(choices.constants[role], quantity, f"--constant {role}")
+            constant = units.value(choices.constants[role], quantity(kind), f"--constant {role}")
             values[role] = np.full(len(columns.log), constant)
             continue
         if (role in choices.flip) != (kind in choices.flip):
             values[role] = -values[role]
         for key in (role, kind):
             if key in choices.offsets:
-                values[role] = values[role] + units.value(choices.offsets[key], quantity, f"--offset {key}")
+                values[role] = values[role] + units.value(choices.offsets[key], quantity(kind), f"--offset {key}")
         if {role, kind} & set(choices.unwrap):
             known = np.isfinite(values[role])
             values[role][known] = np.unwrap(values[role][known])
@@ -197,7 +197,7 @@ def _add_to_runs(columns: Columns, run: Array, joints: dict[str, Array]) -> None
         tubes = slice(int(joint[-1]) - 1, int(joint[-1])) if joint != kind else slice(None)
         if not rows.any() or not joints[kind][:, tubes].size:
             raise InputError(Problem(f"there is no {joint} in a run {number}", field=f"--offset {key}"))
-        joints[kind][rows, tubes] += units.value(text, "length" if kind == "beta" else "angle", f"--offset {key}")
+        joints[kind][rows, tubes] += units.value(text, quantity(kind), f"--offset {key}")
 
 
 def _runs(columns: Columns, t: Array) -> Array:

@@ -49,8 +49,9 @@ def _marker(columns: Columns, prefix: str) -> Pose | None:
     hidden = poses.unseen(pose)
     if columns.has(prefix + "seen"):
         used = columns.mapping.used[prefix + "seen"]
-        if fields.tells_seen(columns.log, used.column):
-            hidden |= ~fields.seen(columns.log, used.column)
+        seen = fields.seen(columns.log, used.column)
+        if seen.any():
+            hidden |= ~seen
         else:
             columns.notes.append(f"{used.name} has no word for seen: it is not used")
     if hidden.any():
