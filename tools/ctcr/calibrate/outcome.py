@@ -162,7 +162,7 @@ def frame_rows(
     return rows
 
 
-def judged(outcome: Outcome, robot: Robot | None, command: str, source: str) -> Outcome:
+def judged(outcome: Outcome, robot: Robot | None) -> Outcome:
     """The outcome with its doubts: values that contradict the robot file, or that look wrong by themselves.
 
     Raises InputError where no robot can have the values.
@@ -173,7 +173,7 @@ def judged(outcome: Outcome, robot: Robot | None, command: str, source: str) -> 
         name = f"{heading}: {row.name.strip()}" if row.name.startswith(" ") else row.name
         names[row.path] = name
         said += [f"{name}: {_contradiction(row)}"] if row.contradicts else []
-    for path, text in _odd(outcome, robot, command, source):
+    for path, text in _odd(outcome, robot):
         said.append(f"{names.get(path) or checks.path_text(path)}: {text}")
     if said and outcome.suspects:
         said.append(f"what may be wrong: {outcome.suspects}{', or the robot file' if robot else ''}")
@@ -187,7 +187,7 @@ def _contradiction(row: Row) -> str:
     return f"{found}, {stated} by the robot file: {apart:g} standard deviations apart"
 
 
-def _odd(outcome: Outcome, robot: Robot | None, command: str, source: str) -> Iterator[checks.Fault]:
+def _odd(outcome: Outcome, robot: Robot | None) -> Iterator[checks.Fault]:
     """What looks wrong of the values by themselves: without a robot by their units, else in the robot with them."""
     if robot is None:
         known = [(row, *Robot.owner(row.path)) for row in outcome.rows if row.path]
@@ -195,7 +195,7 @@ def _odd(outcome: Outcome, robot: Robot | None, command: str, source: str) -> It
         yield from ((row.path, unit.doubt(row.value)) for row, unit in quantities if not unit.is_usual(row.value))
         return
     before = set(checks.doubts(robot))
-    after = ledger.changed(robot, *_changes(outcome, robot, command, source))
+    after = ledger.changed(robot, _changes(outcome, robot), Entry(""))
     yield from (fault for fault in checks.doubts(after) if fault not in before and fault[0][0] != "uncertainty")
 
 
@@ -212,12 +212,13 @@ def check_target(robot, target: str | None, in_place: bool, needed: bool = False
 
 def write_robot(outcome: Outcome, robot, target: str, command: str, source: str, in_place: bool) -> None:
     """Writes the robot file with the changes, and an entry of its ledger."""
-    ledger.write(robot, target, *_changes(outcome, robot, command, source), in_place=in_place)
+    entry = Entry(command, [source], outcome.figures, " ".join([*outcome.doubts, *outcome.notices]))
+    ledger.write(robot, target, _changes(outcome, robot), entry, in_place=in_place)
 
 
-def _changes(outcome: Outcome, robot, command: str, source: str) -> tuple[list[Change], Entry]:
-    changes = [*outcome.changes, *_uncertainties(robot, outcome.rows), *_correlations(robot, outcome)]
-    return changes, Entry(command, [source], outcome.figures, " ".join([*outcome.doubts, *outcome.notices]))
+def _changes(outcome: Outcome, robot) -> list[Change]:
+    """All that the outcome changes in the robot file: values, their standard deviations and correlations."""
+    return [*outcome.changes, *_uncertainties(robot, outcome.rows), *_correlations(robot, outcome)]
 
 
 def _uncertainties(robot, rows: list[Row]) -> list[Change]:

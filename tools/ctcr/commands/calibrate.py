@@ -71,7 +71,7 @@ def _give(found, robot, target, in_place, called: str, table: str, out) -> None:
     """Gives an Outcome back: robot file, report, JSON, text."""
     from ctcr.calibrate import outcome
 
-    found = outcome.judged(found, robot, called, table)
+    found = outcome.judged(found, robot)
     if target:
         outcome.write_robot(found, robot, target, called, table, in_place)
     out.write_report("calibrate.outcome", found, files=[*(robot.files if robot else []), table], robot=robot)
