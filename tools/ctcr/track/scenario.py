@@ -17,14 +17,13 @@ from ctcr.arrays import Array
 from ctcr.errors import InputError, Problem
 from ctcr.robot import yaml_document
 from ctcr.robot.checks import problems, validated
-from ctcr.robot.description import Section, Three
+from ctcr.robot.description import BELOW, Section, Three
 from ctcr.robot.units import Quantity
 
 # All twelve edges of a cube: three are travelled twice, as each of its eight corners has three edges. Bit k of a
 # corner's number says at which end of axis k it lies.
 CUBE_TOUR = (0, 1, 3, 2, 0, 4, 5, 1, 5, 7, 3, 7, 6, 2, 6, 4)
 TASKS = ("tracking", "damping", "limit avoidance", "obstacle avoidance", "stability margin", "posture")
-NESTED = "its fields, indented below it"
 
 Lengths = Annotated[list[float] | None, Quantity("mm", usual=(0, 2000), count="one number a tube,")]
 Weight = Annotated[list[float], Len(2, 2), Quantity("", count="two numbers, of translation and rotation,", least=0)]
@@ -117,12 +116,12 @@ class Scenario(Section):
     name: str = Field(description="text")
     about: str = Field("", description="text")
     rate_Hz: Annotated[float, Quantity("Hz", usual=(1, 5000), above=0)] = 40.0
-    trajectory: Trajectory = Field(description=NESTED)
-    start: Start = Field(description=NESTED)
-    tasks: Tasks = Field(default_factory=Tasks, description=NESTED)
-    limits: Limits = Field(default_factory=Limits, description=NESTED)
-    obstacle: Obstacle | None = Field(None, description=NESTED)
-    load: TipLoad = Field(default_factory=TipLoad, description=NESTED)
+    trajectory: Trajectory = Field(description=BELOW)
+    start: Start = Field(description=BELOW)
+    tasks: Tasks = Field(default_factory=Tasks, description=BELOW)
+    limits: Limits = Field(default_factory=Limits, description=BELOW)
+    obstacle: Obstacle | None = Field(None, description=BELOW)
+    load: TipLoad = Field(default_factory=TipLoad, description=BELOW)
     noise_mm: Annotated[float, Quantity("mm", usual=(1e-4, 5), least=0)] = 0.035
     noise_deg: Annotated[float, Quantity("deg", usual=(1e-4, 5), least=0)] = 0.0
     repetitions: Annotated[int, Field(ge=1, le=1000, description="a whole number from 1 to 1000")] = 10

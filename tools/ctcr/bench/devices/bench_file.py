@@ -14,7 +14,7 @@ from ctcr.bench.shared.folder import AURORA, MASTER
 from ctcr.errors import InputError, Problem
 from ctcr.robot import yaml_document
 from ctcr.robot.checks import validated
-from ctcr.robot.description import MAX_TUBES, Robot, Section
+from ctcr.robot.description import BELOW, MAX_TUBES, Robot, Section
 from ctcr.robot.units import Quantity
 
 SIMULATED = "simulated"
@@ -81,9 +81,9 @@ class Limits(Section):
 class Bench(Section):
     """The whole file. `person` hangs weights and looks at the tubes."""
 
-    tracker: TrackerPort = Field(description="its fields, indented below it")
-    motors: Motors = Field(description="its fields, indented below it")
-    limits: Limits = Field(description="its fields, indented below it")
+    tracker: TrackerPort = Field(description=BELOW)
+    motors: Motors = Field(description=BELOW)
+    limits: Limits = Field(description=BELOW)
     person: Literal["present", "simulated"] = Field("present", description="present or simulated")
 
     def port(self, folder: Path) -> str:
