@@ -11,6 +11,7 @@ from ctcr.bench.record.folder import TABLE
 from ctcr.demo import blind_drive
 from ctcr.demo.story import Story
 from ctcr.effects import catalogue
+from ctcr.frames import points_to_tracker
 from ctcr.model import simulation
 from ctcr.robot import robot_file
 from ctcr.robot.description import Robot
@@ -119,7 +120,7 @@ def cube(folder: Path) -> Array:
     """Corners of the cube (P, 3) [m] in the order of its tour, in the tracker frame that calibration alone found."""
     robot = robot_file.load(folder / "calibrated.yaml")
     path = scenario.load(folder / "cube.yaml", robot.n_tubes).trajectory
-    return blind_drive.in_tracker(robot, path.points)
+    return points_to_tracker(robot.tracker, path.points)
 
 
 # ---- results of the commands, in words

@@ -4,7 +4,6 @@ import numpy as np
 
 from ctcr.arrays import Array, ArrayLike
 from ctcr.errors import InputError, Problem
-from ctcr.frames import points_to_tracker
 from ctcr.model import simulation
 from ctcr.model.model import Model
 from ctcr.robot.description import Robot
@@ -15,11 +14,6 @@ CLOSE = 2e-5  # [m] from a point, by the model
 MOST_STEPS = 40
 DAMPING = 1e-3  # of the least-squares step, relative
 RADIAN = 0.05  # [m]: weight of a turn by 1 rad in it
-
-
-def in_tracker(robot: Robot, points: ArrayLike) -> Array:
-    """Points (P, 3) [m] of the base frame in the tracker frame."""
-    return points_to_tracker(robot.tracker, points)
 
 
 def drive(robot: Robot, start: ArrayLike, points: ArrayLike) -> Measurements:

@@ -26,8 +26,8 @@ def tell(folder: Path, console: Terminal) -> int:
         shutil.copy(files / name, folder)
     (folder / LOG).write_text("".join(f"$ ctcr {command}\n" for command in STEPS.values()))
     for number, (why, command) in enumerate(STEPS.items(), 1):
-        console.print(f"\n{number}. {why}\n   $ ctcr {command}\n", style="bold", soft_wrap=True, highlight=False)
+        console.print(f"\n{number}. {why}\n   $ ctcr {command}\n", style="bold", soft_wrap=True)
         if code := subprocess.run([sys.executable, "-m", "ctcr", *command.split()], cwd=folder).returncode:
             return code
-    console.print(f"\nThe reports: {folder}/1_before.html, 2_found.html, 3_after.html", soft_wrap=True, highlight=False)
+    console.print(f"\nThe reports: {folder}/1_before.html, 2_found.html, 3_after.html", soft_wrap=True)
     return 0
