@@ -89,10 +89,9 @@ def random_joints(robot, rows: int, random):
 
     lengths = robot.lengths
     ends = np.empty((rows, robot.n_tubes))  # arc lengths of the tips; beta = end - length
-    inner_end = np.zeros(rows)
+    least = np.zeros(rows)
     for i in reversed(range(robot.n_tubes)):
-        least = inner_end
         most = lengths[i] + (ends[:, i + 1] - lengths[i + 1] if i + 1 < robot.n_tubes else 0.0)
         ends[:, i] = random.uniform(least, np.minimum(most, least + 0.1))
-        inner_end = ends[:, i]
+        least = ends[:, i]
     return ends - lengths, random.uniform(-np.pi, np.pi, (rows, robot.n_tubes))

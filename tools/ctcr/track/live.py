@@ -31,8 +31,6 @@ from ctcr.track.result import Run
 from ctcr.track.runs import check, run_once, system_values
 from ctcr.track.scenario import Scenario
 
-PATIENCE_S = 2.0
-MOST_ERROR_MM = 20.0
 VALID_PERIODS = 3  # for which a velocity is driven before the motors come to rest by themselves
 MOST_FEEDBACK = 0.375  # a period: a loop two periods late, as that of tracker and motors is, is unstable above 0.62
 
@@ -44,8 +42,8 @@ def track(
     bench: str,
     *,
     place: str | Path | None = None,
-    patience_s: float = PATIENCE_S,
-    most_error_mm: float = MOST_ERROR_MM,
+    patience_s: float = 2.0,
+    most_error_mm: float = 20.0,
     said: Callable[[str], None] = lambda text: None,
 ) -> tuple[list[Run], Scenario]:
     """Runs the scenario of a file on the bench of a file, records it in the folder `target`, and returns the runs.
