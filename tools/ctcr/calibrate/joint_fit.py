@@ -286,7 +286,7 @@ def _explaining(fits: Iterable[Fit]) -> list[Fit]:
 
 
 def stage_of(name: str, residual: Array) -> Stage:
-    """Of residuals (K, 6), position [m] and rotation [rad]."""
+    """The errors of residuals (K, 6), position [m] and rotation [rad]."""
     size = 1e3 * np.linalg.norm(residual[:, :3], axis=1)
     size = size[np.isfinite(size)]
     errors = 1e3 * rms(residual[:, :3]), float(np.degrees(rms(residual[:, 3:])))

@@ -113,7 +113,7 @@ class StillReading:
     frames: int
 
     def fields(self) -> list[float]:
-        """Of POSITION_COLUMNS."""
+        """The values of POSITION_COLUMNS."""
         return [*1e3 * self.position, 1e3 * self.scatter, self.frames]
 
 

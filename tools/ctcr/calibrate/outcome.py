@@ -87,7 +87,7 @@ class Outcome:
 
     @property
     def changes(self) -> list[Change]:
-        """Those of the robot file; the ledger holds no deviations of the components of a rotation vector."""
+        """What changes in the robot file. The ledger holds no deviations of the components of a rotation vector."""
         updating = [row for row in self.rows if row.path]
         return [Change(row.path, row.unit, row.value, None if row.unit == "rad" else row.sd) for row in updating]
 
@@ -237,7 +237,7 @@ def _uncertainties(robot, rows: list[Row]) -> list[Change]:
 
 
 def _correlations(robot, outcome: Outcome) -> list[Change]:
-    """Those of the measured values, in place of all that the file says of these."""
+    """The change that puts the correlations of the measured values in place of those of the file; none without any."""
     measured = {name_at(row.path) for row in outcome.rows if row.path}
     old = robot.uncertainty.correlations
     kept = [vars(pair) for pair in old if not {pair.first, pair.second} & measured]

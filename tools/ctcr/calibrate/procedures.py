@@ -145,8 +145,8 @@ def rotation_offsets(
 
 
 def radius_of_circle(robot: Robot | None, tube: int, deployed_mm: float | None = None) -> tuple[float, float]:
-    """That of the sensor on a tube that turns alone [m], by the robot file, with its standard deviation; NaN where the
-    file does not say it."""
+    """The radius of the circle of the sensor on a tube that turns alone [m], and its standard deviation, by the robot
+    file; NaN where the file does not say them."""
     if robot is None or robot.tracker.sensor_position_mm is None:
         return nan, nan
     out = inf if deployed_mm is None else 1e-3 * deployed_mm

@@ -231,7 +231,7 @@ def _in_ledger(robot: Robot, name: str) -> str:
 
 
 def _of_effect(robot: Robot, name: str, value: float) -> str:
-    """The same of a parameter of an effect, which is in SI there."""
+    """How the ledger came to the value of a parameter of an effect, in SI units there; empty where it does not say."""
     for entry in reversed(robot.history):
         if one := section(entry, "figures", "parameters", name):
             said = _said(entry, value, one.get("sd"), "") if _is_same(one.get("value"), value) else ""

@@ -211,7 +211,7 @@ def _pose(words: list[str]) -> Found:
 
 
 def _numbers(words: list[str]) -> list[int]:
-    """Numbers of tubes."""
+    """The numbers of tubes among the words."""
     return [int(word) if word.isdigit() else _WORDS[word] for word in words if word.isdigit() or word in _WORDS]
 
 

@@ -86,7 +86,7 @@ def _matrix(columns: Columns, prefix: str) -> tuple[Array | None, Array | None]:
 
 
 def _matrix_of_three_rows(columns: Columns, prefix: str) -> tuple[Array, Array]:
-    """Of 3 x 4 matrices, by rows or by columns: as their rotations say."""
+    """Positions and rotations of 3 x 4 matrices, read by rows or by columns: the one that gives rotations."""
     values = np.column_stack([columns.values(prefix + role) for role in SEQUENCE[:12]])
     by_rows, by_columns = values.reshape(-1, 3, 4), np.swapaxes(values.reshape(-1, 4, 3), 1, 2)
     error = [np.nan_to_num(poses.off_rotation(one[:, :, :3])).sum() for one in (by_rows, by_columns)]

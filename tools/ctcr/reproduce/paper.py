@@ -34,7 +34,7 @@ class Claim:
         return self.ours / self.paper if self.paper else None
 
     def row(self) -> list[str]:
-        """Of a table with COLUMNS."""
+        """The row of a table with COLUMNS."""
         ratio = "" if self.ratio is None else f"{self.ratio:.3g}"
         values = [f"{value:.4g} {self.unit}".strip() for value in (self.paper, self.ours)]
         return [self.where, self.what, self.why, *values, ratio]

@@ -228,7 +228,7 @@ class Tracker(Section):
 
     @property
     def sensor_rotation_vector(self) -> Array:
-        """Of R_tip_sensor (3,) [rad]; zero where it is not known."""
+        """The rotation vector of R_tip_sensor (3,) [rad]; zero where it is not known."""
         return np.array(self.sensor_rotation_vector_rad or (0.0, 0.0, 0.0))
 
     @property
@@ -238,7 +238,7 @@ class Tracker(Section):
 
 
 class Correlation(Section):
-    """Of the priors of two parameters, by their names as fits show them."""
+    """The correlation of the priors of two parameters, which have the names that fits show."""
 
     first: str = Field(description="the name of a parameter, such as tubes.1.length")
     second: str = Field(description="the name of a parameter, such as tubes.1.length")
@@ -297,17 +297,17 @@ class Robot(Shown, Section):
 
     @property
     def lengths(self) -> Array:
-        """Of the tubes (N,) [m]."""
+        """The lengths of the tubes (N,) [m]."""
         return np.array([tube.length for tube in self.tubes])
 
     @property
     def files(self) -> list[str]:
-        """For a ledger or a page: the file that it was loaded from, or none."""
+        """The file that the robot was loaded from, for a ledger or a page; none where it was not."""
         return [self.file] if self.file else []
 
     @property
     def file(self) -> str:
-        """That it was loaded from; empty where it was not."""
+        """The file that the robot was loaded from; empty where it was not."""
         return self._source.file if self._source else ""
 
     def glance(self) -> Glance:

@@ -59,7 +59,7 @@ def waterfall(robot: Robot) -> list[Stage]:
 
 
 def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> None:
-    """Both on the terminal."""
+    """Prints the ledger and the waterfall on the terminal."""
     if not lines:
         console.print(f"{robot.name}: nothing was changed yet (ctcr calibrate, ctcr add)")
         return
@@ -79,7 +79,7 @@ def show(console, robot: Robot, lines: list[list[str]], stages: list[Stage]) -> 
 
 
 def page(robot: Robot) -> str:
-    """Both as one HTML page that needs nothing else."""
+    """The ledger and the waterfall as one HTML page that needs nothing else."""
     stages, lines = waterfall(robot), entries(robot)
     title = f"History: {robot.name}"
     lead = _lead(stages) if stages else "Nothing was changed yet." if not lines else ""

@@ -89,7 +89,7 @@ class Measurements(Shown):
 
     @property
     def quaternions(self) -> Array:
-        """The same of the quaternions (M, 4)."""
+        """The quaternions (M, 4), NaN also where their columns are absent."""
         return np.full((len(self), 4), np.nan) if self.quaternion is None else self.quaternion
 
     @property
@@ -146,7 +146,7 @@ class Measurements(Shown):
 
     @property
     def files(self) -> list[str]:
-        """For a ledger: the file, or none."""
+        """The file that the table was read from, for a ledger; none where it was not."""
         return [self.file] if self.file else []
 
     def glance(self) -> Glance:

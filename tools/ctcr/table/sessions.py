@@ -78,7 +78,7 @@ class Sessions:
 
     @property
     def columns(self) -> dict[str, str]:
-        """Of `rows`, with what they mean."""
+        """The columns of `rows`, with what they mean."""
         tubes = [] if self.homes is None else range(1, self.homes.shape[1] // 2 + 1)
         return (
             {"run": ""}
@@ -96,7 +96,7 @@ class Sessions:
         ]
 
     def as_dict(self) -> list[dict[str, Any]]:
-        """The same for JSON."""
+        """The runs against the typical one, for JSON."""
         shift, turn, homes = self.typical
         own = (Rotation.from_rotvec(turn).inv() * Rotation.from_rotvec(self.turn)).as_rotvec()
         found: list[dict[str, Any]] = [

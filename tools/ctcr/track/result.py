@@ -106,7 +106,7 @@ def limit_in_words(kind: int, tube: int, n: int) -> str:
 
 
 def beside_obstacle(scenario: Scenario, tip: Array, wanted: Array) -> tuple[Mask, float]:
-    """Run.far and Run.clearance."""
+    """The values of Run.far and Run.clearance."""
     if not scenario.obstacle:
         return np.ones(len(wanted), bool), np.inf
     centre, radius = 1e-3 * np.array(scenario.obstacle.centre_mm), 1e-3 * scenario.obstacle.radius_mm
@@ -148,12 +148,12 @@ def figures(runs: list[Run]) -> dict[str, Any]:
 
 
 def summary(runs: list[Run]) -> dict[str, Any]:
-    """{"20 g": figures}."""
+    """The figures of each weight, by its name, such as "20 g"."""
     return {f"{mass:g} g": figures(group) for mass, group in by_mass(runs).items()}
 
 
 def rows(numbers: dict[str, dict[str, Any]]) -> list[list[str]]:
-    """Of a table with COLUMNS."""
+    """The rows of a table with COLUMNS."""
     forms = {"mean_mm": ".3f", "p99_8_mm": ".3f", "max_mm": ".3f", "below_1_mm_percent": ".2f", "obstacle_mm": ".2f"}
 
     def cell(value: float | None, form: str) -> str:

@@ -23,7 +23,7 @@ _fault = partial(DeviceFault, "joints")
 
 @dataclass(frozen=True)
 class AxisSettings:
-    """Of the joints (2N,), translations [m] then rotations [rad]."""
+    """What the control knows of the joints (2N,): translations [m] first, then rotations [rad]."""
 
     speeds: Array  # highest [1/s]
     ramp_s: float  # to the highest speed
@@ -183,7 +183,7 @@ def _finite(*values: ArrayLike) -> None:
 
 
 def _axis_fault(which: Mask, what: str, remedy: str) -> DeviceFault:
-    """Of the first axis of a mask (2N,)."""
+    """The fault of the first axis that a mask (2N,) marks."""
     tube, n = int(np.flatnonzero(which)[0]), len(which) // 2
     kind = "translation" if tube < n else "rotation"
     return DeviceFault(f"{kind} of tube {tube % n + 1}", what, remedy)

@@ -101,7 +101,7 @@ class Bench(Section):
         return [*self.motors.translation_terminals, *self.motors.rotation_terminals]
 
     def axis_settings(self, robot: Robot) -> AxisSettings:
-        """Of this robot's joints. Raises InputError where the file is for another number of tubes."""
+        """The settings of this robot's joints. Raises InputError where the file is for another number of tubes."""
         n, motors, limits = robot.n_tubes, self.motors, self.limits
         counts = {
             "motors.translation_terminals": len(motors.translation_terminals),

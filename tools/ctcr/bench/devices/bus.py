@@ -76,7 +76,7 @@ class Bus:
         return [drive.inputs() for drive in self.drives] if self._cycle() == self._master.expected_wkc else None
 
     def inputs(self) -> list[DriveInputs]:
-        """Those of the first exchange whose frame comes back whole."""
+        """The inputs of the first exchange whose frame comes back whole."""
         for _ in range(TRIES):
             if inputs := self.exchange():
                 return inputs

@@ -98,7 +98,7 @@ class StepperDrive:
         self.slave.output = self._images[_RX].pack(outputs)
 
     def inputs(self) -> DriveInputs:
-        """Of the last cycle."""
+        """The inputs of the last cycle."""
         values = self._images[_TX].unpack(self.slave.input)
         return DriveInputs(
             counter=signed(values[_COUNTER], 32),

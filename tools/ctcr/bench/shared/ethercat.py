@@ -46,7 +46,7 @@ DIAGNOSES = {  # subindex: fault, remedy
 
 
 def state_name(status: int) -> str:
-    """Of an AL status, with its error flag."""
+    """The state that an AL status names, and whether its error flag is set, in words."""
     state = status & 0x0F
     name = State(state).name if state in set(State) else f"state {state:#x}"
     return name + (" with an error" if status & ERROR_FLAG else "")

@@ -36,6 +36,6 @@ def private_folder(path: str | Path | None = None) -> Path:
 
 
 def _of_this_user() -> Path:
-    """The same for all programs: `tempfile` would name another one while the disk is full."""
+    """The folder of this user in all programs: `tempfile` would name another one while the disk is full."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     return Path(runtime) / "ctcr" if runtime else Path(os.environ.get("TMPDIR", "/tmp")) / f"ctcr-{os.getuid()}"

@@ -88,7 +88,7 @@ class AuroraDevice:
 
     @property
     def frame_ends_in(self) -> float:
-        """[s]"""
+        """The time until the next frame begins [s]."""
         return (1 - (time.monotonic() - self._start) * RATE_HZ % 1) / RATE_HZ
 
     def acquire(self) -> None:

@@ -30,7 +30,7 @@ class StepperMotor:
     # ---- counter
 
     def counter(self, from_encoder: bool) -> int:
-        """Of the encoder, or of the steps that the terminal has commanded."""
+        """The counter of the encoder, or of the steps that the terminal has commanded."""
         turned = self.shaft * ENCODER_COUNTS if from_encoder else self._stepped * STEP_COUNTS
         return round(turned + self._offsets[from_encoder])
 

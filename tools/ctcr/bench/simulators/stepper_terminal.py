@@ -108,7 +108,7 @@ class StepperTerminal(Application):
             raise Abort(OUT_OF_RANGE)
 
     def _images(self) -> tuple[ProcessImage, ProcessImage]:
-        """Of outputs and inputs."""
+        """The process images of outputs and inputs."""
 
         def image(assignment: int) -> ProcessImage:
             count, *slots = (entry.value for entry in self.objects[assignment].entries.values())
