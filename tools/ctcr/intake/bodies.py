@@ -66,6 +66,6 @@ def settled(roles: Roles) -> Roles:
             made["numbered"] = roles[f"q{first}"]
     if matrix := _matrix_roles(roles):
         made |= {role: roles[name] for name, role in matrix.items()}
-    elif all(f"m{i}{j}" in roles for i in (1, 2, 3) for j in (1, 2, 3)):
+    elif set(roles) >= set(GRID):
         made |= {role: roles[role] for role in GRID}
     return made

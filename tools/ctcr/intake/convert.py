@@ -109,20 +109,20 @@ def _check_joints(columns: Columns) -> None:
         raise InputError(Problem(f"there are {n} tubes: no {join(high)}", str(log.path)))
     wanted = [f"{kind}{i}" for i in range(1, n + 1) for kind in ("beta", "alpha")]
     missing = [role for role in wanted if role not in used and role not in choices.constants]
-    unused = listed(columns.unused, 30)
     if len(missing) == len(wanted):
         text = "no column looks like a joint: name them with --column beta1=NAME, --column alpha1=NAME, ..."
         if log.is_stated:
             text = f"an export of {log.kind} holds no joints: give their log with --joints FILE"
         elif all(name.startswith("#") for name in log.names):
             text = "it has no header: name its columns in their order, such as --columns t,beta1..beta2,alpha1..alpha2"
-        raise InputError(Problem(f"{text} (not used: {unused})", str(log.path)))
-    if missing:
+    elif missing:
         still = "0mm where it never moves" if missing[0].startswith("beta") else "0deg where it never turns"
         text = (
             f"no column looks like {join(missing)}: give --column {missing[0]}=NAME, or --constant {missing[0]}={still}"
         )
-        raise InputError(Problem(f"{text} (not used: {unused})", str(log.path)))
+    else:
+        return
+    raise InputError(Problem(f"{text} (not used: {listed(columns.unused, 30)})", str(log.path)))
 
 
 def _check_values(columns: Columns, moving: Columns, moved: Motion, position, quaternion) -> None:

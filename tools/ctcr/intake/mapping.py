@@ -53,17 +53,15 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
 
     Raises InputError with all columns that are missing or that could be two things.
     """
-    faults: list[Problem] = []
-    explicit = _explicit(log, choices, faults)
-    ignored = {i for name in choices.ignore if (i := _index(log, name, "ignore", faults)) is not None}
+    picker = _Picker(log)
+    explicit = _explicit(choices, picker)
+    ignored = {i for name in choices.ignore if (i := picker.index(name, "ignore")) is not None}
     taken = {used.column for used in explicit.values()} | ignored
     candidates = []
     for i, (name, spelled) in enumerate(zip(log.names, names.with_middle(log.names), strict=True)):
         found = log.meanings[name] if name in log.meanings else names.meaning(spelled)
         if i not in taken and found and not (n_tubes == 0 and found.role in MOVING):
             candidates.append(Candidate(i, name, found))
-    how = "format" if log.is_stated else "name"
-    picker = _Picker(log, how, faults)
     joints, n = _joints(candidates, explicit, choices, n_tubes, picker)
     made = Mapping(joints | explicit, n)
     for role in ("t", "nsec", "run", "fx", "fy", "fz", "weight"):
@@ -73,19 +71,21 @@ def of(log: Log, choices: Choices, n_tubes: int | None, poses: bool = True) -> M
             made.used[role] = picker.best(role, same)
     if poses:
         _poses(made, candidates, choices, picker)
-        _check_whole(log, made, candidates, ignored, faults)
-    _check(log, made, faults)
-    _check_units(log, made, choices, faults)
-    if faults:
-        raise InputError(faults)
+        _check_whole(made, candidates, ignored, picker)
+    _check(made, picker)
+    _check_units(made, choices, picker)
+    if picker.faults:
+        raise InputError(picker.faults)
     return made
 
 
 class _Picker:
-    """Takes the best of several candidates; two that are equally good are a fault."""
+    """Takes the best of several candidates for a role, and collects the faults of the log: two that are equally good
+    are one."""
 
-    def __init__(self, log: Log, how: str, faults: list[Problem]):
-        self.log, self.how, self.faults = log, how, faults
+    def __init__(self, log: Log):
+        self.log, self.how = log, "format" if log.is_stated else "name"
+        self.faults: list[Problem] = []
 
     def best(self, role: str, candidates: list[Candidate]) -> Used:
         ordered = sorted(candidates, key=lambda one: one.meaning.rank)
@@ -98,19 +98,19 @@ class _Picker:
     def say(self, text: str, where: str | None = None) -> None:
         self.faults.append(Problem(text, str(self.log.path), field=where))
 
+    def index(self, name: str, where: str) -> int | None:
+        """The position of a column that the user named; None where the log has none, which is a fault."""
+        try:
+            return self.log.index(name, where)
+        except InputError as error:
+            self.faults += error.problems
+            return None
 
-def _index(log: Log, name: str, where: str, faults: list[Problem]) -> int | None:
-    try:
-        return log.index(name, where)
-    except InputError as error:
-        faults += error.problems
-        return None
 
-
-def _explicit(log: Log, choices: Choices, faults: list[Problem]) -> dict[str, Used]:
-    made = {}
+def _explicit(choices: Choices, picker: _Picker) -> dict[str, Used]:
+    made, log = {}, picker.log
     for role, name in choices.columns.items():
-        i = _index(log, name, f"column {role}", faults)
+        i = picker.index(name, f"column {role}")
         if i is not None:
             found = log.meanings.get(log.names[i])
             unit = found.unit if found else names.unit(log.names[i])
@@ -238,28 +238,22 @@ def _take(made: Mapping, prefix: str, roles: Roles, choices: Choices, picker: _P
             picker.say(f"{text}Joints: name them, such as --column beta1={name}", name)
 
 
-def _check(log: Log, made: Mapping, faults: list[Problem]) -> None:
+def _check(made: Mapping, picker: _Picker) -> None:
     """Faults where columns are missing."""
-
-    def say(text: str) -> None:
-        faults.append(Problem(text, str(log.path)))
-
     n = made.n_tubes
     extra = [role for role in made.used if role[:-1] in ("beta", "alpha") and int(role[-1]) > n]
     if extra:
-        say(f"it has {join(sorted(extra))}: the robot has {n} tubes")
+        picker.say(f"it has {join(sorted(extra))}: the robot has {n} tubes")
     for group, roles in (("position", POSITION), ("quaternion", QUATERNION), ("Euler angles", EULER)):
         for prefix in ("", "ref_"):
             there = [role for role in roles if prefix + role in made.used]
             if there and len(there) < len(roles):
                 absent = [prefix + role for role in roles if role not in there]
                 lack = f"{join(absent)} of the {group} {'is' if len(absent) == 1 else 'are'} missing"
-                say(f"{lack}: give --column {absent[0]}=NAME")
+                picker.say(f"{lack}: give --column {absent[0]}=NAME")
 
 
-def _check_whole(
-    log: Log, made: Mapping, candidates: list[Candidate], ignored: set[int], faults: list[Problem]
-) -> None:
+def _check_whole(made: Mapping, candidates: list[Candidate], ignored: set[int], picker: _Picker) -> None:
     """A fault where all columns of a position or of a quaternion but one are there: its name may have a slip."""
     used = {one.column for one in made.used.values()} | ignored
     bodies = _bodies([one for one in candidates if not one.meaning.is_given])
@@ -274,18 +268,17 @@ def _check_whole(
             if len(absent) == 1:
                 there = [one for role in whole for one in roles.get(role, [])]
                 known = used | {one.column for one in there}
-                others = listed([name for i, name in enumerate(log.names) if i not in known], 30)
+                others = listed([name for i, name in enumerate(picker.log.names) if i not in known], 30)
                 text = f"{join([one.name for one in there])} look like a {what} without {absent[0]}"
-                text += f": give --column {absent[0]}=NAME, or --ignore them (not used: {others or 'none'})"
-                faults.append(Problem(text, str(log.path)))
+                picker.say(f"{text}: give --column {absent[0]}=NAME, or --ignore them (not used: {others or 'none'})")
 
 
-def _check_units(log: Log, made: Mapping, choices: Choices, faults: list[Problem]) -> None:
+def _check_units(made: Mapping, choices: Choices, picker: _Picker) -> None:
     """Faults where a name states a unit of no known size, and where a weight has none: it may be in g, kg or N."""
     silent: dict[tuple[str, str], list[str]] = {}
     for role, used in made.used.items():
         group, unit = group_of(_plain(role)), used.unit
-        is_clock = role == "t" and is_text(log, used.column)
+        is_clock = role == "t" and is_text(picker.log, used.column)
         if {role, group} & set(choices.units) or is_clock or (unit.quantity if unit else role != "weight"):
             continue
         silent.setdefault((group, unit.text if unit else ""), []).append(used.name)
@@ -293,4 +286,4 @@ def _check_units(log: Log, made: Mapping, choices: Choices, faults: list[Problem
         quantity, one = GROUPS[group], {"length": "0.0025mm", "angle": "0.09deg", "time": "0.1s", "force": "0.01N"}
         said = f"{text} is no unit of {quantity} that is known" if text else "has no unit"
         todo = f"say what one is, such as --unit {group}={one[quantity] if text else 'g'} ({units.of(quantity)})"
-        faults.append(Problem(f"{said}: {todo}, or --ignore it", str(log.path), field=join(columns)))
+        picker.say(f"{said}: {todo}, or --ignore it", join(columns))
