@@ -75,16 +75,14 @@ def convert(log: Log, choices: Choices, robot: Robot | None = None, joints: Log 
         moved.rows,
         warnings=[*_doubts(columns, moved), *moving.doubts],
     )
-    columns.notes += [
-        f"{option} has no effect here: there is no {what}" for option, what in _idle(columns, moving, pose)
-    ]
+    columns.notes += _idle(columns, moving, pose)
     if not columns.has("t"):
         columns.notes.append("no column of times: effects of speed and delay cannot be found")
     return Imported(table, [columns] if joints is None else [columns, moving])
 
 
-def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tuple[str, str]]:
-    """Options that concern what the log lacks."""
+def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[str]:
+    """Notes on options that concern what the log lacks."""
     choices, turned = columns.choices, pose is not None and pose.quaternion is not None
     forces = any(moving.has(role) for role in (*motion.FORCE, "weight"))
     for option, said, there, what in (
@@ -97,7 +95,7 @@ def _idle(columns: Columns, moving: Columns, pose: Pose | None) -> Iterator[tupl
         ("--offset t", "t" in choices.offsets, columns.has("t"), "time"),
     ):
         if said and not there:
-            yield option, what
+            yield f"{option} has no effect here: there is no {what}"
 
 
 def _check_joints(columns: Columns) -> None:

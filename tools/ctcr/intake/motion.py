@@ -15,7 +15,7 @@ from ctcr.intake.columns import DEG_FROM, RAD_UP_TO, STRONGEST_N, Columns, angle
 from ctcr.intake.names import quantity
 from ctcr.intake.units import Unit, named
 from ctcr.robot.description import Robot
-from ctcr.show.wording import join, listed
+from ctcr.show.wording import counted, join, listed
 from ctcr.table import measurements
 from ctcr.table.csv_table import Faults
 
@@ -128,7 +128,7 @@ def row_ranges(rows: Integers) -> str:
     starts = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) > 1)
     ends = np.append(starts[1:] - 1, len(rows) - 1)
     ranges = [f"{rows[a]}" if a == b else f"{rows[a]} to {rows[b]}" for a, b in zip(starts, ends, strict=True)]
-    return f"{len(rows)} row{'s' * (len(rows) != 1)} ({listed(ranges)})"
+    return f"{counted(len(rows), 'row')} ({listed(ranges)})"
 
 
 def _joints(columns: Columns, kind: str, guess) -> Array:
