@@ -44,6 +44,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     from ctcr.errors import InputError, Problem
     from ctcr.robot import new_file, robot_file
     from ctcr.show.output import write_text
+    from ctcr.show.wording import counted
 
     if os.path.exists(target):
         raise InputError(Problem("exists already: give another name, or remove it", target))
@@ -68,9 +69,7 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
     loaded = robot_file.parse(text.encode(), target)
     write_text(text, target)
     out = options.Output()
-    out.say(
-        f"{target}: {loaded.n_tubes} tube{'s' * (loaded.n_tubes > 1)}; comments in it say which values are defaults"
-    )
+    out.say(f"{target}: {counted(loaded.n_tubes, 'tube')}; comments in it say which values are defaults")
     for i, tube in enumerate(robot.tubes, start=1):
         if tube.curvature_per_m is None:
             out.say(f"Doubt: tube {i} counts as straight, as no curvature was given; radius_mm=inf says that it is")

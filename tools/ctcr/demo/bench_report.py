@@ -69,9 +69,8 @@ def page(story: Story, hidden: Robot, drives: dict[str, Driven]) -> str:
         _truth(story, known, found, hidden),
         _loops(story),
     ]
-    return html_page.page(
-        TITLE, sections, [str(folder / name) for name in ("robot.yaml", "both.csv", "with_effect.yaml")]
-    )
+    files = [str(folder / name) for name in ("robot.yaml", "both.csv", "with_effect.yaml")]
+    return html_page.page(TITLE, sections, files)
 
 
 def _drives(folder: Path) -> dict[str, Driven]:

@@ -43,9 +43,8 @@ def _each(value: Any, number: Callable[[Any], float]) -> Any:
     return [number(each) for each in value] if isinstance(value, list) else number(value)
 
 
-Each = Annotated[
-    float, WrapValidator(_each), PlainSerializer(lambda value: value)
-]  # one number for all, or a list of one for each
+# One number for all, or a list of one for each.
+Each = Annotated[float, WrapValidator(_each), PlainSerializer(lambda value: value)]
 
 
 def path_of(error: Mapping[str, Any]) -> tuple[FieldPath, bool]:

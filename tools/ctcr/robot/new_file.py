@@ -7,7 +7,7 @@ from typing import Any
 
 from ctcr.errors import ArgumentError, Problem, did_you_mean, suggestion
 from ctcr.robot.defaults import TRACKER, UNCERTAINTY
-from ctcr.show.wording import numbers
+from ctcr.show.wording import counted, numbers
 
 NITINOL_GPA, NITINOL_POISSON, NITINOL_DENSITY = 60.0, 0.3, 6450.0
 
@@ -58,7 +58,7 @@ _EXAMPLES = (  # innermost first; the fourth is a straight sheath
 
 def example(n_tubes: int) -> NewRobot:
     """A robot of 1 to 4 tubes with invented, plausible numbers."""
-    name = f"example of {n_tubes} tube{'s' * (n_tubes > 1)}"
+    name = f"example of {counted(n_tubes, 'tube')}"
     return NewRobot(list(_EXAMPLES[:n_tubes]), name, note=" Its numbers are invented: replace them.")
 
 

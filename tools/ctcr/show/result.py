@@ -68,9 +68,8 @@ class Result(Shown):
     def plot(self) -> Picture:
         """Its main picture, a matplotlib figure; `savefig` writes it."""
         module, function, width, height = self.PICTURE
-        made = import_module("ctcr.show.style").picture(
-            getattr(import_module(f"ctcr.{module}"), function), self, width, height
-        )
+        draw = getattr(import_module(f"ctcr.{module}"), function)
+        made = import_module("ctcr.show.style").picture(draw, self, width, height)
         if made is None:
             raise InputError(Problem("there is nothing to draw"))
         return made
