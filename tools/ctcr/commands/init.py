@@ -56,7 +56,9 @@ def command(target, name, tubes, example, gravity, sensor_on_tube, home_mm) -> N
         robot = new_file.example(example)
     else:
         robot, gravity = _asked(new_file, gravity)
-        sensor_on_tube = sensor_on_tube or (_ask_sensor(len(robot.tubes)) if len(robot.tubes) > 1 else 1)
+        if not sensor_on_tube and len(robot.tubes) > 1:
+            text = "Tube that carries the sensor (1: the innermost)"
+            sensor_on_tube = click.prompt(text, type=click.IntRange(1, len(robot.tubes)), default=1)
     robot.name = name or robot.name
     robot.sensor_on_tube = sensor_on_tube or 1
     robot.gravity = _vector(gravity or "unknown")
@@ -110,10 +112,6 @@ def _bent(answer: str) -> float:
 
 def _ask(text: str) -> float:
     return click.prompt(text, type=options.Finite(min=0))
-
-
-def _ask_sensor(count: int) -> int:
-    return click.prompt("Tube that carries the sensor (1: the innermost)", type=click.IntRange(1, count), default=1)
 
 
 def _vector(direction: str) -> list[float] | None:

@@ -47,15 +47,15 @@ def read(path: Path, content: bytes) -> Log:
     start = _first_data(head)
     if start is None:
         raise InputError(Problem("holds no rows of numbers: is this a log?", str(path)))
-    count = _usual_count(head, start)
+    first, sample = head[start][0], [fields for _, fields in head[start : start + SAMPLE_LINES]]
+    count = Counter(len(fields) for fields in sample if fields).most_common(1)[0][0]  # the usual one
     names = _names(head, start, count)
     if delimiter == "," and (halves := _halves(head, start, count)):
         text = f"has {count} fields a row and {halves} names: between commas, decimal commas cannot be told"
         raise InputError(
             Problem(f"{text}: export it with decimal points, or separated by semicolons or tabs", str(path))
         )
-    notes += [f"line 1 to {head[start][0] - 1}: no table; passed over"] * (names[0] == "#1" and head[start][0] > 1)
-    first, sample = head[start][0], [fields for _, fields in head[start : start + SAMPLE_LINES]]
+    notes += [f"line 1 to {first - 1}: no table; passed over"] * (names[0] == "#1" and first > 1)
     regular = _regular(lines, first, delimiter, len(names))
     rows = [] if regular else _split(path, lines, delimiter)
     columns, numbers = regular or _irregular(path, rows, start, names, notes)
@@ -160,10 +160,6 @@ def _first_data(rows: Rows) -> int | None:
         if alike and not counting and not _joined(above, rows[i][1]):  # 0, 1, 2, ... is how some programs name columns
             return i
     return None
-
-
-def _usual_count(rows: Rows, start: int) -> int:
-    return Counter(len(fields) for _, fields in rows[start : start + SAMPLE_LINES] if fields).most_common(1)[0][0]
 
 
 def _names(rows: Rows, start: int, count: int) -> list[str]:

@@ -151,15 +151,13 @@ def _updated(old: Any, new: Any) -> Any:
         for key in [key for key in old if key not in new]:
             del old[key]
         for key, value in new.items():
-            old[key] = _updated(old[key], value) if key in old else _new(value)
+            if key in old:
+                old[key] = _updated(old[key], value)
+            else:  # a section may be changed there, with comments, as the others
+                old[key] = CommentedMap(value) if isinstance(value, dict) else value
         return old
     if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for i, value in enumerate(new):
             old[i] = _updated(old[i], value)
         return old
     return old if old == new else new
-
-
-def _new(value: Any) -> Any:
-    """A value that the document does not hold yet; a section may be changed there, with comments, as the others."""
-    return CommentedMap(value) if isinstance(value, dict) else value
